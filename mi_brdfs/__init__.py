@@ -1,0 +1,31 @@
+"""Every classical BRDF as a Mitsuba 3 plugin.
+
+``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
+dict scenes. :func:`list_models` names them, :func:`info` is the manual page of one, :func:`preview_scene` a scene to
+look at one in.
+"""
+
+import re
+import warnings
+
+import mitsuba as mi
+
+__version__ = "0.1.0"
+
+_TESTED = (3, 9)
+_version = tuple(int(number) for number in re.findall(r"\d+", mi.__version__)[:2])
+if _version < _TESTED:
+    raise ImportError(f"mi_brdfs needs Mitsuba 3.9 or newer, this is {mi.__version__}: pip install -U mitsuba")
+if _version > _TESTED:
+    warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
+
+from . import llvm  # noqa: E402
+
+llvm.point_to_extra()
+
+from .preview import preview_scene  # noqa: E402
+from .registry import info, install, list_models  # noqa: E402
+
+install()
+
+__all__ = ["__version__", "info", "list_models", "preview_scene"]

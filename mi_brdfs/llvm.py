@@ -1,0 +1,149 @@
+"""Which LLVM library the ``llvm_*`` variants compile with, and whether it is safe on this machine.
+
+Dr.Jit looks for LLVM once, in a thread started by ``import drjit`` (so by ``import mitsuba``), and takes what
+``DRJIT_LIBLLVM_PATH`` names or else the system's. Mitsuba 3.9 refuses LLVM before 15; on machines with AVX-512,
+15 and 16 abort the whole process in an ordinary render (``Cannot select: fminimum``).
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import warnings
+from functools import cache
+
+PACKAGE = "karellen-llvm-core"  # what the extra `mi_brdfs[llvm]` installs
+VARIABLE = "DRJIT_LIBLLVM_PATH"
+ABORTING_MAJORS = (15, 16)
+
+
+def point_to_extra() -> None:
+    """Make Dr.Jit use the library of the ``llvm`` extra.
+
+    Call it before ``import mitsuba``. Where Mitsuba was imported first and found no LLVM or one that aborts, Dr.Jit's
+    backends are restarted, provided that nothing uses them yet. A ``DRJIT_LIBLLVM_PATH`` set by the user, and a
+    missing extra, leave everything as it is.
+    """
+    if os.environ.get(VARIABLE):
+        return
+    started = "drjit" in sys.modules
+    if started and (_is_safe() or _backends_in_use()):
+        return
+    library = extra_library()
+    if library is None:
+        return
+    os.environ[VARIABLE] = library
+    if started:
+        _restart_backends()
+
+
+def version() -> tuple[int, int, int] | None:
+    """The version of the LLVM in use, or None where Dr.Jit found none."""
+    import drjit as dr
+
+    found = dr.detail.llvm_version()
+    return tuple(found) if found[0] > 0 else None
+
+
+def extra_library() -> str | None:
+    """Path of the library that the ``llvm`` extra brought, or None where it is not installed."""
+    from importlib.metadata import PackageNotFoundError, files  # 25 ms: only when needed
+
+    try:
+        installed = files(PACKAGE) or []
+    except PackageNotFoundError:
+        return None
+    return next((str(file.locate().resolve()) for file in installed if file.name == "libLLVM.so"), None)
+
+
+def problem() -> str | None:
+    """One sentence with the cure if the LLVM in use aborts the process on this machine, else None."""
+    found = version()
+    if found is None or not _aborts(found):
+        return None
+    chosen, library = os.environ.get(VARIABLE), extra_library()
+    if chosen and (library is None or not _same_file(chosen, library)):
+        cure = f"unset {VARIABLE} (it names {chosen})" + ("" if library else f", then {install_advice()}")
+    elif library:
+        cure = "restart Python and import mi_brdfs before mi.set_variant('llvm_…')"
+    else:
+        cure = install_advice()
+    return f"LLVM {dotted(found)} aborts the process when it renders on this machine (AVX-512): {cure}."
+
+
+def warn_if_unsafe(variant: str | None) -> None:
+    """Warn, once, if rendering in ``variant`` would abort the process."""
+    if variant and variant.startswith("llvm") and (text := problem()):
+        _warn_once(text)
+
+
+def install_advice(system: str = sys.platform, machine: str = platform.machine()) -> str:
+    """What to do on this platform to get an LLVM that works."""
+    if system == "darwin":
+        return "run: brew install llvm (or use the metal_ad_* variants, which need none)"
+    if system == "win32":
+        return "install LLVM from https://github.com/llvm/llvm-project/releases"
+    if system == "linux" and machine == "x86_64":
+        return 'run: pip install "mi_brdfs[llvm]"'
+    return "install LLVM 17 or later with the system's package manager"
+
+
+def dotted(found: tuple[int, int, int]) -> str:
+    """``(23, 1, 4)`` as ``23.1.4``."""
+    return ".".join(map(str, found))
+
+
+def _is_safe() -> bool:
+    found = version()
+    return found is not None and not _aborts(found)
+
+
+def _aborts(found: tuple[int, int, int]) -> bool:
+    return found[0] in ABORTING_MAJORS and _has_avx512()
+
+
+@cache
+def _has_avx512() -> bool:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            flags = next((line for line in lines if line.startswith("flags")), "")
+    except OSError:
+        return False  # not Linux: no affected machine known
+    return "avx512f" in flags.split()
+
+
+def _same_file(a: str, b: str) -> bool:
+    return os.path.realpath(a) == os.path.realpath(b)
+
+
+def _backends_in_use() -> bool:
+    import drjit as dr
+
+    mitsuba = sys.modules.get("mitsuba")
+    variant = mitsuba.variant() if mitsuba else None
+    vectorized = variant is not None and not variant.startswith("scalar")
+    return vectorized or "No variables registered" not in dr.whos(as_string=True)
+
+
+def _restart_backends() -> None:
+    """Let Dr.Jit look for LLVM again: ``jit_shutdown(light=0)``, then ``jit_init()``, as its jit.h describes.
+
+    Python has no binding for the two; where they are not found under these (C++) names, ``problem`` still warns.
+    """
+    import ctypes
+
+    import drjit as dr
+
+    try:
+        core = ctypes.CDLL(os.path.join(dr.__path__[0], "libdrjit-core.so"))
+        shutdown, init = core["_Z12jit_shutdowni"], core["_Z8jit_initj"]
+    except (OSError, AttributeError):
+        return
+    shutdown(0)
+    init(sum(1 << int(backend) for backend in (dr.JitBackend.CUDA, dr.JitBackend.LLVM)))
+
+
+@cache
+def _warn_once(text: str) -> None:
+    warnings.warn(text, stacklevel=4)

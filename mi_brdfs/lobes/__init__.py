@@ -1,0 +1,9 @@
+"""What can be evaluated, sampled and mixed."""
+
+from .diffuse import LambertLobe
+from .lobe import Lobe
+from .microfacet import MicrofacetLobe
+from .mirror import PowerLobe, PowerResponseLobe
+from .mixture import Mixture
+
+__all__ = ["LambertLobe", "Lobe", "MicrofacetLobe", "Mixture", "PowerLobe", "PowerResponseLobe"]

@@ -1,0 +1,33 @@
+"""The contract of a lobe: one additive part of a BRDF, which can be evaluated, sampled and mixed."""
+
+from __future__ import annotations
+
+
+class Lobe:
+    """One additive part of a BRDF, holding its parameters evaluated at a surface point.
+
+    Directions are unit vectors of the local frame (n = z) that point away from the surface: ``wi`` is the known one
+    (towards the viewer, in Mitsuba's radiance transport), ``wo`` the sampled one. Whoever calls guarantees
+    wi.z > 0 and, in :meth:`eval_pdf`, wo.z > 0; so a lobe needs no masks. Colours are ``mi.UnpolarizedSpectrum`` or
+    floats, densities are per solid angle of ``wo``.
+    """
+
+    glossy = True
+    """Glossy or diffuse, as Mitsuba's flags and type masks distinguish."""
+
+    reciprocal = True
+    """Whether f(wi, wo) = f(wo, wi)."""
+
+    def albedo(self, wi):
+        """An estimate of ∫ f cosθ_o dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
+        exact; but where the lobe reflects anything it must be positive."""
+        raise NotImplementedError
+
+    def eval_pdf(self, wi, wo):
+        """``(value, pdf)``: f cosθ_o, and the density of ``wo`` in :meth:`sample`."""
+        raise NotImplementedError
+
+    def sample(self, wi, u, v):
+        """A direction ``wo`` for three uniform variates ``u`` and ``v = (v.x, v.y)``. It may lie below the horizon,
+        where the lobe is zero."""
+        raise NotImplementedError

@@ -1,0 +1,42 @@
+"""Microfacet lobes."""
+
+from __future__ import annotations
+
+from ..math import luminance
+from ..microfacet.facet import Facet
+from .lobe import Lobe
+
+
+class MicrofacetLobe(Lobe):
+    """f = ρ·F(cosθ_d)·D(h)·G / (4 cosθ_i cosθ_o), for any distribution, shadowing and Fresnel term of
+    :mod:`mi_brdfs.microfacet`, drawn by one of its samplers.
+
+    ``directional_albedo`` estimates the albedo for ρ = F = 1.
+    """
+
+    def __init__(self, reflectance, distribution, shadowing, fresnel, sampler, directional_albedo=1.0):
+        self.reflectance, self.distribution, self.shadowing, self.fresnel = reflectance, distribution, shadowing, fresnel
+        self.sampler, self.directional_albedo = sampler, directional_albedo
+
+    def albedo(self, wi):
+        return self.reflectance * self.fresnel(wi.z) * self.directional_albedo
+
+    def eval_pdf(self, wi, wo):
+        facet = Facet.between(wi, wo)
+        value = self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
+        return self.reflectance * (self.fresnel(facet.cos_d) * value), self.sampler.pdf(self, facet)
+
+    def sample(self, wi, u, v):
+        return self.sampler.sample(self, wi, u, v)
+
+    def half_vector_weight(self, facet):
+        """f cosθ_o · 4cosθ_d / q: the weight of a sample of the distribution's half-vector density, for ρ = 1 and as
+        a number. D cancels from it."""
+        fresnel = luminance(self.fresnel(facet.cos_d))
+        return (
+            fresnel
+            * self.shadowing(facet)
+            * facet.cos_d
+            / facet.cos_i
+            * self.distribution.over_density(facet)
+        )

@@ -1,0 +1,137 @@
+"""Lobes that are a power of the cosine to an axis: the mirror direction."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import choose, expm1, log1p, normalize_or, safe_sqrt
+from .lobe import Lobe
+
+
+class AxisFrame:
+    """Directions around a unit vector ``axis``, in the frame (side, up, axis) with ``up`` in the plane of the axis and
+    the normal. Mirroring a direction i in the plane that axis and side span keeps its cosine A = i·axis, and turns
+    B = i·up into -B. The cosines to the normal of the two are axis_z A ± sinθ_axis |B|: so samplers draw A and |B|
+    first, and then one of the pair.
+    """
+
+    def __init__(self, axis):
+        self.axis = axis
+        self.sin = dr.sqrt(axis.x * axis.x + axis.y * axis.y)
+        x, y = normalize_or(axis.x, axis.y, (1, 0))
+        self.up = mi.Vector3f(-axis.z * x, -axis.z * y, self.sin)
+        self.side = mi.Vector3f(-y, x, 0)
+
+    @classmethod
+    def mirror(cls, wi) -> AxisFrame:
+        """Around the mirror direction of ``wi``."""
+        return cls(mi.Vector3f(-wi.x, -wi.y, wi.z))
+
+    def cosine(self, w):
+        """``(log A, 1 - A, inside)`` of the direction ``w``, where ``inside`` says whether A > 0."""
+        versine = 0.5 * dr.squared_norm(w - self.axis)
+        inside = versine < 1
+        versine = dr.select(inside, versine, 0)
+        return log1p(-versine), versine, inside
+
+    def direction(self, log_a, b, c):
+        """The direction of cosine A whose rest points along ``b up + c side``, with b² + c² = 1."""
+        sin = dr.sqrt(dr.maximum(-expm1(2 * log_a), 0))
+        return self.axis * dr.exp(log_a) + self.up * (sin * b) + self.side * (sin * c)
+
+    def mirrored_z(self, w, versine):
+        """The cosine to the normal of the mirror image of ``w``, or 0 below the horizon."""
+        return dr.maximum(2 * self.axis.z * (1 - versine) - w.z, 0)
+
+
+class MirrorLobe(Lobe):
+    """A lobe of scale·max(0, A)ⁿ around the mirror direction."""
+
+    def __init__(self, reflectance, exponent, scale):
+        self.reflectance, self.exponent, self.scale = reflectance, exponent, scale
+
+
+class PowerLobe(MirrorLobe):
+    r"""f = ρ·scale·max(0, A)ⁿ, sampled nearly in proportion to f cosθ.
+
+    A and |B| = √(1-A²) cosφ come from a mixture on the half space B > 0, one density for each term of cosθ:
+
+        P (n+2)/π Aⁿ⁺¹  +  (1-P) ¾(n+1) Aⁿ √(1-Aⁿ⁺¹) cosφ,
+
+    where the second stands for AⁿB; with √(1-Aⁿ⁺¹) in place of √(1-A²) its radial part can be inverted. The shares
+    are those of the terms' integrals. One of the pair is then chosen with probability ∝ cosθ⁺, so none lies below the
+    horizon: the weight is constant where both lie well above it, and below three times its mean everywhere.
+    """
+
+    def _masses(self, frame):
+        """The integrals of the two terms over the pair, relative to 2π/(n+2). The constant fits the ratio of Gamma
+        functions √π Γ((n+1)/2) / Γ(n/2+1) of the second one to 2 %."""
+        return dr.maximum(frame.axis.z, 0), frame.sin * dr.rsqrt(dr.two_pi * (self.exponent + 0.64))
+
+    def _share(self, frame):
+        upright, tilted = self._masses(frame)
+        return upright / (upright + tilted)
+
+    def albedo(self, wi):
+        # Exact where the axis lies along the normal or in the horizon.
+        upright, tilted = self._masses(AxisFrame.mirror(wi))
+        mass = dr.sqrt(upright * upright + tilted * tilted)
+        return self.reflectance * (self.scale * dr.two_pi / (self.exponent + 2) * mass)
+
+    def eval_pdf(self, wi, wo):
+        n, frame = self.exponent, AxisFrame.mirror(wi)
+        log_a, versine, inside = frame.cosine(wo)
+        power = dr.select(inside, dr.exp(n * log_a), 0)
+        sin = dr.sqrt(dr.maximum(versine * (2 - versine), 1e-30))
+        cos_phi = dr.minimum(abs(dr.dot(wo - frame.axis, frame.up)) / sin, 1)
+        upright = (n + 2) * (1 - versine)
+        tilted = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 0)) * cos_phi
+        share = self._share(frame)
+        pair = power * dr.inv_pi * (share * upright + (1 - share) * tilted)
+        return (
+            self.reflectance * (self.scale * power * wo.z),
+            pair * wo.z / (wo.z + frame.mirrored_z(wo, versine)),
+        )
+
+    def sample(self, wi, u, v):
+        n, frame = self.exponent, AxisFrame.mirror(wi)
+        is_upright, u = choose(u, self._share(frame))
+        sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
+        c = dr.select(is_upright, sin_phi, 2 * v.y - 1)
+        b = dr.select(is_upright, abs(cos_phi), safe_sqrt(1 - c * c))
+        log_a = dr.select(is_upright, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1))
+        wo, mirrored = frame.direction(log_a, b, c), frame.direction(log_a, -b, c)
+        z, mirrored_z = dr.maximum(wo.z, 0), dr.maximum(mirrored.z, 0)
+        return dr.select(u * (z + mirrored_z) < z, wo, mirrored)
+
+
+class PowerResponseLobe(MirrorLobe):
+    """f cosθ = ρ·scale·max(0, A)ⁿ above the horizon: a power that stands for the whole response to light, cosine
+    included, as in the shading formulas of the 1970s. Neither reciprocal nor bounded as a BRDF.
+
+    A is drawn ∝ Aⁿ, and then one of the pair that lies above the horizon: the weight takes two values only.
+    """
+
+    reciprocal = False
+
+    def albedo(self, wi):
+        # The tanh estimates what lies above the horizon.
+        visible = 0.5 + 0.5 * dr.tanh(wi.z * dr.sqrt(self.exponent + 1))
+        return self.reflectance * (self.scale * dr.two_pi / (self.exponent + 1) * visible)
+
+    def eval_pdf(self, wi, wo):
+        frame = AxisFrame.mirror(wi)
+        log_a, versine, inside = frame.cosine(wo)
+        power = dr.select(inside, dr.exp(self.exponent * log_a), 0)
+        pdf = power * (self.exponent + 1) * dr.inv_pi
+        alone = frame.mirrored_z(wo, versine) <= 0
+        return self.reflectance * (self.scale * power), dr.select(alone, pdf, 0.5 * pdf)
+
+    def sample(self, wi, u, v):
+        frame = AxisFrame.mirror(wi)
+        sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
+        log_a = log1p(-v.x) / (self.exponent + 1)
+        wo, mirrored = frame.direction(log_a, cos_phi, sin_phi), frame.direction(log_a, -cos_phi, sin_phi)
+        # The azimuth already chose one of the two at random; the other replaces it only where it cannot be seen.
+        return dr.select(wo.z > 0, wo, mirrored)

@@ -1,0 +1,45 @@
+"""The choice among lobes, and the density that results."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import ONE_MINUS_EPSILON, clamp, luminance
+
+
+class Mixture:
+    """Several lobes sampled as one: lobe k with probability ∝ the luminance of its albedo at ``wi``."""
+
+    def __init__(self, lobes, wi):
+        self.lobes, self.wi = lobes, wi
+        if len(lobes) == 1:
+            self.probabilities = [mi.Float(1)]
+            return
+        energies = [luminance(lobe.albedo(wi)) for lobe in lobes]
+        total = sum(energies)
+        black = total <= 0
+        scale = dr.rcp(dr.select(black, 1, total))
+        self.probabilities = [dr.select(black, 1 / len(lobes), energy * scale) for energy in energies]
+
+    def eval_pdf(self, wo):
+        """``(value, pdf)`` of the whole: Σ f_k cosθ_o and Σ P_k pdf_k."""
+        parts = [lobe.eval_pdf(self.wi, wo) for lobe in self.lobes]
+        pdf = sum(p * lobe_pdf for p, (_, lobe_pdf) in zip(self.probabilities, parts, strict=True))
+        return mi.UnpolarizedSpectrum(sum(value for value, _ in parts)), pdf
+
+    def sample(self, u, v):
+        """``(wo, k)``: a direction and the index of the lobe that it was drawn from."""
+        index, start, share = mi.UInt32(0), mi.Float(0), self.probabilities[0]
+        end = share
+        for k, probability in enumerate(self.probabilities[1:], start=1):
+            passed = (u >= end) & (probability > 0)
+            index = dr.select(passed, k, index)
+            start, share = dr.select(passed, end, start), dr.select(passed, probability, share)
+            end = end + probability
+        u = clamp((u - start) / dr.maximum(share, 1e-30), 0, ONE_MINUS_EPSILON)
+
+        wo = self.lobes[0].sample(self.wi, u, v)
+        for k, lobe in enumerate(self.lobes[1:], start=1):
+            wo = dr.select(index == k, lobe.sample(self.wi, u, v), wo)
+        return wo, index

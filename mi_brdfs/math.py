@@ -1,0 +1,69 @@
+"""Float32-stable primitives.
+
+Narrow lobes live in the last bits of a cosine: (N·H)^n at n = 1e5, or a GGX peak at alpha = 1e-3, lose all their digits
+when computed from N·H itself. The functions below take what does keep its digits, such as sin²θ or |i - R|².
+They work on every variant's floats and spectra, and their derivatives are finite wherever their values are.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+ONE_MINUS_EPSILON = 1 - 2**-24
+"""The largest float32 below one: uniform variates are clamped to it."""
+
+
+def clamp(x, low: float, high: float):
+    """x limited to [low, high]. Unlike ``dr.clip``, the derivative at the limits is one: a parameter that starts at
+    its limit can be optimised away from it."""
+    return dr.select(x < low, low, dr.select(x > high, high, x))
+
+
+def log1p(x):
+    """log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
+    small = abs(x) < 0.5
+    y = dr.select(small, x, 0)
+    y = y / (2 + y)
+    y2 = y * y
+    # log(1 + x) = 2 atanh(y); |y| < 1/3, so the next term is below 1e-8.
+    series = 2 * y * (1 + y2 * (1 / 3 + y2 * (1 / 5 + y2 * (1 / 7 + y2 * (1 / 9 + y2 * (1 / 11 + y2 / 13))))))
+    return dr.select(small, series, dr.log(dr.select(small, 1, 1 + x)))
+
+
+def expm1(x):
+    """exp(x) - 1, accurate to a few ulp."""
+    small = abs(x) < 0.5
+    y = dr.select(small, x, 0)
+    series = y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4 * (1 + y / 5 * (1 + y / 6 * (1 + y / 7 * (1 + y / 8)))))))
+    return dr.select(small, series, dr.exp(dr.select(small, 0, x)) - 1)
+
+
+def safe_sqrt(x):
+    """sqrt(x) with 0 for x <= 0, and derivative 0 there."""
+    positive = x > 0
+    return dr.select(positive, dr.sqrt(dr.select(positive, x, 1)), 0)
+
+
+def normalize_or(x, y, fallback: tuple[float, float]):
+    """The 2-vector (x, y) scaled to length one, or ``fallback`` where its length is zero."""
+    length2 = x * x + y * y
+    valid = length2 > 1e-37
+    scale = dr.rsqrt(dr.select(valid, length2, 1))
+    return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
+
+
+def choose(u, probability):
+    """``(chosen, u')``: whether an event of the given probability happens, decided by the uniform variate ``u``, and
+    the fresh uniform variate that is left of it."""
+    chosen = u < probability
+    left = dr.select(chosen, u, u - probability)
+    left = left / dr.maximum(dr.select(chosen, probability, 1 - probability), 1e-30)
+    return chosen, dr.minimum(left, ONE_MINUS_EPSILON)
+
+
+def luminance(colour):
+    """One number for how bright a reflectance is: its luminance in rgb variants, its mean over the wavelengths in the
+    others (with four wavelengths the CIE weight may vanish at all of them, and a zero here would starve a lobe)."""
+    colour = mi.UnpolarizedSpectrum(colour)
+    return mi.luminance(colour) if mi.is_rgb else dr.mean(colour)

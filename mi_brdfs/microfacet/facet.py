@@ -1,0 +1,53 @@
+"""The geometry of a reflection at a facet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+
+@dataclass
+class Facet:
+    """A reflection of ``wi`` into ``wo`` at a facet of normal ``h``, the half vector; the cosines are the usual
+    (n·wi), (n·wo), (n·h) and (wi·h) = (wo·h), written cosθ_i, cosθ_o, cosθ_h and cosθ_d."""
+
+    wi: Any
+    wo: Any
+    h: Any
+    cos_d: Any
+
+    @classmethod
+    def between(cls, wi, wo) -> Facet:
+        """The facet that reflects ``wi`` into ``wo``, both above the horizon."""
+        h = wi + wo
+        length2 = dr.squared_norm(h)
+        inv_length = dr.rsqrt(length2)
+        return cls(wi, wo, h * inv_length, 0.5 * length2 * inv_length)
+
+    @classmethod
+    def at(cls, wi, slope_x, slope_y) -> Facet:
+        """The facet whose normal is ∝ (slope_x, slope_y, 1)."""
+        inv_length = dr.rsqrt(slope_x * slope_x + slope_y * slope_y + 1)
+        h = mi.Vector3f(slope_x * inv_length, slope_y * inv_length, inv_length)
+        cos_d = dr.dot(wi, h)
+        return cls(wi, 2 * cos_d * h - wi, h, cos_d)
+
+    @property
+    def cos_i(self):
+        return self.wi.z
+
+    @property
+    def cos_o(self):
+        return self.wo.z
+
+    @property
+    def cos_h(self):
+        return self.h.z
+
+    @property
+    def sin2_h(self):
+        # Not 1 - cos², which loses the digits of narrow lobes.
+        return self.h.x * self.h.x + self.h.y * self.h.y

@@ -1,0 +1,66 @@
+"""Fresnel reflectance F(cosθ_d): each class holds its parameters, and is called with the cosine."""
+
+from __future__ import annotations
+
+import drjit as dr
+
+from ..math import safe_sqrt
+
+
+class Unit:
+    """F = 1."""
+
+    def __call__(self, cos):
+        return 1.0
+
+
+class Schlick:
+    """F = f0 + (1 - f0)(1 - cosθ)⁵ (Schlick 1994, doi:10.1111/1467-8659.1330233)."""
+
+    def __init__(self, f0):
+        self.f0 = f0
+
+    def __call__(self, cos):
+        m = dr.maximum(1 - cos, 0)
+        m2 = m * m
+        return self.f0 + (1 - self.f0) * (m2 * m2 * m)
+
+
+class Dielectric:
+    """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
+    Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
+
+    def __init__(self, eta):
+        self.eta = eta
+
+    def __call__(self, cos):
+        step = self.eta * self.eta - 1
+        g2 = step + cos * cos
+        total = g2 <= 0
+        g = dr.sqrt(dr.select(total, 1, g2))
+        # (g - c) as (η² - 1)/(g + c), which keeps its digits near η = 1.
+        difference = step / (g + cos)
+        s = dr.square(difference / (g + cos))
+        p = dr.square((cos * (g + cos) - 1) / (cos * difference + 1))
+        return dr.select(total, 1, 0.5 * s * (1 + p))
+
+
+class Conductor:
+    """The exact unpolarized reflectance of a conductor of relative complex index ``eta`` - i ``k``."""
+
+    def __init__(self, eta, k):
+        self.eta, self.k = eta, k
+
+    def __call__(self, cos):
+        cos2 = cos * cos
+        sin2 = 1 - cos2
+        # a + ib = sqrt((η - ik)² - sin²θ)
+        eta2, k2 = self.eta * self.eta, self.k * self.k
+        real = eta2 - k2 - sin2
+        modulus = safe_sqrt(real * real + 4 * eta2 * k2)
+        a = safe_sqrt(0.5 * (modulus + real))
+        even_s, odd_s = modulus + cos2, 2 * cos * a
+        s = (even_s - odd_s) / (even_s + odd_s)
+        even_p, odd_p = modulus * cos2 + sin2 * sin2, odd_s * sin2
+        p = (even_p - odd_p) / (even_p + odd_p)
+        return 0.5 * s * (1 + p)

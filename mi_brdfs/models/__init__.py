@@ -1,0 +1,1 @@
+"""The models, one file each: importing the package finds them by themselves."""

@@ -1,0 +1,30 @@
+from ..lobes import LambertLobe
+from ..model import Model
+from ..parameters import Reflectance
+
+
+class Lambert(Model):
+    """Lambert's diffuse reflection (1760).
+
+    J. H. Lambert, Photometria sive de mensura et gradibus luminis, colorum et umbrae, 1760.
+
+        f = ρ/π
+
+    The surface looks equally bright from everywhere. Same as Mitsuba's ``diffuse``.
+
+    Reciprocal. Energy-conserving: the albedo is ρ. Sampled exactly (cosine-weighted): every weight is ρ. One-sided;
+    wrap it in ``twosided`` for both.
+
+    Example
+    -------
+    <bsdf type="lambert">
+        <rgb name="reflectance" value="0.2, 0.5, 0.8"/>
+    </bsdf>
+
+    {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
+    """
+
+    reflectance = Reflectance(0.5, "albedo ρ")
+
+    def lobes(self, p):
+        return (LambertLobe(p.reflectance),)

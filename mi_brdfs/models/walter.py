@@ -1,0 +1,58 @@
+from ..lobes import LambertLobe, MicrofacetLobe
+from ..microfacet.distributions import GGX
+from ..microfacet.sampling import BoundedVisibleNormals
+from ..microfacet.shadowing import SmithGGX
+from ..model import Model
+from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
+
+
+class Walter(Model):
+    """The GGX microfacet model of Walter, Marschner, Li and Torrance (2007), its reflection part.
+
+    B. Walter, S. R. Marschner, H. Li and K. E. Torrance, Microfacet models for refraction through rough surfaces,
+    EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206. The anisotropic and the height-correlated form: E. Heitz,
+    Understanding the masking-shadowing function in microfacet-based BRDFs, Journal of Computer Graphics Techniques
+    3(2), 2014, https://jcgt.org/published/0003/02/03/.
+
+        f = ρd/π + ρs F(wi·h) D(h) G(wi, wo) / (4 cosθ_i cosθ_o)
+        D = 1 / (π αu αv ((h_x/αu)² + (h_y/αv)² + h_z²)²)
+        Λ(v) = ½ (√(1 + ((αu v_x)² + (αv v_y)²)/v_z²) - 1)
+
+    with h = (wi+wo)/|wi+wo| and, by ``shadowing``, G = 1/((1+Λ(wi))(1+Λ(wo))) (separable, as published) or
+    1/(1+Λ(wi)+Λ(wo)) (correlated). F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics
+    (``int_ior`` over ``ext_ior``), Schlick's approximation for ``f0``, and 1 if none of them is given.
+
+    Reciprocal. Energy-conserving with ρd + ρs <= 1: the albedo of the lobe stays below ρs, and far below for rough
+    surfaces, as light is reflected once only (α = 1, F = 1: 0.31 ρs at normal incidence). Same as Mitsuba's
+    ``roughconductor`` with ``distribution="ggx"`` (separable), but in polarized variants the light is depolarised.
+    One-sided.
+
+    Sampling: bounded visible normals, tilted towards the normal
+    (mi_brdfs.microfacet.sampling.BoundedVisibleNormals).
+
+    Example
+    -------
+    <bsdf type="walter">
+        <string name="material" value="Au"/>
+        <float name="alpha" value="0.2"/>
+    </bsdf>
+
+    {"type": "walter", "material": "Au", "alpha": 0.2}
+    """
+
+    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
+    alpha = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
+    fresnel = FresnelSet()
+    shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")
+    rotation = Rotation()
+
+    def lobes(self, p):
+        specular = MicrofacetLobe(
+            p.specular_reflectance,
+            GGX(*p.alpha),
+            SmithGGX(*p.alpha, correlated=self.shadowing == "correlated"),
+            p.fresnel,
+            BoundedVisibleNormals(),
+        )
+        return LambertLobe(p.diffuse_reflectance), specular

@@ -1,0 +1,467 @@
+"""Parameters: declared once per model, and from that parsed, checked, exposed and documented.
+
+A model lists its parameters as class attributes. Each declaration knows the property names that it answers to, turns
+a plugin's properties into a *slot*, and describes itself for the manual page:
+
+    class Ward(Model):
+        diffuse_reflectance = Reflectance(0.5, "albedo of the diffuse lobe")
+        alpha               = Number(0.1, (1e-4, 1), "roughness", anisotropic=True)
+        variant             = Choice(("balanced", "ward"), "normalization of the lobe")
+
+Every number and colour becomes a Mitsuba texture, whatever it was given as: then a new value does not compile a new
+kernel, can be optimised, and can vary over the surface. Literal values are checked against the declared range here;
+textured and optimised ones are limited to it where they are evaluated.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from .math import clamp
+from .microfacet.fresnel import Conductor, Dielectric, Schlick, Unit
+
+Range = tuple[float, float]
+
+
+class ParameterError(ValueError):
+    """A parameter that a plugin cannot accept; the message is one sentence that says what it would."""
+
+
+class Row(NamedTuple):
+    """A line of the parameter table on a manual page."""
+
+    name: str
+    type: str
+    default: str
+    range: str
+    text: str
+
+
+# --- What was given -------------------------------------------------------------------------------------------------
+
+
+class Given:
+    """The properties that a plugin was given, read with errors that name plugin, parameter, value and remedy."""
+
+    def __init__(self, plugin: str, props: mi.Properties):
+        self.plugin, self.props = plugin, props
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.props
+
+    def error(self, name: str, problem: str) -> ParameterError:
+        return ParameterError(f"{self.plugin}: {name} {problem}.")
+
+    def reject_unknown(self, known: list[str]):
+        """Raise if a property was given that is none of the ``known`` ones."""
+        for name in self.props.keys():
+            if name in known:
+                continue
+            if name.startswith("_arg_"):
+                raise ParameterError(
+                    f"{self.plugin}: {_kind(self.props[name])} is nested without a name; give it the name of the parameter "
+                    f"it is meant for: {_listed(known)}."
+                )
+            closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+            raise ParameterError(
+                f"{self.plugin}: unknown parameter {name}; did you mean {closest[0]}? (Known: {', '.join(known)}.)"
+            )
+
+    def number(self, name: str, default: float, limits: Range) -> mi.Texture:
+        """The texture of a scalar parameter."""
+        allowed = f"a number in {_interval(limits)} or a texture"
+        if name in self:
+            value = self.props[name]
+            if isinstance(value, mi.Texture):
+                if value.class_name() in _SPECTRA:
+                    raise self.error(name, f"is a colour; it must be {allowed}")
+            else:
+                self._check(name, value, [value], limits, allowed)
+        return self.props.get_unbounded_texture(name, default)
+
+    def colour(self, name: str, default: float, limits: Range) -> mi.Texture:
+        """The texture of a reflectance or another spectral parameter."""
+        allowed = f"a number, rgb or spectrum within {_interval(limits)} or a texture"
+        if name in self:
+            value = self.props[name]
+            if not isinstance(value, mi.Texture):
+                kind = self.props.type(name)
+                if kind == mi.Properties.Type.Spectrum:
+                    values = value.values
+                elif kind == mi.Properties.Type.Color:
+                    values = list(value)
+                else:
+                    values = [value]
+                self._check(name, value, values, limits, allowed)
+        bounded = limits[1] <= 1
+        return (self.props.get_texture if bounded else self.props.get_unbounded_texture)(name, default)
+
+    def _check(self, name: str, value, numbers, limits: Range, allowed: str):
+        for number in numbers:
+            if isinstance(number, bool) or not isinstance(number, (int, float)):
+                raise self.error(name, f"= {_shown(value)} is {_kind(value)}; it must be {allowed}")
+            if not math.isfinite(number) or not limits[0] <= number <= limits[1]:
+                raise self.error(name, f"= {_shown(value)} is not allowed; it must be {allowed}")
+
+    def choice(self, name: str, choices: tuple[str, ...]) -> str:
+        """One of several words; the first is the default."""
+        if name not in self:
+            return choices[0]
+        value = self.props[name]
+        if value not in choices:
+            raise self.error(name, f'= {_shown(value)} is unknown; it must be one of {_listed(choices, quote=True)}')
+        return value
+
+    def text(self, name: str) -> str:
+        value = self.props[name]
+        if not isinstance(value, str):
+            raise self.error(name, f"= {_shown(value)} is {_kind(value)}; it must be a name")
+        return value
+
+
+_SPECTRA = ("SRGBReflectanceSpectrum", "SRGBEmitterSpectrum", "RegularSpectrum", "IrregularSpectrum")
+
+
+def _kind(value) -> str:
+    """A word or two for what a value is."""
+    if isinstance(value, bool):
+        return "a boolean"
+    if isinstance(value, str):
+        return "a string"
+    if isinstance(value, mi.Texture):
+        return "a texture"
+    if isinstance(value, mi.Object):
+        return "a BSDF" if isinstance(value, mi.BSDF) else f"a {value.class_name()}"
+    return {"Color3d": "a colour", "ScalarColor3d": "a colour", "Spectrum": "a spectrum"}.get(
+        type(value).__name__, "a " + type(value).__name__
+    )
+
+
+def _shown(value) -> str:
+    """A value as it appears in a message, on one line."""
+    if isinstance(value, mi.Object):
+        return value.class_name()
+    shown = f'"{value}"' if isinstance(value, str) else f"{value:.6g}" if isinstance(value, float) else str(value)
+    return " ".join(shown.split())
+
+
+def _interval(limits: Range) -> str:
+    low, high = limits
+    return f"[{low:g}, {high:g}]" if math.isfinite(high) else f"[{low:g}, ∞)"
+
+
+def _listed(words, quote: bool = False) -> str:
+    words = [f'"{word}"' if quote else word for word in words]
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
+
+
+# --- Slots: parameters of one plugin instance -----------------------------------------------------------------------
+
+
+@dataclass
+class Slot:
+    """A parameter of a plugin instance: its textures by property name, and how to evaluate them at a point."""
+
+    textures: dict[str, Any] = field(default_factory=dict)
+    anisotropic = False
+
+    def evaluate(self, si, active):
+        raise NotImplementedError
+
+
+@dataclass
+class NumberSlot(Slot):
+    """One or two numbers; evaluated, a pair for the two tangent directions if the parameter is ``paired``."""
+
+    limits: Range = (0, 1)
+    paired: bool = False
+
+    @property
+    def anisotropic(self) -> bool:
+        return len(self.textures) == 2
+
+    def evaluate(self, si, active):
+        values = [clamp(texture.eval_1(si, active), *self.limits) for texture in self.textures.values()]
+        if self.paired:
+            return values[0], values[-1]
+        return values[0]
+
+
+@dataclass
+class ColourSlot(Slot):
+    limits: Range = (0, 1)
+
+    def evaluate(self, si, active):
+        return clamp(next(iter(self.textures.values())).eval(si, active), *self.limits)
+
+
+@dataclass
+class FresnelSlot(Slot):
+    """The Fresnel term of the parameters given; evaluated, a function of the cosine."""
+
+    kind: str = "none"
+
+    def evaluate(self, si, active):
+        def value(name, limits):
+            return clamp(self.textures[name].eval(si, active), *limits)
+
+        if self.kind == "conductor":
+            return Conductor(value("eta", FresnelSet.INDEX), value("k", FresnelSet.EXTINCTION))
+        if self.kind == "schlick":
+            return Schlick(value("f0", (0, 1)))
+        if self.kind == "dielectric":
+            interior, exterior = (
+                clamp(self.textures[name].eval_1(si, active), *FresnelSet.INDEX) for name in ("int_ior", "ext_ior")
+            )
+            return Dielectric(interior / exterior)
+        return Unit()
+
+
+class RotationSlot(Slot):
+    """The turn of the tangent frame, if one was given; evaluated, its (cosine, sine)."""
+
+    @property
+    def anisotropic(self) -> bool:
+        return bool(self.textures)
+
+    def evaluate(self, si, active):
+        if not self.textures:
+            return None
+        sin, cos = dr.sincos(dr.two_pi * self.textures["rotation"].eval_1(si, active))
+        return cos, sin
+
+
+# --- Declarations ---------------------------------------------------------------------------------------------------
+
+
+class Parameter:
+    """A declared parameter of a model. ``names`` lists the properties it answers to, the usual one first."""
+
+    def __init__(self, text: str):
+        self.text = text
+
+    def __set_name__(self, owner, name):
+        self.name = name
+
+    @property
+    def names(self) -> list[str]:
+        return [self.name]
+
+    def bind(self, given: Given):
+        """The slot (or, for a choice, the word) that the given properties make of this parameter."""
+        raise NotImplementedError
+
+    def placeholder(self):
+        """What an evaluated slot may look like, to build a model's lobes before there is a surface point."""
+        raise NotImplementedError
+
+    def rows(self) -> list[Row]:
+        """What the manual page says of it."""
+        raise NotImplementedError
+
+
+class Number(Parameter):
+    """A scalar within ``limits``. An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and
+    evaluates to a pair; with ``lone_default``, one of the pair alone leaves the other at the default."""
+
+    def __init__(self, default: float, limits: Range, text: str, *, anisotropic=False, lone_default=False):
+        super().__init__(text)
+        self.default, self.limits = default, limits
+        self.anisotropic, self.lone_default = anisotropic, lone_default
+
+    @property
+    def pair(self) -> list[str]:
+        return [f"{self.name}_u", f"{self.name}_v"] if self.anisotropic else []
+
+    @property
+    def names(self) -> list[str]:
+        return [self.name, *self.pair]
+
+    def bind(self, given: Given) -> NumberSlot:
+        names = [name for name in self.pair if name in given]
+        if names and self.name in given:
+            raise given.error(self.name, f"excludes {names[0]}; give either {self.name} or {' and '.join(self.pair)}")
+        if len(names) == 1 and not self.lone_default:
+            missing = next(name for name in self.pair if name not in given)
+            raise given.error(names[0], f"needs {missing} beside it; give both, or {self.name} alone")
+        textures = {
+            name: given.number(name, self.default, self.limits) for name in (self.pair if names else [self.name])
+        }
+        return NumberSlot(textures, self.limits, self.anisotropic)
+
+    def placeholder(self):
+        value = mi.Float(self.default)
+        return (value, value) if self.anisotropic else value
+
+    def rows(self) -> list[Row]:
+        rows = [Row(self.name, "number", f"{self.default:g}", _interval(self.limits), self.text)]
+        if self.anisotropic:
+            lone = f"; one alone leaves the other at {self.default:g}" if self.lone_default else ""
+            rows.append(
+                Row(", ".join(self.pair), "number", "-", _interval(self.limits),
+                    f"instead of {self.name}: its values along dp_du and across{lone}")
+            )  # fmt: skip
+        return rows
+
+
+class Colour(Parameter):
+    """A spectral quantity within ``limits``."""
+
+    def __init__(self, default: float, limits: Range, text: str):
+        super().__init__(text)
+        self.default, self.limits = default, limits
+
+    def bind(self, given: Given) -> ColourSlot:
+        return ColourSlot({self.name: given.colour(self.name, self.default, self.limits)}, self.limits)
+
+    def placeholder(self):
+        return mi.UnpolarizedSpectrum(self.default)
+
+    def rows(self) -> list[Row]:
+        return [Row(self.name, "colour", f"{self.default:g}", _interval(self.limits), self.text)]
+
+
+class Reflectance(Colour):
+    """A colour in [0, 1]."""
+
+    def __init__(self, default: float, text: str):
+        super().__init__(default, (0, 1), text)
+
+
+class Choice(Parameter):
+    """One of several words, the first by default."""
+
+    def __init__(self, choices: tuple[str, ...], text: str):
+        super().__init__(text)
+        self.choices = choices
+
+    def bind(self, given: Given) -> str:
+        return given.choice(self.name, self.choices)
+
+    def rows(self) -> list[Row]:
+        return [Row(self.name, "string", self.choices[0], " | ".join(self.choices), self.text)]
+
+
+class FresnelSet(Parameter):
+    """The Fresnel term: of a conductor (eta and k, or a material's name), Schlick's (f0), of a dielectric (int_ior
+    over ext_ior), or none (F = 1)."""
+
+    INDEX, EXTINCTION = (0.01, 100), (0, 100)
+    SETS = {"conductor": ("eta", "k"), "material": ("material",), "schlick": ("f0",),
+            "dielectric": ("int_ior", "ext_ior")}  # fmt: skip
+
+    def __init__(self):
+        super().__init__("Fresnel reflectance")
+
+    @property
+    def names(self) -> list[str]:
+        return [name for names in self.SETS.values() for name in names]
+
+    def bind(self, given: Given) -> FresnelSlot:
+        chosen = {kind: [n for n in names if n in given] for kind, names in self.SETS.items()}
+        chosen = {kind: names for kind, names in chosen.items() if names}
+        if len(chosen) > 1:
+            first, second = (names[0] for names in list(chosen.values())[:2])
+            raise given.error(
+                first, f"excludes {second}; give one of eta and k, material, f0, int_ior and ext_ior, or none for F = 1"
+            )
+        if "conductor" in chosen:
+            for name, other in (("eta", "k"), ("k", "eta")):
+                if other not in given:
+                    raise given.error(name, f"needs {other} beside it")
+            return FresnelSlot(
+                {"eta": given.colour("eta", 0, self.INDEX), "k": given.colour("k", 0, self.EXTINCTION)}, "conductor"
+            )
+        if "material" in chosen:
+            return self._material(given)
+        if "schlick" in chosen:
+            return FresnelSlot({"f0": given.colour("f0", 0, (0, 1))}, "schlick")
+        if "dielectric" in chosen:
+            return FresnelSlot(
+                {"int_ior": self._ior(given, "int_ior", "bk7"), "ext_ior": self._ior(given, "ext_ior", "air")},
+                "dielectric",
+            )
+        return FresnelSlot()
+
+    def _ior(self, given: Given, name: str, default: str) -> mi.Texture:
+        """An index of refraction: a number, a texture, or the name of a substance that Mitsuba knows."""
+        if name in given and not isinstance(given.props[name], str):
+            return given.number(name, 1, self.INDEX)
+        try:
+            index = mi.lookup_ior(given.props, name, default)
+        except RuntimeError as error:
+            known = str(error).partition("choices are:")[2].strip()
+            raise given.error(name, f'= "{given.props[name]}" is unknown; it must be a number or one of {known}') from None
+        return _constant(index)
+
+    def _material(self, given: Given) -> FresnelSlot:
+        material = given.text("material")
+        if material == "none":
+            return FresnelSlot()
+        folder = Path(mi.__file__).parent / "data" / "ior"
+        known = sorted(path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd"))
+        if material not in known:
+            closest = difflib.get_close_matches(material, known, n=3, cutoff=0.0)
+            raise given.error(
+                "material",
+                f'= "{material}" is unknown; the closest of Mitsuba\'s {len(known)} conductors are {_listed(closest, True)}, '
+                f'and "none" means F = 1',
+            )
+        return FresnelSlot({name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}, "conductor")
+
+    def placeholder(self):
+        return Unit()
+
+    def rows(self) -> list[Row]:
+        return [
+            Row("eta, k", "colour", "-", f"{_interval(self.INDEX)}, {_interval(self.EXTINCTION)}",
+                "complex index of refraction of a conductor, relative to the exterior"),
+            Row("material", "string", "none", "Mitsuba's conductors | none", "a conductor by name; none means F = 1"),
+            Row("f0", "colour", "-", "[0, 1]", "Schlick's approximation with this reflectance at normal incidence"),
+            Row("int_ior, ext_ior", "number or name", "bk7, air", _interval(self.INDEX),
+                "indices of refraction of a dielectric, inside and outside"),
+        ]  # fmt: skip
+
+
+class Rotation(Parameter):
+    """An optional turn of the tangent frame."""
+
+    def __init__(self):
+        super().__init__("turn of the tangent frame, counter-clockwise about n from dp_du, in turns (1 is 360°)")
+
+    def bind(self, given: Given) -> RotationSlot:
+        return RotationSlot({self.name: given.number(self.name, 0, (-1e4, 1e4))} if self.name in given else {})
+
+    def placeholder(self):
+        return None
+
+    def rows(self) -> list[Row]:
+        return [Row(self.name, "number", "none", "any", self.text)]
+
+
+def _constant(value: float) -> mi.Texture:
+    props = mi.Properties()
+    props["value"] = value
+    return props.get_unbounded_texture("value")
+
+
+def _measured(path: Path) -> mi.Texture:
+    """The texture of a measured spectrum: as it is in spectral variants, as the rgb colour or luminance that Mitsuba's
+    own conductors make of it in the others."""
+    wavelengths, values = mi.spectrum_from_file(str(path))
+    if mi.is_spectral:
+        listed = {"wavelengths": wavelengths, "values": values}
+        return mi.load_dict(
+            {"type": "irregular"} | {name: ", ".join(map(repr, numbers)) for name, numbers in listed.items()}
+        )
+    colour = mi.spectrum_list_to_srgb(wavelengths, values, bounded=False, d65=False)
+    props = mi.Properties()
+    props["value"] = mi.ScalarColor3d(colour)
+    return props.get_unbounded_texture("value")

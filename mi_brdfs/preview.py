@@ -1,0 +1,3 @@
+"""A scene to look at a material in."""
+def preview_scene(bsdf):
+    ...

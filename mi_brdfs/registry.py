@@ -1,0 +1,73 @@
+"""From names to models: which plugins there are, and how they get into each variant."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+
+import mitsuba as mi
+
+from . import llvm, models
+from .bsdf import bsdf_class
+from .model import Model
+
+
+def _discover() -> dict[str, type[Model]]:
+    """The models of the files in ``mi_brdfs/models``, by plugin name and alias."""
+    found = {}
+    for module_info in pkgutil.iter_modules(models.__path__):
+        module = importlib.import_module(f"{models.__name__}.{module_info.name}")
+        for value in vars(module).values():
+            if isinstance(value, type) and issubclass(value, Model) and value.__module__ == module.__name__:
+                found.update(dict.fromkeys(value.plugins, value))
+    return dict(sorted(found.items()))
+
+
+MODELS = _discover()
+_registered: set[str] = set()
+
+
+def list_models() -> list[str]:
+    """The names of all plugins, aliases included, in alphabetical order."""
+    return list(MODELS)
+
+
+def find_model(name: str) -> type[Model]:
+    """The model of a plugin name.
+
+    Raises:
+        ValueError: if there is none, with the closest name there is.
+    """
+    if name not in MODELS:
+        closest = difflib.get_close_matches(str(name), MODELS, n=1, cutoff=0.0)[0]
+        raise ValueError(f"There is no model {name!r}; did you mean {closest!r}? list_models() names them all.")
+    return MODELS[name]
+
+
+def info(name: str) -> str:
+    """The manual page of a plugin: formula and source, conventions, properties, and the table of its parameters.
+
+    Raises:
+        ValueError: if there is no such plugin, with the closest name there is.
+    """
+    return find_model(name).manual()
+
+
+def install():
+    """Register the plugins in the active variant, if there is one, and in every variant that becomes active."""
+    mi.detail.add_variant_callback(_on_variant)
+    if mi.variant() is not None:
+        _on_variant(None, mi.variant())
+
+
+def _on_variant(old: str | None, new: str | None):
+    if new is None:
+        return
+    llvm.warn_if_unsafe(new)
+    # Mitsuba asks scalar_rgb what kind of plugin a name stands for, whatever the active variant.
+    for variant in {new, "scalar_rgb"} - _registered:
+        module = importlib.import_module(f"mitsuba.{variant}")
+        for name, model in MODELS.items():
+            module.register_bsdf(name, bsdf_class(model, module.BSDF))
+        _registered.add(variant)
