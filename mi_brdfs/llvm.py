@@ -57,19 +57,31 @@ def extra_library() -> str | None:
     return next((str(file.locate().resolve()) for file in installed if file.name == "libLLVM.so"), None)
 
 
+def loaded_file() -> str | None:
+    """Path of the LLVM library in this process, as far as the system tells (Linux)."""
+    try:
+        with open("/proc/self/maps", encoding="utf-8") as lines:
+            return next((line.split()[-1] for line in lines if "libLLVM" in line), None)
+    except OSError:
+        return None
+
+
 def problem() -> str | None:
     """One sentence with the cure if the LLVM in use aborts the process on this machine, else None."""
     found = version()
     if found is None or not _aborts(found):
         return None
+    return f"LLVM {dotted(found)} aborts the process when it renders on this machine (AVX-512): {cure()}."
+
+
+def cure() -> str:
+    """What to do where the LLVM in use is missing or unsafe."""
     chosen, library = os.environ.get(VARIABLE), extra_library()
     if chosen and (library is None or not _same_file(chosen, library)):
-        cure = f"unset {VARIABLE} (it names {chosen})" + ("" if library else f", then {install_advice()}")
-    elif library:
-        cure = "restart Python and import mi_brdfs before mi.set_variant('llvm_…')"
-    else:
-        cure = install_advice()
-    return f"LLVM {dotted(found)} aborts the process when it renders on this machine (AVX-512): {cure}."
+        return f"unset {VARIABLE} (it names {chosen})" + ("" if library else f", then {install_advice()}")
+    if library:
+        return "restart Python and import mi_brdfs first, before mi.set_variant('llvm_…')"
+    return install_advice()
 
 
 def warn_if_unsafe(variant: str | None) -> None:
@@ -81,11 +93,11 @@ def warn_if_unsafe(variant: str | None) -> None:
 def install_advice(system: str = sys.platform, machine: str = platform.machine()) -> str:
     """What to do on this platform to get an LLVM that works."""
     if system == "darwin":
-        return "run: brew install llvm (or use the metal_ad_* variants, which need none)"
+        return "brew install llvm (or use the metal_ad_* variants, which need none)"
     if system == "win32":
         return "install LLVM from https://github.com/llvm/llvm-project/releases"
     if system == "linux" and machine == "x86_64":
-        return 'run: pip install "mi_brdfs[llvm]"'
+        return 'pip install "mi_brdfs[llvm]"'
     return "install LLVM 17 or later with the system's package manager"
 
 
@@ -141,7 +153,7 @@ def _restart_backends() -> None:
     except (OSError, AttributeError):
         return
     shutdown(0)
-    init(sum(1 << int(backend) for backend in (dr.JitBackend.CUDA, dr.JitBackend.LLVM)))
+    init(1 << dr.JitBackend.CUDA.value | 1 << dr.JitBackend.LLVM.value)
 
 
 @cache

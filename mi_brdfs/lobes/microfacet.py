@@ -10,16 +10,14 @@ from .lobe import Lobe
 class MicrofacetLobe(Lobe):
     """f = ρ·F(cosθ_d)·D(h)·G / (4 cosθ_i cosθ_o), for any distribution, shadowing and Fresnel term of
     :mod:`mi_brdfs.microfacet`, drawn by one of its samplers.
-
-    ``directional_albedo`` estimates the albedo for ρ = F = 1.
     """
 
-    def __init__(self, reflectance, distribution, shadowing, fresnel, sampler, directional_albedo=1.0):
-        self.reflectance, self.distribution, self.shadowing, self.fresnel = reflectance, distribution, shadowing, fresnel
-        self.sampler, self.directional_albedo = sampler, directional_albedo
+    def __init__(self, reflectance, distribution, shadowing, fresnel, sampler):
+        self.reflectance, self.distribution = reflectance, distribution
+        self.shadowing, self.fresnel, self.sampler = shadowing, fresnel, sampler
 
     def albedo(self, wi):
-        return self.reflectance * self.fresnel(wi.z) * self.directional_albedo
+        return self.reflectance * (self.fresnel(wi.z) * self.distribution.albedo(wi.z))
 
     def eval_pdf(self, wi, wo):
         facet = Facet.between(wi, wo)
@@ -32,11 +30,5 @@ class MicrofacetLobe(Lobe):
     def half_vector_weight(self, facet):
         """f cosθ_o · 4cosθ_d / q: the weight of a sample of the distribution's half-vector density, for ρ = 1 and as
         a number. D cancels from it."""
-        fresnel = luminance(self.fresnel(facet.cos_d))
-        return (
-            fresnel
-            * self.shadowing(facet)
-            * facet.cos_d
-            / facet.cos_i
-            * self.distribution.over_density(facet)
-        )
+        visible = self.shadowing(facet) * facet.cos_d / facet.cos_i
+        return luminance(self.fresnel(facet.cos_d)) * visible * self.distribution.over_density(facet)

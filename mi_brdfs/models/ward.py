@@ -58,8 +58,16 @@ class Ward(Model):
 
     def lobes(self, p):
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)
-        specular = MicrofacetLobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), Orbit(8))
+        lobe = DarkeningLobe if self.variant in ("ward", "approximate") else MicrofacetLobe
+        specular = lobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), Orbit(8))
         return LambertLobe(p.diffuse_reflectance), specular
+
+
+class DarkeningLobe(MicrofacetLobe):
+    """A lobe whose albedo falls about like the cosine, as that of Ward's own normalisation does."""
+
+    def albedo(self, wi):
+        return super().albedo(wi) * (0.1 + 0.9 * wi.z)
 
 
 class ApproximateBeckmann(Distribution):
@@ -68,6 +76,8 @@ class ApproximateBeckmann(Distribution):
     As sin²/(1+cos) = 1-cos, D is exp(-2g(1-cosθ_h)) at a given azimuth: its integral over the hemisphere converges to
     one as α → 0, and can be inverted; q = D/(1 - exp(-2g)).
     """
+
+    LOSS = Beckmann.LOSS
 
     def eval(self, facet):
         return dr.exp(-2 * self.steepness(facet) / (1 + facet.cos_h)) / (dr.pi * self.alpha_u * self.alpha_v)

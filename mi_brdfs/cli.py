@@ -1,0 +1,355 @@
+"""The command line ``mi-brdfs``: list, info, doctor, render.
+
+Results go to stdout, errors and progress to stderr. Exit status: 0 fine, 1 error, 2 wrong usage, 130 after Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from . import doctor as doctor_module
+from . import info as manual
+from . import list_models, llvm
+
+import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
+
+if TYPE_CHECKING:
+    from .render import Picture
+
+out = Console(markup=False, highlight=False, soft_wrap=True)
+err = Console(markup=False, highlight=False, soft_wrap=True, stderr=True)
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+
+LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: no -D parameter can have these names
+DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+class Exit(IntEnum):
+    """Exit statuses other than 0."""
+
+    ERROR = 1
+    USAGE = 2
+    INTERRUPTED = 130
+
+
+def main() -> None:
+    """The entry point of the command ``mi-brdfs``."""
+    app()
+
+
+@app.callback()
+def _describe() -> None:
+    """Classical BRDFs for Mitsuba 3: what there is, what works here, and rendering scenes that use them."""
+
+
+@app.command("list")
+def list_() -> None:
+    """List the BRDFs: type, aliases, summary."""
+    groups: dict[str, list[str]] = {}
+    for name in list_models():
+        groups.setdefault(manual(name), []).append(name)
+    table = Table("type", "aliases", "summary", box=None, pad_edge=False)
+    for page, names in groups.items():
+        table.add_row(names[0], " ".join(names[1:]), page.splitlines()[0])
+    _print_table(table)
+
+
+@app.command()
+def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or alias that `list` shows.")]) -> None:
+    """Show the manual page of a BRDF."""
+    try:
+        page = manual(type)
+    except ValueError as error:
+        _fail(one_line(error))
+    out.print(_styled(page))
+
+
+@app.command()
+def doctor() -> None:
+    """Say which variants work here, which LLVM is used, and what to do about the others."""
+    findings = doctor_module.examine()
+    table = Table("backend", "state", "", box=None, pad_edge=False)
+    colours = {"works": "green", "missing": "yellow"}
+    for it in findings:
+        table.add_row(it.backend, Text(it.state, colours.get(it.state, "red")), it.detail)
+        table.add_row("", "", Text(" ".join(it.variants), "dim"))
+    out.print(", ".join(f"{name} {version}" for name, version in doctor_module.versions().items()))
+    _print_table(table)
+    out.print(doctor_module.next_step(findings))
+    if not doctor_module.any_fast(findings):
+        raise typer.Exit(Exit.ERROR)
+
+
+@app.command()
+def render(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.xml", help="The scene file.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="out.exr, .png or .jpg; the EXR and a display image are always both written."
+        ),
+    ] = None,
+    variant: Annotated[
+        str | None,
+        typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
+    ] = None,
+    spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: the scene's.")] = None,
+    define: Annotated[
+        list[str] | None, typer.Option("-D", metavar="name=value", help="Set a <default> parameter of the scene.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Another seed gives another noise.")] = 0,
+) -> None:
+    """Render a scene, progressively; Ctrl-C keeps what is finished."""
+    parameters = _parameters(define or [])
+    exr, display = _output_files(output or Path(scene.stem + ".exr"))
+    chosen = _set_variant(variant)
+    start = time.perf_counter()
+    try:
+        with _stdout_to_stderr():
+            picture = _render(_load(scene, parameters), spp, seed)
+        seconds = time.perf_counter() - start
+        written = _write(picture, exr, display)
+    except KeyboardInterrupt:
+        err.print("Interrupted; nothing is finished, nothing was written.")
+        raise typer.Exit(Exit.INTERRUPTED) from None
+    for path in written:
+        out.print(str(path))
+    if picture.spp < picture.total:
+        err.print(f"Interrupted; the image has the {picture.spp} of {picture.total} samples per pixel finished so far.")
+        raise typer.Exit(Exit.INTERRUPTED)
+    err.print(f"{picture.spp} samples per pixel in {seconds:.1f} s, {chosen}.")
+
+
+def one_line(error: BaseException) -> str:
+    """Reduce an exception of Mitsuba to its cause, in one line, with the place in the scene file if it is known."""
+    while error.__cause__:  # render-time errors keep their cause there
+        error = error.__cause__
+    text = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)) or type(error).__name__
+    place = None
+    for match in re.finditer(r"(?:At|[Ww]hile loading) (\S+) \(line (\d+), col \d+\): ", text):
+        place, rest = match, text[match.end() :]
+    broken = re.search(r'Parsing of XML file "(.+)" failed: (.+) \(line (\d+), col \d+\)', text)
+    unused = re.findall(r"^ +- \$([^=]+)=", text, re.MULTILINE) if "unused parameters" in text else []
+    if broken:
+        return f"{broken[1]}: line {broken[3]}: {broken[2]}"
+    if unused:
+        return f"-D {', '.join(unused)}: the scene has no <default> parameter of this name"
+    sentence = _last_of_traceback(rest if place else text)
+    return f"{place[1]}: line {place[2]}: {sentence}" if place else sentence
+
+
+def _last_of_traceback(text: str) -> str:
+    """The exception's message if ``text`` holds a Python traceback, else ``text``, in one line."""
+    _, traceback, tail = text.partition("Traceback (most recent call last):")
+    if traceback:
+        text = re.split(r"^[\w.]+(?:Error|Exception|Warning): ", tail, flags=re.MULTILINE)[-1]
+    return " ".join(text.split())
+
+
+def _print_table(table: Table) -> None:
+    """One line a row where another program reads it."""
+    console = Console(highlight=False, width=None if out.is_terminal else 400)
+    console.print(table)
+
+
+def _fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:
+    err.print(f"mi-brdfs: {text}")
+    raise typer.Exit(status)
+
+
+def _parameters(definitions: list[str]) -> dict[str, str]:
+    parameters = {}
+    for definition in definitions:
+        name, equals, value = definition.partition("=")
+        if not equals or not name:
+            _fail(f"-D {definition}: write -Dname=value", Exit.USAGE)
+        if name in LOAD_FILE_ARGUMENTS:
+            _fail(f"-D {name}: Mitsuba keeps this name for itself; rename the parameter in the scene", Exit.USAGE)
+        parameters[name] = value
+    return parameters
+
+
+def _output_files(output: Path) -> tuple[Path, Path]:
+    """The EXR and the display image that ``output`` asks for, if they can be written."""
+    suffix = output.suffix.lower()
+    if suffix != ".exr" and suffix not in DISPLAY_SUFFIXES:
+        _fail(f"{output}: unknown image format; use .exr, .png or .jpg", Exit.USAGE)
+    files = (output, output.with_suffix(".png")) if suffix == ".exr" else (output.with_suffix(".exr"), output)
+    for file in files:
+        if file.is_dir():
+            _fail(f"{file} is a folder")
+    try:
+        tempfile.TemporaryFile(dir=output.parent).close()
+    except OSError as error:
+        _fail(f"cannot write to the folder {output.parent}: {error.strerror}")
+    return files
+
+
+def _set_variant(wanted: str | None) -> str:
+    """Activate the variant asked for, or the fastest that works."""
+    if wanted:
+        _refuse(wanted)
+        try:
+            mi.set_variant(wanted)
+        except ImportError:
+            _fail(f"{wanted} does not work on this machine; `mi-brdfs doctor` says why")
+        return wanted
+    for name in ("cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb"):
+        if name not in mi.variants():
+            continue
+        if name.startswith("llvm") and (text := llvm.problem()):
+            err.print(f"mi-brdfs: using scalar_rgb, which is slow: {text}")
+            continue
+        try:
+            mi.set_variant(name)
+            return name
+        except ImportError:
+            continue
+    mi.set_variant("scalar_rgb")
+    return "scalar_rgb"
+
+
+def _refuse(variant: str) -> None:
+    if variant not in mi.variants():
+        _fail(f"there is no variant {variant}; this Mitsuba has {', '.join(mi.variants())}")
+    if variant.startswith("llvm") and (text := llvm.problem()):
+        _fail(text)
+
+
+@contextmanager
+def _stdout_to_stderr() -> Iterator[None]:
+    """Send to stderr what Mitsuba prints to stdout, its warnings.
+
+    At the level of the operating system: its log may speak inside a signal handler, where no Python may run.
+    """
+    sys.stdout.flush()
+    stdout = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        os.dup2(stdout, 1)
+        os.close(stdout)
+
+
+def _load(path: Path, parameters: dict[str, str]) -> mi.Scene:
+    if not path.is_file():
+        _fail(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+    try:
+        scene = mi.load_file(str(path), **parameters)
+    except Exception as error:
+        _fail(one_line(error))
+    if not isinstance(scene, mi.Scene):
+        _fail(f"{path} does not hold a <scene>")
+    if not scene.sensors():
+        _fail(f"{path}: the scene has no <sensor>")
+    if not scene.integrator():
+        _fail(f"{path}: the scene has no <integrator>")
+    return scene
+
+
+def _render(scene: mi.Scene, spp: int | None, seed: int) -> Picture:
+    from .render import render  # imports numpy
+
+    columns = [
+        TextColumn("Rendering"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("samples per pixel,"),
+        TimeRemainingColumn(elapsed_when_finished=True),
+        TextColumn("left"),
+    ]
+    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("", total=None)
+        with _answer_ctrl_c(lambda: err.print("Stopping; Ctrl-C again aborts at once.")):
+            try:
+                return render(
+                    scene, spp, seed, on_pass=lambda done, total: progress.update(task, completed=done, total=total)
+                )
+            except Exception as error:
+                _fail(one_line(error))
+
+
+@contextmanager
+def _answer_ctrl_c(announce: Callable[[], None]) -> Iterator[None]:
+    """Answer Ctrl-C at once, where Python's own handlers wait for the pass to end; the second ends the process."""
+    ours, written_by_python = socket.socketpair()
+    written_by_python.setblocking(False)
+
+    def watch() -> None:
+        pressed = 0
+        while received := ours.recv(64):
+            pressed += received.count(signal.SIGINT)
+            if pressed > 1:
+                err.show_cursor(True)
+                err.print("Aborted; nothing was written.")
+                os._exit(Exit.INTERRUPTED)
+            if pressed == 1:
+                announce()
+
+    previous = signal.set_wakeup_fd(written_by_python.fileno(), warn_on_full_buffer=False)
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(previous)
+        written_by_python.close()
+        watcher.join()
+        ours.close()
+
+
+def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
+    from .render import display_image, write
+
+    image = display_image(picture.bitmap)
+    files = [(picture.bitmap, exr), (image, display)]
+    if image is None:
+        err.print(f"The film has no RGB, XYZ or luminance channels, so there is no {display.name}.")
+        files.pop()
+    try:
+        for bitmap, path in files:
+            write(bitmap, path)
+    except Exception as error:
+        _fail(f"cannot write {path}: {one_line(error)}")
+    return [path for _, path in files]
+
+
+def _styled(page: str) -> Text:
+    """A manual page for the terminal: literals and headings by style instead of by reStructuredText's marks."""
+    lines = re.sub(r":\w+:`([^`]+)`", r"\1", page).splitlines()
+    text = Text()
+    for line, following in zip(lines, [*lines[1:], ""], strict=True):
+        if _underlines(line):
+            continue
+        heading = bool(line.strip()) and _underlines(following)
+        for index, part in enumerate(line.split("``")):
+            text.append(part, "bold" if heading else "cyan" if index % 2 else "")
+        text.append("\n")
+    return text
+
+
+def _underlines(line: str) -> bool:
+    return re.fullmatch(r"(=|-|~){3,}", line.strip()) is not None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

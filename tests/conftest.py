@@ -1,0 +1,20 @@
+import pytest
+
+import mi_brdfs  # noqa: F401
+import mitsuba as mi
+
+mi.set_variant("scalar_rgb")  # variant_context needs one to return to
+
+
+@pytest.fixture
+def llvm_rgb():
+    """The variant that most tests run in."""
+    with mi.variant_context("llvm_ad_rgb"):
+        yield
+
+
+@pytest.fixture(params=["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono_polarized", "scalar_rgb", "scalar_spectral"])
+def variant(request):
+    """Each kind of variant in turn."""
+    with mi.variant_context(request.param):
+        yield request.param

@@ -1,0 +1,118 @@
+"""Samplers: the density is what pdf says, and the weight is eval/pdf."""
+
+import drjit as dr
+import numpy as np
+import pytest
+from catalogue import ROWS
+from support import call, direction, hemisphere, interaction, is_scalar
+
+import mitsuba as mi
+from mitsuba.chi2 import ChiSquareTest, SphericalDomain
+
+ANGLES = [(0, 0), (30, 0), (60, 0), (80, 0), (60, 127)]
+
+
+def contexts(bsdf):
+    """The whole BSDF, and each of its components alone."""
+    yield "mixture", mi.BSDFContext()
+    if bsdf.component_count() > 1:
+        for component in range(bsdf.component_count()):
+            context = mi.BSDFContext()
+            context.component = component
+            yield f"component {component}", context
+
+
+CHI2_COUNT = sum(len(ANGLES) * 3 for _ in ROWS)  # at least as many as there are: significance is corrected for it
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.filterwarnings("ignore:The AST-transforming decorator")  # inside Mitsuba's own test
+@pytest.mark.parametrize("row", ROWS, ids=str)
+def test_chi2(row):
+    """The stock test, with cells that a lobe does not outrun, and with samples counted by pdf > 0: where f = 0 the
+    weight is 0 though the sample was drawn. A sampler without samples would pass, hence the last line."""
+    bsdf = mi.load_dict(row.bsdf)
+    for name, context in contexts(bsdf):
+        for seed, angles in enumerate(ANGLES):
+            si = interaction(direction(*angles))
+            si.wi = dr.normalize(si.wi)
+
+            def sample(u, si=si, context=context):
+                bs, _ = bsdf.sample(context, si, u[0], mi.Point2f(u[1], u[2]), True)
+                return bs.wo, dr.select(bs.pdf > 0, 1.0, 0.0)
+
+            def pdf(wo, si=si, context=context):
+                return bsdf.pdf(context, si, wo, True)
+
+            resolution = {"res": 140, "ires": 32} if row.sharp else {"res": 101, "ires": 16}
+            test = ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, seed=seed, **resolution)
+            accepted = test.run(test_count=CHI2_COUNT, quiet=True)
+            assert accepted, f"{name} at {angles}: {test.messages}"
+            assert test.histogram_sum[0] > 0.2
+
+
+@pytest.mark.parametrize("row", ROWS, ids=str)
+def test_weight_is_value_over_density(row, variant):
+    """In every variant, with eval_pdf = (eval, pdf), and eval_pdf_sample both at once."""
+    bsdf = mi.load_dict(row.bsdf)
+    count = 40 if is_scalar() else 20_000
+    rng = np.random.default_rng(3)
+    wi, other = hemisphere(count, 1), hemisphere(count, 2)
+    u, v = rng.random((count, 1)).astype(np.float32), rng.random((count, 2)).astype(np.float32)
+    for _, context in contexts(bsdf):
+        wo, pdf, weight = call(bsdf.sample, context, wi, u, v)
+        wo = wo.astype(np.float32)
+        value, density = call(bsdf.eval_pdf, context, wi, wo)
+        np.testing.assert_allclose(density, pdf, rtol=1e-4, atol=1e-6)
+        drawn = (density > 0).ravel()
+        assert drawn.mean() > 0.3
+        np.testing.assert_allclose(weight[drawn], value[drawn] / density[drawn], rtol=1e-4, atol=1e-7)
+        assert not weight[~drawn].any()
+        np.testing.assert_array_equal(call(bsdf.eval, context, wi, wo)[0], value)
+        np.testing.assert_array_equal(call(bsdf.pdf, context, wi, wo)[0], density)
+
+        both = call(bsdf.eval_pdf_sample, context, wi, other, u, v)
+        np.testing.assert_allclose(both[0], call(bsdf.eval, context, wi, other)[0], rtol=1e-5)
+        np.testing.assert_allclose(both[1], call(bsdf.pdf, context, wi, other)[0], rtol=1e-5)
+        np.testing.assert_allclose(both[2], wo, atol=1e-6)
+        np.testing.assert_allclose(both[4], weight, rtol=1e-4, atol=1e-7)
+
+
+def mirror_grid(wi, radial, azimuthal):
+    """Directions on a polar grid around the mirror direction of ``wi``, denser towards it, and their solid angles."""
+    s, phi = np.meshgrid((np.arange(radial) + 0.5) / radial, (np.arange(azimuthal) + 0.5) / azimuthal * 2 * np.pi)
+    theta = np.pi * s**3
+    solid_angle = np.sin(theta) * 3 * np.pi * s**2 / radial * 2 * np.pi / azimuthal
+    axis = wi * [-1, -1, 1]
+    side = np.cross(axis, [1, 0, 0] if abs(axis[0]) < 0.5 else [0, 1, 0])
+    side /= np.linalg.norm(side)
+    up = np.cross(axis, side)
+    directions = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+    wo = sum(d[..., None] * base for d, base in zip(directions, (side, up, axis), strict=True))
+    return wo.reshape(-1, 3), solid_angle.ravel()
+
+
+@pytest.mark.parametrize("row", ROWS, ids=str)
+def test_density_integrates_to_one_at_most(row, variant):
+    """By the midpoint rule, good to 1e-3 on the fine grid and to 3e-2 on the coarse one of scalar variants."""
+    bsdf, (grid, error) = mi.load_dict(row.bsdf), ((24, 24), 3e-2) if is_scalar() else ((1000, 500), 1e-3)
+    for _, context in contexts(bsdf):
+        for angles in ANGLES[2:3] if is_scalar() else ANGLES:
+            wi = direction(*angles)
+            wo, solid_angle = mirror_grid(wi, *grid)
+            pdf = call(bsdf.pdf, context, np.broadcast_to(wi, wo.shape) if is_scalar() else wi, wo)[0]
+            assert 0.2 < (pdf[:, 0] * solid_angle).sum() < 1 + error
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row.reciprocal], ids=str)
+def test_reciprocity(row, variant):
+    bsdf, context = mi.load_dict(row.bsdf), mi.BSDFContext()
+    count = 40 if is_scalar() else 20_000
+    wi, wo = hemisphere(count, 5), hemisphere(count, 6)
+    # Half of the pairs near each other's mirror direction, where narrow lobes are.
+    near = wo[::2] * 0.03 + wi[::2] * [-1, -1, 1]
+    near[:, 2] = np.maximum(near[:, 2], 0.02)
+    wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
+    forth, back = call(bsdf.eval, context, wi, wo)[0], call(bsdf.eval, context, wo, wi)[0]
+    assert forth.max() > 0
+    np.testing.assert_allclose(forth * wi[:, 2:], back * wo[:, 2:], rtol=1e-4, atol=1e-12)

@@ -1,0 +1,72 @@
+"""Values against the independent float64 reference."""
+
+import catalogue
+import numpy as np
+import pytest
+from catalogue import ROWS
+from support import call, direction, hemisphere
+
+import mitsuba as mi
+
+BOTH = catalogue.BOTH
+EXTREME = [
+    catalogue.ward(f"{variant} alpha {α:g}", 0.4, 0.5, (α, 3 * α), variant, alpha_u=α, alpha_v=3 * α, **BOTH)
+    for variant in ("balanced", "ward", "ward-duer", "approximate")
+    for α in (1e-3, 0.3)
+]
+EXTREME += [
+    catalogue.walter(f"{shadowing} alpha {α:g}", 0.4, 0.5, (α, 3 * α), shadowing, alpha_u=α, alpha_v=3 * α, **BOTH)
+    for shadowing in ("separable", "correlated")
+    for α in (1e-3, 0.6)
+]
+EXTREME += [
+    catalogue.phong(f"{normalization} exponent {n:g}", 0.4, 0.5, n, normalization, exponent=n, **BOTH)
+    for normalization in ("energy", "none", "original")
+    for n in (1.0, 1e4, 1e5)
+]
+COSINES = [1, 0.999, 0.9, 0.7, 0.4, 0.1, 0.05, 0.02]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("row", [*ROWS, *EXTREME], ids=str)
+def test_matches_the_reference(row):
+    """Within 1e-4 where f is above 1e-6 of its peak: a few float32 ulp, times the at most 14 e-foldings of a lobe."""
+    bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
+    rng = np.random.default_rng(7)
+    for cosine in COSINES:
+        wi = np.tile(direction(np.degrees(np.arccos(cosine)), 37), (6000, 1))
+        wo = call(bsdf.sample, ctx, wi, rng.random((6000, 1)), rng.random((6000, 2)))[0].astype(np.float32)
+        wo = np.where(wo[:, 2:] < 0.02, hemisphere(6000, 8), wo)
+        wo[:2000] = hemisphere(2000, 9)
+        value = call(bsdf.eval, ctx, wi, wo)[0][:, 0]
+        expected = row.reference(wi, wo)
+        checked = expected > 1e-6 * expected.max()
+        assert checked.sum() > 500
+        np.testing.assert_allclose(value[checked], expected[checked], rtol=1e-4)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("row", ROWS, ids=str)
+def test_nothing_below_the_horizon(row):
+    bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
+    above, below = hemisphere(1000, 1, 0), hemisphere(1000, 2, 0) * [1, 1, -1]
+    for wi, wo in [(above, below), (below, above), (below, below), (above, above * [1, 1, 0])]:
+        value, pdf = call(bsdf.eval_pdf, ctx, wi, wo)
+        assert not value.any() and not pdf.any()
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("row", [*ROWS, *EXTREME], ids=str)
+def test_finite_at_grazing_and_normal_incidence(row):
+    bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
+    special = [[0, 0, 1], [1, 0, 1e-7], [0, -1, 1e-4], [0.6, 0.8, 1e-20], [1e-20, 0, 1], [0.6, 0, 0.8]]
+    special = np.concatenate([np.array(special, np.float32), hemisphere(200, 3, 0)])
+    wi, wo = (np.repeat(special, len(special), axis=0), np.tile(special, (len(special), 1)))
+    value, pdf = call(bsdf.eval_pdf, ctx, wi, wo)
+    assert np.isfinite(value).all() and np.isfinite(pdf).all() and (value >= 0).all() and (pdf >= 0).all()
+    uniform = np.array([[0, 0, 0], [0, 0, 1 - 2**-24], [0, 1 - 2**-24, 0], [1 - 2**-24] * 3, [0.5, 0.5, 0.5]])
+    uniform = np.concatenate([uniform, np.random.default_rng(4).random((100, 3))])
+    wi, samples = np.repeat(special, len(uniform), axis=0), np.tile(uniform, (len(special), 1))
+    wo, pdf, weight = call(bsdf.sample, ctx, wi, samples[:, :1], samples[:, 1:])
+    assert np.isfinite(wo).all() and np.isfinite(pdf).all() and np.isfinite(weight).all() and (weight >= 0).all()
+    np.testing.assert_allclose(np.linalg.norm(wo, axis=1), 1, atol=1e-5)
