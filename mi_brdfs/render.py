@@ -4,7 +4,7 @@ From Python::
 
     scene = mi.load_file("scene.xml")
     picture = render(scene, spp=256)
-    picture.image                               # the developed tensor, as mi.render would return it
+    picture.image                               # the developed tensor
     write(picture.bitmap, "scene.exr")
     write(display_image(picture.bitmap), "scene.png")
 """
@@ -32,7 +32,7 @@ class Picture:
     """What ``render`` returns."""
 
     image: mi.TensorXf
-    """The developed image, in the film's pixel format, AOVs included."""
+    """The developed image as ``film.develop()`` returns it, in the film's pixel format and with all AOVs."""
     bitmap: mi.Bitmap
     """The same with channel names, ready to be written as an EXR."""
     spp: int
@@ -151,7 +151,7 @@ def _pixel_count(film: mi.Film, particles: bool) -> int:
 
 
 def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> list[int]:
-    """Samples per pixel of each pass: equal powers of two up to ``limit`` and a rest, rounded as the sampler does."""
+    """Samples per pixel of each pass: powers of two up to ``limit`` and a rest, rounded as the sampler does."""
 
     def rounded(count: int) -> int:
         sampler.set_sample_count(count)

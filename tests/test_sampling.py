@@ -29,8 +29,10 @@ CHI2_COUNT = sum(len(ANGLES) * 3 for _ in ROWS)  # at least as many as there are
 @pytest.mark.filterwarnings("ignore:The AST-transforming decorator")  # inside Mitsuba's own test
 @pytest.mark.parametrize("row", ROWS, ids=str)
 def test_chi2(row):
-    """The stock test, with cells that a lobe does not outrun, and with samples counted by pdf > 0: where f = 0 the
-    weight is 0 though the sample was drawn. A sampler without samples would pass, hence the last line."""
+    """The stock test, with cells that a lobe does not outrun. The sphere's poles are laid into the horizon, as cells
+    at a pole are too long for a narrow lobe, and the horizon onto cell borders, as densities may jump there. Samples
+    count by pdf > 0: where f = 0 the weight is 0 though the sample was drawn. Without samples the test would pass,
+    hence the last line."""
     bsdf = mi.load_dict(row.bsdf)
     for name, context in contexts(bsdf):
         for seed, angles in enumerate(ANGLES):
@@ -39,10 +41,10 @@ def test_chi2(row):
 
             def sample(u, si=si, context=context):
                 bs, _ = bsdf.sample(context, si, u[0], mi.Point2f(u[1], u[2]), True)
-                return bs.wo, dr.select(bs.pdf > 0, 1.0, 0.0)
+                return mi.Vector3f(bs.wo.x, bs.wo.z, bs.wo.y), dr.select(bs.pdf > 0, 1.0, 0.0)
 
-            def pdf(wo, si=si, context=context):
-                return bsdf.pdf(context, si, wo, True)
+            def pdf(w, si=si, context=context):
+                return bsdf.pdf(context, si, mi.Vector3f(w.x, w.z, w.y), True)
 
             resolution = {"res": 140, "ires": 32} if row.sharp else {"res": 101, "ires": 16}
             test = ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, seed=seed, **resolution)
@@ -95,7 +97,7 @@ def mirror_grid(wi, radial, azimuthal):
 @pytest.mark.parametrize("row", ROWS, ids=str)
 def test_density_integrates_to_one_at_most(row, variant):
     """By the midpoint rule, good to 1e-3 on the fine grid and to 3e-2 on the coarse one of scalar variants."""
-    bsdf, (grid, error) = mi.load_dict(row.bsdf), ((24, 24), 3e-2) if is_scalar() else ((1000, 500), 1e-3)
+    bsdf, (grid, error) = mi.load_dict(row.bsdf), ((24, 24), 3e-2) if is_scalar() else ((2000, 256), 1e-3)
     for _, context in contexts(bsdf):
         for angles in ANGLES[2:3] if is_scalar() else ANGLES:
             wi = direction(*angles)

@@ -1,0 +1,267 @@
+"""The command line, each command in a process of its own as a user would type it."""
+
+import contextlib
+import glob
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mi_brdfs
+from mi_brdfs import llvm
+from mi_brdfs.cli import one_line
+
+BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
+needs_bad_llvm = pytest.mark.skipif(BAD_LLVM is None or not llvm._has_avx512(), reason="no LLVM here that aborts")
+
+SCENE = """<scene version="3.0.0">
+  <default name="res" value="24"/>
+  <default name="spp" value="3"/>
+  <default name="material" value="diffuse"/>
+  <integrator type="path"/>
+  <sensor type="perspective">
+    <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="$res"/><integer name="height" value="$res"/></film>
+    <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
+  </sensor>
+  <shape type="obj"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
+  <emitter type="constant"/>
+</scene>
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A scene in a folder of its own, beside the folder that the commands run in."""
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "work").mkdir()
+    (tmp_path / "scenes" / "box.xml").write_text(SCENE)
+    (tmp_path / "scenes" / "triangle.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")
+    return tmp_path
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "mi_brdfs.cli", *map(str, arguments)]
+
+
+def run(*arguments, cwd=None, library=None):
+    env = {name: value for name, value in os.environ.items() if name != llvm.VARIABLE}
+    env |= {llvm.VARIABLE: library} if library else {}
+    return subprocess.run(command(*arguments), cwd=cwd, env=env, capture_output=True, text=True, timeout=180)
+
+
+def test_list_names_every_type_once():
+    done = run("list")
+    assert done.returncode == 0 and done.stderr == ""
+    words = done.stdout.split()
+    assert all(name in words for name in mi_brdfs.list_models())
+    assert "Ward" in next(line for line in done.stdout.splitlines() if line.startswith("ward "))
+
+
+def test_info_shows_the_manual_page():
+    done = run("info", "ward")
+    assert done.returncode == 0
+    assert done.stdout.startswith(mi_brdfs.info("ward").splitlines()[0])
+    assert "alpha_u" in done.stdout and "``" not in done.stdout
+
+
+def test_info_of_a_misspelt_type():
+    done = run("info", "wrad")
+    assert done.returncode == 1 and done.stdout == ""
+    assert "'ward'" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_doctor_tries_every_backend():
+    done = run("doctor")
+    states = dict(re.findall(r"^(scalar|llvm|cuda|metal) +(works|missing|aborts|fails)", done.stdout, re.MULTILINE))
+    assert states["scalar"] == "works"
+    assert set(states) == {variant.split("_")[0] for variant in mi.variants()}
+    works = any(states[name] == "works" for name in states if name != "scalar")
+    assert done.returncode == (0 if works else 1)
+    assert f"mitsuba {mi.__version__}" in done.stdout and "llvm_ad_spectral_polarized" in done.stdout
+    if states["llvm"] == "works" and states.get("cuda") != "works":
+        assert re.search(r"LLVM \d+\.\d+\.\d+ \S*libLLVM", done.stdout)
+        assert "Everything works" in done.stdout
+
+
+@needs_bad_llvm
+def test_doctor_survives_an_llvm_that_aborts():
+    done = run("doctor", library=BAD_LLVM)
+    assert re.search(r"^llvm +aborts +the test render died of SIGABRT", done.stdout, re.MULTILINE)
+    assert f"Next: unset {llvm.VARIABLE}" in done.stdout
+    assert done.stderr == ""
+
+
+def test_doctor_with_no_llvm_at_all():
+    done = run("doctor", library="/nowhere/libLLVM.so")
+    assert re.search(r"^llvm +missing", done.stdout, re.MULTILINE)
+    if "cuda     works" not in done.stdout and "metal    works" not in done.stdout:
+        assert done.returncode == 1 and f"unset {llvm.VARIABLE}" in done.stdout
+
+
+def test_render_writes_an_exr_and_a_display_image_here(folder):
+    done = run("render", "../scenes/box.xml", "-Dmaterial=ward", "-Dres=20", "--spp", 5, cwd=folder / "work")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["box.exr", "box.png"]
+    assert re.fullmatch(r"5 samples per pixel in [\d.]+ s, \w+_rgb\.\n", done.stderr)
+    assert sorted(file.name for file in (folder / "work").iterdir()) == ["box.exr", "box.png"]
+    exr = np.array(mi.Bitmap(str(folder / "work" / "box.exr")))
+    png = mi.Bitmap(str(folder / "work" / "box.png"))
+    assert exr.shape == (20, 20, 3) and exr.dtype == np.float32 and exr.mean() > 0.1
+    assert list(png.size()) == [20, 20] and np.array(png).mean() > 20
+
+
+def test_the_output_option_names_either_file(folder):
+    done = run("render", "scenes/box.xml", "--variant", "scalar_rgb", "-o", "work/picture.jpg", cwd=folder)
+    assert done.stdout.split() == ["work/picture.exr", "work/picture.jpg"]
+    assert "3 samples per pixel" in done.stderr
+    assert list(mi.Bitmap(str(folder / "work" / "picture.jpg")).size()) == [24, 24]
+
+
+def test_seeds(folder):
+    pixels = []
+    for name, seed in ("a", 1), ("b", 1), ("c", 2):
+        run("render", "scenes/box.xml", "--variant", "scalar_rgb", "--seed", seed, "-o", f"{name}.exr", cwd=folder)
+        pixels.append(np.array(mi.Bitmap(str(folder / f"{name}.exr"))))
+    np.testing.assert_allclose(pixels[0], pixels[1], rtol=1e-4)
+    assert not np.allclose(pixels[0], pixels[2], rtol=1e-3)
+
+
+def test_mitsubas_warnings_go_to_stderr(folder):
+    done = run("render", "scenes/box.xml", "--variant", "llvm_ad_mono", cwd=folder)
+    assert done.stdout.split() == ["box.exr", "box.png"]
+    assert "Monochrome mode" in done.stderr
+
+
+ERRORS = {
+    "missing": (["nowhere.xml"], 1, "nowhere.xml: no such file"),
+    "folder": (["scenes"], 1, "not a file"),
+    "broken": (["scenes/broken.xml"], 1, "scenes/broken.xml: line 2: "),
+    "not a scene": (["scenes/bsdf.xml"], 1, "does not hold a <scene>"),
+    "no sensor": (["scenes/bare.xml"], 1, "no <sensor>"),
+    "unknown plugin": (["scenes/box.xml", "-Dmaterial=wrad"], 1, 'scenes/box.xml: line 11: .*"wrad"'),
+    "our parameter": (["scenes/ward.xml", "-Dalpha=1.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 1.7 .*allowed"),
+    "misspelt parameter": (["scenes/misspelt.xml"], 1, "scenes/misspelt.xml: line 2: .*reflectanse"),
+    "bad value": (["scenes/box.xml", "-Dres=many"], 1, 'scenes/box.xml: line 8: .*"many"'),
+    "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
+    "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
+    "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -Dname=value"),
+    "reserved -D": (["scenes/box.xml", "-Doptimize=1"], 2, "-D optimize: "),
+    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "a.bmp: unknown image format"),
+    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 1, "cannot write to the folder gone"),
+    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 1, "taken.exr is a folder"),
+    "unknown variant": (["scenes/box.xml", "--variant", "llvm"], 1, "no variant llvm; this Mitsuba has scalar_rgb, "),
+}
+
+
+@pytest.mark.parametrize("arguments, status, text", ERRORS.values(), ids=ERRORS)
+def test_an_error_is_one_readable_line(folder, arguments, status, text):
+    write = (folder / "scenes").joinpath
+    write("broken.xml").write_text('<scene version="3.0.0">\n<shape></scene>')
+    write("bsdf.xml").write_text('<bsdf version="3.0.0" type="diffuse"/>')
+    write("bare.xml").write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
+    write("misspelt.xml").write_text(
+        '<scene version="3.0.0">\n<bsdf type="diffuse"><float name="reflectanse" value="1"/></bsdf></scene>'
+    )
+    write("ward.xml").write_text(
+        '<scene version="3.0.0"><default name="alpha" value="0.1"/>\n<bsdf type="twosided">\n'
+        '<bsdf type="ward"><float name="alpha" value="$alpha"/></bsdf></bsdf></scene>'
+    )
+    write("no_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
+    (folder / "taken.exr").mkdir()
+    before = sorted(folder.rglob("*"))
+    done = run("render", *arguments, cwd=folder)
+    assert done.returncode == status
+    assert done.stdout == ""
+    assert re.search(text, done.stderr), done.stderr
+    assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_a_variant_that_does_not_work_here(folder):
+    backends = {"cuda_ad_rgb", "metal_ad_rgb"} & set(mi.variants())
+    if not backends or f"{(name := backends.pop()).split('_')[0]} works" in " ".join(run("doctor").stdout.split()):
+        pytest.skip("every variant works here")
+    done = run("render", "scenes/box.xml", "--variant", name, cwd=folder)
+    assert done.returncode == 1
+    assert done.stderr == f"mi-brdfs: {name} does not work on this machine; `mi-brdfs doctor` says why\n"
+
+
+@needs_bad_llvm
+def test_a_bad_llvm_is_refused(folder):
+    done = run("render", "scenes/box.xml", "--variant", "llvm_ad_rgb", cwd=folder, library=BAD_LLVM)
+    assert done.returncode == 1
+    assert f"unset {llvm.VARIABLE}" in done.stderr and done.stderr.count("\n") == 1
+
+
+@needs_bad_llvm
+def test_without_a_choice_a_bad_llvm_is_avoided(folder):
+    done = run("render", "scenes/box.xml", cwd=folder, library=BAD_LLVM)
+    assert done.returncode == 0 and "box.exr" in done.stdout
+    if "cuda" not in done.stderr:
+        assert f"unset {llvm.VARIABLE}" in done.stderr and "scalar_rgb." in done.stderr
+
+
+def interrupted(folder, *arguments, running, times=1):
+    """Start a render that would take hours, on a terminal, and press Ctrl-C once ``running`` shows on it."""
+    pty = pytest.importorskip("pty")
+    terminal, its_end = pty.openpty()
+    process = subprocess.Popen(
+        command("render", "scenes/box.xml", "--spp", 10**6, *arguments),
+        cwd=folder, stdout=subprocess.PIPE, stderr=its_end, text=True, env={**os.environ, "TERM": "xterm"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    os.close(its_end)
+    shown = ""
+    while not re.search(running, shown):
+        shown += os.read(terminal, 1024).decode(errors="replace")
+    for _ in range(times):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+    out, _ = process.communicate(timeout=60)
+    with contextlib.suppress(OSError):  # the end of a terminal
+        while data := os.read(terminal, 1024):
+            shown += data.decode(errors="replace")
+    os.close(terminal)
+    return process.returncode, out, shown
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
+def test_ctrl_c_keeps_what_is_finished(folder, variant):
+    if variant.startswith("llvm") and llvm.version() is None:
+        pytest.skip("no LLVM here")
+    status, out, err = interrupted(folder, "--variant", variant, running=r"[1-9]\d*/1000000")
+    assert status == 130
+    assert out.split() == ["box.exr", "box.png"]
+    finished = re.search(r"Interrupted; the image has the (\d+) of 1000000 samples per pixel", err)
+    assert finished and int(finished[1]) > 0 and "Traceback" not in err
+    exr = np.array(mi.Bitmap(str(folder / "box.exr")))
+    assert exr[0, 0] == pytest.approx(1, rel=0.01)  # the constant emitter, so sums and weights belong together
+
+
+def test_a_second_ctrl_c_aborts_at_once(folder):
+    if llvm.version() is None:
+        pytest.skip("no LLVM here")
+    status, out, err = interrupted(folder, "--variant", "llvm_ad_rgb", "-Dres=4096", running="Rendering", times=2)
+    assert status == 130 and out == ""
+    assert "Aborted; nothing was written." in err and "Traceback" not in err
+    assert not list(folder.glob("*.exr"))
+
+
+def test_errors_of_mitsuba_in_one_line():
+    traceback = (
+        '[parser.cpp:1718] At a.xml (line 13, col 6): failed to instantiate bsdf plugin of type "ward": '
+        'Traceback (most recent call last):\n  File "x.py", line 1, in f\nValueError: ward: alpha = 1.7\n is wrong.'
+    )
+    assert one_line(RuntimeError(traceback)) == "a.xml: line 13: ward: alpha = 1.7 is wrong."
+    cause = RuntimeError("render failed")
+    cause.__cause__ = ValueError("the real reason")
+    assert one_line(cause) == "the real reason"
+    assert one_line(KeyError()) == "KeyError"
+    assert "\n" not in one_line(RuntimeError("two\nlines"))
