@@ -221,9 +221,10 @@ def interrupted(folder, *arguments, running, times=1):
     shown = ""
     while not re.search(running, shown):
         shown += os.read(terminal, 1024).decode(errors="replace")
+    time.sleep(1)
     for _ in range(times):
         process.send_signal(signal.SIGINT)
-        time.sleep(0.3)
+        time.sleep(0.1)
     out, _ = process.communicate(timeout=60)
     with contextlib.suppress(OSError):  # the end of a terminal
         while data := os.read(terminal, 1024):

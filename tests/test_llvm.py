@@ -43,9 +43,8 @@ def python(code: str, library: str | None = None) -> subprocess.CompletedProcess
     ],
 )
 def test_a_safe_llvm_is_used_in_every_order_of_imports(imports):
-    run = python(
-        f"{imports}\nmi.set_variant('llvm_ad_rgb')\n{RENDER}\nprint(mi_brdfs.llvm.version()[0], mi_brdfs.llvm.problem())"
-    )
+    says = "print(mi_brdfs.llvm.version()[0], mi_brdfs.llvm.problem())"
+    run = python(f"{imports}\nmi.set_variant('llvm_ad_rgb')\n{RENDER}\n{says}")
     assert run.returncode == 0, run.stderr[-500:]
     major, problem = run.stdout.split()[-2:]
     assert int(major) >= 17 and problem == "None"

@@ -137,7 +137,13 @@ def test_a_spectral_film_has_no_display_image():
 
 @pytest.mark.parametrize(
     "sampler, spp, counted",
-    [("independent", 10, 10), ("stratified", 10, 12), ("multijitter", 7, 7), ("orthogonal", 10, 12), ("ldsampler", 5, 8)],
+    [
+        ("independent", 10, 10),
+        ("stratified", 10, 12),
+        ("multijitter", 7, 7),
+        ("orthogonal", 10, 12),
+        ("ldsampler", 5, 8),
+    ],
 )
 def test_samples_are_counted_as_the_sampler_rounds_them(variant, sampler, spp, counted):
     loaded, progress = scene(sampler=sampler), []

@@ -1,0 +1,140 @@
+"""Lobes as components: flags, masks, the choice among them, and the other questions that Mitsuba asks a BSDF."""
+
+import numpy as np
+import pytest
+from support import call, direction, hemisphere, interaction, numbers
+
+import drjit as dr
+import mitsuba as mi
+
+TWO_LOBES = {
+    "phong": {"type": "phong", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.5]}},
+    "ward": {"type": "ward", "alpha": 0.3, "specular_reflectance": 0.4},
+    "walter": {"type": "walter", "alpha": 0.3, "f0": 0.04, "diffuse_reflectance": 0.3},
+}
+
+
+def context(component=None, mask=None):
+    ctx = mi.BSDFContext()
+    if component is not None:
+        ctx.component = component
+    if mask is not None:
+        ctx.type_mask = int(mask)
+    return ctx
+
+
+@pytest.mark.parametrize("name", TWO_LOBES)
+def test_flags(name, variant):
+    bsdf = mi.load_dict(TWO_LOBES[name])
+    flags = mi.BSDFFlags
+    assert bsdf.component_count() == 2
+    assert bsdf.flags(0) == int(flags.DiffuseReflection | flags.FrontSide)
+    assert bsdf.flags(1) == int(flags.GlossyReflection | flags.FrontSide)
+    assert bsdf.flags() == bsdf.flags(0) | bsdf.flags(1)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_flags_tell_anisotropy_textures_and_reciprocity():
+    flags = mi.BSDFFlags
+    pair = mi.load_dict({"type": "ward", "alpha_u": 0.1, "alpha_v": 0.2})
+    turned = mi.load_dict({"type": "ward", "rotation": 0.25})
+    textured = mi.load_dict({"type": "ward", "specular_reflectance": {"type": "checkerboard"}})
+    original = mi.load_dict({"type": "phong", "normalization": "original"})
+    plain = mi.load_dict({"type": "ward"})
+    for bsdf, flag in [(pair, flags.Anisotropic), (turned, flags.Anisotropic), (original, flags.NonSymmetric)]:
+        assert mi.has_flag(bsdf.flags(1), flag) and not mi.has_flag(bsdf.flags(0), flag)
+        assert not mi.has_flag(plain.flags(), flag)
+    assert mi.has_flag(textured.flags(), flags.SpatiallyVarying)
+    assert not mi.has_flag(plain.flags(), flags.SpatiallyVarying)
+
+
+@pytest.mark.parametrize("name", TWO_LOBES)
+def test_masks_select_lobes(name, variant):
+    """Component and type mask mean the same, the lobes add up to the whole, and an empty selection is black."""
+    bsdf, flags = mi.load_dict(TWO_LOBES[name]), mi.BSDFFlags
+    wi, wo = hemisphere(30, 1), hemisphere(30, 2)
+    rng = np.random.default_rng(0)
+    u, v = rng.random((30, 1)), rng.random((30, 2))
+    lobes = []
+    for component, mask in enumerate([flags.DiffuseReflection, flags.GlossyReflection]):
+        by_index, by_type = context(component), context(mask=mask)
+        value, pdf = call(bsdf.eval_pdf, by_index, wi, wo)
+        lobes.append(value)
+        np.testing.assert_array_equal(call(bsdf.eval_pdf, by_type, wi, wo)[0], value)
+        np.testing.assert_array_equal(call(bsdf.eval_pdf, by_type, wi, wo)[1], pdf)
+        for ctx in (by_index, by_type):
+            bs, _ = bsdf.sample(ctx, interaction(direction(40)), mi.Float(0.3), mi.Point2f(0.4, 0.6), True)
+            assert dr.all(bs.sampled_component == component) and dr.all(bs.sampled_type == int(mask))
+    np.testing.assert_allclose(call(bsdf.eval, context(), wi, wo)[0], sum(lobes), rtol=1e-5)
+
+    for nothing in (context(7), context(0, flags.GlossyReflection), context(mask=flags.Transmission)):
+        assert not any(value.any() for value in call(bsdf.eval_pdf, nothing, wi, wo))
+        assert not call(bsdf.sample, nothing, wi, u, v)[2].any()
+        assert not call(bsdf.eval_pdf_sample, nothing, wi, wo, u, v)[4].any()
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", TWO_LOBES)
+def test_lobes_are_chosen_by_energy(name):
+    """A lobe's share of the samples follows its share of the reflected light, at each point by itself."""
+    count = 1 << 18
+    rng = np.random.default_rng(1)
+    u, v = rng.random((count, 1)), rng.random((count, 2))
+    dark_left = mi.Bitmap(np.array([[[0.02], [0.9]]], np.float32))
+    texture = {"type": "bitmap", "bitmap": dark_left, "raw": True, "filter_type": "nearest"}
+    bsdf = mi.load_dict({**TWO_LOBES[name], "diffuse_reflectance": texture})
+    for x in (0.25, 0.75):
+        si = interaction(direction(30))
+        si.uv = mi.Point2f(x, 0.5)
+        bs, _ = bsdf.sample(context(), si, mi.Float(u.ravel()), mi.Point2f(v.T), True)
+        share = numbers(mi.Float(bs.sampled_component)).mean()
+        energies = []
+        for component in (0, 1):
+            bs, weight = bsdf.sample(context(component), si, mi.Float(u.ravel()), mi.Point2f(v.T), True)
+            energies.append(numbers(weight)[:, 1].mean())
+        assert share == pytest.approx(energies[1] / sum(energies), abs=0.1)
+
+
+@pytest.mark.parametrize("name", TWO_LOBES)
+def test_attributes_and_albedo(name, variant):
+    bsdf, si = mi.load_dict(TWO_LOBES[name]), interaction(direction(20))
+    assert dr.all(bsdf.has_attribute("diffuse_reflectance", True))
+    assert not dr.any(bsdf.has_attribute("nonsense", True))
+    assert numbers(bsdf.eval_attribute("diffuse_reflectance", si, True)).max() <= 0.6
+    if name != "phong":
+        assert numbers(bsdf.eval_attribute_1("alpha", si, True)).item() == pytest.approx(0.3)
+    albedo = numbers(bsdf.eval_diffuse_reflectance(si, True))
+    assert ((0.2 < albedo) & (albedo <= 1)).all()
+
+
+@pytest.mark.parametrize("name", TWO_LOBES)
+def test_parameters_are_traversed_and_shown(name, variant):
+    bsdf = mi.load_dict(TWO_LOBES[name])
+    params = mi.traverse(bsdf)
+    keys = {key.split(".")[0] for key in params.keys()}
+    expected = {"phong": {"exponent"}, "ward": {"alpha"}, "walter": {"alpha", "f0"}}[name]
+    assert keys == {"diffuse_reflectance", "specular_reflectance"} | expected
+    assert all(key in str(bsdf) for key in keys)
+    before = call(bsdf.eval, context(0), direction(20)[None], direction(30)[None])[0]
+    key = next(key for key in params.keys() if key.startswith("diffuse_reflectance"))
+    params[key] = params[key] * 0.5
+    params.update()
+    after = call(bsdf.eval, context(0), direction(20)[None], direction(30)[None])[0]
+    if mi.is_spectral and "rgb" in str(TWO_LOBES[name]):
+        assert (after != before).all()  # the coefficients of an upsampled colour are not proportional to it
+    else:
+        np.testing.assert_allclose(after, before / 2, rtol=1e-5)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_optimised_values_are_limited_to_the_range():
+    bsdf = mi.load_dict({"type": "ward", "alpha": 0.5})
+    params = mi.traverse(bsdf)
+    wi, wo = hemisphere(100, 1), hemisphere(100, 2)
+    for value, limit in [(7.0, 1.0), (-3.0, 1e-4)]:
+        params["alpha.value"] = value
+        params.update()
+        limited = mi.load_dict({"type": "ward", "alpha": limit})
+        np.testing.assert_array_equal(
+            call(bsdf.eval, context(), wi, wo)[0], call(limited.eval, context(), wi, wo)[0]
+        )
