@@ -68,7 +68,5 @@ class Model:
         rows = [Row("parameter", "type", "default", "range", "meaning")]
         rows += [row for parameter in cls.declared() for row in parameter.rows()]
         widths = [max(len(row[column]) for row in rows) for column in range(4)]
-        table = [
-            "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row.text]) for row in rows
-        ]
+        table = ["  ".join([*map(str.ljust, row[:4], widths), row.text]) for row in rows]
         return "\n".join([inspect.cleandoc(cls.__doc__), "", "Parameters", "----------", *table, ""])

@@ -19,7 +19,7 @@ import difflib
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -66,12 +66,12 @@ class Given:
                 continue
             if name.startswith("_arg_"):
                 raise ParameterError(
-                    f"{self.plugin}: {_kind(self.props[name])} is nested without a name; give it the name of the parameter "
-                    f"it is meant for: {_listed(known)}."
+                    f"{self.plugin}: {_kind(self.props[name])} is nested without a name; "
+                    f"give it the name of the parameter it is meant for, {_listed(known)}."
                 )
-            closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+            closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
             raise ParameterError(
-                f"{self.plugin}: unknown parameter {name}; did you mean {closest[0]}? (Known: {', '.join(known)}.)"
+                f"{self.plugin}: unknown parameter {name}; did you mean {closest}? Known are {', '.join(known)}."
             )
 
     def number(self, name: str, default: float, limits: Range) -> mi.Texture:
@@ -116,7 +116,7 @@ class Given:
             return choices[0]
         value = self.props[name]
         if value not in choices:
-            raise self.error(name, f'= {_shown(value)} is unknown; it must be one of {_listed(choices, quote=True)}')
+            raise self.error(name, f"= {_shown(value)} is unknown; it must be one of {_listed(choices, quote=True)}")
         return value
 
     def text(self, name: str) -> str:
@@ -139,15 +139,22 @@ def _kind(value) -> str:
         return "a texture"
     if isinstance(value, mi.Object):
         return "a BSDF" if isinstance(value, mi.BSDF) else f"a {value.class_name()}"
-    return {"Color3d": "a colour", "ScalarColor3d": "a colour", "Spectrum": "a spectrum"}.get(
-        type(value).__name__, "a " + type(value).__name__
-    )
+    if isinstance(value, (int, float)):
+        return "a number"
+    kind = type(value).__name__
+    return next((known for part, known in _KINDS.items() if part in kind), f"a {kind}")
+
+
+_KINDS = {"Color": "a colour", "Spectrum": "a spectrum", "Array3": "a vector", "Transform": "a transform"}
 
 
 def _shown(value) -> str:
     """A value as it appears in a message, on one line."""
     if isinstance(value, mi.Object):
         return value.class_name()
+    if hasattr(value, "wavelengths"):
+        shown = ", ".join(f"{number:g}" for number in value.values[:6])
+        return f"[{shown}, …]" if len(value.values) > 6 else f"[{shown}]"
     shown = f'"{value}"' if isinstance(value, str) else f"{value:.6g}" if isinstance(value, float) else str(value)
     return " ".join(shown.split())
 
@@ -354,8 +361,12 @@ class FresnelSet(Parameter):
     over ext_ior), or none (F = 1)."""
 
     INDEX, EXTINCTION = (0.01, 100), (0, 100)
-    SETS = {"conductor": ("eta", "k"), "material": ("material",), "schlick": ("f0",),
-            "dielectric": ("int_ior", "ext_ior")}  # fmt: skip
+    SETS: ClassVar = {
+        "conductor": ("eta", "k"),
+        "material": ("material",),
+        "schlick": ("f0",),
+        "dielectric": ("int_ior", "ext_ior"),
+    }
 
     def __init__(self):
         super().__init__("Fresnel reflectance")
@@ -398,7 +409,8 @@ class FresnelSet(Parameter):
             index = mi.lookup_ior(given.props, name, default)
         except RuntimeError as error:
             known = str(error).partition("choices are:")[2].strip()
-            raise given.error(name, f'= "{given.props[name]}" is unknown; it must be a number or one of {known}') from None
+            problem = f"= {_shown(given.props[name])} is unknown; it must be a number or one of {known}"
+            raise given.error(name, problem) from None
         return _constant(index)
 
     def _material(self, given: Given) -> FresnelSlot:
@@ -411,8 +423,8 @@ class FresnelSet(Parameter):
             closest = difflib.get_close_matches(material, known, n=3, cutoff=0.0)
             raise given.error(
                 "material",
-                f'= "{material}" is unknown; the closest of Mitsuba\'s {len(known)} conductors are {_listed(closest, True)}, '
-                f'and "none" means F = 1',
+                f"= {_shown(material)} is unknown; the closest of Mitsuba's {len(known)} conductors are "
+                f'{_listed(closest, quote=True)}, and "none" means F = 1',
             )
         return FresnelSlot({name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}, "conductor")
 

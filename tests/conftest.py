@@ -1,7 +1,7 @@
+import mitsuba as mi
 import pytest
 
 import mi_brdfs  # noqa: F401
-import mitsuba as mi
 
 mi.set_variant("scalar_rgb")  # variant_context needs one to return to
 

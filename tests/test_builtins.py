@@ -1,11 +1,10 @@
 """Our models against Mitsuba's own where the two are the same model."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 import scipy.stats
 from support import call, direction, hemisphere, is_scalar
-
-import mitsuba as mi
 
 GGX = {"type": "roughconductor", "distribution": "ggx"}
 PAIRS = {

@@ -1,13 +1,12 @@
 """Samplers: the density is what pdf says, and the weight is eval/pdf."""
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from catalogue import ROWS
-from support import call, direction, hemisphere, interaction, is_scalar
-
-import mitsuba as mi
 from mitsuba.chi2 import ChiSquareTest, SphericalDomain
+from support import call, direction, hemisphere, interaction, is_scalar
 
 ANGLES = [(0, 0), (30, 0), (60, 0), (80, 0), (60, 127)]
 

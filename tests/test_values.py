@@ -1,12 +1,11 @@
 """Values against the independent float64 reference."""
 
 import catalogue
+import mitsuba as mi
 import numpy as np
 import pytest
 from catalogue import ROWS
 from support import call, direction, hemisphere
-
-import mitsuba as mi
 
 BOTH = catalogue.BOTH
 EXTREME = [

@@ -98,9 +98,9 @@ class ApproximateBeckmann(Distribution):
     def inverse_cdf(self, c, complement, g):
         total = -expm1(-2 * g)
         in_peak = c < 0.5
-        logarithm = dr.select(
-            in_peak, log1p(-dr.select(in_peak, c * total, 0)), dr.log(dr.select(in_peak, 1, complement * total + 1 - total))
-        )
+        peak = log1p(-dr.select(in_peak, c * total, 0))
+        tail = dr.log(dr.select(in_peak, 1, complement * total + (1 - total)))
+        logarithm = dr.select(in_peak, peak, tail)
         versine = dr.minimum(-logarithm / (2 * g), 1 - 1e-7)
         return versine * (2 - versine) / dr.square(1 - versine)
 

@@ -1,0 +1,141 @@
+"""Bad input gives one sentence that names plugin, parameter, value and what is allowed; good input works in any form."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import call, direction
+
+NAN, INF = float("nan"), float("inf")
+RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
+SPECTRUM = {"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}
+
+# plugin, parameters → what the message must contain
+# ruff: noqa: E501
+REJECTED = [
+    ("ward", {"alpha": 1.7}, "ward: alpha = 1.7 is not allowed; it must be a number in [0.0001, 1] or a texture."),
+    ("ward", {"alpha": 0}, "ward: alpha = 0 is not allowed; it must be a number in [0.0001, 1] or a texture."),
+    ("ward", {"alpha": NAN}, "ward: alpha = nan is not allowed; it must be"),
+    ("ward", {"alpha_v": -INF, "alpha_u": 0.1}, "ward: alpha_v = -inf is not allowed; it must be"),
+    ("ward", {"alpha": True}, "ward: alpha = True is a boolean; it must be a number in"),
+    ("ward", {"alpha": "rough"}, 'ward: alpha = "rough" is a string; it must be a number in'),
+    ("ward", {"alpha": RGB}, "is a colour; it must be a number in"),
+    ("ward", {"alpha": SPECTRUM}, "is a spectrum; it must be a number in"),
+    ("ward", {"alpha": {"type": "diffuse"}}, "ward: alpha = SmoothDiffuse is a BSDF; it must be a number in"),
+    ("ward", {"alpha": [1, 2, 3]}, "ward: alpha = [1, 2, 3] is a vector; it must be a number in"),
+    ("ward", {"alpha": 0.1, "alpha_u": 0.1}, "ward: alpha excludes alpha_u; give either alpha or alpha_u and alpha_v."),
+    ("walter", {"alpha_u": 0.1}, "walter: alpha_u needs alpha_v beside it; give both, or alpha alone."),
+    ("ward", {"variant": "wrad"}, 'ward: variant = "wrad" is unknown; it must be one of "balanced", "ward", "ward-duer" or'),
+    ("ward", {"variant": 3}, 'ward: variant = 3 is unknown; it must be one of "balanced"'),
+    ("lambert", {"reflectance": 1.5}, "lambert: reflectance = 1.5 is not allowed; it must be a number, rgb or spectrum within [0, 1]"),
+    ("lambert", {"reflectance": {"type": "rgb", "value": [0.1, 2, 0]}}, "lambert: reflectance = [0.1, 2, 0] is not allowed"),
+    ("lambert", {"reflectance": {"type": "spectrum", "value": [(400, 0.1), (700, 1.9)]}}, "lambert: reflectance = "),
+    ("lambert", {"reflectance": -0.1}, "lambert: reflectance = -0.1 is not allowed"),
+    ("lambert", {"reflectance": NAN}, "lambert: reflectance = nan is not allowed"),
+    ("lambert", {"reflectance": "red"}, 'lambert: reflectance = "red" is a string; it must be a number, rgb or spectrum'),
+    ("lambert", {"reflectanse": 0.1}, "lambert: unknown parameter reflectanse; did you mean reflectance?"),
+    ("phong", {"alpha": 0.1}, "phong: unknown parameter alpha; did you mean"),
+    ("phong", {"exponent": 2e6}, "phong: exponent = 2e+06 is not allowed; it must be a number in [0, 1e+06] or a texture."),
+    ("walter", {"f0": 0.04, "int_ior": 1.5}, "walter: f0 excludes int_ior; give one of eta and k, material, f0, int_ior and"),
+    ("walter", {"material": "Au", "eta": 1.5, "k": 1.0}, "walter: eta excludes material; give one of"),
+    ("walter", {"eta": 1.5}, "walter: eta needs k beside it."),
+    ("walter", {"eta": 1.5, "k": -1.0}, "walter: k = -1 is not allowed; it must be"),
+    ("walter", {"material": "gold"}, 'walter: material = "gold" is unknown; the closest of Mitsuba\'s'),
+    ("walter", {"material": 3}, "walter: material = 3 is a number; it must be a name."),
+    ("walter", {"int_ior": "glas"}, 'walter: int_ior = "glas" is unknown; it must be a number or one of vacuum, helium'),
+    ("walter", {"int_ior": 0}, "walter: int_ior = 0 is not allowed; it must be a number in [0.01, 100]"),
+    ("walter", {"int_ior": True}, "walter: int_ior = True is a boolean"),
+    ("walter", {"f0": 1.2}, "walter: f0 = 1.2 is not allowed"),
+    ("walter", {"rotation": NAN}, "walter: rotation = nan is not allowed"),
+    ("walter", {"shadowing": "smith"}, 'walter: shadowing = "smith" is unknown; it must be one of "separable" or "correlated".'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_spectral"])
+@pytest.mark.parametrize("plugin, given, message", REJECTED, ids=[f"{p} {g}" for p, g, _ in REJECTED])
+def test_rejected(plugin, given, message, variant):
+    with mi.variant_context(variant), pytest.raises(RuntimeError) as caught:
+        mi.load_dict({"type": plugin, **given})
+    sentence = str(caught.value).strip().splitlines()[-1]
+    assert message in sentence
+    assert sentence.split(": ")[1] == plugin and sentence.endswith(".")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_nested_objects_without_a_name():
+    with pytest.raises(RuntimeError, match=r"ward: a texture is nested without a name; give it the name of the parameter"):
+        mi.load_string('<bsdf type="ward" version="3.0.0"><texture type="checkerboard"/></bsdf>')
+    with pytest.raises(RuntimeError, match=r"lambert: a BSDF is nested without a name"):
+        mi.load_string('<bsdf type="lambert" version="3.0.0"><bsdf type="diffuse"/></bsdf>')
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_errors_in_xml_name_the_line():
+    xml = '<scene version="3.0.0">\n<bsdf type="ward">\n<float name="alpha" value="7"/>\n</bsdf>\n</scene>'
+    with pytest.raises(RuntimeError, match=r"(?s)line 2.*ward: alpha = 7 is not allowed"):
+        mi.load_string(xml)
+
+
+def bitmap(value, channels=1):
+    return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(np.full((2, 2, channels), value, np.float32))}
+
+
+@pytest.mark.parametrize("spelling", ["float", "integer", "uniform", "bitmap", "checkerboard"])
+def test_numbers_take_any_texture(spelling, variant):
+    if spelling == "checkerboard" and mi.is_spectral:
+        pytest.skip("Mitsuba's checkerboard does not answer numbers in spectral variants")
+    given = {
+        "float": 1.0,
+        "integer": 1,
+        "uniform": {"type": "uniform", "value": 1.0},
+        "bitmap": bitmap(1.0),
+        "checkerboard": {"type": "checkerboard", "color0": 1.0, "color1": 1.0},
+    }[spelling]
+    bsdf, plain = mi.load_dict({"type": "ward", "alpha": given}), mi.load_dict({"type": "ward", "alpha": 1.0})
+    wi, wo = direction(20)[None], direction(50, 30)[None]
+    ctx = mi.BSDFContext()
+    np.testing.assert_allclose(call(bsdf.eval, ctx, wi, wo)[0], call(plain.eval, ctx, wi, wo)[0], rtol=1e-5)
+
+
+@pytest.mark.parametrize("spelling", ["rgb", "spectrum", "bitmap", "texture object"])
+def test_colours_take_any_texture(spelling, variant):
+    given = {
+        "rgb": {"type": "rgb", "value": [0.4, 0.4, 0.4]},
+        "spectrum": {"type": "spectrum", "value": [(300, 0.4), (900, 0.4)]},
+        "bitmap": bitmap(0.4),
+        "texture object": mi.load_dict({"type": "uniform", "value": 0.4}),
+    }[spelling]
+    bsdf = mi.load_dict({"type": "lambert", "reflectance": given})
+    value = call(bsdf.eval, mi.BSDFContext(), direction(20)[None], direction(60)[None])[0]
+    np.testing.assert_allclose(value, 0.4 / np.pi * 0.5, rtol=2e-3)  # rgb values are fitted by a smooth spectrum
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_ward_leaves_a_lone_roughness_at_its_default():
+    """As Mitsuba 0.6 does."""
+    lone = mi.load_dict({"type": "ward", "alpha_v": 0.4})
+    pair = mi.load_dict({"type": "ward", "alpha_u": 0.1, "alpha_v": 0.4})
+    assert str(lone) == str(pair)
+
+
+def test_rotation_turns_counter_clockwise_from_dp_du(variant):
+    """A quarter turn swaps the roughnesses; an eighth turn lays the wide axis along +45°."""
+    ctx, up = mi.BSDFContext(), direction(0)[None]
+
+    def value(phi, **given):
+        bsdf = mi.load_dict({"type": "walter", **given})
+        return call(bsdf.eval, ctx, up, direction(40, phi)[None])[0].max()
+
+    tall, wide = {"alpha_u": 0.05, "alpha_v": 0.4}, {"alpha_u": 0.4, "alpha_v": 0.05}
+    assert value(20, **tall, rotation=0.25) == pytest.approx(value(20, **wide), rel=1e-4)
+    assert value(45, **wide, rotation=0.125) > 10 * value(-45, **wide, rotation=0.125)
+
+
+@pytest.mark.parametrize("material", ["Au", "Cu", "none"])
+def test_materials_are_mitsubas(material, variant):
+    """In spectral and in mono variants, too, where Mitsuba makes something else of the same spectra."""
+    if mi.is_polarized:
+        pytest.skip("Mitsuba's conductors polarize")
+    ours = mi.load_dict({"type": "walter", "material": material})
+    theirs = mi.load_dict({"type": "roughconductor", "distribution": "ggx", "material": material})
+    wi, wo, ctx = direction(20)[None], direction(25, 180)[None], mi.BSDFContext()
+    np.testing.assert_allclose(call(ours.eval, ctx, wi, wo)[0], call(theirs.eval, ctx, wi, wo)[0], rtol=1e-4)

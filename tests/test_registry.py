@@ -1,0 +1,101 @@
+"""Registration: in any order, in every variant, beside whatever is there."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import mitsuba as mi
+import pytest
+
+import mi_brdfs
+
+
+def run(code: str) -> str:
+    """What a fresh Python prints."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+ORDERS = {
+    "before": "import mi_brdfs, mitsuba as mi; mi.set_variant('{0}')",
+    "after": "import mitsuba as mi; mi.set_variant('{0}'); import mi_brdfs",
+    "twice": "import mitsuba as mi; mi.set_variant('{0}'); import mi_brdfs; import mi_brdfs; mi.set_variant('{0}')",
+    "back and forth": "import mi_brdfs, mitsuba as mi; [mi.set_variant(v) for v in ('scalar_spectral', '{0}') * 2]",
+}
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("variant", ["scalar_rgb", "scalar_spectral", "scalar_spectral_polarized"])
+def test_any_order_of_import_and_variant(order, variant):
+    check = "; print(type(mi.load_dict({'type': 'ward'})).__name__, mi.variant())"
+    assert run(ORDERS[order].format(variant) + check) == f"Ward {variant}\n"
+
+
+def test_any_order_in_llvm():
+    """Importing after the variant is set may warn of a bad LLVM, but registers all the same."""
+    code = "import warnings; warnings.simplefilter('ignore'); " + ORDERS["after"].format("llvm_ad_rgb")
+    assert run(code + "; print(type(mi.load_dict({'type': 'walter'})).__name__)") == "Walter\n"
+
+
+def test_import_sets_no_variant():
+    assert run("import mi_brdfs, mitsuba as mi; print(mi.variant())") == "None\n"
+
+
+def test_variant_context():
+    code = (
+        "import mi_brdfs, mitsuba as mi\n"
+        "mi.set_variant('scalar_rgb')\n"
+        "outer = mi.load_dict({'type': 'phong'})\n"
+        "with mi.variant_context('scalar_spectral'):\n"
+        "    inner = mi.load_dict({'type': 'phong'})\n"
+        "    print(isinstance(inner, mi.BSDF), isinstance(outer, mi.BSDF))\n"
+        "again = mi.load_dict({'type': 'phong'})\n"
+        "print(*(isinstance(bsdf, mi.BSDF) for bsdf in (inner, outer, again)))"
+    )
+    assert run(code) == "True False\nFalse True True\n"
+
+
+def test_known_as_bsdfs_in_every_variant(variant):
+    """An unregistered plugin name would be an unknown plugin, not a BSDF with a wrong parent."""
+    for name in mi_brdfs.list_models():
+        assert isinstance(mi.load_dict({"type": name}), mi.BSDF)
+        assert isinstance(mi.load_string(f'<bsdf type="{name}" version="3.0.0"/>'), mi.BSDF)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_inside_other_bsdfs():
+    flat = {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(mi.TensorXf([0.5, 0.5, 1.0], (1, 1, 3)))}
+    bumped = {"type": "normalmap", "normalmap": flat, "inner": {"type": "phong"}}
+    nested = {"type": "blendbsdf", "weight": 0.5, "a": {"type": "ward"}, "b": bumped}
+    assert mi.load_dict({"type": "twosided", "inner": nested}).component_count() == 8
+
+
+def test_no_builtin_is_shadowed():
+    """Mitsuba's plugins are shared libraries, and those that its Python package registers."""
+    package = Path(mi.__file__).parent
+    builtin = {path.stem for path in (package / "plugins").iterdir()}
+    for source in (package / "python").rglob("*.py"):
+        builtin |= set(re.findall(r"register_\w+\(\s*['\"](\w+)", source.read_text(encoding="utf-8")))
+    assert {"diffuse", "roughconductor", "prb"} <= builtin
+    assert not builtin & set(mi_brdfs.list_models())
+
+
+def test_list_and_info():
+    assert mi_brdfs.list_models() == sorted(mi_brdfs.list_models())
+    assert {"lambert", "phong", "ward", "walter"} <= set(mi_brdfs.list_models())
+    page = mi_brdfs.info("ward")
+    for part in ("doi:10.1145/133994.134078", "alpha_u, alpha_v", "balanced | ward | ward-duer", "Reciprocal"):
+        assert part in page
+    with pytest.raises(ValueError, match="There is no model 'wrad'; did you mean 'ward'"):
+        mi_brdfs.info("wrad")
+
+
+@pytest.mark.parametrize("name", mi_brdfs.list_models())
+def test_examples_on_the_manual_pages_load(name):
+    page = mi_brdfs.info(name)
+    xml = re.search(r"<bsdf .*?</bsdf>", page, re.S).group().replace("<bsdf", '<bsdf version="3.0.0"', 1)
+    given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
+    with mi.variant_context("scalar_rgb"):
+        assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
