@@ -8,7 +8,11 @@ look at one in.
 import re
 import warnings
 
-import mitsuba as mi
+from . import llvm
+
+llvm.point_to_extra()  # before Mitsuba is imported, which loads LLVM
+
+import mitsuba as mi  # noqa: E402
 
 __version__ = "0.1.0"
 
@@ -18,10 +22,6 @@ if _version < _TESTED:
     raise ImportError(f"mi_brdfs needs Mitsuba 3.9 or newer, this is {mi.__version__}: pip install -U mitsuba")
 if _version > _TESTED:
     warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
-
-from . import llvm  # noqa: E402
-
-llvm.point_to_extra()
 
 from .preview import preview_scene  # noqa: E402
 from .registry import info, install, list_models  # noqa: E402

@@ -274,7 +274,7 @@ def _render(scene: mi.Scene, spp: int | None, seed: int) -> Picture:
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("samples per pixel,"),
-        TimeRemainingColumn(elapsed_when_finished=True),
+        TimeRemainingColumn(),
         TextColumn("left"),
     ]
     with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:

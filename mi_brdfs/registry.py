@@ -15,13 +15,13 @@ from .model import Model
 
 def _discover() -> dict[str, type[Model]]:
     """The models of the files in ``mi_brdfs/models``, by plugin name and alias."""
-    found = {}
+    found = []
     for module_info in pkgutil.iter_modules(models.__path__):
         module = importlib.import_module(f"{models.__name__}.{module_info.name}")
         for value in vars(module).values():
             if isinstance(value, type) and issubclass(value, Model) and value.__module__ == module.__name__:
-                found.update(dict.fromkeys(value.plugins, value))
-    return dict(sorted(found.items()))
+                found.append(value)
+    return {name: model for model in sorted(found, key=lambda model: model.plugins) for name in model.plugins}
 
 
 MODELS = _discover()
@@ -29,7 +29,7 @@ _registered: set[str] = set()
 
 
 def list_models() -> list[str]:
-    """The names of all plugins, aliases included, in alphabetical order."""
+    """The names of all plugins, in alphabetical order, each followed by its aliases."""
     return list(MODELS)
 
 
@@ -41,7 +41,7 @@ def find_model(name: str) -> type[Model]:
     """
     if name not in MODELS:
         closest = difflib.get_close_matches(str(name), MODELS, n=1, cutoff=0.0)[0]
-        raise ValueError(f"There is no model {name!r}; did you mean {closest!r}? list_models() names them all.")
+        raise ValueError(f"There is no model {name!r}; did you mean {closest!r}?")
     return MODELS[name]
 
 

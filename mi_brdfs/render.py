@@ -135,11 +135,11 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
 
 
 def _samples_per_pass() -> int:
-    """About a second's worth on an ordinary scene; fixed numbers, so that results do not depend on timing."""
+    """About a second's worth on an ordinary scene: fixed numbers, so that results do not depend on timing."""
     if mi.variant().startswith("scalar"):
         return 1 << 14
     if mi.variant().startswith("llvm"):
-        return (1 << 18) * dr.thread_count()
+        return (1 << 20) * dr.thread_count()
     return 1 << 24
 
 

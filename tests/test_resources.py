@@ -1,0 +1,92 @@
+"""What a plugin costs over time: no kernels compiled on updates, no time or memory lost on loading."""
+
+import subprocess
+import sys
+
+import drjit as dr
+import mitsuba as mi
+import pytest
+
+MODELS = {
+    "lambert": {"type": "lambert"},
+    "phong": {"type": "phong"},
+    "ward": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3, "rotation": 0.1},
+    "walter": {"type": "walter", "alpha": 0.2, "eta": 0.2, "k": 3.0},
+    "walter dielectric": {"type": "walter", "int_ior": 1.5},
+}
+
+
+def scene_of(bsdf):
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 3},
+        "sensor": {
+            "type": "perspective",
+            "to_world": mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": 16, "height": 16},
+        },
+        "shape": {"type": "sphere", "bsdf": bsdf},
+        "sky": {"type": "constant"},
+    }
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", MODELS)
+def test_updates_compile_no_kernel(name):
+    """After the first update of a parameter no value of it makes a kernel that was not there."""
+    scene = mi.load_dict(scene_of(MODELS[name]))
+    params = mi.traverse(scene)
+    keys = [key for key in params.keys() if key.startswith("shape.bsdf.")]
+
+    def compiled():
+        history = dr.kernel_history([dr.KernelType.JIT])
+        return sum(not kernel["cache_hit"] for kernel in history), len(history)
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for key in keys:
+            for step in range(4):
+                params[key] = params[key] * 0.95
+                params.update()
+                dr.eval(mi.render(scene, params, spp=4, seed=step))
+                fresh, all_of_them = compiled()
+                assert all_of_them > 0
+                if step > 0:
+                    assert fresh == 0, key
+
+
+CYCLES = """
+import gc, statistics, time
+import mi_brdfs, mitsuba as mi, drjit as dr
+mi.set_variant("{variant}")
+from test_resources import MODELS, scene_of
+
+def resident():
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * 4096 / 2**20
+
+times, memory = [], []
+for cycle in range(200):
+    start = time.perf_counter()
+    for bsdf in MODELS.values():
+        dr.eval(mi.render(mi.load_dict(scene_of(bsdf)), spp=1, seed=cycle))
+    dr.sync_thread()
+    times.append(time.perf_counter() - start)
+    memory.append(resident())
+print(statistics.median(times[-50:]) / statistics.median(times[20:70]), memory[-1] - memory[50])
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb"])
+def test_loading_200_times_loses_neither_time_nor_memory(variant, pytestconfig):
+    """In a process of its own: the last 50 cycles take as long as earlier ones, in the median, within the noise of a
+    busy machine, and memory grows by less than 5 MB over the last 150."""
+    done = subprocess.run(
+        [sys.executable, "-c", CYCLES.format(variant=variant)],
+        capture_output=True, text=True, timeout=600, cwd=pytestconfig.rootpath / "tests",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    slower, growth = map(float, done.stdout.split())
+    assert slower < 1.25
+    assert growth < 5
