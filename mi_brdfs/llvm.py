@@ -97,7 +97,7 @@ def install_advice(system: str = sys.platform, machine: str = platform.machine()
     if system == "win32":
         return "install LLVM from https://github.com/llvm/llvm-project/releases"
     if system == "linux" and machine == "x86_64":
-        return 'pip install "mi_brdfs[llvm]"'
+        return f"pip install {PACKAGE}"
     return "install LLVM 17 or later with the system's package manager"
 
 

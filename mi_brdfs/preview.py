@@ -11,12 +11,16 @@ OUTLINE = [
     (0.96, 1.45), (0.66, 1.80), (0.38, 1.92), (0.30, 2.04), (0.34, 2.14), (0.20, 2.26), (0.00, 2.28),
 ]  # fmt: skip
 
+# The room around it, from its rim to the middle of its floor: a round cove, open above.
+COVE = [(9, 7), (9, 4), (8.6, 1.4), (7, 0.2), (5, 0), (2, 0), (0, 0)]
+
 
 def preview_scene(bsdf: dict | mi.BSDF) -> dict:
     """The dict of a scene that shows a material: ``mi.render(mi.load_dict(preview_scene({"type": "ward"})))``.
 
     A turned body, whose curves show highlight, grazing reflection and anisotropy (dp_du runs around its axis), stands
-    in a softbox: a key light from the left, a narrow rim light from the right, a dim sky. 512 x 512 pixels, 128 samples.
+    in a round cove under a soft key light from the left, a narrow rim light from the right and a dim sky. The picture
+    has 512 x 512 pixels and 128 samples.
 
     Args:
         bsdf: the material, a plugin dict or a loaded BSDF.
@@ -36,22 +40,18 @@ def preview_scene(bsdf: dict | mi.BSDF) -> dict:
             "sampler": {"type": "independent", "sample_count": 128},
         },
         "body": _revolve(_smooth(OUTLINE, 160), 192, bsdf),
-        "floor": {
-            "type": "rectangle",
-            "to_world": T().scale(30),
-            "bsdf": {"type": "diffuse", "reflectance": 0.35},
-        },
+        "cove": _revolve(_smooth(COVE, 64), 64, {"type": "diffuse", "reflectance": 0.3}),
         "key": {
             "type": "rectangle",
             "to_world": T().look_at(origin=[-4, -3.5, 5], target=[0, 0, 1], up=[0, 0, 1]).scale([1.6, 1.6, 1]),
-            "emitter": {"type": "area", "radiance": 9.0},
+            "emitter": {"type": "area", "radiance": 8.0},
         },
         "rim": {
             "type": "rectangle",
             "to_world": T().look_at(origin=[4.5, 1.5, 2.2], target=[0, 0, 1.2], up=[0, 0, 1]).scale([0.3, 1.8, 1]),
             "emitter": {"type": "area", "radiance": 12.0},
         },
-        "sky": {"type": "constant", "radiance": 0.25},
+        "sky": {"type": "constant", "radiance": 0.3},
     }
 
 
@@ -62,7 +62,8 @@ def _smooth(points, count: int) -> np.ndarray:
     k = np.minimum(t.astype(int), len(points) - 2)
     t = (t - k)[:, None]
     p0, p1, p2, p3 = (p[k + offset] for offset in range(4))
-    curve = 0.5 * (2 * p1 + (p2 - p0) * t + (2 * p0 - 5 * p1 + 4 * p2 - p3) * t**2 + (3 * (p1 - p2) + p3 - p0) * t**3)
+    a, b, c = p2 - p0, 2 * p0 - 5 * p1 + 4 * p2 - p3, 3 * (p1 - p2) + p3 - p0
+    curve = p1 + 0.5 * (a * t + b * t**2 + c * t**3)
     curve[:, 0] = np.maximum(curve[:, 0], 0)
     return curve
 
@@ -86,7 +87,7 @@ def _revolve(outline: np.ndarray, segments: int, bsdf: dict | mi.BSDF) -> mi.Mes
 
     props = mi.Properties()
     props["bsdf"] = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
-    mesh = mi.Mesh("body", positions.size // 3, len(faces), props, has_vertex_normals=True, has_vertex_texcoords=True)
+    mesh = mi.Mesh("revolved", positions.size // 3, len(faces), props, has_vertex_normals=True, has_vertex_texcoords=True)
     params = mi.traverse(mesh)
     params["vertex_positions"] = positions.astype(np.float32).ravel()
     params["vertex_normals"] = normals.astype(np.float32).ravel()

@@ -28,5 +28,6 @@ class SmithGGX:
 
 
 def kelemen(facet):
-    """cosθ_i cosθ_o / cos²θ_d (Kelemen and Szirmay-Kalos 2001, doi:10.2312/egs.20011020)."""
+    """cosθ_i cosθ_o / cos²θ_d (Kelemen and Szirmay-Kalos, A microfacet based coupled specular-matte BRDF model with
+    importance sampling, Eurographics short presentations, 2001)."""
     return facet.cos_i * facet.cos_o / dr.square(facet.cos_d)
