@@ -87,7 +87,8 @@ def _revolve(outline: np.ndarray, segments: int, bsdf: dict | mi.BSDF) -> mi.Mes
 
     props = mi.Properties()
     props["bsdf"] = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
-    mesh = mi.Mesh("revolved", positions.size // 3, len(faces), props, has_vertex_normals=True, has_vertex_texcoords=True)
+    vertices = positions.size // 3
+    mesh = mi.Mesh("revolved", vertices, len(faces), props, has_vertex_normals=True, has_vertex_texcoords=True)
     params = mi.traverse(mesh)
     params["vertex_positions"] = positions.astype(np.float32).ravel()
     params["vertex_normals"] = normals.astype(np.float32).ravel()

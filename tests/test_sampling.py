@@ -25,7 +25,6 @@ CHI2_COUNT = sum(len(ANGLES) * 3 for _ in ROWS)  # at least as many as there are
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.filterwarnings("ignore:The AST-transforming decorator")  # inside Mitsuba's own test
 @pytest.mark.parametrize("row", ROWS, ids=str)
 def test_chi2(row):
     """The stock test, with cells that a lobe does not outrun. The sphere's poles are laid into the horizon, as cells
