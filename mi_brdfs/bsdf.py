@@ -30,9 +30,9 @@ class ModelBSDF:
         self.model = self.model_class(props)
 
         flags = mi.BSDFFlags
-        slots = self.model.slots().values()
+        slots = self.model.slots.values()
         common = flags.FrontSide
-        if any(texture.is_spatially_varying() for texture in self.model.textures().values()):
+        if any(texture.is_spatially_varying() for texture in self.model.textures.values()):
             common |= flags.SpatiallyVarying
         self.kinds, components = [], []
         for lobe in self.model.lobes(self.model.placeholders()):
@@ -128,7 +128,7 @@ class ModelBSDF:
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(sum(lobe.albedo(normal) for lobe in lobes)), 0, 1))
 
     def has_attribute(self, name, active=True):
-        return mi.Bool(name in self.model.textures())
+        return mi.Bool(name in self.model.textures)
 
     def eval_attribute(self, name, si, active=True):
         return self._attribute(name).eval(si, active)
@@ -140,18 +140,18 @@ class ModelBSDF:
         return self._attribute(name).eval_3(si, active)
 
     def _attribute(self, name):
-        textures = self.model.textures()
+        textures = self.model.textures
         if name not in textures:
             raise ValueError(f"{self.model.plugins[0]}: no attribute {name}; there are {', '.join(textures)}.")
         return textures[name]
 
     def traverse(self, callback):
-        for name, texture in self.model.textures().items():
+        for name, texture in self.model.textures.items():
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
     def to_string(self):
         lines = [f"  {name} = {value}" for name, value in vars(self.model).items() if isinstance(value, str)]
-        lines += [f"  {name} = {texture}" for name, texture in self.model.textures().items()]
+        lines += [f"  {name} = {texture}" for name, texture in self.model.textures.items()]
         return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 
 

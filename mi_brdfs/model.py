@@ -16,7 +16,8 @@ class Model:
     """A BRDF model. A subclass is its paper in code: its docstring is the manual page, its class attributes declare
     the parameters (:mod:`mi_brdfs.parameters`), and :meth:`lobes` says what they mean.
 
-    An instance belongs to one plugin instance and holds its parameters, under the declared names.
+    An instance belongs to one plugin instance. It holds the parameters that are textures as ``slots``, by declared
+    name, with all their ``textures`` by property name; choices are attributes under their declared names.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -30,8 +31,14 @@ class Model:
         given = Given(self.plugins[0], props)
         declared = self.declared()
         given.reject_unknown([name for parameter in declared for name in parameter.names])
+        self.slots: dict[str, Slot] = {}
         for parameter in declared:
-            setattr(self, parameter.name, parameter.bind(given))
+            bound = parameter.bind(given)
+            if isinstance(bound, Slot):
+                self.slots[parameter.name] = bound
+            else:
+                setattr(self, parameter.name, bound)
+        self.textures = {name: texture for slot in self.slots.values() for name, texture in slot.textures.items()}
         for name in props.keys():
             props.mark_queried(name)
 
@@ -46,21 +53,13 @@ class Model:
         number and kinds depend on nothing but the model's choices."""
         raise NotImplementedError
 
-    def slots(self) -> dict[str, Slot]:
-        """The parameters that are textures, by declared name."""
-        return {name: value for name, value in vars(self).items() if isinstance(value, Slot)}
-
     def evaluate(self, si, active) -> SimpleNamespace:
-        """The values of all parameters at a surface interaction."""
-        return SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in self.slots().items()})
+        """The values of the parameters that are textures, at a surface interaction."""
+        return SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in self.slots.items()})
 
     def placeholders(self) -> SimpleNamespace:
-        """Stand-ins for the values, to learn of which lobes the model consists."""
-        return SimpleNamespace(**{p.name: p.placeholder() for p in self.declared() if p.name in self.slots()})
-
-    def textures(self) -> dict[str, mi.Texture]:
-        """The textures of all parameters, by property name."""
-        return {name: texture for slot in self.slots().values() for name, texture in slot.textures.items()}
+        """Stand-ins for these values, to learn of which lobes the model consists."""
+        return SimpleNamespace(**{p.name: p.placeholder() for p in self.declared() if p.name in self.slots})
 
     @classmethod
     def manual(cls) -> str:
