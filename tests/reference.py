@@ -242,7 +242,7 @@ def toon(
     specular_smooth,
     normalization,
 ):
-    """Two-band shading after Lake et al. 2000: f cos = rho r(c) / Z, with c the cosines of i with n and the mirror R."""
+    """Two-band shading after Lake et al. 2000: f cos = rho r(c) / Z, c the cosine of i with n or with the mirror R."""
     if normalization not in ("energy", "none"):
         raise ValueError(normalization)
     lobes = 0.0
@@ -328,7 +328,7 @@ def vcavity(i, o):
 def cooktorrance(
     i, o, diffuse_reflectance, specular_reflectance, alpha, distribution, normalization, fresnel=np.ones_like
 ):
-    """Cook and Torrance 1982: f = F D G / (4 NL NV), or 4 times it, as printed with D and 1 / pi of their own (tog82)."""
+    """Cook and Torrance 1982: f = F D G / (4 NL NV), or 4 times it as printed, with 1 / (pi NL NV) (tog82)."""
     match distribution:
         case "beckmann":
             d = beckmann(*_half(i, o), alpha, alpha)

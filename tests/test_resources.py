@@ -6,14 +6,7 @@ import sys
 import drjit as dr
 import mitsuba as mi
 import pytest
-
-MODELS = {
-    "lambert": {"type": "lambert"},
-    "phong": {"type": "phong"},
-    "ward": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3, "rotation": 0.1},
-    "walter": {"type": "walter", "alpha": 0.2, "eta": 0.2, "k": 3.0},
-    "walter dielectric": {"type": "walter", "int_ior": 1.5},
-}
+from catalogue import SMOOTH
 
 
 def scene_of(bsdf):
@@ -31,10 +24,10 @@ def scene_of(bsdf):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", SMOOTH)
 def test_updates_compile_no_kernel(name):
     """After the first update of a parameter no value of it makes a kernel that was not there."""
-    scene = mi.load_dict(scene_of(MODELS[name]))
+    scene = mi.load_dict(scene_of(SMOOTH[name]))
     params = mi.traverse(scene)
     keys = [key for key in params.keys() if key.startswith("shape.bsdf.")]
 
@@ -58,7 +51,8 @@ CYCLES = """
 import gc, statistics, time
 import mi_brdfs, mitsuba as mi, drjit as dr
 mi.set_variant("{variant}")
-from test_resources import MODELS, scene_of
+from catalogue import SMOOTH
+from test_resources import scene_of
 
 def resident():
     with open("/proc/self/statm") as statm:
@@ -67,7 +61,7 @@ def resident():
 times, memory = [], []
 for cycle in range(200):
     start = time.perf_counter()
-    for bsdf in MODELS.values():
+    for bsdf in SMOOTH.values():
         dr.eval(mi.render(mi.load_dict(scene_of(bsdf)), spp=1, seed=cycle))
     dr.sync_thread()
     times.append(time.perf_counter() - start)

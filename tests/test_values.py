@@ -1,28 +1,11 @@
 """Values against the independent float64 reference."""
 
-import catalogue
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import ROWS
+from catalogue import EXTREME, ROWS
 from support import call, direction, hemisphere
 
-BOTH = catalogue.BOTH
-EXTREME = [
-    catalogue.ward(f"{variant} alpha {α:g}", 0.4, 0.5, (α, 3 * α), variant, alpha_u=α, alpha_v=3 * α, **BOTH)
-    for variant in ("balanced", "ward", "ward-duer", "approximate")
-    for α in (1e-3, 0.3)
-]
-EXTREME += [
-    catalogue.walter(f"{shadowing} alpha {α:g}", 0.4, 0.5, (α, 3 * α), shadowing, alpha_u=α, alpha_v=3 * α, **BOTH)
-    for shadowing in ("separable", "correlated")
-    for α in (1e-3, 0.6)
-]
-EXTREME += [
-    catalogue.phong(f"{normalization} exponent {n:g}", 0.4, 0.5, n, normalization, exponent=n, **BOTH)
-    for normalization in ("energy", "none", "original")
-    for n in (1.0, 1e4, 1e5)
-]
 COSINES = [1, 0.999, 0.9, 0.7, 0.4, 0.1, 0.05, 0.02]
 
 
