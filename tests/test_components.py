@@ -137,3 +137,16 @@ def test_optimised_values_are_limited_to_the_range():
         np.testing.assert_array_equal(
             call(bsdf.eval, context(), wi, wo)[0], call(limited.eval, context(), wi, wo)[0]
         )
+
+
+@pytest.mark.parametrize("name", TWO_LOBES)
+def test_reflected_light_is_unpolarized(name):
+    """Of the Mueller matrices only the first entry is not zero."""
+    with mi.variant_context("llvm_ad_mono_polarized"):
+        bsdf, si, wo = mi.load_dict(TWO_LOBES[name]), interaction(direction(40)), mi.Vector3f(direction(30, 160))
+        sample = (mi.Float(0.5), mi.Point2f(0.3, 0.6))
+        value, _, _, weight = bsdf.eval_pdf_sample(context(), si, wo, *sample, True)
+        matrices = [value, weight, bsdf.eval(context(), si, wo, True), bsdf.sample(context(), si, *sample, True)[1]]
+        for matrix in [*matrices, bsdf.eval_diffuse_reflectance(si, True)]:
+            entries = np.array(matrix).reshape(4, 4, -1)
+            assert (entries[0, 0] > 0).all() and np.count_nonzero(entries) == entries.shape[2]

@@ -48,7 +48,7 @@ def test_updates_compile_no_kernel(name):
 
 
 CYCLES = """
-import gc, statistics, time
+import time
 import mi_brdfs, mitsuba as mi, drjit as dr
 mi.set_variant("{variant}")
 from catalogue import SMOOTH
@@ -66,7 +66,7 @@ for cycle in range(200):
     dr.sync_thread()
     times.append(time.perf_counter() - start)
     memory.append(resident())
-print(statistics.median(times[-50:]) / statistics.median(times[20:70]), memory[-1] - memory[50])
+print(min(times[-50:]) / min(times[20:70]), memory[-1] - memory[50])
 """
 
 
@@ -74,13 +74,13 @@ print(statistics.median(times[-50:]) / statistics.median(times[20:70]), memory[-
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb"])
 def test_loading_200_times_loses_neither_time_nor_memory(variant, pytestconfig):
-    """In a process of its own: the last 50 cycles take as long as earlier ones, in the median, within the noise of a
-    busy machine, and memory grows by less than 5 MB over the last 150."""
+    """In a process of its own: the last 50 cycles take as long as earlier ones, by the fastest of each, which a busy
+    machine disturbs least, and memory grows by less than 5 MB over the last 150."""
     done = subprocess.run(
         [sys.executable, "-c", CYCLES.format(variant=variant)],
         capture_output=True, text=True, timeout=600, cwd=pytestconfig.rootpath / "tests",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     slower, growth = map(float, done.stdout.split())
-    assert slower < 1.25
+    assert slower < 1.1
     assert growth < 5
