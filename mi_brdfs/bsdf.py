@@ -36,7 +36,10 @@ class ModelBSDF:
             common |= flags.SpatiallyVarying
         self.kinds, components = [], []
         for lobe in self.model.lobes(self.model.placeholders()):
-            kind = flags.GlossyReflection if lobe.glossy else flags.DiffuseReflection
+            if lobe.transmits:
+                kind = flags.GlossyTransmission if lobe.glossy else flags.DiffuseTransmission
+            else:
+                kind = flags.GlossyReflection if lobe.glossy else flags.DiffuseReflection
             component = kind | common
             if lobe.glossy and any(slot.anisotropic for slot in slots):
                 component |= flags.Anisotropic
@@ -66,11 +69,15 @@ class ModelBSDF:
 
     @staticmethod
     def _eval_pdf(valid, mixture, frame, wo):
-        valid = dr.select(wo.z > 0, valid, False)
-        if valid is False:
-            return mi.UnpolarizedSpectrum(0), mi.Float(0)
-        value, pdf = mixture.eval_pdf(frame.to_local(dr.select(valid, wo, mi.Vector3f(0, 0, 1))))
-        return dr.select(valid, value, 0), dr.select(valid, pdf, 0)
+        value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
+        for transmitted in sorted({lobe.transmits for lobe in mixture.lobes}):
+            here = dr.select(wo.z < 0 if transmitted else wo.z > 0, valid, False)
+            if here is False:
+                continue
+            harmless = mi.Vector3f(0, 0, -1 if transmitted else 1)
+            side = mixture.eval_pdf(frame.to_local(dr.select(here, wo, harmless)), transmitted)
+            value, pdf = value + dr.select(here, side[0], 0), pdf + dr.select(here, side[1], 0)
+        return value, pdf
 
     def _sample(self, valid, mixture, components, frame, sample1, sample2):
         bs = dr.zeros(mi.BSDFSample3f)
@@ -125,7 +132,8 @@ class ModelBSDF:
         """The albedo at normal incidence: the diffuse colour and the specular lobes' together."""
         normal = mi.Vector3f(0, 0, 1)
         lobes = self.model.lobes(self.model.evaluate(si, active))
-        return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(sum(lobe.albedo(normal) for lobe in lobes)), 0, 1))
+        albedo = sum(lobe.albedo(normal) for lobe in lobes if not lobe.transmits)
+        return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 
     def has_attribute(self, name, active=True):
         return mi.Bool(name in self.model.textures)
@@ -150,7 +158,7 @@ class ModelBSDF:
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
     def to_string(self):
-        lines = [f"  {name} = {value}" for name, value in vars(self.model).items() if isinstance(value, str)]
+        lines = [f"  {name} = {value}" for name, value in vars(self.model).items() if isinstance(value, (str, bool))]
         lines += [f"  {name} = {texture}" for name, texture in self.model.textures.items()]
         return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 

@@ -39,6 +39,29 @@ def expm1(x):
     return dr.select(small, series, dr.exp(dr.select(small, 0, x)) - 1)
 
 
+def log1p_ratio(x):
+    """log(1 + x)/x, and its limit 1 at x = 0."""
+    small = abs(x) < 1e-3
+    series = 1 - x * (1 / 2 - x * (1 / 3 - x / 4))
+    safe = dr.select(small, 1, x)
+    return dr.select(small, series, log1p(safe) / safe)
+
+
+def expm1_ratio(x):
+    """(exp(x) - 1)/x, and its limit 1 at x = 0."""
+    small = abs(x) < 1e-3
+    series = 1 + x * (1 / 2 + x * (1 / 6 + x / 24))
+    safe = dr.select(small, 1, x)
+    return dr.select(small, series, expm1(safe) / safe)
+
+
+def log_cos(cos, sin2):
+    """log(cosθ), from sin²θ where the cosine has lost its digits."""
+    near = sin2 < 0.5
+    from_sin = 0.5 * log1p(-dr.select(near, sin2, 0))
+    return dr.select(near, from_sin, dr.log(dr.select(near, 1, dr.maximum(cos, 1e-30))))
+
+
 def safe_sqrt(x):
     """sqrt(x) with 0 for x <= 0, and derivative 0 there."""
     positive = x > 0

@@ -30,7 +30,7 @@ class Model:
     def __init__(self, props: mi.Properties):
         given = Given(self.plugins[0], props)
         declared = self.declared()
-        given.reject_unknown([name for parameter in declared for name in parameter.names])
+        given.reject_unknown([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
         self.slots: dict[str, Slot] = {}
         for parameter in declared:
             bound = parameter.bind(given)
@@ -59,7 +59,8 @@ class Model:
 
     def placeholders(self) -> SimpleNamespace:
         """Stand-ins for these values, to learn of which lobes the model consists."""
-        return SimpleNamespace(**{p.name: p.placeholder() for p in self.declared() if p.name in self.slots})
+        declared = [parameter for parameter in self.declared() if parameter.name in self.slots]
+        return SimpleNamespace(**{p.name: p.placeholder(self.slots[p.name]) for p in declared})
 
     @classmethod
     def manual(cls) -> str:

@@ -15,10 +15,12 @@ textured and optimised ones are limited to it where they are evaluated.
 
 from __future__ import annotations
 
+import copy
 import difflib
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
 import drjit as dr
@@ -59,19 +61,19 @@ class Given:
     def error(self, name: str, problem: str) -> ParameterError:
         return ParameterError(f"{self.plugin}: {name} {problem}.")
 
-    def reject_unknown(self, known: list[str]):
-        """Raise if a property was given that is none of the ``known`` ones."""
+    def reject_unknown(self, known: list[str], shown: list[str]):
+        """Raise if a property was given that is none of the ``known`` ones, of which messages list the ``shown``."""
         for name in self.props.keys():
             if name in known:
                 continue
             if name.startswith("_arg_"):
                 raise ParameterError(
                     f"{self.plugin}: {_kind(self.props[name])} is nested without a name; "
-                    f"give it the name of the parameter it is meant for, {_listed(known)}."
+                    f"give it the name of the parameter it is meant for, {_listed(shown)}."
                 )
             closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
             raise ParameterError(
-                f"{self.plugin}: unknown parameter {name}; did you mean {closest}? Known are {', '.join(known)}."
+                f"{self.plugin}: unknown parameter {name}; did you mean {closest}? Known are {', '.join(shown)}."
             )
 
     def number(self, name: str, default: float, limits: Range) -> mi.Texture:
@@ -117,6 +119,15 @@ class Given:
         value = self.props[name]
         if value not in choices:
             raise self.error(name, f"= {_shown(value)} is unknown; it must be one of {_listed(choices, quote=True)}")
+        return value
+
+    def flag(self, name: str, default: bool) -> bool:
+        """True or false."""
+        if name not in self:
+            return default
+        value = self.props[name]
+        if not isinstance(value, bool):
+            raise self.error(name, f"= {_shown(value)} is {_kind(value)}; it must be true or false")
         return value
 
     def text(self, name: str) -> str:
@@ -185,10 +196,12 @@ class Slot:
 
 @dataclass
 class NumberSlot(Slot):
-    """One or two numbers; evaluated, a pair for the two tangent directions if the parameter is ``paired``."""
+    """One or two numbers; evaluated, times ``scale``, and a pair for the two tangent directions if the parameter is
+    ``paired``."""
 
     limits: Range = (0, 1)
     paired: bool = False
+    scale: float = 1
 
     @property
     def anisotropic(self) -> bool:
@@ -196,6 +209,8 @@ class NumberSlot(Slot):
 
     def evaluate(self, si, active):
         values = [clamp(texture.eval_1(si, active), *self.limits) for texture in self.textures.values()]
+        if self.scale != 1:
+            values = [value * self.scale for value in values]
         if self.paired:
             return values[0], values[-1]
         return values[0]
@@ -231,6 +246,22 @@ class FresnelSlot(Slot):
         return Unit()
 
 
+@dataclass
+class LobesSlot(Slot):
+    """The parameters of several lobes, as slots by declared name for each; evaluated, a list of their values."""
+
+    lobes: list[dict[str, Slot]] = field(default_factory=list)
+
+    @property
+    def anisotropic(self) -> bool:
+        return any(slot.anisotropic for lobe in self.lobes for slot in lobe.values())
+
+    def evaluate(self, si, active):
+        return [
+            SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in lobe.items()}) for lobe in self.lobes
+        ]
+
+
 class RotationSlot(Slot):
     """The turn of the tangent frame, if one was given; evaluated, its (cosine, sine)."""
 
@@ -249,7 +280,11 @@ class RotationSlot(Slot):
 
 
 class Parameter:
-    """A declared parameter of a model. ``names`` lists the properties it answers to, the usual one first."""
+    """A declared parameter of a model. ``names`` lists the properties it answers to, the usual one first; ``shown``
+    does so for people."""
+
+    number = ""
+    """What follows each of the names, if the parameter belongs to one of several lobes: "_1", "_2" …"""
 
     def __init__(self, text: str):
         self.text = text
@@ -259,14 +294,24 @@ class Parameter:
 
     @property
     def names(self) -> list[str]:
-        return [self.name]
+        return [self.name + self.number]
+
+    @property
+    def shown(self) -> list[str]:
+        return self.names
+
+    def numbered(self, number: str) -> Parameter:
+        """The same declaration for one of several lobes."""
+        parameter = copy.copy(self)
+        parameter.number = number
+        return parameter
 
     def bind(self, given: Given):
         """The slot (or, for a choice, the word) that the given properties make of this parameter."""
         raise NotImplementedError
 
-    def placeholder(self):
-        """What an evaluated slot may look like, to build a model's lobes before there is a surface point."""
+    def placeholder(self, slot: Slot):
+        """What the evaluated slot may look like, to build a model's lobes before there is a surface point."""
         raise NotImplementedError
 
     def rows(self) -> list[Row]:
@@ -274,47 +319,76 @@ class Parameter:
         raise NotImplementedError
 
 
+class Spelling(NamedTuple):
+    """Another way to give a number: as ``name`` within ``limits``, of which it is ``scale`` times the value."""
+
+    name: str
+    limits: Range
+    scale: float
+    text: str
+
+
 class Number(Parameter):
     """A scalar within ``limits``. An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and
-    evaluates to a pair; with ``lone_default``, one of the pair alone leaves the other at the default."""
+    evaluates to a pair; with ``lone_default``, one of the pair alone leaves the other at the default. One with another
+    ``spelling`` may be given as that instead."""
 
-    def __init__(self, default: float, limits: Range, text: str, *, anisotropic=False, lone_default=False):
+    def __init__(
+        self,
+        default: float,
+        limits: Range,
+        text: str,
+        *,
+        anisotropic=False,
+        lone_default=False,
+        spelling: Spelling | None = None,
+    ):
         super().__init__(text)
-        self.default, self.limits = default, limits
+        self.default, self.limits, self.spelling = default, limits, spelling
         self.anisotropic, self.lone_default = anisotropic, lone_default
 
     @property
     def pair(self) -> list[str]:
-        return [f"{self.name}_u", f"{self.name}_v"] if self.anisotropic else []
+        return [f"{self.name}_{axis}{self.number}" for axis in "uv"] if self.anisotropic else []
 
     @property
     def names(self) -> list[str]:
-        return [self.name, *self.pair]
+        return [self.name + self.number, *self.pair, *([self.other] if self.spelling else [])]
+
+    @property
+    def other(self) -> str:
+        return self.spelling.name + self.number
 
     def bind(self, given: Given) -> NumberSlot:
-        names = [name for name in self.pair if name in given]
-        if names and self.name in given:
-            raise given.error(self.name, f"excludes {names[0]}; give either {self.name} or {' and '.join(self.pair)}")
+        if self.spelling and self.other in given:
+            if self.names[0] in given:
+                raise given.error(self.names[0], f"excludes {self.other}; give either {self.names[0]} or {self.other}")
+            _, limits, scale, _ = self.spelling
+            return NumberSlot({self.other: given.number(self.other, 0, limits)}, limits, scale=scale)
+        single, names = self.names[0], [name for name in self.pair if name in given]
+        if names and single in given:
+            raise given.error(single, f"excludes {names[0]}; give either {single} or {' and '.join(self.pair)}")
         if len(names) == 1 and not self.lone_default:
             missing = next(name for name in self.pair if name not in given)
-            raise given.error(names[0], f"needs {missing} beside it; give both, or {self.name} alone")
-        textures = {
-            name: given.number(name, self.default, self.limits) for name in (self.pair if names else [self.name])
-        }
+            raise given.error(names[0], f"needs {missing} beside it; give both, or {single} alone")
+        textures = {name: given.number(name, self.default, self.limits) for name in (self.pair if names else [single])}
         return NumberSlot(textures, self.limits, self.anisotropic)
 
-    def placeholder(self):
+    def placeholder(self, slot):
         value = mi.Float(self.default)
         return (value, value) if self.anisotropic else value
 
     def rows(self) -> list[Row]:
-        rows = [Row(self.name, "number", f"{self.default:g}", _interval(self.limits), self.text)]
+        rows = [Row(self.names[0], "number", f"{self.default:g}", _interval(self.limits), self.text)]
         if self.anisotropic:
             lone = f"; one alone leaves the other at {self.default:g}" if self.lone_default else ""
             rows.append(
                 Row(", ".join(self.pair), "number", "-", _interval(self.limits),
-                    f"instead of {self.name}: its values along dp_du and across{lone}")
+                    f"instead of {self.names[0]}: its values along dp_du and across{lone}")
             )  # fmt: skip
+        if self.spelling:
+            text = f"instead of {self.names[0]}: {self.spelling.text}"
+            rows.append(Row(self.other, "number", "-", _interval(self.spelling.limits), text))
         return rows
 
 
@@ -326,13 +400,14 @@ class Colour(Parameter):
         self.default, self.limits = default, limits
 
     def bind(self, given: Given) -> ColourSlot:
-        return ColourSlot({self.name: given.colour(self.name, self.default, self.limits)}, self.limits)
+        (name,) = self.names
+        return ColourSlot({name: given.colour(name, self.default, self.limits)}, self.limits)
 
-    def placeholder(self):
+    def placeholder(self, slot):
         return mi.UnpolarizedSpectrum(self.default)
 
     def rows(self) -> list[Row]:
-        return [Row(self.name, "colour", f"{self.default:g}", _interval(self.limits), self.text)]
+        return [Row(self.names[0], "colour", f"{self.default:g}", _interval(self.limits), self.text)]
 
 
 class Reflectance(Colour):
@@ -354,6 +429,68 @@ class Choice(Parameter):
 
     def rows(self) -> list[Row]:
         return [Row(self.name, "string", self.choices[0], " | ".join(self.choices), self.text)]
+
+
+class PerLobe(Parameter):
+    """The parameters of one to ``most`` lobes of a kind: NAME_1, NAME_2 … Lobe i exists if any of its names is given.
+    A single lobe may drop the number, and exists if nothing is given."""
+
+    def __init__(self, most: int, **declared: Parameter):
+        super().__init__("")
+        self.declared = declared
+        for name, parameter in declared.items():
+            parameter.__set_name__(None, name)
+        self.numbers = ["", *(f"_{i}" for i in range(1, most + 1))]
+
+    def _lobe(self, number: str) -> list[Parameter]:
+        return [parameter.numbered(number) for parameter in self.declared.values()]
+
+    def _names(self, number: str) -> list[str]:
+        return [name for parameter in self._lobe(number) for name in parameter.names]
+
+    @property
+    def names(self) -> list[str]:
+        return [name for number in self.numbers for name in self._names(number)]
+
+    @property
+    def shown(self) -> list[str]:
+        return self._names("_i")
+
+    def bind(self, given: Given) -> LobesSlot:
+        first = {number: next((n for n in self._names(number) if n in given), None) for number in self.numbers}
+        numbers = [number for number in self.numbers if first[number]] or [""]
+        if "" in numbers and len(numbers) > 1:
+            raise given.error(first[""], f"excludes {first[numbers[1]]}; number the names of all lobes, or of none")
+        for number, expected in zip(numbers, self.numbers[1:], strict=False):
+            if number not in ("", expected):
+                problem = f"leaves a gap; number the lobes from 1, so that this one is {expected[1:]}"
+                raise given.error(first[number], problem)
+        lobes = [{p.name: p.bind(given) for p in self._lobe(number)} for number in numbers]
+        slots = [slot for lobe in lobes for slot in lobe.values()]
+        return LobesSlot({name: texture for slot in slots for name, texture in slot.textures.items()}, lobes)
+
+    def placeholder(self, slot):
+        return [
+            SimpleNamespace(**{name: p.placeholder(lobe[name]) for name, p in self.declared.items()})
+            for lobe in slot.lobes
+        ]
+
+    def rows(self) -> list[Row]:
+        return [row for parameter in self._lobe("_i") for row in parameter.rows()]
+
+
+class Flag(Parameter):
+    """True or false."""
+
+    def __init__(self, default: bool, text: str):
+        super().__init__(text)
+        self.default = default
+
+    def bind(self, given: Given) -> bool:
+        return given.flag(self.name, self.default)
+
+    def rows(self) -> list[Row]:
+        return [Row(self.name, "boolean", str(self.default).lower(), "true | false", self.text)]
 
 
 class FresnelSet(Parameter):
@@ -428,7 +565,7 @@ class FresnelSet(Parameter):
             )
         return FresnelSlot({name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}, "conductor")
 
-    def placeholder(self):
+    def placeholder(self, slot):
         return Unit()
 
     def rows(self) -> list[Row]:
@@ -451,7 +588,7 @@ class Rotation(Parameter):
     def bind(self, given: Given) -> RotationSlot:
         return RotationSlot({self.name: given.number(self.name, 0, (-1e4, 1e4))} if self.name in given else {})
 
-    def placeholder(self):
+    def placeholder(self, slot):
         return None
 
     def rows(self) -> list[Row]:

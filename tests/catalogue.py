@@ -25,6 +25,8 @@ class Row:
     reciprocal: bool = True
     sharp: bool = False
     """Narrower than the usual resolution of a chi² test."""
+    transmits: bool = False
+    """Lets light through from behind, too."""
 
     def __str__(self):
         return self.name

@@ -24,6 +24,13 @@ def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), z], axis=-1).astype(np.float32)
 
 
+def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
+    """The same, every other one below the horizon."""
+    w = hemisphere(count, seed, lowest)
+    w[::2, 2] *= -1
+    return w
+
+
 def interaction(wi) -> mi.SurfaceInteraction3f:
     """A surface interaction for one direction of the local frame, or for an array of shape (N, 3)."""
     si = dr.zeros(mi.SurfaceInteraction3f)

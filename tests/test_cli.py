@@ -72,9 +72,9 @@ def test_info_shows_the_manual_page():
 
 
 def test_info_of_a_misspelt_type():
-    done = run("info", "wrad")
+    done = run("info", "phnog")
     assert done.returncode == 1 and done.stdout == ""
-    assert "'ward'" in done.stderr and done.stderr.count("\n") == 1
+    assert "'phong'" in done.stderr and done.stderr.count("\n") == 1
 
 
 def test_doctor_tries_every_backend():

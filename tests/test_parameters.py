@@ -47,6 +47,10 @@ REJECTED = [
     ("walter", {"f0": 1.2}, "walter: f0 = 1.2 is not allowed"),
     ("walter", {"rotation": NAN}, "walter: rotation = nan is not allowed"),
     ("walter", {"shadowing": "smith"}, 'walter: shadowing = "smith" is unknown; it must be one of "separable" or "correlated".'),
+    ("orennayar", {"sigma": 0.3, "alpha": 0.3}, "orennayar: sigma excludes alpha; give either sigma or alpha."),
+    ("orennayar", {"alpha": 3}, "orennayar: alpha = 3 is not allowed; it must be a number in [0, 2.2] or a texture."),
+    ("roughdiffuse", {"use_fast_approx": "yes"}, 'roughdiffuse: use_fast_approx = "yes" is a string; it must be true or false.'),
+    ("roughdiffuse", {"use_fast_approx": 1}, "roughdiffuse: use_fast_approx = 1 is a number; it must be true or false."),
 ]  # fmt: skip
 
 

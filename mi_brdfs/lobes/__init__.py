@@ -2,8 +2,8 @@
 
 from .diffuse import LambertLobe
 from .lobe import Lobe
-from .microfacet import MicrofacetLobe
+from .microfacet import DimmedLobe, MicrofacetLobe
 from .mirror import PowerLobe, PowerResponseLobe
 from .mixture import Mixture
 
-__all__ = ["LambertLobe", "Lobe", "MicrofacetLobe", "Mixture", "PowerLobe", "PowerResponseLobe"]
+__all__ = ["DimmedLobe", "LambertLobe", "Lobe", "MicrofacetLobe", "Mixture", "PowerLobe", "PowerResponseLobe"]

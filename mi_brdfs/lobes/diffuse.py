@@ -5,6 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from ..math import choose, normalize_or, safe_sqrt
 from .lobe import Lobe
 
 
@@ -25,3 +26,90 @@ class LambertLobe(Lobe):
 
     def sample(self, wi, u, v):
         return mi.warp.square_to_cosine_hemisphere(v)
+
+
+class ZonalLobe(Lobe):
+    """f |cosθ_o| = albedo(wi)·p(cosθ_o)/2π: wherever it is seen from, light comes from the same density p of the
+    cosine, by whose inverse it is sampled. The weight is the albedo."""
+
+    glossy = False
+
+    def density(self, cos):
+        """p, of which the integral over the cosine is one."""
+        raise NotImplementedError
+
+    def cosine(self, u):
+        """The cosine below which the fraction ``u`` of p lies."""
+        raise NotImplementedError
+
+    def eval_pdf(self, wi, wo):
+        pdf = self.density(wo.z) * dr.inv_two_pi
+        return self.albedo(wi) * pdf, pdf
+
+    def sample(self, wi, u, v):
+        cos = self.cosine(v.x)
+        sin = safe_sqrt(1 - cos * cos)
+        sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
+        return mi.Vector3f(sin * cos_phi, sin * sin_phi, cos)
+
+
+class RoughDiffuseLobe(Lobe):
+    r"""A diffuse lobe that is brighter towards ``wi``, as those of Oren and Nayar are: ``retro`` = 0 is Lambert's,
+    1 the roughest. Subclasses evaluate it.
+
+    Sampled by a linearly transformed cosine, clipped to the horizon before the transform, in a mixture with uniform
+    directions; the matrix and the share of these are the polynomials that Portsmouth, Kutz and Hill fitted to their
+    model (EON, 2025, https://jcgt.org/published/0014/01/06/). No sample falls below the horizon, and ``retro`` = 0 is
+    the cosine itself.
+    """
+
+    glossy = False
+
+    def __init__(self, reflectance, retro):
+        self.reflectance, self.retro = reflectance, retro
+
+    def eval(self, wi, wo):
+        """f."""
+        raise NotImplementedError
+
+    def _uniform(self, wi):
+        """The probability of the uniform directions."""
+        mu, r = wi.z, self.retro
+        share = 0.162925 + mu * (-0.372058 + mu * (0.538233 - 0.290822 * mu))
+        return dr.select(r > 0, dr.power(dr.maximum(r, 1e-30), 0.1), 0) * share
+
+    def _matrix(self, wi):
+        """``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of wi."""
+        mu, r = wi.z, self.retro
+        a = 1 + r * (0.303392 + mu * (-0.518982 + 0.111709 * mu) + r * (-0.276266 + 0.335918 * mu))
+        b = r * (-1.16407 + 1.15859 * mu + r * (0.150815 - 0.150105 * mu)) / (mu * mu * mu - 1.43545)
+        c = 1 + r * (0.20013 + mu * (-0.506373 + 0.261777 * mu))
+        d = r * (0.540852 + mu * (-1.01625 + 0.475392 * mu)) / (-1.0743 + mu * (0.0725628 + mu))
+        # The clipping below wants d <= 0; the fit exceeds that by 0.003 near normal incidence.
+        return a, b, c, dr.minimum(d, 0)
+
+    def eval_pdf(self, wi, wo):
+        a, b, c, d = self._matrix(wi)
+        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        along, across = x * wo.x + y * wo.y, x * wo.y - y * wo.x
+        det = c * (a - b * d)
+        # The direction before the transform, times det.
+        cosine = mi.Vector3f(c * (along - b * wo.z), (a - b * d) * across, c * (a * wo.z - d * along))
+        visible = 0.5 + 0.5 * dr.rsqrt(d * d + 1)
+        transformed = dr.square(det / dr.squared_norm(cosine)) * dr.maximum(cosine.z, 0) / (dr.pi * visible)
+        uniform = self._uniform(wi)
+        return self.eval(wi, wo) * wo.z, uniform * dr.inv_two_pi + (1 - uniform) * transformed
+
+    def sample(self, wi, u, v):
+        is_uniform, _ = choose(u, self._uniform(wi))
+        a, b, c, d = self._matrix(wi)
+        # Below the horizon, the transform takes what lies beyond half an ellipse in the disc: squeeze that out.
+        disc = mi.warp.square_to_uniform_disk_concentric(v)
+        visible = 0.5 + 0.5 * dr.rsqrt(d * d + 1)
+        end = safe_sqrt(1 - disc.y * disc.y)
+        disc.x = visible * (disc.x + end) - end
+        z = safe_sqrt(1 - dr.squared_norm(disc))
+        local = dr.normalize(mi.Vector3f(a * disc.x + b * z, c * disc.y, d * disc.x + z))
+        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        wo = mi.Vector3f(local.x * x - local.y * y, local.x * y + local.y * x, local.z)
+        return dr.select(is_uniform, mi.warp.square_to_uniform_hemisphere(v), wo)

@@ -8,8 +8,8 @@ class Lobe:
 
     Directions are unit vectors of the local frame (n = z) that point away from the surface: ``wi`` is the known one
     (towards the viewer, in Mitsuba's radiance transport), ``wo`` the sampled one. Whoever calls guarantees
-    wi.z > 0 and, in :meth:`eval_pdf`, wo.z > 0; so a lobe needs no masks. Colours are ``mi.UnpolarizedSpectrum`` or
-    floats, densities are per solid angle of ``wo``.
+    wi.z > 0 and, in :meth:`eval_pdf`, wo.z > 0, or wo.z < 0 if the lobe transmits; so a lobe needs no masks. Colours
+    are ``mi.UnpolarizedSpectrum`` or floats, densities are per solid angle of ``wo``.
     """
 
     glossy = True
@@ -18,16 +18,19 @@ class Lobe:
     reciprocal = True
     """Whether f(wi, wo) = f(wo, wi)."""
 
+    transmits = False
+    """Whether the light comes from the other side of the surface."""
+
     def albedo(self, wi):
-        """An estimate of ∫ f cosθ_o dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
+        """An estimate of ∫ f |cosθ_o| dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
         exact; but where the lobe reflects anything it must be positive."""
         raise NotImplementedError
 
     def eval_pdf(self, wi, wo):
-        """``(value, pdf)``: f cosθ_o, and the density of ``wo`` in :meth:`sample`."""
+        """``(value, pdf)``: f |cosθ_o|, and the density of ``wo`` in :meth:`sample`."""
         raise NotImplementedError
 
     def sample(self, wi, u, v):
-        """A direction ``wo`` for three uniform variates ``u`` and ``v = (v.x, v.y)``. It may lie below the horizon,
+        """A direction ``wo`` for three uniform variates ``u`` and ``v = (v.x, v.y)``. It may lie beyond the horizon,
         where the lobe is zero."""
         raise NotImplementedError

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import drjit as dr
+import mitsuba as mi
+
 from ..math import luminance
 from ..microfacet.facet import Facet
+from ..microfacet.shadowing import SmithGGX
 from .lobe import Lobe
 
 
@@ -32,3 +36,16 @@ class MicrofacetLobe(Lobe):
         a number. D cancels from it."""
         visible = self.shadowing(facet) * facet.cos_d / facet.cos_i
         return luminance(self.fresnel(facet.cos_d)) * visible * self.distribution.over_density(facet)
+
+
+class DimmedLobe(MicrofacetLobe):
+    """A microfacet lobe which at grazing is dimmer than F(cosθ_i) and its distribution say: the facets seen there are
+    tilted towards the viewer, and reflect less; and a shadowing term other than Smith's may take more."""
+
+    def albedo(self, wi):
+        alpha, tilt = dr.sqrt(self.distribution.roughness2()), 1 - wi.z
+        cos = dr.sqrt(wi.z * wi.z + 0.45 * alpha * tilt * dr.sqrt(tilt))  # fitted to GGX
+        z = dr.maximum(wi.z, 1e-4)  # the terms must not vanish
+        mirror = Facet(mi.Vector3f(wi.x, wi.y, z), mi.Vector3f(-wi.x, -wi.y, z), mi.Vector3f(0, 0, 1), z)
+        shadowing = self.shadowing(mirror) / SmithGGX(alpha, alpha, correlated=False)(mirror)
+        return self.reflectance * (self.fresnel(cos) * (self.distribution.albedo(wi.z) * shadowing))

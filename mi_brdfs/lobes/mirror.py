@@ -1,4 +1,4 @@
-"""Lobes that are a power of the cosine to an axis: the mirror direction."""
+"""Lobes that are a power of the cosine to an axis: the mirror direction, unless a lobe has its own."""
 
 from __future__ import annotations
 
@@ -23,11 +23,6 @@ class AxisFrame:
         self.up = mi.Vector3f(-axis.z * x, -axis.z * y, self.sin)
         self.side = mi.Vector3f(-y, x, 0)
 
-    @classmethod
-    def mirror(cls, wi) -> AxisFrame:
-        """Around the mirror direction of ``wi``."""
-        return cls(mi.Vector3f(-wi.x, -wi.y, wi.z))
-
     def cosine(self, w):
         """``(log A, 1 - A, inside)`` of the direction ``w``, where ``inside`` says whether A > 0."""
         versine = 0.5 * dr.squared_norm(w - self.axis)
@@ -50,6 +45,13 @@ class MirrorLobe(Lobe):
 
     def __init__(self, reflectance, exponent, scale):
         self.reflectance, self.exponent, self.scale = reflectance, exponent, scale
+
+    def frame(self, wi) -> AxisFrame:
+        return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
+
+    def peak(self, wi):
+        """The scale for ``wi``."""
+        return self.scale
 
 
 class PowerLobe(MirrorLobe):
@@ -75,12 +77,12 @@ class PowerLobe(MirrorLobe):
 
     def albedo(self, wi):
         # Exact where the axis lies along the normal or in the horizon.
-        upright, tilted = self._masses(AxisFrame.mirror(wi))
+        upright, tilted = self._masses(self.frame(wi))
         mass = dr.sqrt(upright * upright + tilted * tilted)
-        return self.reflectance * (self.scale * dr.two_pi / (self.exponent + 2) * mass)
+        return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 2) * mass)
 
     def eval_pdf(self, wi, wo):
-        n, frame = self.exponent, AxisFrame.mirror(wi)
+        n, frame = self.exponent, self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(n * log_a), 0)
         sin = dr.sqrt(dr.maximum(versine * (2 - versine), 1e-30))
@@ -90,12 +92,12 @@ class PowerLobe(MirrorLobe):
         share = self._share(frame)
         pair = power * dr.inv_pi * (share * upright + (1 - share) * tilted)
         return (
-            self.reflectance * (self.scale * power * wo.z),
+            self.reflectance * (self.peak(wi) * power * wo.z),
             pair * wo.z / (wo.z + frame.mirrored_z(wo, versine)),
         )
 
     def sample(self, wi, u, v):
-        n, frame = self.exponent, AxisFrame.mirror(wi)
+        n, frame = self.exponent, self.frame(wi)
         is_upright, u = choose(u, self._share(frame))
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         c = dr.select(is_upright, sin_phi, 2 * v.y - 1)
@@ -118,18 +120,18 @@ class PowerResponseLobe(MirrorLobe):
     def albedo(self, wi):
         # The tanh estimates what lies above the horizon.
         visible = 0.5 + 0.5 * dr.tanh(wi.z * dr.sqrt(self.exponent + 1))
-        return self.reflectance * (self.scale * dr.two_pi / (self.exponent + 1) * visible)
+        return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 1) * visible)
 
     def eval_pdf(self, wi, wo):
-        frame = AxisFrame.mirror(wi)
+        frame = self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(self.exponent * log_a), 0)
         pdf = power * (self.exponent + 1) * dr.inv_pi
         alone = frame.mirrored_z(wo, versine) <= 0
-        return self.reflectance * (self.scale * power), dr.select(alone, pdf, 0.5 * pdf)
+        return self.reflectance * (self.peak(wi) * power), dr.select(alone, pdf, 0.5 * pdf)
 
     def sample(self, wi, u, v):
-        frame = AxisFrame.mirror(wi)
+        frame = self.frame(wi)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         log_a = log1p(-v.x) / (self.exponent + 1)
         wo, mirrored = frame.direction(log_a, cos_phi, sin_phi), frame.direction(log_a, -cos_phi, sin_phi)

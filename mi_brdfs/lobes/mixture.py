@@ -22,11 +22,12 @@ class Mixture:
         scale = dr.rcp(dr.select(black, 1, total))
         self.probabilities = [dr.select(black, 1 / len(lobes), energy * scale) for energy in energies]
 
-    def eval_pdf(self, wo):
-        """``(value, pdf)`` of the whole: Σ f_k cosθ_o and Σ P_k pdf_k."""
-        parts = [lobe.eval_pdf(self.wi, wo) for lobe in self.lobes]
-        pdf = sum(p * lobe_pdf for p, (_, lobe_pdf) in zip(self.probabilities, parts, strict=True))
-        return mi.UnpolarizedSpectrum(sum(value for value, _ in parts)), pdf
+    def eval_pdf(self, wo, transmitted):
+        """``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
+        of_side = [(p, lobe) for p, lobe in zip(self.probabilities, self.lobes, strict=True)
+                   if lobe.transmits == transmitted]  # fmt: skip
+        parts = [(p, *lobe.eval_pdf(self.wi, wo)) for p, lobe in of_side]
+        return mi.UnpolarizedSpectrum(sum(value for _, value, _ in parts)), sum(p * pdf for p, _, pdf in parts)
 
     def sample(self, u, v):
         """``(wo, k)``: a direction and the index of the lobe that it was drawn from."""

@@ -9,12 +9,13 @@ t = tan²θ_h, which may depend on ``g`` = 1/((αu cosψ)² + (αv sinψ)²).
 from __future__ import annotations
 
 import drjit as dr
+import mitsuba as mi
 
-from ..math import expm1, log1p
+from ..math import clamp, expm1, expm1_ratio, log1p, log1p_ratio, log_cos
 
 
 class Distribution:
-    LOSS: float
+    LOSS = 1.7
     """How much light is lost to multiple reflections: the constant of :meth:`albedo`, fitted."""
 
     def __init__(self, alpha_u, alpha_v):
@@ -24,19 +25,22 @@ class Distribution:
         """(h_x/αu)² + (h_y/αv)²."""
         return dr.square(facet.h.x / self.alpha_u) + dr.square(facet.h.y / self.alpha_v)
 
+    def roughness2(self):
+        """About the mean square slope, over both axes."""
+        return 0.5 * (dr.square(self.alpha_u) + dr.square(self.alpha_v))
+
     def albedo(self, cos):
         """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
         have in the direction of that cosine."""
-        rms2 = 0.5 * (dr.square(self.alpha_u) + dr.square(self.alpha_v))
-        return 1 / (1 + self.LOSS * dr.power(rms2, 1.15) * (0.5 + 0.5 * cos))
+        return 1 / (1 + self.LOSS * dr.power(self.roughness2(), 1.15) * (0.5 + 0.5 * cos))
 
     def eval(self, facet):
         """D(h)."""
         raise NotImplementedError
 
     def over_density(self, facet):
-        """D(h)/q(h)."""
-        raise NotImplementedError
+        """D(h)/q(h); by default q = D cosθ_h."""
+        return 1 / facet.cos_h
 
     def cdf(self, tan2, g):
         """``(C, 1 - C)``: the cumulative distribution in t on the line, and its complement with digits of its own."""
@@ -47,24 +51,25 @@ class Distribution:
         raise NotImplementedError
 
 
+class Isotropic(Distribution):
+    """A distribution whose own parameters replace the roughness."""
+
+    def __init__(self):
+        super().__init__(mi.Float(1), mi.Float(1))
+
+
 class Beckmann(Distribution):
     """D = exp(-((h_x/αu)² + (h_y/αv)²)/h_z²) / (π αu αv h_z⁴); q = D cosθ_h."""
-
-    LOSS = 1.7
 
     def eval(self, facet):
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-14)  # α² cos⁴ must not underflow
         return dr.exp(-self.steepness(facet) / cos2) / (dr.pi * self.alpha_u * self.alpha_v * cos2 * cos2)
 
-    def over_density(self, facet):
-        return 1 / facet.cos_h
-
     def cdf(self, tan2, g):
         return -expm1(-g * tan2), dr.exp(-g * tan2)
 
     def inverse_cdf(self, c, complement, g):
-        in_peak = c < 0.5
-        return -dr.select(in_peak, log1p(-dr.select(in_peak, c, 0)), dr.log(dr.select(in_peak, 1, complement))) / g
+        return -log_complement(c, complement) / g
 
 
 class GGX(Distribution):
@@ -74,3 +79,176 @@ class GGX(Distribution):
 
     def eval(self, facet):
         return 1 / (dr.pi * self.alpha_u * self.alpha_v * dr.square(self.steepness(facet) + dr.square(facet.cos_h)))
+
+    def cdf(self, tan2, g):
+        x = dr.minimum(g * tan2, 1e30)
+        return x / (1 + x), 1 / (1 + x)
+
+    def inverse_cdf(self, c, complement, g):
+        return c / (dr.maximum(complement, 1e-30) * g)
+
+
+class Blinn(Isotropic):
+    """D = (n+2)/(2π) cosⁿθ_h (Blinn 1977, doi:10.1145/563858.563893, with the normalisation of a distribution)."""
+
+    def __init__(self, exponent):
+        super().__init__()
+        self.exponent = exponent
+
+    def roughness2(self):
+        return 2 / (self.exponent + 2)
+
+    def eval(self, facet):
+        n = self.exponent
+        return (n + 2) * dr.inv_two_pi * dr.exp(n * log_cos(facet.cos_h, facet.sin2_h))
+
+    def cdf(self, tan2, g):
+        logarithm = -0.5 * (self.exponent + 2) * log1p(dr.minimum(tan2, 1e30))
+        return -expm1(logarithm), dr.exp(logarithm)
+
+    def inverse_cdf(self, c, complement, g):
+        return dr.minimum(expm1(log_complement(c, complement) * (-2 / (self.exponent + 2))), 1e30)
+
+
+class AshikhminShirley(Distribution):
+    """D = √((nu+1)(nv+1))/(2π) cosθ_h^e, e = (nu h_x² + nv h_y²)/sin²θ_h (Ashikhmin and Shirley 2000,
+    doi:10.1080/10867651.2000.10487522). Here ∫ D dω_h = 1, without a cosine, and q = D."""
+
+    def __init__(self, exponent_u, exponent_v):
+        # An ellipse: the exponent plus one at azimuth φ is (cosφ/αu)² + (sinφ/αv)².
+        super().__init__(dr.rsqrt(exponent_u + 1), dr.rsqrt(exponent_v + 1))
+
+    def roughness2(self):
+        return dr.square(self.alpha_u) + dr.square(self.alpha_v)
+
+    def eval(self, facet):
+        # e log(cosθ), where steepness is (e + 1) sin²θ
+        sin2 = facet.sin2_h
+        near = -0.5 * log1p_ratio(-dr.minimum(sin2, 0.5))
+        far = log_cos(facet.cos_h, sin2) / dr.maximum(sin2, 0.5)
+        exponent = (self.steepness(facet) - sin2) * dr.select(sin2 < 0.5, near, far)
+        return dr.inv_two_pi / (self.alpha_u * self.alpha_v) * dr.exp(exponent)
+
+    def over_density(self, facet):
+        return mi.Float(1)
+
+    def cdf(self, tan2, g):
+        logarithm = -0.5 * g * log1p(dr.minimum(tan2, 1e30))
+        return -expm1(logarithm), dr.exp(logarithm)
+
+    def inverse_cdf(self, c, complement, g):
+        return dr.minimum(expm1(log_complement(c, complement) * (-2 / g)), 1e30)
+
+
+class PowerLaw:
+    """The density ∝ (1 + k s)^-γ for s >= 0 (to 1, where k < 0): with x = 1-γ and L = log(1 + k s), its integral is
+    (exp(x L) - 1)/(x k), where every ratio has its limit at x = 0 and k = 0. ``norm`` is the integral to 1."""
+
+    def __init__(self, k, gamma):
+        self.k, self.gamma, self.x = k, gamma, 1 - gamma
+        self.norm = self.mass(1)
+
+    def eval(self, s):
+        return dr.exp(-self.gamma * log1p(self.k * s))
+
+    def mass(self, s):
+        """∫ (1 + k s)^-γ from 0 to s."""
+        logarithm = s * log1p_ratio(self.k * s)
+        return logarithm * expm1_ratio(self.x * self.k * logarithm)
+
+    def inverse(self, mass):
+        """The s of a ``mass``."""
+        z = self.x * self.k * mass
+        logarithm = mass * log1p_ratio(dr.maximum(z, -1 + 1e-7))
+        return logarithm * expm1_ratio(self.k * logarithm)
+
+
+class GTR(Isotropic):
+    """D ∝ (1 + (α²-1) cos²θ_h)^-γ, generalised Trowbridge-Reitz (Burley 2012, Physically based shading at Disney).
+    GGX is γ = 2; γ = 1 has the tail of a clear coat."""
+
+    def __init__(self, alpha, gamma):
+        super().__init__()
+        self.alpha2 = dr.square(alpha)
+        # In s = sin²θ: 1 + (α²-1) cos²θ = α² (1 + k s)
+        self.law = PowerLaw((1 - self.alpha2) / self.alpha2, gamma)
+
+    def roughness2(self):
+        return self.alpha2
+
+    def eval(self, facet):
+        return self.law.eval(facet.sin2_h) * dr.inv_pi / self.law.norm
+
+    def cdf(self, tan2, g):
+        tan2 = dr.minimum(tan2, 1e30)
+        c = clamp(self.law.mass(tan2 / (1 + tan2)) / self.law.norm, 0, 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        s = clamp(self.law.inverse(c * self.law.norm), 0, 1 - 1e-7)
+        return s / (1 - s)
+
+
+class ABC(Isotropic):
+    """D = scale·(1 + B (1 - cosθ_h))^-C (Church and Takacs 1991; Löw et al. 2012, doi:10.1145/2077341.2077350).
+    ``scale`` None stands for the one with ∫ D cosθ_h dω_h = 1. Here q ∝ D, without the cosine."""
+
+    def __init__(self, b, c, scale=None):
+        super().__init__()
+        self.law = PowerLaw(b, c)
+        cosine_mass = self._cosine_mass()
+        self.scale = dr.inv_two_pi / cosine_mass if scale is None else scale
+        self.total = self.scale * dr.two_pi * cosine_mass
+
+    def _cosine_mass(self):
+        """∫ (1 - y)(1 + B y)^-C over 0 <= y <= 1."""
+        b = self.law.k
+        broad = b < 0.5
+        # Gauss-Legendre where the closed form, (∫ (1 + B y)^(1-C) - ∫ (1 + B y)^-C)/B, would cancel.
+        nodes, weights = [0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558], [0.1739274226, 0.3260725774]
+        quadrature = sum(w * y * self.law.eval(y) for y, w in zip(nodes, weights + weights[::-1], strict=True))
+        closed = (PowerLaw(b, self.law.gamma - 1).norm - self.law.norm) / dr.select(broad, 1, b)
+        return self.law.norm - dr.select(broad, quadrature, closed)
+
+    def roughness2(self):
+        return dr.minimum(2 / (1 + self.law.k * self.law.gamma), 1)
+
+    def albedo(self, cos):
+        return super().albedo(cos) * self.total
+
+    def eval(self, facet):
+        return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
+
+    def over_density(self, facet):
+        return self.scale * self.law.norm * dr.two_pi
+
+    def cdf(self, tan2, g):
+        c = clamp(self.law.mass(versine_of_tan2(tan2)) / self.law.norm, 0, 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        return tan2_of_versine(self.law.inverse(c * self.law.norm))
+
+
+def versine(cos, sin2):
+    """1 - cosθ."""
+    return sin2 / (1 + cos)
+
+
+def versine_of_tan2(tan2):
+    """1 - cosθ of tan²θ, for tan²θ up to infinity."""
+    cos = dr.rsqrt(1 + tan2)
+    return dr.select(tan2 < 1, dr.minimum(tan2, 1) * cos * cos / (1 + cos), 1 - cos)
+
+
+def tan2_of_versine(v):
+    """tan²θ of 1 - cosθ, limited at the horizon."""
+    v = clamp(v, 0, 1 - 1e-7)
+    return v * (2 - v) / dr.square(1 - v)
+
+
+def log_complement(c, complement):
+    """log(1 - c), from whichever of c and 1 - c has its digits."""
+    in_peak = c < 0.5
+    peak = log1p(-dr.select(in_peak, c, 0))
+    return dr.select(in_peak, peak, dr.log(dr.select(in_peak, 1, dr.maximum(complement, 1e-37))))

@@ -27,7 +27,58 @@ class SmithGGX:
         return (2 * cos_i / (cos_i + length_i)) * (2 * cos_o / (cos_o + length_o))
 
 
+class SchlickGGX:
+    """Schlick's rational stand-in for Smith's term, Π cosθ/(cosθ (1-k) + k) over both directions (Schlick 1994,
+    doi:10.1111/1467-8659.1330233). For GGX facets k = α/2 comes near it (Karis 2013)."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def __call__(self, facet):
+        i, o = (cos / (cos + self.k * (1 - cos)) for cos in (facet.cos_i, facet.cos_o))
+        return i * o
+
+
 def kelemen(facet):
     """cosθ_i cosθ_o / cos²θ_d (Kelemen and Szirmay-Kalos, A microfacet based coupled specular-matte BRDF model with
     importance sampling, Eurographics short presentations, 2001)."""
     return facet.cos_i * facet.cos_o / dr.square(facet.cos_d)
+
+
+def vcavity(facet):
+    """min(1, 2 cosθ_h cosθ_i / cosθ_d, 2 cosθ_h cosθ_o / cosθ_d) (Torrance and Sparrow 1967; Cook and Torrance 1982,
+    doi:10.1145/357290.357293)."""
+    return dr.minimum(1, 2 * facet.cos_h * dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d)
+
+
+def implicit(facet):
+    """cosθ_i cosθ_o, which cancels the denominator."""
+    return facet.cos_i * facet.cos_o
+
+
+def neumann(facet):
+    """cosθ_i cosθ_o / max(cosθ_i, cosθ_o) (Neumann, Neumann and Szirmay-Kalos 1999, Compact metallic reflectance
+    models)."""
+    return dr.minimum(facet.cos_i, facet.cos_o)
+
+
+def ashikhmin_shirley(facet):
+    """cosθ_i cosθ_o / (cosθ_d max(cosθ_i, cosθ_o)) (Ashikhmin and Shirley 2000,
+    doi:10.1080/10867651.2000.10487522)."""
+    return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d
+
+
+def ashikhmin_premoze(facet):
+    """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premože, Distribution-based BRDFs, 2007)."""
+    product = facet.cos_i * facet.cos_o
+    return product / (facet.cos_i + facet.cos_o - product)
+
+
+class Kurt:
+    """(cosθ_i cosθ_o)^(1-κ) / cosθ_d (Kurt, Szirmay-Kalos and Křivánek 2010, doi:10.1145/1722991.1722996)."""
+
+    def __init__(self, exponent):
+        self.exponent = exponent
+
+    def __call__(self, facet):
+        return dr.power(facet.cos_i * facet.cos_o, 1 - self.exponent) / facet.cos_d

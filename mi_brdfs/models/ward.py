@@ -1,8 +1,8 @@
 import drjit as dr
 
 from ..lobes import LambertLobe, MicrofacetLobe
-from ..math import expm1, log1p
-from ..microfacet.distributions import Beckmann, Distribution
+from ..math import expm1
+from ..microfacet.distributions import Beckmann, Distribution, log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.fresnel import Unit
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import kelemen
@@ -76,9 +76,6 @@ class ApproximateBeckmann(Distribution):
     As sin²/(1+cos) = 1-cos, D is exp(-2g(1-cosθ_h)) at a given azimuth: its integral over the hemisphere converges to
     one as α → 0, and can be inverted; q = D/(1 - exp(-2g)).
     """
-
-    LOSS = Beckmann.LOSS
-
     def eval(self, facet):
         return dr.exp(-2 * self.steepness(facet) / (1 + facet.cos_h)) / (dr.pi * self.alpha_u * self.alpha_v)
 
@@ -89,20 +86,12 @@ class ApproximateBeckmann(Distribution):
         return -expm1(-2 * g)
 
     def cdf(self, tan2, g):
-        # 1 - cosθ = sin²θ/(1 + cosθ), for tan²θ up to infinity
-        cos = dr.rsqrt(1 + tan2)
-        versine = dr.select(tan2 < 1, dr.minimum(tan2, 1) * cos * cos / (1 + cos), 1 - cos)
-        total = expm1(-2 * g)
-        return expm1(-2 * g * versine) / total, (dr.exp(-2 * g * versine) - dr.exp(-2 * g)) / -total
+        v, total = versine_of_tan2(tan2), -expm1(-2 * g)
+        return -expm1(-2 * g * v) / total, (dr.exp(-2 * g * v) - dr.exp(-2 * g)) / total
 
     def inverse_cdf(self, c, complement, g):
         total = -expm1(-2 * g)
-        in_peak = c < 0.5
-        peak = log1p(-dr.select(in_peak, c * total, 0))
-        tail = dr.log(dr.select(in_peak, 1, complement * total + (1 - total)))
-        logarithm = dr.select(in_peak, peak, tail)
-        versine = dr.minimum(-logarithm / (2 * g), 1 - 1e-7)
-        return versine * (2 - versine) / dr.square(1 - versine)
+        return tan2_of_versine(-log_complement(c * total, complement * total + (1 - total)) / (2 * g))
 
 
 SHADOWING = {

@@ -1,0 +1,82 @@
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import Lobe, MicrofacetLobe
+from ..microfacet.distributions import AshikhminShirley as Distribution
+from ..microfacet.fresnel import Schlick
+from ..microfacet.sampling import Orbit
+from ..microfacet.shadowing import ashikhmin_shirley
+from ..model import Model
+from ..parameters import Number, Reflectance, Rotation
+
+
+class AshikhminShirley(Model):
+    """Ashikhmin and Shirley's anisotropic Phong model (2000), with a diffuse lobe that leaves what is not reflected.
+
+    M. Ashikhmin and P. Shirley, An anisotropic Phong BRDF model, Journal of Graphics Tools 5(2), 2000,
+    doi:10.1080/10867651.2000.10487522.
+
+        f  = fd + fs
+        fs = √((nu+1)(nv+1))/(8π) cosθ_h^e F(wi·h) / ((wi·h) max(cosθ_i, cosθ_o)),  e = (nu h_x² + nv h_y²)/sin²θ_h
+        fd = 28 Rd/(23π) (1-Rs) (1-(1-cosθ_i/2)⁵) (1-(1-cosθ_o/2)⁵)
+        F  = Rs + (1-Rs) (1-wi·h)⁵
+
+    with h = (wi+wo)/|wi+wo|. As a microfacet model fs has the distribution D = √((nu+1)(nv+1))/(2π) cosθ_h^e, which
+    normalises without a cosine, and the shadowing term G = min(cosθ_i, cosθ_o)/(wi·h).
+
+    Reciprocal. Energy-conserving: the albedo of fs is at most 1 (F = 1), that of fd is Rd (1-Rs) (1-(1-cosθ_i/2)⁵).
+    These exponents are not those of microfacet distributions called "phong" elsewhere, which normalise with n+2.
+    One-sided.
+
+    Sampling: fs by eight images of a half vector, one of them chosen by what it reflects
+    (mi_brdfs.microfacet.sampling.Orbit), so that no sample falls below the horizon; fd cosine-weighted.
+
+    Example
+    -------
+    <bsdf type="ashikhminshirley">
+        <float name="exponent_u" value="20"/>
+        <float name="exponent_v" value="400"/>
+    </bsdf>
+
+    {"type": "ashikhminshirley", "exponent_u": 20, "exponent_v": 400}
+    """
+
+    diffuse_reflectance = Reflectance(0.5, "colour Rd of the diffuse lobe")
+    specular_reflectance = Reflectance(0.05, "reflectance Rs of the specular lobe at normal incidence")
+    exponent = Number(100, (0, 1e6), "exponent n: the higher, the narrower the highlight", anisotropic=True)
+    rotation = Rotation()
+
+    def lobes(self, p):
+        specular = MicrofacetLobe(
+            mi.UnpolarizedSpectrum(1),
+            Distribution(*p.exponent),
+            ashikhmin_shirley,
+            Schlick(p.specular_reflectance),
+            Orbit(8),
+        )
+        return CoupledDiffuseLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)), specular
+
+
+class CoupledDiffuseLobe(Lobe):
+    """f = 28/(23π) ρ g(cosθ_i) g(cosθ_o) with g(μ) = 1-(1-μ/2)⁵; its albedo is ρ g(cosθ_i)."""
+
+    glossy = False
+
+    def __init__(self, reflectance):
+        self.reflectance = reflectance
+
+    @staticmethod
+    def _g(cos):
+        m = 1 - 0.5 * cos
+        m2 = m * m
+        return 1 - m2 * m2 * m
+
+    def albedo(self, wi):
+        return self.reflectance * self._g(wi.z)
+
+    def eval_pdf(self, wi, wo):
+        pdf = wo.z * dr.inv_pi
+        return self.reflectance * (28 / 23 * self._g(wi.z) * self._g(wo.z) * pdf), pdf
+
+    def sample(self, wi, u, v):
+        return mi.warp.square_to_cosine_hemisphere(v)

@@ -1,0 +1,66 @@
+import drjit as dr
+
+from ..lobes import LambertLobe, MicrofacetLobe
+from ..microfacet.distributions import GGX, Beckmann, Blinn
+from ..microfacet.sampling import Orbit
+from ..microfacet.shadowing import vcavity
+from ..model import Model
+from ..parameters import Choice, FresnelSet, Number, Reflectance
+
+
+class CookTorrance(Model):
+    """Cook and Torrance's microfacet model (1982): Beckmann facets in V-cavities.
+
+    R. L. Cook and K. E. Torrance, A reflectance model for computer graphics, ACM Transactions on Graphics 1(1), 1982,
+    doi:10.1145/357290.357293. K. E. Torrance and E. M. Sparrow, Theory for off-specular reflection from roughened
+    surfaces, Journal of the Optical Society of America 57(9), 1967, doi:10.1364/JOSA.57.001105.
+
+        f = ρd/π + ρs F(wi·h) D(h) G(wi, wo) / (4 cosθ_i cosθ_o)
+        G = min(1, 2 cosθ_h cosθ_i / (wi·h), 2 cosθ_h cosθ_o / (wi·h))
+
+    with h = (wi+wo)/|wi+wo| and, by ``distribution``,
+
+    * beckmann: D = exp(-tan²θ_h/α²) / (π α² cos⁴θ_h)
+    * ggx: D = α² / (π (sin²θ_h + α² cos²θ_h)²)
+    * blinn: D = (n+2)/(2π) cosθ_h^n with n = 2/α² - 2; α is limited to 1
+
+    F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``, in the
+    form the paper gives), Schlick's approximation for ``f0``, and 1 if none of them is given. ``normalization`` is
+
+    * modern: as above, where D is a distribution of facets (∫ D cosθ_h = 1) and 4 the Jacobian of the half vector.
+      So the conference version of 1981 has it, with D/4 and 1/π.
+    * tog82: four times that, as printed in 1982, where D lost its factor 1/4. The albedo is up to 4 ρs.
+
+    Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. The paper's sum of several D of different roughness
+    is a ``blendbsdf``. One-sided.
+
+    Sampling: eight images of a half vector, one of them chosen by what it reflects
+    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="cooktorrance">
+        <string name="material" value="Cu"/>
+        <float name="alpha" value="0.25"/>
+    </bsdf>
+
+    {"type": "cooktorrance", "material": "Cu", "alpha": 0.25}
+    """
+
+    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
+    alpha = Number(0.1, (1e-4, 2), "roughness α (the paper's m), the root mean square slope of the facets")
+    fresnel = FresnelSet()
+    distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")
+    normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
+
+    def lobes(self, p):
+        α = p.alpha
+        if self.distribution == "blinn":
+            α = dr.minimum(α, 1)
+            distribution = Blinn(2 / dr.square(α) - 2)
+        else:
+            distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
+        scale = 4 if self.normalization == "tog82" else 1
+        specular = MicrofacetLobe(p.specular_reflectance * scale, distribution, vcavity, p.fresnel, Orbit(8))
+        return LambertLobe(p.diffuse_reflectance), specular

@@ -1,0 +1,62 @@
+from ..lobes import LambertLobe, MicrofacetLobe
+from ..microfacet.distributions import Beckmann
+from ..microfacet.fresnel import Schlick
+from ..microfacet.sampling import Orbit
+from ..microfacet.shadowing import Kurt as Shadowing
+from ..model import Model
+from ..parameters import Number, PerLobe, Reflectance, Rotation
+
+
+class Kurt(Model):
+    """Kurt, Szirmay-Kalos and Křivánek's anisotropic model (2010): Beckmann facets with an adjustable grazing term.
+
+    M. Kurt, L. Szirmay-Kalos and J. Křivánek, An anisotropic BRDF model for fitting and Monte Carlo rendering, ACM
+    SIGGRAPH Computer Graphics 44(1), 2010, doi:10.1145/1722991.1722996.
+
+        f = ρd/π + Σ ks F(wi·h) D(h) / (4 (wi·h) (cosθ_i cosθ_o)^κ)
+        D = exp(-((h_x/αu)² + (h_y/αv)²)/h_z²) / (π αu αv h_z⁴),    F = f0 + (1-f0) (1-wi·h)⁵
+
+    with h = (wi+wo)/|wi+wo|, summed over one to eight lobes of ``specular_reflectance_i`` (ks), ``f0_i``,
+    ``alpha_i`` (or ``alpha_u_i`` and ``alpha_v_i``) and ``kurt_exponent_i`` (κ, the paper's α), numbered from 1; a
+    single lobe drops the number. As a microfacet model each is Beckmann's with the shadowing term
+    G = (cosθ_i cosθ_o)^(1-κ)/(wi·h).
+
+    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1, and in practice to κ = 0.25: there the albedo begins to
+    exceed 1 beyond 89.5° only. For κ = 0.5 it diverges at grazing: α = 0.1, F = 1 reach 1.05 at 88° and 3.7 at 89.9°.
+    That D's cosine power is 4 was not checked against the paper. One-sided.
+
+    Sampling: eight images of a half vector, one of them chosen by what it reflects
+    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="kurt">
+        <float name="alpha_1" value="0.05"/>
+        <float name="alpha_2" value="0.3"/>
+    </bsdf>
+
+    {"type": "kurt", "alpha_1": 0.05, "alpha_2": 0.3}
+    """
+
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
+    specular = PerLobe(
+        8,
+        specular_reflectance=Reflectance(1, "scale ks of lobe i"),
+        f0=Reflectance(0.04, "Fresnel reflectance of lobe i at normal incidence"),
+        alpha=Number(0.1, (1e-4, 2), "roughness of lobe i, the root mean square slope of its facets", anisotropic=True),
+        kurt_exponent=Number(0.25, (0, 0.5), "exponent κ of lobe i: the higher, the brighter at grazing"),
+    )
+    rotation = Rotation()
+
+    def lobes(self, p):
+        glossy = [
+            MicrofacetLobe(
+                lobe.specular_reflectance,
+                Beckmann(*lobe.alpha),
+                Shadowing(lobe.kurt_exponent),
+                Schlick(lobe.f0),
+                Orbit(8),
+            )
+            for lobe in p.specular
+        ]
+        return LambertLobe(p.diffuse_reflectance), *glossy

@@ -1,0 +1,90 @@
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import LambertLobe, PowerLobe
+from ..lobes.mirror import AxisFrame
+from ..model import Model
+from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
+
+
+class Lafortune(Model):
+    """Lafortune, Foo, Torrance and Greenberg's generalised cosine lobes (1997).
+
+    E. P. F. Lafortune, S.-C. Foo, K. E. Torrance and D. P. Greenberg, Non-linear approximation of reflectance
+    functions, SIGGRAPH 1997, doi:10.1145/258734.258801.
+
+        f = ρd/π + Σ ρ_l max(0, Cx wi_x wo_x + Cy wi_y wo_y + Cz wi_z wo_z)^n
+
+    summed over one to eight lobes of ``specular_reflectance_i`` (ρ_l), ``cx_i``, ``cy_i``, ``cz_i`` and ``exponent_i``
+    (n), numbered from 1; a single lobe drops the number. Cx = Cy = -Cz < 0 is a mirror lobe (Phong's, for Cz = 1),
+    Cx = Cy > 0 reflects back to where the light came from, |Cz| < |Cx| lies beyond the mirror direction, Cx ≠ Cy is
+    anisotropic.
+    ``normalization`` is
+
+    * energy: ρ_l is multiplied by (n+2)/(2π Cmax^n), where Cmax is the largest of |Cx|, |Cy| and |Cz|: the albedo of
+      a lobe stays below ρ_l.
+    * none: as in the paper and in its published fits, where the C carry the energy. The albedo of a lobe is at most
+      2π ρ_l Cmax^n/(n+2), which may exceed 1.
+
+    Reciprocal. Energy-conserving for ``energy`` with ρd + Σ ρ_l <= 1. A spectral exponent is one lobe for each colour.
+    One-sided.
+
+    Sampling: each lobe nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe). Where a lobe's axis lies below the
+    horizon (Cz < 0) only its tail can be seen, and most samples are lost.
+
+    Example
+    -------
+    <bsdf type="lafortune">
+        <float name="exponent_1" value="20"/>
+        <float name="cx_2" value="0.9"/>
+        <float name="cy_2" value="0.9"/>
+        <float name="cz_2" value="0.7"/>
+        <float name="exponent_2" value="9"/>
+    </bsdf>
+
+    {"type": "lafortune", "exponent_1": 20, "cx_2": 0.9, "cy_2": 0.9, "cz_2": 0.7, "exponent_2": 9}
+    """
+
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
+    specular = PerLobe(
+        8,
+        specular_reflectance=Reflectance(0.2, "scale ρ of lobe i"),
+        cx=Number(-1, (-1.5, 1.5), "factor Cx of lobe i"),
+        cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i"),
+        cz=Number(1, (-1.5, 1.5), "factor Cz of lobe i"),
+        exponent=Number(30, (0, 1e6), "exponent n of lobe i"),
+    )
+    normalization = Choice(("energy", "none"), "scale of the lobes")
+    rotation = Rotation()
+
+    def lobes(self, p):
+        energy = self.normalization == "energy"
+        glossy = []
+        for lobe in p.specular:
+            n, c = lobe.exponent, (lobe.cx, lobe.cy, lobe.cz)
+            largest = dr.maximum(dr.maximum(abs(c[0]), abs(c[1])), dr.maximum(abs(c[2]), 1e-6)) if energy else 1
+            scale = (n + 2) * dr.inv_two_pi if energy else 1
+            glossy.append(LafortuneLobe(lobe.specular_reflectance, n, scale, c, largest))
+        return LambertLobe(p.diffuse_reflectance), *glossy
+
+
+class LafortuneLobe(PowerLobe):
+    """ρ·scale·max(0, (C∘wi)·wo / unit)ⁿ: a power of the cosine to the axis C∘wi, times one of its length."""
+
+    def __init__(self, reflectance, exponent, scale, c, unit):
+        super().__init__(reflectance, exponent, scale)
+        self.c, self.unit = c, unit
+
+    def _stretched(self, wi):
+        """``(C∘wi, its length)``, the length relative to that of wi, which may be off one by a rounding error."""
+        v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
+        return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), 1e-20))
+
+    def frame(self, wi) -> AxisFrame:
+        v, length = self._stretched(wi)
+        return AxisFrame(dr.select(length > 1e-8, v / length, mi.Vector3f(0, 0, 1)))
+
+    def peak(self, wi):
+        # A C above 1 with a large exponent leaves the range of float32; so bright a lobe is limited.
+        _, length = self._stretched(wi)
+        return self.scale * dr.exp(dr.minimum(self.exponent * dr.log(length / self.unit), 60))

@@ -1,0 +1,116 @@
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe
+from ..math import clamp, luminance, normalize_or, safe_sqrt
+from ..microfacet.distributions import ABC, PowerLaw
+from ..microfacet.fresnel import Dielectric
+from ..microfacet.sampling import Orbit
+from ..microfacet.shadowing import vcavity
+from ..model import Model
+from ..parameters import Choice, Colour, Number, Reflectance
+
+
+class Low(Model):
+    """Löw, Kronander, Ynnerman and Unger's models for glossy surfaces (2012), with the ABC distribution.
+
+    J. Löw, J. Kronander, A. Ynnerman and J. Unger, BRDF models for accurate and efficient rendering of glossy
+    surfaces, ACM Transactions on Graphics 31(1), 2012, doi:10.1145/2077341.2077350.
+
+        microfacet:  f = ρd/π + F(wi·h) G S(1 - cosθ_h) / (π cosθ_i cosθ_o)
+        smooth:      f = ρd/π + F(cosθ_d) S(|wi_xy + wo_xy|²),     cosθ_d = √(1 - ¼|wi_xy - wo_xy|²)
+        S(x) = A / (1 + B x)^C
+
+    with h = (wi+wo)/|wi+wo|, the V-cavity G = min(1, 2 cosθ_h cosθ_i/(wi·h), 2 cosθ_h cosθ_o/(wi·h)) and the exact
+    Fresnel reflectance F of a dielectric of index ``int_ior`` in vacuum. The smooth variant follows Rayleigh-Rice
+    theory, and has no shadowing. ``normalization`` concerns the microfacet variant:
+
+    * fit: as above, as the published fits of the MERL materials need it
+    * paper: without 1/π, as equation 15 is printed
+    * unit: f = ρd/π + A F D G/(4 cosθ_i cosθ_o), D ∝ (1 + B (1 - cosθ_h))^-C normalised by ∫ D cosθ_h = 1; so A <= 1
+      conserves energy
+
+    Reciprocal. Energy-conserving for ``unit`` with ρd + A <= 1; otherwise A is whatever a fit made it, and the albedo
+    may exceed 1. The factor 1/π was inferred from the fits. One-sided.
+
+    Sampling: microfacet by eight images of a half vector, one of them chosen by what it reflects
+    (mi_brdfs.microfacet.sampling.Orbit); smooth exactly in S on the disc of projected directions, clipped to it. No
+    sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="low">
+        <rgb name="a" value="8, 6, 4"/>
+        <float name="b" value="2000"/>
+        <float name="c" value="1.2"/>
+    </bsdf>
+
+    {"type": "low", "a": {"type": "rgb", "value": [8, 6, 4]}, "b": 2000, "c": 1.2}
+    """
+
+    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    a = Colour(1, (0, float("inf")), "scale A")
+    b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
+    c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
+    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum")
+    variant = Choice(("microfacet", "smooth"), "which of the paper's two models")
+    normalization = Choice(("fit", "paper", "unit"), "scale of the microfacet variant")
+
+    def lobes(self, p):
+        fresnel = Dielectric(p.int_ior)
+        if self.variant == "smooth":
+            specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
+        else:
+            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[self.normalization]
+            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, Orbit(8))
+        return LambertLobe(p.diffuse_reflectance), specular
+
+
+class SmoothLobe(Lobe):
+    """f = A F(cosθ_d) (1 + B d²)^-C, where d is the distance of wo_xy from the mirror direction -wi_xy.
+
+    As f cosθ_o dω = f dx on the unit disc of projected directions x, d² is drawn from the power law on a chord through
+    -wi_xy, up to the disc's edge. Of the chord's two ends, at the same fraction of their masses, one is chosen with
+    probability ∝ mass times F.
+    """
+
+    def __init__(self, reflectance, law, fresnel):
+        self.reflectance, self.law, self.fresnel = reflectance, law, fresnel
+
+    def albedo(self, wi):
+        return self.reflectance * (self.fresnel(wi.z) * self.law.norm * dr.pi)
+
+    def _mass(self, wi, x, y):
+        """The power law's mass on the way from -wi_xy in the direction (x, y) to the edge of the disc."""
+        along = x * wi.x + y * wi.y
+        reach = along + dr.sqrt(along * along + wi.z * wi.z)
+        return self.law.mass(reach * reach)
+
+    def _reflectance(self, wi, x, y):
+        """F for the projected direction (x, y)."""
+        return self.fresnel(safe_sqrt(1 - 0.25 * (dr.square(x - wi.x) + dr.square(y - wi.y))))
+
+    def _end(self, wi, x, y, u):
+        """``(point, W)``: the point at the fraction ``u`` of one end of a chord, and the end's mass times F."""
+        mass = self._mass(wi, x, y)
+        d = safe_sqrt(self.law.inverse(u * mass))
+        point = (d * x - wi.x, d * y - wi.y)
+        return point, mass * luminance(self._reflectance(wi, *point))
+
+    def eval_pdf(self, wi, wo):
+        dx, dy = wi.x + wo.x, wi.y + wo.y
+        d2 = dx * dx + dy * dy
+        x, y = normalize_or(dx, dy, (1, 0))
+        shape = self.law.eval(d2) * wo.z
+        value = self._reflectance(wi, wo.x, wo.y) * shape
+        mass = self._mass(wi, x, y)
+        _, other = self._end(wi, -x, -y, clamp(self.law.mass(d2) / mass, 0, 1))
+        own = luminance(self._reflectance(wi, wo.x, wo.y))
+        return self.reflectance * value, 2 * dr.inv_pi * own * shape / (mass * own + other)
+
+    def sample(self, wi, u, v):
+        y, x = dr.sincos(dr.two_pi * v.x)
+        (first, weight), (second, other) = self._end(wi, x, y, v.y), self._end(wi, -x, -y, v.y)
+        take_first = u * (weight + other) < weight
+        px, py = (dr.select(take_first, a, b) for a, b in zip(first, second, strict=True))
+        return mi.Vector3f(px, py, safe_sqrt(1 - px * px - py * py))
