@@ -1,0 +1,80 @@
+import math
+
+import drjit as dr
+
+from ..lobes.diffuse import ZonalLobe
+from ..math import safe_sqrt
+from ..model import Model
+from ..parameters import Choice, Number, Reflectance
+
+
+class Minnaert(Model):
+    """Minnaert's reflection (1941), known from the Moon.
+
+    M. Minnaert, The reciprocity principle in lunar photometry, Astrophysical Journal 93, 1941, doi:10.1086/144279.
+
+        f = ρ (k+1)/(2π) (cosθ_i cosθ_o)^(k-1)
+
+    k = 1 is Lambert's model; above, surfaces darken towards their limb, and below they brighten. ``normalization``
+    chooses what becomes of the formula:
+
+    * energy: as above for k >= 1. For k < 1 it would diverge at grazing, and is held from a cosine of 0.1 on:
+      f = ρ (k+1)/(2π) (m_i m_o/0.1)^(k-1), where m = max(cosθ, 0.1). The albedo rises from about 10^(k-1) ρ at
+      normal incidence to ρ at most: 0.31 ρ and 0.99 ρ for k = 0.5.
+    * published: as above for all k. The albedo is ρ cosθ_i^(k-1): for k = 0.5 it is 1.41 ρ at 60° and 7.6 ρ at 89°.
+    * none: f cosθ_o = ρ/π (cosθ_i cosθ_o)^k, the shading formula; not reciprocal. The albedo is
+      2ρ/(k+1) cosθ_i^k, up to 2ρ.
+
+    Reciprocal, but for ``none``. Energy-conserving for k >= 1, and for ``energy`` at any k. The paper is about the
+    exponents; the factor (k+1)/2π, which is common usage, could not be compared with it. One-sided.
+
+    Sampling: the cosine by its inverse cumulative distribution, so every weight is the albedo.
+
+    Example
+    -------
+    <bsdf type="minnaert">
+        <rgb name="reflectance" value="0.3, 0.28, 0.25"/>
+        <float name="exponent" value="0.7"/>
+    </bsdf>
+
+    {"type": "minnaert", "reflectance": {"type": "rgb", "value": [0.3, 0.28, 0.25]}, "exponent": 0.7}
+    """
+
+    reflectance = Reflectance(0.5, "scale ρ; for k >= 1 the albedo at normal incidence")
+    exponent = Number(1.5, (0, 100), "exponent k: above 1 the limb darkens, below it brightens")
+    normalization = Choice(("energy", "published", "none"), "what becomes of the formula at grazing")
+
+    def lobes(self, p):
+        return (MinnaertLobe(p.reflectance, p.exponent, self.normalization),)
+
+
+class MinnaertLobe(ZonalLobe):
+    """p ∝ μ max(μ, c)^(k-1), where c is 0.1 for ``energy`` and k < 1, and else 0."""
+
+    HELD = 0.1
+
+    def __init__(self, reflectance, exponent, normalization):
+        self.reflectance, self.exponent, self.normalization = reflectance, exponent, normalization
+        self.reciprocal = normalization != "none"
+        self.held = exponent < 1 if normalization == "energy" else False
+        # The integrals of p for c = 0 over [0, c], and of what holding it takes away.
+        self.mass = dr.select(self.held, dr.exp(math.log(self.HELD) * (exponent + 1)), 0)
+        self.lost = 0.5 * (1 - exponent) * self.mass
+
+    def albedo(self, wi):
+        mu, k = wi.z, self.exponent
+        if self.normalization == "none":
+            return self.reflectance * (2 / (k + 1) * dr.power(mu, k))
+        mu = dr.select(self.held, dr.maximum(mu / self.HELD, 1), mu)
+        return self.reflectance * ((1 - self.lost) * dr.power(mu, k - 1))
+
+    def density(self, cos):
+        k = self.exponent
+        base = dr.maximum(cos, dr.select(self.held, self.HELD, 0))
+        return (k + 1) / (1 - self.lost) * cos * dr.power(base, k - 1)
+
+    def cosine(self, u):
+        k, u = self.exponent, u * (1 - self.lost)
+        below = u < 0.5 * (k + 1) * self.mass
+        inside = self.HELD * safe_sqrt(2 * u / ((k + 1) * dr.select(below, self.mass, 1)))
+        return dr.select(below, inside, dr.power(u + self.lost, 1 / (k + 1)))

@@ -1,0 +1,84 @@
+"""Models that are the same model for some parameters."""
+
+from math import sqrt
+
+import mitsuba as mi
+import numpy as np
+import pytest
+import reference as ref
+from support import call, hemisphere, is_scalar
+
+
+def assert_same(ours, theirs):
+    """To float32 round-off, at directions all over the hemisphere."""
+    count = 40 if is_scalar() else 20_000
+    wi, wo, ctx = hemisphere(count, 1), hemisphere(count, 2), mi.BSDFContext()
+    values = [call(mi.load_dict(bsdf).eval, ctx, wi, wo)[0] for bsdf in (ours, theirs)]
+    assert (values[1] > 0).all()
+    np.testing.assert_allclose(*values, rtol=1e-5)
+
+
+def both_densities(ours, theirs):
+    wi, wo, ctx = hemisphere(20_000, 1), hemisphere(20_000, 2), mi.BSDFContext()
+    return [call(mi.load_dict(bsdf).pdf, ctx, wi, wo)[0] for bsdf in (ours, theirs)]
+
+
+LAMBERT = {
+    "wrap": {"type": "wrap", "wrap": 0, "exponent": 1},
+    "wrap, unnormalised": {"type": "wrap", "wrap": 0, "exponent": 1, "normalization": "none"},
+    "wrap on the sphere": {"type": "wrap", "wrap": 0, "exponent": 1, "domain": "sphere"},
+    "minnaert": {"type": "minnaert", "exponent": 1},
+    "minnaert as published": {"type": "minnaert", "exponent": 1, "normalization": "published"},
+    "orennayar": {"type": "orennayar", "sigma": 0},
+    "full orennayar": {"type": "orennayar", "sigma": 0, "model": "full"},
+    "eon": {"type": "eon", "roughness": 0},
+}
+
+
+@pytest.mark.parametrize("name", LAMBERT)
+def test_lambert(name, variant):
+    colour = {"reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
+    assert_same(LAMBERT[name] | colour, {"type": "lambert"} | colour)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", LAMBERT)
+def test_lambert_is_sampled_by_the_cosine(name):
+    np.testing.assert_allclose(*both_densities(LAMBERT[name], {"type": "lambert"}), rtol=1e-5)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model", ["qualitative", "full"])
+def test_two_spellings_of_the_roughness_of_orennayar(model):
+    for alpha in (0.1, 0.4, 0.9):
+        sigma, spelt = ({"type": "orennayar", "model": model} | given
+                        for given in ({"sigma": alpha / sqrt(2)}, {"alpha": alpha}))  # fmt: skip
+        assert_same(spelt, sigma)
+        np.testing.assert_allclose(*both_densities(spelt, sigma), rtol=1e-5)
+        assert [key.split(".")[0] for key in mi.traverse(mi.load_dict(spelt)).keys()] == ["reflectance", "alpha"]
+        assert [key.split(".")[0] for key in mi.traverse(mi.load_dict(sigma)).keys()] == ["reflectance", "sigma"]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("fast, model", [(None, "full"), (False, "full"), (True, "qualitative")])
+def test_roughdiffuse(fast, model):
+    given = {} if fast is None else {"use_fast_approx": fast}
+    for alpha in (None, 0.7):
+        roughdiffuse = {"type": "roughdiffuse"} | given | ({} if alpha is None else {"alpha": alpha})
+        assert_same(roughdiffuse, {"type": "orennayar", "model": model, "sigma": (alpha or 0.2) / sqrt(2)})
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_roughdiffuse_of_a_mitsuba_06_scene():
+    xml = '<bsdf type="roughdiffuse" version="0.6.0"><boolean name="useFastApprox" value="true"/></bsdf>'
+    assert "use_fast_approx = True" in str(mi.load_string(xml))
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_full_orennayar_is_black_where_its_formula_is_negative():
+    bsdf = mi.load_dict({"type": "orennayar", "model": "full", "sigma": 1.5, "reflectance": 0.2})
+    wi, wo = hemisphere(20_000, 1), hemisphere(20_000, 2)
+    value = call(bsdf.eval, mi.BSDFContext(), wi, wo)[0][:, 0]
+    expected = ref.orennayar(wi, wo, 0.2, 1.5, "full")
+    assert (expected < 0).any() and (value >= 0).all()
+    np.testing.assert_allclose(value, np.maximum(expected, 0), rtol=1e-5, atol=1e-7)

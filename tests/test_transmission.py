@@ -1,0 +1,76 @@
+"""Lobes on the other side of the surface, with the one model that has one."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import call, direction, sphere
+
+SHEET = {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5}
+
+
+def context(component=None, mask=None):
+    ctx = mi.BSDFContext()
+    if component is not None:
+        ctx.component = component
+    if mask is not None:
+        ctx.type_mask = int(mask)
+    return ctx
+
+
+def test_flags(variant):
+    bsdf, flags = mi.load_dict(SHEET), mi.BSDFFlags
+    assert bsdf.component_count() == 2
+    assert bsdf.flags(0) == int(flags.DiffuseReflection | flags.FrontSide | flags.NonSymmetric)
+    assert bsdf.flags(1) == int(flags.DiffuseTransmission | flags.FrontSide | flags.NonSymmetric)
+    with pytest.raises(RuntimeError, match="transmission"):
+        mi.load_dict({"type": "twosided", "inner": SHEET})
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_each_lobe_has_its_side():
+    """Component and type mask mean the same, and the lobes add up to the whole."""
+    bsdf, flags = mi.load_dict(SHEET), mi.BSDFFlags
+    wo, rng = sphere(20_000, 1), np.random.default_rng(2)
+    wi, u, v = np.tile(direction(40), (20_000, 1)), rng.random((20_000, 1)), rng.random((20_000, 2))
+    lobes = []
+    for component, mask, side in [(0, flags.DiffuseReflection, 1), (1, flags.DiffuseTransmission, -1)]:
+        for ctx in (context(component), context(mask=mask)):
+            value, pdf = call(bsdf.eval_pdf, ctx, wi, wo)
+            assert not value[wo[:, 2] * side < 0].any() and not pdf[wo[:, 2] * side < 0].any()
+            sampled, _, weight = call(bsdf.sample, ctx, wi, u, v)
+            assert (sampled[:, 2] * side > 0).all() and (weight > 0).all()
+        lobes.append(value)
+    np.testing.assert_allclose(call(bsdf.eval, context(), wi, wo)[0], sum(lobes), rtol=1e-5)
+    assert all(lobe.any() for lobe in lobes)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("normalization, albedo", [("energy", 0.5), ("none", 0.5 * 2 * 1.8 / 2.5)])
+def test_albedo(normalization, albedo):
+    """The weight is the albedo of both lobes together, in each sample."""
+    bsdf, rng = mi.load_dict(SHEET | {"normalization": normalization}), np.random.default_rng(2)
+    wi, u, v = np.tile(direction(40), (20_000, 1)), rng.random((20_000, 1)), rng.random((20_000, 2))
+    wo, _, weight = call(bsdf.sample, context(), wi, u, v)
+    np.testing.assert_allclose(weight, albedo, rtol=1e-5)
+    assert (wo[:, 2] < 0).mean() == pytest.approx((0.8 / 1.8) ** 2.5, abs=0.01)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_light_from_behind():
+    """A sheet seen from its front, lit by a distant lamp behind it: radiance = E f |cosθ|."""
+    for domain, expected in [("sphere", 0.5 * 3 / (4 * np.pi) * 0.25**2), ("hemisphere", 0)]:
+        scene = mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "path", "max_depth": 2},
+                "sensor": {
+                    "type": "perspective",
+                    "fov": 20,
+                    "to_world": mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
+                    "film": {"type": "hdrfilm", "width": 8, "height": 8},
+                },
+                "sheet": {"type": "rectangle", "bsdf": {"type": "wrap", "domain": domain}},
+                "lamp": {"type": "directional", "direction": [np.sqrt(3) / 2, 0, 0.5], "irradiance": 1.0},
+            }
+        )
+        np.testing.assert_allclose(np.array(mi.render(scene, spp=4)), expected, rtol=1e-4)
