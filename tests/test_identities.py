@@ -82,3 +82,39 @@ def test_full_orennayar_is_black_where_its_formula_is_negative():
     expected = ref.orennayar(wi, wo, 0.2, 1.5, "full")
     assert (expected < 0).any() and (value >= 0).all()
     np.testing.assert_allclose(value, np.maximum(expected, 0), rtol=1e-5, atol=1e-7)
+
+
+BOTH = {"diffuse_reflectance": 0.3, "specular_reflectance": 0.6}
+SAME = {
+    "a mirror-like lafortune lobe": (
+        {"type": "lafortune", "cx": -1, "cy": -1, "cz": 1, "exponent": 40} | BOTH,
+        {"type": "phong", "exponent": 40} | BOTH,
+    ),
+    "the same, numbered": (
+        {"type": "lafortune", "exponent_1": 40, "specular_reflectance_1": 0.6, "diffuse_reflectance": 0.3},
+        {"type": "phong", "exponent": 40} | BOTH,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_same_model(name, variant):
+    assert_same(*SAME[name])
+
+
+ISOTROPIC = {
+    "ward": ("alpha", 0.2),
+    "walter": ("alpha", 0.3),
+    "kurt": ("alpha", 0.2),
+    "ashikhminshirley": ("exponent", 50),
+}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("plugin", ISOTROPIC)
+def test_isotropic_is_anisotropic_with_equal_pairs(plugin):
+    parameter, value = ISOTROPIC[plugin]
+    one, two = {"type": plugin, parameter: value}, {"type": plugin, f"{parameter}_u": value, f"{parameter}_v": value}
+    assert_same(one, two)
+    assert_same(one, one | {"rotation": 0.17})
+    np.testing.assert_allclose(*both_densities(one, two), rtol=1e-5)
