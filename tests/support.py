@@ -6,9 +6,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-# Drjit's rounding of the parameters and directions to float32 moves a narrow lobe by up to this much, relatively.
-FLOAT32 = 1e-4
-
 
 def direction(theta: float, phi: float = 0.0) -> np.ndarray:
     """The float32 unit vector at these angles, in degrees."""

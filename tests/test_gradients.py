@@ -7,6 +7,9 @@ import pytest
 from catalogue import SMOOTH
 from support import direction, interaction
 
+LINEAR = ("reflectance", "subsurface", "metallic", "specular", "tint", "sheen", "clearcoat.")
+"""Parts of the keys of parameters in which a picture is linear or quadratic: a central difference is exact."""
+
 
 def scene_of(bsdf):
     """A sphere under a point light, where a highlight has no noise, and a sky with a broad bright spot, where both the
@@ -39,7 +42,7 @@ def test_prb_agrees_with_finite_differences(name):
     show a turned frame: the highlight that they would be symmetric to has no derivative for the rotation.)
 
     Both sides use the same random numbers, so they share most of their noise; what remains is below 1 % for 1M paths.
-    A central difference over ±3 % errs by some tenths of a percent; reflectances, in which the picture is linear, take
+    A central difference over ±3 % errs by some tenths of a percent; parameters in which the picture is linear take
     longer steps against the noise of lobes that are chosen otherwise.
     """
     turned = {"rotation": SMOOTH[name]["rotation"] + 0.05} if "rotation" in SMOOTH[name] else {}
@@ -55,7 +58,8 @@ def test_prb_agrees_with_finite_differences(name):
     assert keys
     for key in keys:
         original = type(params[key])(params[key])  # params[key] changes with what is assigned to it
-        step = 0.15 if "reflectance" in key else 0.03 * abs(np.array(original).ravel()[0])
+        linear = any(part in key for part in LINEAR)
+        step = 0.15 if linear else 0.03 * abs(np.array(original).ravel()[0])
 
         dr.enable_grad(params[key])
         params.update()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import luminance
+from ..math import luminance, safe_sqrt
 from ..microfacet.facet import Facet
 from ..microfacet.shadowing import SmithGGX
 from .lobe import Lobe
@@ -44,7 +44,7 @@ class DimmedLobe(MicrofacetLobe):
 
     def albedo(self, wi):
         alpha, tilt = dr.sqrt(self.distribution.roughness2()), 1 - wi.z
-        cos = dr.sqrt(wi.z * wi.z + 0.45 * alpha * tilt * dr.sqrt(tilt))  # fitted to GGX
+        cos = dr.sqrt(wi.z * wi.z + 0.45 * alpha * tilt * safe_sqrt(tilt))  # fitted to GGX
         z = dr.maximum(wi.z, 1e-4)  # the terms must not vanish
         mirror = Facet(mi.Vector3f(wi.x, wi.y, z), mi.Vector3f(-wi.x, -wi.y, z), mi.Vector3f(0, 0, 1), z)
         shadowing = self.shadowing(mirror) / SmithGGX(alpha, alpha, correlated=False)(mirror)

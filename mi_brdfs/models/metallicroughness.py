@@ -1,0 +1,80 @@
+import drjit as dr
+
+from ..lobes import DimmedLobe, LambertLobe
+from ..microfacet.distributions import GGX
+from ..microfacet.facet import Facet
+from ..microfacet.fresnel import Schlick
+from ..microfacet.sampling import Orbit
+from ..microfacet.shadowing import SchlickGGX, SmithGGX
+from ..model import Model
+from ..parameters import Choice, Number, Reflectance
+
+
+class MetallicRoughness(Model):
+    """The metallic-roughness model of real-time rendering (Karis 2013).
+
+    B. Karis, Real shading in Unreal Engine 4, in: Physically based shading in theory and practice, SIGGRAPH 2013
+    courses, doi:10.1145/2504435.2504457.
+
+        f = (1 - F(wi·h)) (1 - metallic) C/π + F(wi·h) D(h) G(wi, wo) / (4 cosθ_i cosθ_o)
+        F(x) = f0 + (1 - f0) (1 - x)⁵,    f0 = (1 - metallic) 0.04 + metallic C
+        D = α² / (π (1 + (α²-1) h_z²)²),    α = r²
+
+    with h = (wi+wo)/|wi+wo|, the base colour C, the roughness r and, by ``shadowing``, G = g(cosθ_i) g(cosθ_o) where
+
+    * direct: g(x) = x/(x (1-k) + k) with k = (r+1)²/8, which Karis has for analytic lights. It darkens smooth surfaces
+      at grazing: for C = 1, metallic = 1 and r = 0.1 the albedo is 0.34 at 80°.
+    * ibl: the same with k = r²/2, which he has for image-based lighting; it is nearly Smith's term.
+    * smith: Smith's term for GGX, separable, as that of ``walter``.
+
+    The factor 1-F of the diffuse lobe is common practice, as in the glTF 2.0 specification; Karis's notes have
+    Lambert's lobe without it. It takes away the light that facets between wi and wo reflect, not all that the specular
+    lobe does.
+
+    Reciprocal. Energy-conserving for metallic = 1. Else a bright surface gains energy towards grazing, the smoother the
+    more: for C = 1, metallic = 0 the albedo reaches, for r = 0.5 and r = 0.1, 1.00 and 1.09 (direct), 1.10 and 1.57
+    (ibl), 1.12 and 1.72 (smith). One-sided.
+
+    Sampling: the diffuse lobe by cosine, the specular one by eight images of a half vector, one of them chosen by what
+    it reflects (mi_brdfs.microfacet.sampling.Orbit). No sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="metallicroughness">
+        <rgb name="base_color" value="0.9, 0.6, 0.3"/>
+        <float name="metallic" value="1"/>
+    </bsdf>
+
+    {"type": "metallicroughness", "base_color": {"type": "rgb", "value": [0.9, 0.6, 0.3]}, "metallic": 1.0}
+    """
+
+    base_color = Reflectance(0.5, "base colour C")
+    metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
+    roughness = Number(0.5, (0.01, 1), "roughness r; the facets' is its square")
+    shadowing = Choice(("direct", "ibl", "smith"), "shadowing term")
+
+    def lobes(self, p):
+        fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))
+        alpha = dr.square(p.roughness)
+        if self.shadowing == "smith":
+            shadowing = SmithGGX(alpha, alpha, correlated=False)
+        else:
+            shadowing = SchlickGGX(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
+        diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
+        return diffuse, DimmedLobe(1, GGX(alpha, alpha), shadowing, fresnel, Orbit(8))
+
+
+class FresnelDiffuseLobe(LambertLobe):
+    """f = ρ/π (1 - F(cosθ_d)), cosine-sampled: Lambert's lobe, less the light that facets half-way would reflect."""
+
+    def __init__(self, reflectance, fresnel):
+        super().__init__(reflectance)
+        self.fresnel = fresnel
+
+    def albedo(self, wi):
+        # At any incidence: few pairs of directions graze their half vector.
+        return self.reflectance * (1 - self.fresnel(1))
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (1 - self.fresnel(Facet.between(wi, wo).cos_d)), pdf
