@@ -83,29 +83,33 @@ def test_weight_is_value_over_density(row, variant):
         np.testing.assert_allclose(both[4], weight, rtol=1e-4, atol=1e-7)
 
 
-def mirror_grid(wi, radial, azimuthal, power=3):
-    """Directions on a polar grid around the mirror direction of ``wi``, denser towards it, and their solid angles."""
+@functools.cache
+def mirror_grid(angles, radial, azimuthal, power=3):
+    """Directions on a polar grid around the mirror direction of the one at ``angles``, denser towards it, and their
+    solid angles."""
     s, phi = np.meshgrid((np.arange(radial) + 0.5) / radial, (np.arange(azimuthal) + 0.5) / azimuthal * 2 * np.pi)
     theta = np.pi * s**power
     solid_angle = np.sin(theta) * power * np.pi * s ** (power - 1) / radial * 2 * np.pi / azimuthal
-    axis = wi * [-1, -1, 1]
+    axis = direction(*angles) * [-1, -1, 1]
     side = np.cross(axis, [1, 0, 0] if abs(axis[0]) < 0.5 else [0, 1, 0])
     side /= np.linalg.norm(side)
     up = np.cross(axis, side)
     directions = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
     wo = sum(d[..., None] * base for d, base in zip(directions, (side, up, axis), strict=True))
-    return wo.reshape(-1, 3), solid_angle.ravel()
+    return wo.reshape(-1, 3).astype(np.float32), solid_angle.ravel()
 
 
 @pytest.mark.parametrize("row", ROWS, ids=str)
 def test_density_integrates_to_one_at_most(row, variant):
-    """By the midpoint rule, good to 1e-3 on the fine grid and to 3e-2 on the coarse one of scalar variants. A lobe
-    behind the surface may begin with a jump, so that grid gets a border in the horizon."""
+    """By the midpoint rule, good to 1e-3 on the fine grid and to 3e-2 on the coarse one of scalar variants; each lobe
+    alone in rgb, where the others would only repeat it. A lobe behind the surface may begin with a jump, so that grid
+    gets a border in the horizon."""
     bsdf, (grid, error) = mi.load_dict(row.bsdf), ((24, 24), 3e-2) if is_scalar() else ((1600, 600), 1e-3)
-    for _, context in contexts(bsdf):
-        for angles in ANGLES[2:3] if is_scalar() else ANGLES:
+    thorough = variant == "llvm_ad_rgb"
+    for _, context in contexts(bsdf) if thorough else [next(contexts(bsdf))]:
+        for angles in ANGLES if thorough else ANGLES[2:3]:
             wi = direction(*angles)
-            wo, solid_angle = mirror_grid(direction(0), *grid, power=1) if row.transmits else mirror_grid(wi, *grid)
+            wo, solid_angle = mirror_grid((0, 0), *grid, power=1) if row.transmits else mirror_grid(angles, *grid)
             pdf = call(bsdf.pdf, context, np.broadcast_to(wi, wo.shape) if is_scalar() else wi, wo)[0]
             assert 0.2 < (pdf[:, 0] * solid_angle).sum() < 1 + error
 
