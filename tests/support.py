@@ -39,6 +39,16 @@ def interaction(wi) -> mi.SurfaceInteraction3f:
     return si
 
 
+def context(component=None, mask=None):
+    """A BSDF context, of one component or of some types if they are given."""
+    ctx = mi.BSDFContext()
+    if component is not None:
+        ctx.component = component
+    if mask is not None:
+        ctx.type_mask = int(mask)
+    return ctx
+
+
 def is_scalar() -> bool:
     return mi.variant().startswith("scalar")
 

@@ -4,22 +4,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, direction, hemisphere, interaction, numbers
+from support import call, context, direction, hemisphere, interaction, numbers
 
 TWO_LOBES = {
     "phong": {"type": "phong", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.5]}},
     "ward": {"type": "ward", "alpha": 0.3, "specular_reflectance": 0.4},
     "walter": {"type": "walter", "alpha": 0.3, "f0": 0.04, "diffuse_reflectance": 0.3},
 }
-
-
-def context(component=None, mask=None):
-    ctx = mi.BSDFContext()
-    if component is not None:
-        ctx.component = component
-    if mask is not None:
-        ctx.type_mask = int(mask)
-    return ctx
 
 
 @pytest.mark.parametrize("name", TWO_LOBES)

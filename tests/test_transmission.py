@@ -3,18 +3,9 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, direction, sphere
+from support import call, context, direction, sphere
 
 SHEET = {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5}
-
-
-def context(component=None, mask=None):
-    ctx = mi.BSDFContext()
-    if component is not None:
-        ctx.component = component
-    if mask is not None:
-        ctx.type_mask = int(mask)
-    return ctx
 
 
 def test_flags(variant):

@@ -103,11 +103,10 @@ class Blinn(Isotropic):
         return (n + 2) * dr.inv_two_pi * dr.exp(n * log_cos(facet.cos_h, facet.sin2_h))
 
     def cdf(self, tan2, g):
-        logarithm = -0.5 * (self.exponent + 2) * log1p(dr.minimum(tan2, 1e30))
-        return -expm1(logarithm), dr.exp(logarithm)
+        return cosine_power_cdf(tan2, self.exponent + 2)
 
     def inverse_cdf(self, c, complement, g):
-        return dr.minimum(expm1(log_complement(c, complement) * (-2 / (self.exponent + 2))), 1e30)
+        return inverse_cosine_power_cdf(c, complement, self.exponent + 2)
 
 
 class AshikhminShirley(Distribution):
@@ -133,11 +132,10 @@ class AshikhminShirley(Distribution):
         return mi.Float(1)
 
     def cdf(self, tan2, g):
-        logarithm = -0.5 * g * log1p(dr.minimum(tan2, 1e30))
-        return -expm1(logarithm), dr.exp(logarithm)
+        return cosine_power_cdf(tan2, g)
 
     def inverse_cdf(self, c, complement, g):
-        return dr.minimum(expm1(log_complement(c, complement) * (-2 / g)), 1e30)
+        return inverse_cosine_power_cdf(c, complement, g)
 
 
 class PowerLaw:
@@ -245,6 +243,17 @@ def tan2_of_versine(v):
     """tan²θ of 1 - cosθ, limited at the horizon."""
     v = clamp(v, 0, 1 - 1e-7)
     return v * (2 - v) / dr.square(1 - v)
+
+
+def cosine_power_cdf(tan2, power):
+    """``(C, 1 - C)`` for 1 - C = cosθ^power."""
+    logarithm = -0.5 * power * log1p(dr.minimum(tan2, 1e30))
+    return -expm1(logarithm), dr.exp(logarithm)
+
+
+def inverse_cosine_power_cdf(c, complement, power):
+    """The tan²θ of a ``cosine_power_cdf`` value."""
+    return dr.minimum(expm1(log_complement(c, complement) * (-2 / power)), 1e30)
 
 
 def log_complement(c, complement):

@@ -56,22 +56,10 @@ def implicit(facet):
     return facet.cos_i * facet.cos_o
 
 
-def neumann(facet):
-    """cosθ_i cosθ_o / max(cosθ_i, cosθ_o) (Neumann, Neumann and Szirmay-Kalos 1999, Compact metallic reflectance
-    models)."""
-    return dr.minimum(facet.cos_i, facet.cos_o)
-
-
 def ashikhmin_shirley(facet):
     """cosθ_i cosθ_o / (cosθ_d max(cosθ_i, cosθ_o)) (Ashikhmin and Shirley 2000,
     doi:10.1080/10867651.2000.10487522)."""
     return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d
-
-
-def ashikhmin_premoze(facet):
-    """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premože, Distribution-based BRDFs, 2007)."""
-    product = facet.cos_i * facet.cos_o
-    return product / (facet.cos_i + facet.cos_o - product)
 
 
 class Kurt:

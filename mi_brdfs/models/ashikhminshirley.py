@@ -1,7 +1,6 @@
-import drjit as dr
 import mitsuba as mi
 
-from ..lobes import Lobe, MicrofacetLobe
+from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import AshikhminShirley as Distribution
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
@@ -57,13 +56,8 @@ class AshikhminShirley(Model):
         return CoupledDiffuseLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)), specular
 
 
-class CoupledDiffuseLobe(Lobe):
-    """f = 28/(23π) ρ g(cosθ_i) g(cosθ_o) with g(μ) = 1-(1-μ/2)⁵; its albedo is ρ g(cosθ_i)."""
-
-    glossy = False
-
-    def __init__(self, reflectance):
-        self.reflectance = reflectance
+class CoupledDiffuseLobe(LambertLobe):
+    """f = 28/(23π) ρ g(cosθ_i) g(cosθ_o) with g(μ) = 1-(1-μ/2)⁵; its albedo is ρ g(cosθ_i). Cosine-sampled."""
 
     @staticmethod
     def _g(cos):
@@ -75,8 +69,5 @@ class CoupledDiffuseLobe(Lobe):
         return self.reflectance * self._g(wi.z)
 
     def eval_pdf(self, wi, wo):
-        pdf = wo.z * dr.inv_pi
-        return self.reflectance * (28 / 23 * self._g(wi.z) * self._g(wo.z) * pdf), pdf
-
-    def sample(self, wi, u, v):
-        return mi.warp.square_to_cosine_hemisphere(v)
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (28 / 23 * self._g(wi.z) * self._g(wo.z)), pdf
