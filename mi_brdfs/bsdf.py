@@ -158,7 +158,10 @@ class ModelBSDF:
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
     def to_string(self):
-        lines = [f"  {name} = {value}" for name, value in vars(self.model).items() if isinstance(value, (str, bool))]
+        words = {name: value for name, value in vars(self.model).items() if isinstance(value, (str, bool))}
+        for slot in self.model.slots.values():
+            words |= slot.words
+        lines = [f"  {name} = {value}" for name, value in words.items()]
         lines += [f"  {name} = {texture}" for name, texture in self.model.textures.items()]
         return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 ONE_MINUS_EPSILON = 1 - 2**-24
 """The largest float32 below one: uniform variates are clamped to it."""
@@ -83,6 +84,12 @@ def choose(u, probability):
     left = dr.select(chosen, u, u - probability)
     left = left / dr.maximum(dr.select(chosen, probability, 1 - probability), 1e-30)
     return chosen, dr.minimum(left, ONE_MINUS_EPSILON)
+
+
+def gauss_legendre(count: int) -> list[tuple[float, float]]:
+    """The nodes and weights of Gauss-Legendre quadrature on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return [(float(0.5 * (1 + x)), float(0.5 * w)) for x, w in zip(nodes, weights, strict=True)]
 
 
 def luminance(colour):

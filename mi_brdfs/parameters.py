@@ -175,9 +175,9 @@ def _interval(limits: Range) -> str:
     return f"[{low:g}, {high:g}]" if math.isfinite(high) else f"[{low:g}, ∞)"
 
 
-def _listed(words, quote: bool = False) -> str:
+def _listed(words, last: str = "or", quote: bool = False) -> str:
     words = [f'"{word}"' if quote else word for word in words]
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " or " + words[-1]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
 # --- Slots: parameters of one plugin instance -----------------------------------------------------------------------
@@ -189,6 +189,8 @@ class Slot:
 
     textures: dict[str, Any] = field(default_factory=dict)
     anisotropic = False
+    words: ClassVar[dict[str, str]] = {}
+    """The choices among these parameters."""
 
     def evaluate(self, si, active):
         raise NotImplementedError
@@ -260,6 +262,28 @@ class LobesSlot(Slot):
         return [
             SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in lobe.items()}) for lobe in self.lobes
         ]
+
+
+@dataclass
+class OneOfSlot(Slot):
+    """A choice and the parameters that go with it, as slots (or words) by declared name; evaluated, a namespace of
+    their values, and the chosen word as ``choice``."""
+
+    name: str = ""
+    choice: str = ""
+    own: dict[str, Slot | str] = field(default_factory=dict)
+
+    @property
+    def anisotropic(self) -> bool:
+        return any(slot.anisotropic for slot in self.own.values() if isinstance(slot, Slot))
+
+    @property
+    def words(self) -> dict[str, str]:
+        return {self.name: self.choice} | {name: word for name, word in self.own.items() if isinstance(word, str)}
+
+    def evaluate(self, si, active):
+        values = {n: own.evaluate(si, active) if isinstance(own, Slot) else own for n, own in self.own.items()}
+        return SimpleNamespace(choice=self.choice, **values)
 
 
 class RotationSlot(Slot):
@@ -429,6 +453,50 @@ class Choice(Parameter):
 
     def rows(self) -> list[Row]:
         return [Row(self.name, "string", self.choices[0], " | ".join(self.choices), self.text)]
+
+
+class OneOf(Parameter):
+    """One of several words, the first by default, each with parameters of its own. Evaluated, it has these as
+    attributes, and the word as ``choice``."""
+
+    def __init__(self, words: dict[str, dict[str, Parameter]], text: str):
+        super().__init__(text)
+        self.words = words
+        for declared in words.values():
+            for name, parameter in declared.items():
+                parameter.__set_name__(None, name)
+
+    @property
+    def names(self) -> list[str]:
+        own = [name for declared in self.words.values() for p in declared.values() for name in p.names]
+        return list(dict.fromkeys([self.name, *own]))
+
+    def bind(self, given: Given) -> OneOfSlot:
+        choice = given.choice(self.name, tuple(self.words))
+        declared = self.words[choice]
+        allowed = [name for parameter in declared.values() for name in parameter.names]
+        for name in self.names[1:]:
+            if name in given and name not in allowed:
+                has = f"has {_listed(allowed, 'and')}" if allowed else "has no parameter"
+                raise given.error(name, f'does not belong to {self.name} = "{choice}", which {has} of its own')
+        own = {name: parameter.bind(given) for name, parameter in declared.items()}
+        textures = {n: t for slot in own.values() if isinstance(slot, Slot) for n, t in slot.textures.items()}
+        return OneOfSlot(textures, self.name, choice, own)
+
+    def placeholder(self, slot):
+        declared = self.words[slot.choice]
+        values = {n: declared[n].placeholder(own) if isinstance(own, Slot) else own for n, own in slot.own.items()}
+        return SimpleNamespace(choice=slot.choice, **values)
+
+    def rows(self) -> list[Row]:
+        rows = [Row(self.name, "string", next(iter(self.words)), " | ".join(self.words), self.text)]
+        users: dict[Parameter, list[str]] = {}
+        for word, declared in self.words.items():
+            for parameter in declared.values():
+                users.setdefault(parameter, []).append(word)
+        for parameter, words in users.items():
+            rows += [row._replace(text=f"with {_listed(words, 'and')}: {row.text}") for row in parameter.rows()]
+        return rows
 
 
 class PerLobe(Parameter):

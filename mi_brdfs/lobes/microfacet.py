@@ -25,15 +25,23 @@ class MicrofacetLobe(Lobe):
 
     def eval_pdf(self, wi, wo):
         facet = Facet.between(wi, wo)
-        value = self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
-        return self.reflectance * (self.fresnel(facet.cos_d) * value), self.sampler.pdf(self, facet)
+        value = self.reflectance * (self.fresnel(facet.cos_d) * self._facets(facet))
+        return value, self.sampler.pdf(self, facet)
 
     def sample(self, wi, u, v):
         return self.sampler.sample(self, wi, u, v)
 
+    def _facets(self, facet):
+        """f cosθ_o for ρ = F = 1."""
+        return self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
+
+    def response(self, facet):
+        """f cosθ_o as a number, for ρ = 1."""
+        return luminance(self.fresnel(facet.cos_d)) * self._facets(facet)
+
     def half_vector_weight(self, facet):
-        """f cosθ_o · 4cosθ_d / q: the weight of a sample of the distribution's half-vector density, for ρ = 1 and as
-        a number. D cancels from it."""
+        """The ``response`` times 4cosθ_d/q: the weight of a sample of the distribution's half-vector density. D cancels
+        from it."""
         visible = self.shadowing(facet) * facet.cos_d / facet.cos_i
         return luminance(self.fresnel(facet.cos_d)) * visible * self.distribution.over_density(facet)
 

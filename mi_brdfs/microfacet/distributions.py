@@ -8,10 +8,12 @@ t = tan²θ_h, which may depend on ``g`` = 1/((αu cosψ)² + (αv sinψ)²).
 
 from __future__ import annotations
 
+import functools
+
 import drjit as dr
 import mitsuba as mi
 
-from ..math import clamp, expm1, expm1_ratio, log1p, log1p_ratio, log_cos
+from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
 
 
 class Distribution:
@@ -203,8 +205,7 @@ class ABC(Isotropic):
         b = self.law.k
         broad = b < 0.5
         # Gauss-Legendre where the closed form, (∫ (1 + B y)^(1-C) - ∫ (1 + B y)^-C)/B, would cancel.
-        nodes, weights = [0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558], [0.1739274226, 0.3260725774]
-        quadrature = sum(w * y * self.law.eval(y) for y, w in zip(nodes, weights + weights[::-1], strict=True))
+        quadrature = sum(w * y * self.law.eval(y) for y, w in gauss_legendre(4))
         closed = (PowerLaw(b, self.law.gamma - 1).norm - self.law.norm) / dr.select(broad, 1, b)
         return self.law.norm - dr.select(broad, quadrature, closed)
 
@@ -226,6 +227,180 @@ class ABC(Isotropic):
 
     def inverse_cdf(self, c, complement, g):
         return tan2_of_versine(self.law.inverse(c * self.law.norm))
+
+
+class BentLaw:
+    """A density on [0, 1] that can be inverted: ∝ exp(κ s) for κ >= 0, and ∝ 1/(1 - κ s) for κ < 0. Its cumulative
+    distribution begins at s = 1; next to that, s comes as its complement m = 1 - s, too."""
+
+    def __init__(self, kappa):
+        self.rises = kappa >= 0
+        self.kappa, self.k = dr.maximum(kappa, 0), dr.maximum(-kappa, 0)
+        self.norm = dr.select(self.rises, expm1_ratio(self.kappa), log1p_ratio(self.k))
+
+    def eval(self, s):
+        return dr.select(self.rises, dr.exp(self.kappa * s), 1 / (1 + self.k * s)) / self.norm
+
+    def cdf(self, m, s):
+        """``(c, 1 - c)``, where c is the mass above s."""
+        x = m / (1 + self.k)
+        above = dr.select(self.rises, self._exp_mass(m), x * log1p_ratio(-self.k * x) / self.norm)
+        below = s * dr.select(self.rises, expm1_ratio(self.kappa * s), log1p_ratio(self.k * s)) / self.norm
+        return above, below
+
+    def _exp_mass(self, m):
+        return m * expm1_ratio(-self.kappa * m) / expm1_ratio(-self.kappa)
+
+    def inverse_cdf(self, c, complement):
+        """``(m, s)``"""
+        y = complement * self.norm
+        s = y * dr.select(self.rises, log1p_ratio(self.kappa * y), expm1_ratio(self.k * y))
+        # From c where that is the smaller of the two; elsewhere its own formula may have lost its digits.
+        small = c < 0.5
+        c = dr.select(small, c, 0)
+        up = c * expm1_ratio(-self.kappa)
+        m = dr.select(
+            self.rises,
+            up * log1p_ratio(-self.kappa * up),
+            c * self.norm * (1 + self.k) * expm1_ratio(-self.k * c * self.norm),
+        )
+        return dr.select(small, m, 1 - s), s
+
+
+class HemiEPD(Isotropic):
+    """D = (γ+2)/(2π J) cosᵞθ_h e(κ cosᵞθ_h), e(x) = (exp(x) - 1)/x: the hemispherical exponential power distribution
+    ∝ |exp(κ cosᵞθ_h) - 1| (Nishino and Lombardi 2011, doi:10.1364/JOSAA.28.000008). J = ∫ e(κ s^p) ds over 0 <= s <= 1,
+    p = γ/(γ+2).
+
+    With s = cosθ_h^(γ+2), D cosθ_h dω_h is e(κ s^p)/J ds. q takes the place of that by a law that falls as steeply at
+    s = 1; their ratio is bounded.
+    """
+
+    def __init__(self, kappa, gamma):
+        super().__init__()
+        self.kappa, self.gamma, self.power = kappa, gamma, gamma / (gamma + 2)
+        self.law = BentLaw(kappa * self.power)
+        self.integral = self._integral()
+
+    def _integral(self):
+        """J, by quadrature in a variable in which the integrand has neither peak nor singularity: good to 5e-7."""
+        law = BentLaw(self.kappa * self.power * dr.select(self.kappa > 0, 0.5, 1))
+        integral = 0
+        for x, weight in gauss_legendre(16):
+            _, s = law.inverse_cdf(1, x**3)
+            integral += 3 * x * x * weight * expm1_ratio(self.kappa * dr.power(s, self.power)) / law.eval(s)
+        return integral
+
+    def roughness2(self):
+        # That of Blinn's distribution with the same slope at the normal.
+        return dr.minimum(2 / (2 + self.gamma / dr.maximum(expm1_ratio(-self.kappa), 1e-30)), 1)
+
+    def _shape(self, facet):
+        """``(cosᵞθ_h, e(κ cosᵞθ_h))``"""
+        power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
+        return power, expm1_ratio(self.kappa * power)
+
+    def eval(self, facet):
+        power, shape = self._shape(facet)
+        return (self.gamma + 2) * dr.inv_two_pi * power * shape / self.integral
+
+    def over_density(self, facet):
+        power, shape = self._shape(facet)
+        s = power * dr.square(facet.cos_h)
+        return shape / (self.integral * self.law.eval(s) * facet.cos_h)
+
+    def cdf(self, tan2, g):
+        return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
+
+    def inverse_cdf(self, c, complement, g):
+        return inverse_cosine_power_cdf(*self.law.inverse_cdf(c, complement), self.gamma + 2)
+
+
+class Steps:
+    """A density on [0, 1], constant on each of equal steps, of which the ``heights`` are given up to a factor."""
+
+    def __init__(self, heights):
+        highest = functools.reduce(dr.maximum, heights)
+        self.heights = [dr.maximum(height, 1e-9 * highest) for height in heights]  # it must not vanish
+        self.total = sum(self.heights)
+
+    def eval(self, c):
+        value = self.heights[0]
+        for k, height in enumerate(self.heights[1:], start=1):
+            value = dr.select(c * len(self.heights) < k, value, height)
+        return value * len(self.heights) / self.total
+
+    def cdf(self, c, complement):
+        """``(C, 1 - C)`` of c, which comes with its complement."""
+        return self._mass(self.heights, c), self._mass(self.heights[::-1], complement)
+
+    def inverse_cdf(self, c, complement):
+        return self._quantile(self.heights, c), self._quantile(self.heights[::-1], complement)
+
+    def _mass(self, heights, c):
+        c = c * len(heights)
+        return sum(height * clamp(c - k, 0, 1) for k, height in enumerate(heights)) / self.total
+
+    def _quantile(self, heights, mass):
+        left, c = mass * self.total, 0
+        for height in heights:
+            c += clamp(left / height, 0, 1)
+            left -= height
+        return c / len(heights)
+
+
+class EPD(Isotropic):
+    """D = exp(-(tan²θ_h/α²)ᵞ) / (π α² Γ(1 + 1/γ) cos⁴θ_h), the exponential power distribution of slopes, of which γ = 1
+    is Beckmann's (Holzschuch and Pacanowski 2017, doi:10.1145/3072959.3073621).
+
+    q follows D cosθ_h, by steps over a distribution with a heavy tail: x/(1+x) for x = tan²θ_h/width.
+    """
+
+    STEPS = 16
+
+    def __init__(self, alpha, gamma):
+        super().__init__()
+        self.alpha2, self.gamma = dr.square(alpha), gamma
+        # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3.
+        median = self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma)
+        self.width = self._width(dr.minimum(median, 1e12))
+        self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
+
+        borders = [k / (self.STEPS - k) for k in range(self.STEPS)]
+        at = [self._per_slope(x * self.width) * (1 + x) ** 2 for x in borders]
+        self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
+
+    def _width(self, median):
+        return median
+
+    def _power(self, tan2):
+        """exp(-(tan²θ/α²)ᵞ)"""
+        return dr.exp(-dr.power(dr.maximum(tan2 / self.alpha2, 1e-30), self.gamma))
+
+    def _per_slope(self, tan2):
+        """What D cosθ dω is proportional to, per tan²θ."""
+        return self._power(tan2)
+
+    def roughness2(self):
+        return dr.minimum(self.width, 1)
+
+    def eval(self, facet):
+        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-14)
+        return self.scale * self._power(facet.sin2_h / cos2) / dr.square(cos2)
+
+    def over_density(self, facet):
+        tan2 = facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14)
+        x = dr.minimum(tan2 / self.width, 1e15)
+        ratio = self._per_slope(tan2) * dr.square(1 + x) / self.steps.eval(x / (1 + x))
+        return self.scale * dr.pi * self.width * ratio / facet.cos_h
+
+    def cdf(self, tan2, g):
+        x = dr.minimum(tan2 / self.width, 1e30)
+        return self.steps.cdf(x / (1 + x), 1 / (1 + x))
+
+    def inverse_cdf(self, c, complement, g):
+        inner, outer = self.steps.inverse_cdf(c, complement)
+        return dr.minimum(inner / dr.maximum(outer, 1e-30) * self.width, 1e30)
 
 
 def versine(cos, sin2):

@@ -78,8 +78,8 @@ class Orbit:
         u, v = clamp(c / mass, 0, 1), clamp((complement - rest) / mass, 0, 1)
         images = self._orbit(lobe, facet.wi, cos_psi, sin_psi, u, v)
         mean = sum(weight for _, weight in images) / len(images)
-        density = distribution.eval(facet) / distribution.over_density(facet)
-        return dr.select(mean > 0, lobe.half_vector_weight(facet) * density / (4 * facet.cos_d * mean), 0)
+        valid = mean > 0
+        return dr.select(valid, lobe.response(facet) / dr.select(valid, mean, 1), 0)
 
 
 class BoundedVisibleNormals:

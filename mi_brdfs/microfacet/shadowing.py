@@ -5,19 +5,24 @@ from __future__ import annotations
 import drjit as dr
 
 
-class SmithGGX:
-    """Smith's term for GGX facets of roughness (αu, αv), Λ(v) = ½(√(1 + ((αu v_x)² + (αv v_y)²)/v_z²) - 1):
+class Smith:
+    """Smith's term for facets whose Λ is in the ``stretched`` cosines,
 
-    * separable, 1/((1 + Λ(wi))(1 + Λ(wo))) (Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206);
+    * separable, 1/((1 + Λ(wi))(1 + Λ(wo))) (Smith 1967, doi:10.1109/TAP.1967.1138991; Walter et al. 2007,
+      doi:10.2312/EGWR/EGSR07/195-206);
     * height-correlated, 1/(1 + Λ(wi) + Λ(wo)) (Heitz 2014, https://jcgt.org/published/0003/02/03/).
     """
 
     def __init__(self, alpha_u, alpha_v, correlated: bool):
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated
 
+    def slope2(self, v):
+        """(αu v_x)² + (αv v_y)²"""
+        return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
+
     def stretched(self, v):
-        """v_z (1 + 2Λ(v)): the length of v, stretched by the roughness."""
-        return dr.sqrt(dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y) + v.z * v.z)
+        """v_z (1 + 2Λ(v)), which stays finite at the horizon."""
+        raise NotImplementedError
 
     def __call__(self, facet):
         cos_i, cos_o = facet.cos_i, facet.cos_o
@@ -27,9 +32,40 @@ class SmithGGX:
         return (2 * cos_i / (cos_i + length_i)) * (2 * cos_o / (cos_o + length_o))
 
 
-class SchlickGGX:
+class SmithGGX(Smith):
+    """Λ = ½(√(1 + 1/a²) - 1) with 1/a² = ((αu v_x)² + (αv v_y)²)/v_z²: exact for GGX."""
+
+    def stretched(self, v):
+        return dr.sqrt(self.slope2(v) + v.z * v.z)
+
+
+class SmithBeckmann(Smith):
+    """Λ = ½(exp(-a²)/(a √π) - erfc(a)), a as for GGX: exact for Beckmann's distribution."""
+
+    def stretched(self, v):
+        slope = dr.sqrt(dr.maximum(self.slope2(v), 1e-30))
+        a = dr.minimum(v.z / slope, 10)
+        return v.z * dr.erf(a) + slope * dr.inv_sqrt_pi * dr.exp(-a * a)
+
+
+class SmithBlinn(Smith):
+    """Walter et al.'s rational approximation of Beckmann's Λ, which they use for Blinn's distribution with
+    a = √(n/2 + 1) cosθ/sinθ: 1 + Λ = (1 + 2.276 a + 2.577 a²)/(3.535 a + 2.181 a²) for a < 1.6, and else 1."""
+
+    def __init__(self, exponent, correlated: bool):
+        alpha = dr.rsqrt(0.5 * exponent + 1)
+        super().__init__(alpha, alpha, correlated)
+
+    def stretched(self, v):
+        slope = dr.sqrt(dr.maximum(self.slope2(v), 1e-30))
+        a = dr.minimum(v.z / slope, 1.6)
+        rational = 2 * slope * (1 - 1.259 * a + 0.396 * a * a) / (3.535 + 2.181 * a)
+        return v.z + dr.select(a < 1.6, rational, 0)
+
+
+class SchlickSmith:
     """Schlick's rational stand-in for Smith's term, Π cosθ/(cosθ (1-k) + k) over both directions (Schlick 1994,
-    doi:10.1111/1467-8659.1330233). For GGX facets k = α/2 comes near it (Karis 2013)."""
+    doi:10.1111/1467-8659.1330233): k = α √(2/π) comes near it for Beckmann facets, k = α/2 for GGX (Karis 2013)."""
 
     def __init__(self, k):
         self.k = k
@@ -54,6 +90,18 @@ def vcavity(facet):
 def implicit(facet):
     """cosθ_i cosθ_o, which cancels the denominator."""
     return facet.cos_i * facet.cos_o
+
+
+def neumann(facet):
+    """cosθ_i cosθ_o / max(cosθ_i, cosθ_o) (Neumann, Neumann and Szirmay-Kalos, Compact metallic reflectance models,
+    Computer Graphics Forum 18(3), 1999)."""
+    return dr.minimum(facet.cos_i, facet.cos_o)
+
+
+def ashikhmin_premoze(facet):
+    """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premoze, Distribution-based BRDFs, 2007)."""
+    i, o = facet.cos_i, facet.cos_o
+    return i * o / (i + o - i * o)
 
 
 def ashikhmin_shirley(facet):

@@ -5,7 +5,7 @@ from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
-from ..microfacet.shadowing import SchlickGGX, SmithGGX
+from ..microfacet.shadowing import SchlickSmith, SmithGGX
 from ..model import Model
 from ..parameters import Choice, Number, Reflectance
 
@@ -59,7 +59,7 @@ class MetallicRoughness(Model):
         if self.shadowing == "smith":
             shadowing = SmithGGX(alpha, alpha, correlated=False)
         else:
-            shadowing = SchlickGGX(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
+            shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
         diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
         return diffuse, DimmedLobe(1, GGX(alpha, alpha), shadowing, fresnel, Orbit(8))
 

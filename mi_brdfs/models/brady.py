@@ -1,0 +1,92 @@
+import drjit as dr
+
+from ..lobes import LambertLobe, MicrofacetLobe
+from ..microfacet.distributions import EPD
+from ..microfacet.fresnel import Schlick
+from ..microfacet.sampling import Orbit
+from ..model import Model
+from ..parameters import Choice, Colour, Number, Reflectance
+
+
+class Brady(Model):
+    """Model A of Brady, Lawrence, Peers and Weimer's genBRDF (2014), found by genetic programming.
+
+    A. Brady, J. Lawrence, P. Peers and W. Weimer, genBRDF: discovering new analytic BRDFs with genetic programming,
+    ACM Transactions on Graphics 33(4), 2014, doi:10.1145/2601097.2601193.
+
+        f = ρd/π + K ρs F(wi·h)/(4 (wi·h)) exp(-(tanθ_h/β²)^α),    F = f0 + (1-f0) (1-wi·h)⁵
+
+    with h = (wi+wo)/|wi+wo|. α = 2 has the tail of a Gaussian, and lower α longer ones. ``normalization`` chooses K:
+
+    * unit: (α/2)/(π β⁴ Γ(2/α)), with which the exponential over cos⁴θ_h is a distribution of facets, as in the
+      ``epd`` of ``microfacet`` with its alpha = β² and gamma = α/2. The albedo is about ρs F at normal incidence for
+      narrow lobes.
+    * none: 1, as published. The scale of the lobe is left to ρs, which a fit makes as large as it needs: with ρs = 1
+      the albedo is 0.025 at most for α = 2, β = 0.3, F = 1.
+
+    Of the paper, the formula was checked against public code only; its model B is not part of this plugin.
+
+    Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: towards grazing the albedo falls like cosθ_i, and F
+    raises it less than that. One-sided.
+
+    Sampling: eight images of a half vector, one of them chosen by what it reflects
+    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="brady">
+        <float name="exponent" value="0.8"/>
+        <float name="beta" value="0.25"/>
+    </bsdf>
+
+    {"type": "brady", "exponent": 0.8, "beta": 0.25}
+    """
+
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
+    specular_reflectance = Colour(1, (0, float("inf")), "scale ρs of the specular lobe")
+    f0 = Reflectance(0.04, "Fresnel reflectance at normal incidence")
+    exponent = Number(2, (0.1, 3), "exponent α: the lower, the longer the tail of the lobe")
+    beta = Number(0.3, (0.01, 2), "width β of the lobe, the square root of a slope")
+    normalization = Choice(("unit", "none"), "scale K")
+
+    def lobes(self, p):
+        distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")
+        return (
+            LambertLobe(p.diffuse_reflectance),
+            FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), Orbit(8)),
+        )
+
+
+def projected(facet):
+    """The shadowing term that leaves 1/(wi·h) of 1/(cosθ_i cosθ_o)."""
+    return facet.cos_i * facet.cos_o / facet.cos_d
+
+
+class Exponential(EPD):
+    """D = K exp(-(tan²θ_h/α²)ᵞ), without the EPD's 1/cos⁴θ_h."""
+
+    def __init__(self, alpha, gamma, unit):
+        super().__init__(alpha, gamma)
+        if not unit:
+            self.scale = 1
+
+    def _width(self, median):
+        return median / (1 + median)
+
+    def _per_slope(self, tan2):
+        return super()._per_slope(tan2) / dr.square(1 + tan2)
+
+    def eval(self, facet):
+        return self.scale * self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14))
+
+    def albedo(self, cos):
+        """∫ D cosθ_h dω_h, as the steps have it."""
+        return self.scale * dr.pi * self.width * self.steps.total / self.STEPS
+
+
+class FallingLobe(MicrofacetLobe):
+    """A lobe whose albedo falls like the cosine, as the projected area is not divided out; wide ones less."""
+
+    def albedo(self, wi):
+        rough = dr.minimum(self.distribution.roughness2(), 1)
+        return super().albedo(wi) * (wi.z + 0.2 * rough * (1 - wi.z))

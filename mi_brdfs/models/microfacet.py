@@ -1,0 +1,169 @@
+import math
+
+import drjit as dr
+
+from ..lobes import DimmedLobe, LambertLobe
+from ..microfacet import distributions, shadowing
+from ..microfacet.sampling import Orbit
+from ..model import Model
+from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation
+
+ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
+ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
+
+
+class Microfacet(Model):
+    """The microfacet model as a kit: any distribution D with any shadowing term G and any Fresnel reflectance F.
+
+    K. E. Torrance and E. M. Sparrow, Theory for off-specular reflection from roughened surfaces, Journal of the Optical
+    Society of America 57(9), 1967, doi:10.1364/JOSA.57.001105.
+
+        f = ρd/π + ρs F(wi·h) D(h) G(wi, wo) / (4 cosθ_i cosθ_o)
+
+    with h = (wi+wo)/|wi+wo|. Every D has ∫ D cosθ_h dω_h = 1. ``distribution`` is one of
+
+    * beckmann: D = exp(-((h_x/αu)² + (h_y/αv)²)/h_z²) / (π αu αv h_z⁴)
+    * ggx: D = 1 / (π αu αv ((h_x/αu)² + (h_y/αv)² + h_z²)²) (Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206)
+    * blinn: D = (n+2)/(2π) h_zⁿ, n = ``exponent`` (Blinn 1977, doi:10.1145/563858.563893)
+    * gtr: D ∝ (1 + (α²-1) h_z²)^-γ, generalised Trowbridge-Reitz (Burley 2012, doi:10.1145/2343483.2343493); γ = 2 is
+      GGX, γ = 1 has a longer tail
+    * abc: D ∝ (1 + b (1-h_z))^-c (Church and Takacs 1991; Löw et al. 2012, doi:10.1145/2077341.2077350)
+    * hepd: D ∝ |exp(κ h_zᵞ) - 1| (Nishino and Lombardi 2011, doi:10.1364/JOSAA.28.000008)
+    * epd: D = exp(-(tan²θ_h/α²)ᵞ) / (π α² Γ(1 + 1/γ) h_z⁴) (Holzschuch and Pacanowski 2017,
+      doi:10.1145/3072959.3073621); γ = 1 is Beckmann's, lower γ have longer tails
+
+    and ``shadowing`` one of
+
+    * smith: 1/((1+Λ(wi)) (1+Λ(wo))) (Smith 1967, doi:10.1109/TAP.1967.1138991), with the Λ that belongs to beckmann or
+      ggx; for blinn, Walter et al.'s rational approximation of Beckmann's
+    * smith-correlated: 1/(1+Λ(wi)+Λ(wo)) (Heitz 2014, https://jcgt.org/published/0003/02/03/), for the same
+      distributions
+    * vcavity: min(1, 2 h_z cosθ_i/(wi·h), 2 h_z cosθ_o/(wi·h)) (Torrance and Sparrow)
+    * schlick: Π c/(c (1-k) + k) over c = cosθ_i and cosθ_o, with k = α √(2/π) (Schlick 1994,
+      doi:10.1111/1467-8659.1330233), where α = √(αu αv), or √(2/(n+2)) for blinn; not for abc and hepd
+    * implicit: cosθ_i cosθ_o
+    * neumann: cosθ_i cosθ_o / max(cosθ_i, cosθ_o) (Neumann, Neumann and Szirmay-Kalos 1999)
+    * kelemen: cosθ_i cosθ_o / (wi·h)² (Kelemen and Szirmay-Kalos 2001)
+    * ashikhmin-shirley: cosθ_i cosθ_o / ((wi·h) max(cosθ_i, cosθ_o)) (2000, doi:10.1080/10867651.2000.10487522)
+    * ashikhmin-premoze: cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (2007)
+    * kurt: (cosθ_i cosθ_o)^(1-κ) / (wi·h), κ = ``kurt_exponent`` (2010, doi:10.1145/1722991.1722996)
+
+    F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``),
+    Schlick's approximation for ``f0``, and 1 if none of them is given.
+
+    Other plugins are entries of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx with
+    smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino`` (hepd
+    with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and the
+    specular lobe of ``metallicroughness`` (ggx with smith).
+
+    Reciprocal. Energy-conserving with ρd + ρs <= 1 for smith, smith-correlated and vcavity, which describe surfaces,
+    and otherwise as the table below has it. Of Ashikhmin and Premoze's term, of Neumann's and of the EPD only the
+    formulas were known, from later papers and public code. One-sided.
+
+    Sampling: eight images of a half vector, one of them chosen by what it reflects
+    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="microfacet">
+        <string name="distribution" value="gtr"/>
+        <float name="alpha" value="0.2"/>
+        <float name="gamma" value="1.5"/>
+        <string name="shadowing" value="vcavity"/>
+        <string name="material" value="Al"/>
+    </bsdf>
+
+    {"type": "microfacet", "distribution": "gtr", "alpha": 0.2, "gamma": 1.5, "shadowing": "vcavity", "material": "Al"}
+    """
+
+    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
+    distribution = OneOf(
+        {
+            "beckmann": {"alpha": ANISOTROPIC_ROUGHNESS},
+            "ggx": {"alpha": ANISOTROPIC_ROUGHNESS},
+            "blinn": {"exponent": Number(100, (0, 1e6), "exponent n")},
+            "gtr": {"alpha": ROUGHNESS, "gamma": Number(2, (0, 10), "exponent γ: the lower, the longer the tail")},
+            "abc": {
+                "b": Number(100, (0, 1e8), "width: the higher, the narrower the highlight"),
+                "c": Number(1.5, (0, 10), "exponent of the tail: the higher, the steeper"),
+            },
+            "hepd": {
+                "kappa": Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak"),
+                "gamma": Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe"),
+            },
+            "epd": {"alpha": ROUGHNESS, "gamma": Number(1, (0.1, 4), "exponent γ: the lower, the longer the tail")},
+        },
+        "distribution D of the facets",
+    )
+    shadowing = OneOf(
+        {
+            **dict.fromkeys(("smith", "smith-correlated", "vcavity", "schlick", "implicit", "neumann", "kelemen"), {}),
+            "ashikhmin-shirley": {},
+            "ashikhmin-premoze": {},
+            "kurt": {"kurt_exponent": Number(0.25, (0, 0.5), "exponent κ: the higher, the brighter at grazing")},
+        },
+        "shadowing term G",
+    )
+    fresnel = FresnelSet()
+    rotation = Rotation()
+
+    def __init__(self, props):
+        super().__init__(props)
+        words = self.slots["distribution"].words | self.slots["shadowing"].words
+        distribution, term = words["distribution"], words["shadowing"]
+        suited = SUITED.get(term, DISTRIBUTIONS)
+        if distribution not in suited:
+            raise ParameterError(
+                f'microfacet: shadowing = "{term}" is not known for distribution = "{distribution}"; '
+                f'take it with {", ".join(suited)}, or another one such as "vcavity".'
+            )
+
+    def lobes(self, p):
+        distribution = DISTRIBUTIONS[p.distribution.choice](p.distribution)
+        term = SHADOWING[p.shadowing.choice](p)
+        specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, Orbit(8))
+        return LambertLobe(p.diffuse_reflectance), specular
+
+
+DISTRIBUTIONS = {
+    "beckmann": lambda p: distributions.Beckmann(*p.alpha),
+    "ggx": lambda p: distributions.GGX(*p.alpha),
+    "blinn": lambda p: distributions.Blinn(p.exponent),
+    "gtr": lambda p: distributions.GTR(p.alpha, p.gamma),
+    "abc": lambda p: distributions.ABC(p.b, p.c),
+    "hepd": lambda p: distributions.HemiEPD(p.kappa, p.gamma),
+    "epd": lambda p: distributions.EPD(p.alpha, p.gamma),
+}
+
+ROUGHNESS_OF = {
+    "beckmann": lambda p: dr.sqrt(p.alpha[0] * p.alpha[1]),
+    "ggx": lambda p: dr.sqrt(p.alpha[0] * p.alpha[1]),
+    "blinn": lambda p: dr.rsqrt(0.5 * p.exponent + 1),
+    "gtr": lambda p: p.alpha,
+    "epd": lambda p: p.alpha,
+}
+
+SMITH = {
+    "beckmann": lambda p, correlated: shadowing.SmithBeckmann(*p.alpha, correlated),
+    "ggx": lambda p, correlated: shadowing.SmithGGX(*p.alpha, correlated),
+    "blinn": lambda p, correlated: shadowing.SmithBlinn(p.exponent, correlated),
+}
+
+SUITED = {"smith": SMITH, "smith-correlated": SMITH, "schlick": ROUGHNESS_OF}
+"""The distributions that a shadowing term is known for, if not all."""
+
+SHADOWING = {
+    "smith": lambda p: SMITH[p.distribution.choice](p.distribution, correlated=False),
+    "smith-correlated": lambda p: SMITH[p.distribution.choice](p.distribution, correlated=True),
+    "vcavity": lambda p: shadowing.vcavity,
+    "schlick": lambda p: shadowing.SchlickSmith(
+        math.sqrt(2 / math.pi) * ROUGHNESS_OF[p.distribution.choice](p.distribution)
+    ),
+    "implicit": lambda p: shadowing.implicit,
+    "neumann": lambda p: shadowing.neumann,
+    "kelemen": lambda p: shadowing.kelemen,
+    "ashikhmin-shirley": lambda p: shadowing.ashikhmin_shirley,
+    "ashikhmin-premoze": lambda p: shadowing.ashikhmin_premoze,
+    "kurt": lambda p: shadowing.Kurt(p.shadowing.kurt_exponent),
+}
