@@ -7,7 +7,7 @@ import pytest
 from catalogue import SMOOTH
 from support import direction, interaction
 
-LINEAR = ("reflectance", "subsurface", "metallic", "specular", "tint", "sheen", "clearcoat.")
+LINEAR = ("reflectance", "subsurface", "metallic", "specular.", "tint", "sheen", "clearcoat.")
 """Parts of the keys of parameters in which a picture is linear or quadratic: a central difference is exact."""
 
 

@@ -3,6 +3,7 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, PowerLobe
 from ..lobes.mirror import AxisFrame
+from ..math import log1p
 from ..model import Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
@@ -85,6 +86,11 @@ class LafortuneLobe(PowerLobe):
         return AxisFrame(dr.select(length > 1e-8, v / length, mi.Vector3f(0, 0, 1)))
 
     def peak(self, wi):
-        # A C above 1 with a large exponent leaves the range of float32; so bright a lobe is limited.
         _, length = self._stretched(wi)
-        return self.scale * dr.exp(dr.minimum(self.exponent * dr.log(length / self.unit), 60))
+        # (length/unit)² is one less what the factors smaller than unit take away: a large exponent needs its digits.
+        taken = sum((self.unit - c) * (self.unit + c) * w * w for c, w in zip(self.c, wi, strict=True))
+        taken = taken / (self.unit * self.unit * dr.squared_norm(wi))
+        near = abs(taken) < 0.5
+        log = dr.select(near, 0.5 * log1p(-dr.select(near, taken, 0)), dr.log(length / self.unit))
+        # A C above 1 with a large exponent leaves the range of float32; so bright a lobe is limited.
+        return self.scale * dr.exp(dr.minimum(self.exponent * log, 60))

@@ -38,7 +38,7 @@ EXTREME = [
 SMOOTH = {
     f"brady {normalization}": {
         "type": "brady", "diffuse_reflectance": 0.3, "specular_reflectance": scale, "f0": 0.3, "exponent": 1.4,
-        "beta": 0.5, "normalization": normalization,
+        "beta": width, "normalization": normalization,
     }
-    for normalization, scale in (("unit", 0.6), ("none", 2.0))
+    for normalization, scale, width in (("unit", 0.6, 0.5), ("none", 2.0, 0.35))
 }  # fmt: skip

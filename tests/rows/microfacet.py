@@ -101,12 +101,12 @@ SMOOTH = {
         "type": "microfacet", "distribution": distribution, "shadowing": shadowing, **BOTH, **given
     }
     for distribution, shadowing, given in (
-        ("beckmann", "smith", {"alpha_u": 0.3, "alpha_v": 0.6, "f0": 0.3, "rotation": 0.1}),
+        ("beckmann", "smith", {"alpha_u": 0.2, "alpha_v": 0.4, "f0": 0.3, "rotation": 0.1}),
         ("ggx", "smith-correlated", {"alpha": 0.3}),
         ("blinn", "smith", {"exponent": 10.0}),
         ("gtr", "schlick", {"alpha": 0.3, "gamma": 1.5}),
         ("abc", "ashikhmin-premoze", {"b": 60.0, "c": 1.2}),
-        ("hepd", "kelemen", {"kappa": -5.0, "gamma": 15.0}),
+        ("hepd", "kelemen", {"kappa": -10.0, "gamma": 60.0}),
         ("epd", "kurt", {"alpha": 0.3, "gamma": 0.7, "kurt_exponent": 0.3}),
     )
 }  # fmt: skip

@@ -31,8 +31,10 @@ EXTREME = [
     for κ, γ in ((-80, 0.1), (-80, 1e5), (-1e-3, 10), (1e-3, 10), (80, 0.1), (80, 1e4), (5, 0), (80, 1))
 ]
 
+BRIGHT = {"diffuse_reflectance": 0.2, "specular_reflectance": 0.8}
+
 SMOOTH = {
-    "nishino": {"type": "nishino", "kappa": -6.0, "gamma": 12.0, "f0": 0.3, **BOTH},
-    "nishino peaked": {"type": "nishino", "kappa": 5.0, "gamma": 6.0, **BOTH},
-    "nishino dsbrdf": {"type": "nishino", "kappa": -6.0, "gamma": 12.0, "variant": "dsbrdf", **BOTH},
+    "nishino": {"type": "nishino", "kappa": -10.0, "gamma": 60.0, "f0": 0.6, **BRIGHT},
+    "nishino peaked": {"type": "nishino", "kappa": 3.0, "gamma": 10.0, **BOTH},
+    "nishino dsbrdf": {"type": "nishino", "kappa": -6.0, "gamma": 50.0, "variant": "dsbrdf", **BRIGHT},
 }

@@ -1,0 +1,189 @@
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import Lobe
+from ..lobes.diffuse import ZonalLobe
+from ..lobes.mirror import AxisFrame
+from ..math import choose, safe_sqrt
+from ..model import Model
+from ..parameters import Choice, Number, Reflectance
+
+
+class Toon(Model):
+    """Cartoon shading in two bands, with soft edges and a highlight.
+
+    A. Lake, C. Marshall, M. Harris and M. Blackstein, Stylized rendering techniques for scalable real-time 3D
+    animation, NPAR 2000, doi:10.1145/340916.340918.
+
+        f cosθ_o = ρd/Zd (b + (1-b) S(cosθ_o; td, sd)) + ρs/Zs S(r·wo; ts, ss),    r = 2 (n·wi) n - wi
+        S(c; t, s) = 3x² - 2x³,    x = min(max((c - t + s)/2s, 0), 1)
+
+    with S the step of a cosine c from 0 at t-s to 1 at t+s, and r the mirror direction. A point is lit fully where its
+    normal is within acos td of the light, by the fraction b beyond that, and shows a highlight where the mirror
+    direction is within acos ts of it. The bands are the paper's, which looks them up in a texture of cosθ_o; the
+    formula is this plugin's. It stands for the whole response to a light, cosine included. ``normalization`` chooses
+    the scale:
+
+    * energy: Z is 2π times the integral of the band over the cosines from 0 to 1. The albedo of the diffuse lobe is ρd.
+      That of the specular lobe is ρs as long as the horizon does not clip the highlight, and falls to about half of
+      that at grazing. A lobe whose band is empty (t = 1 and s = b = 0) is black.
+    * none: Z = π, the shading formula: each band is as bright as Lambert's model under a light straight above. The
+      albedo is 2ρd times the integral, and for the specular lobe at most 2ρs times its own: ρd and 0.2 ρs for the
+      defaults, up to 2ρd and 2ρs for bands as wide as the hemisphere.
+
+    Not reciprocal: f diverges like 1/cosθ_o at grazing. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
+
+    Sampling: the cosines by their inverse cumulative distributions, and the azimuth about r where it is above the
+    horizon. The weight of the diffuse lobe is its albedo, that of the specular lobe between half its largest albedo and
+    all of it; no sample falls below the horizon.
+
+    Example
+    -------
+    <bsdf type="toon">
+        <rgb name="diffuse_reflectance" value="0.6, 0.15, 0.1"/>
+        <float name="diffuse_shadow" value="0.3"/>
+    </bsdf>
+
+    {"type": "toon", "diffuse_reflectance": {"type": "rgb", "value": [0.6, 0.15, 0.1]}, "diffuse_shadow": 0.3}
+    """
+
+    diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy")
+    diffuse_threshold = Number(0.5, (0, 1), "cosine td at which the lit band ends")
+    diffuse_smooth = Number(0.05, (0, 1), "half the width sd of its edge, in the cosine; 0 is a hard edge")
+    diffuse_shadow = Number(0, (0, 1), "brightness b of the dark band, as a fraction of that of the lit one")
+    specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe; its largest albedo for energy")
+    specular_threshold = Number(0.9, (0, 1), "cosine ts at which the highlight ends")
+    specular_smooth = Number(0.02, (0, 1), "half the width ss of its edge, in the cosine; 0 is a hard edge")
+    normalization = Choice(("energy", "none"), "scale Z")
+
+    def lobes(self, p):
+        lit, highlight = Step(p.diffuse_threshold, p.diffuse_smooth), Step(p.specular_threshold, p.specular_smooth)
+        dark = p.diffuse_shadow
+        mass = dark + (1 - dark) * lit.mass
+        return (
+            BandsLobe(self._albedo(p.diffuse_reflectance, mass), lit, dark, mass),
+            HighlightLobe(self._albedo(p.specular_reflectance, highlight.mass), highlight),
+        )
+
+    def _albedo(self, reflectance, mass):
+        """The albedo of a band whose integral over the cosines is ``mass``."""
+        return reflectance * (2 * mass if self.normalization == "none" else dr.select(mass > EMPTY, 1, 0))
+
+
+EMPTY = 1e-12
+"""The integral up to which a band counts as empty."""
+
+
+class Step:
+    """S, also as a density of the cosine on [0, 1], where its integral is ``mass``. To keep the digits of narrow bands
+    it deals in the *excess*, by which a cosine exceeds the threshold.
+    """
+
+    def __init__(self, threshold, smooth):
+        self.threshold, self.smooth = threshold, smooth
+        self.start = self._integral(-threshold)
+        self.mass = self._integral(1 - threshold) - self.start
+
+    def _x(self, excess):
+        # The floor makes a jump of an edge of width 0.
+        smooth = dr.maximum(self.smooth, 1e-12)
+        return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
+
+    def _integral(self, excess):
+        """The integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""
+        x = self._x(excess)
+        return 2 * self.smooth * x * x * x * (1 - 0.5 * x) + dr.maximum(excess - self.smooth, 0)
+
+    def eval(self, excess):
+        x = self._x(excess)
+        return x * x * (3 - 2 * x)
+
+    def sample(self, u):
+        """The excess of the cosine below which the fraction ``u`` of the density lies."""
+        integral = self.start + u * self.mass
+        ramp = integral < self.smooth
+        # x³ (1 - x/2) = y: a fit good to 1 %, and two steps of Newton's method, after which it is good to 1e-9.
+        y = dr.select(ramp, integral / (2 * dr.maximum(self.smooth, 1e-30)), 0.5)
+        root = dr.cbrt(y)
+        x = root * (1 + root * (0.1 + 0.28 * root))
+        for _ in range(2):
+            x2 = dr.maximum(x * x, 1e-20)
+            x = x - (x * x2 * (1 - 0.5 * x) - y) / (x2 * (3 - 2 * x))
+        return dr.select(ramp, self.smooth * (2 * x - 1), integral)
+
+
+class BandsLobe(ZonalLobe):
+    """p ∝ b + (1-b) S, the lit band and the dark one, of which ``mass`` is the integral."""
+
+    reciprocal = False
+
+    def __init__(self, reflected, lit, dark, mass):
+        self.reflected, self.lit, self.dark, self.mass = reflected, lit, dark, dr.maximum(mass, EMPTY)
+
+    def albedo(self, wi):
+        return self.reflected
+
+    def density(self, cos):
+        return (self.dark + (1 - self.dark) * self.lit.eval(cos - self.lit.threshold)) / self.mass
+
+    def cosine(self, u):
+        everywhere, u = choose(u, self.dark / self.mass)
+        return dr.select(everywhere, u, dr.clip(self.lit.threshold + self.lit.sample(u), 0, 1))
+
+
+class HighlightLobe(Lobe):
+    """f cosθ_o ∝ S(A) above the horizon, with A the cosine to the mirror direction.
+
+    A > 0 is drawn ∝ S, and then an azimuth among those above the horizon. Where S reaches beyond A = 0, the ring of -A
+    takes its share of the samples: it is above the horizon where the ring of A, its antipodes, is below.
+    """
+
+    reciprocal = False
+
+    def __init__(self, reflected, step):
+        self.reflected, self.step, self.mass = reflected, step, dr.maximum(step.mass, EMPTY)
+
+    def _frame(self, wi):
+        return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
+
+    def _ring(self, frame, versine):
+        """``(sinθ_ring, visible)``: the fraction of the ring at A = 1 - versine >= 0 that lies above the horizon."""
+        sin = safe_sqrt(versine * (2 - versine))
+        rise, height = frame.sin * sin, frame.axis.z * (1 - versine)
+        cut = height < rise
+        below = dr.acos(dr.select(cut, height, 0) / dr.select(cut, rise, 1)) * dr.inv_pi
+        return sin, dr.select(cut, 1 - below, 1)
+
+    def _pair(self, excess, visible):
+        """What the visible parts of the rings of A and -A reflect, from the excess of A."""
+        behind = -2 * self.step.threshold - excess
+        return self.step.eval(excess) * visible, self.step.eval(behind) * (1 - visible)
+
+    def albedo(self, wi):
+        # The ring that halves the solid angle of the highlight stands for all.
+        return self.reflected * self._ring(self._frame(wi), 0.5 * dr.minimum(self.mass, 1))[1]
+
+    def eval_pdf(self, wi, wo):
+        frame, t = self._frame(wi), self.step.threshold
+        # The versine has the digits of a small highlight, the cosine those of a wide one. The squares are subtracted
+        # one by one, as rounding errors shrink with what is left.
+        away = wo - frame.axis
+        cos, versine, excess = dr.dot(wo, frame.axis), 0.5 * dr.squared_norm(away), 1 - t
+        for d in (away.x, away.y, away.z):
+            excess = dr.fma(-0.5 * d, d, excess)
+        excess = dr.select(versine < 0.25, excess, cos - t)
+        nearer = dr.maximum(excess, -2 * t - excess)
+        _, visible = self._ring(frame, dr.minimum(versine, 2 - versine))
+        front, back = self._pair(nearer, visible)
+        value = self.step.eval(excess) / (dr.two_pi * self.mass)
+        return self.reflected * value, value * self.step.eval(nearer) / dr.maximum(front + back, 1e-15)
+
+    def sample(self, wi, u, v):
+        frame, excess = self._frame(wi), self.step.sample(v.x)
+        versine = dr.clip(1 - self.step.threshold - excess, 0, 1)
+        sin, visible = self._ring(frame, versine)
+        front, back = self._pair(excess, visible)
+        behind = u * (front + back) < back
+        cos = dr.select(behind, versine - 1, 1 - versine)
+        sin_phi, cos_phi = dr.sincos(dr.pi * dr.select(behind, 1 - visible, visible) * (2 * v.y - 1))
+        return frame.axis * cos + frame.up * (sin * cos_phi) + frame.side * (sin * sin_phi)
