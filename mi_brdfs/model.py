@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 import inspect
+from math import isfinite
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import mitsuba as mi
 
 from .lobes import Lobe
 from .parameters import Given, Parameter, Row, Slot
+
+
+class Energy(NamedTuple):
+    """The largest directional albedos of a model, at angles up to 89.9° and for lobes as wide as those of α = 0.003 or
+    an exponent of 30 000, at least: narrower ones are mirrors to float32."""
+
+    default: float
+    """With the default parameters."""
+    largest: list[tuple[dict[str, Any], float]]
+    """In white, for some choices by name (a tuple stands for each of its words), over all values of the other
+    parameters: at most 1 if the model conserves energy, infinite beyond about 100. White means that every colour is 1,
+    and so is the Fresnel reflectance, but that a diffuse lobe beside others is black."""
+
+    NOTE = """\
+At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, but a diffuse lobe beside others
+is 0; what is not named takes all values in its range."""
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """``(configuration, largest albedo, class)`` for the manual page."""
+        rows = [("configuration", "albedo", "energy"), ("defaults", f"{self.default:.2f}", "")]
+        for given, albedo in self.largest:
+            words = [f"{name}={' | '.join(v) if isinstance(v, tuple) else v}" for name, v in given.items()]
+            value = f"{albedo:.4g}" if isfinite(albedo) else "no limit"
+            rows.append((", ".join(["white", *words]), value, "conserved" if albedo <= 1 else "gained"))
+        return rows
 
 
 class Model:
@@ -22,6 +48,9 @@ class Model:
 
     plugins: ClassVar[tuple[str, ...]] = ()
     """The plugin's name in scenes, and its aliases; by default the class name in lower case."""
+
+    energy: ClassVar[Energy]
+    """How much light the model reflects at most."""
 
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)
@@ -64,9 +93,29 @@ class Model:
 
     @classmethod
     def manual(cls) -> str:
-        """The manual page: the docstring, and the table of parameters."""
-        rows = [Row("parameter", "type", "default", "range", "meaning")]
-        rows += [row for parameter in cls.declared() for row in parameter.rows()]
-        widths = [max(len(row[column]) for row in rows) for column in range(4)]
-        table = ["  ".join([*map(str.ljust, row[:4], widths), row.text]) for row in rows]
-        return "\n".join([inspect.cleandoc(cls.__doc__), "", "Parameters", "----------", *table, ""])
+        """The manual page: the docstring, the table of parameters, and that of the largest albedos."""
+        parameters = [Row("parameter", "type", "default", "range", "meaning")]
+        parameters += [row for parameter in cls.declared() for row in parameter.rows()]
+        return "\n".join(
+            [
+                inspect.cleandoc(cls.__doc__),
+                "",
+                *_section("Parameters", [[*row[:3], _shortened(row.range), row.text] for row in parameters]),
+                "",
+                *_section("Largest albedo", [list(row) for row in cls.energy.rows()]),
+                "",
+                Energy.NOTE,
+                "",
+            ]
+        )
+
+
+def _section(title: str, table: list[list[str]]) -> list[str]:
+    """A table under a heading, with its columns aligned."""
+    widths = [max(len(row[column]) for row in table) for column in range(len(table[0]) - 1)]
+    rows = ("  ".join([*map(str.ljust, row, widths), row[-1]]).rstrip() for row in table)
+    return [title, "-" * len(title), *rows]
+
+
+def _shortened(words: str) -> str:
+    return words if len(words) <= 45 else "see above"

@@ -69,7 +69,7 @@ class Given:
             if name.startswith("_arg_"):
                 raise ParameterError(
                     f"{self.plugin}: {_kind(self.props[name])} is nested without a name; "
-                    f"give it the name of the parameter it is meant for, {_listed(shown)}."
+                    f"give it the name of the parameter it is meant for, {listed(shown)}."
                 )
             closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
             raise ParameterError(
@@ -118,7 +118,7 @@ class Given:
             return choices[0]
         value = self.props[name]
         if value not in choices:
-            raise self.error(name, f"= {_shown(value)} is unknown; it must be one of {_listed(choices, quote=True)}")
+            raise self.error(name, f"= {_shown(value)} is unknown; it must be one of {listed(choices, quote=True)}")
         return value
 
     def flag(self, name: str, default: bool) -> bool:
@@ -175,7 +175,8 @@ def _interval(limits: Range) -> str:
     return f"[{low:g}, {high:g}]" if math.isfinite(high) else f"[{low:g}, ∞)"
 
 
-def _listed(words, last: str = "or", quote: bool = False) -> str:
+def listed(words, last: str = "or", quote: bool = False) -> str:
+    """Words as a sentence lists them."""
     words = [f'"{word}"' if quote else word for word in words]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
 
@@ -477,7 +478,7 @@ class OneOf(Parameter):
         allowed = [name for parameter in declared.values() for name in parameter.names]
         for name in self.names[1:]:
             if name in given and name not in allowed:
-                has = f"has {_listed(allowed, 'and')}" if allowed else "has no parameter"
+                has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
                 raise given.error(name, f'does not belong to {self.name} = "{choice}", which {has} of its own')
         own = {name: parameter.bind(given) for name, parameter in declared.items()}
         textures = {n: t for slot in own.values() if isinstance(slot, Slot) for n, t in slot.textures.items()}
@@ -495,7 +496,7 @@ class OneOf(Parameter):
             for parameter in declared.values():
                 users.setdefault(parameter, []).append(word)
         for parameter, words in users.items():
-            rows += [row._replace(text=f"with {_listed(words, 'and')}: {row.text}") for row in parameter.rows()]
+            rows += [row._replace(text=f"with {listed(words, 'and')}: {row.text}") for row in parameter.rows()]
         return rows
 
 
@@ -629,7 +630,7 @@ class FresnelSet(Parameter):
             raise given.error(
                 "material",
                 f"= {_shown(material)} is unknown; the closest of Mitsuba's {len(known)} conductors are "
-                f'{_listed(closest, quote=True)}, and "none" means F = 1',
+                f'{listed(closest, quote=True)}, and "none" means F = 1',
             )
         return FresnelSlot({name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}, "conductor")
 

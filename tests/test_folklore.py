@@ -12,7 +12,7 @@ from support import call
 
 import mi_brdfs
 
-CHAPTER = (Path(mi_brdfs.__file__).parent / "folklore.md").read_text(encoding="utf-8")
+CHAPTER = (Path(__file__).parents[1] / "docs" / "folklore.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip() for cell in line.strip("|").split("|")] for line in CHAPTER.splitlines() if line.startswith("|")]
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")

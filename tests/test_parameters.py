@@ -56,6 +56,17 @@ REJECTED = [
     ("orennayar", {"alpha": 3}, "orennayar: alpha = 3 is not allowed; it must be a number in [0, 2.2] or a texture."),
     ("roughdiffuse", {"use_fast_approx": "yes"}, 'roughdiffuse: use_fast_approx = "yes" is a string; it must be true or false.'),
     ("roughdiffuse", {"use_fast_approx": 1}, "roughdiffuse: use_fast_approx = 1 is a number; it must be true or false."),
+    ("microfacet", {"gamma": 2}, 'microfacet: gamma does not belong to distribution = "beckmann", which has alpha, alpha_u and alpha_v of its own.'),
+    ("microfacet", {"distribution": "gtr", "alpha_u": 0.1}, 'alpha_u does not belong to distribution = "gtr", which has alpha and gamma'),
+    ("microfacet", {"kurt_exponent": 0.2}, 'kurt_exponent does not belong to shadowing = "smith", which has no parameter of its own.'),
+    ("microfacet", {"distribution": "phong"}, 'microfacet: distribution = "phong" is unknown; it must be one of "beckmann", "ggx"'),
+    ("microfacet", {"distribution": "abc"}, 'shadowing = "smith" is not known for distribution = "abc"; take it with beckmann, ggx or blinn,'),
+    ("microfacet", {"distribution": "hepd", "shadowing": "schlick"}, 'shadowing = "schlick" is not known for distribution = "hepd"; take it with'),
+    ("microfacet", {"distribution": "hepd", "shadowing": "vcavity", "kappa": 90}, "microfacet: kappa = 90 is not allowed; it must be a number in [-80, 80]"),
+    ("microfacet", {"alfa": 0.1}, "microfacet: unknown parameter alfa; did you mean alpha?"),
+    ("nishino", {"variant": "dsbrdf", "f0": 0.1}, 'nishino: f0 does not belong to variant = "dsbrdf", which has no parameter of its own.'),
+    ("low", {"variant": "smooth", "normalization": "fit"}, 'low: normalization does not belong to variant = "smooth", which has no parameter'),
+    ("brady", {"specular_reflectance": -1.0}, "brady: specular_reflectance = -1 is not allowed; it must be a number, rgb or spectrum within [0, ∞)"),
 ]  # fmt: skip
 
 

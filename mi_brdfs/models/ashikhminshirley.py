@@ -5,7 +5,7 @@ from ..microfacet.distributions import AshikhminShirley as Distribution
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import ashikhmin_shirley
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
 
 
@@ -44,6 +44,8 @@ class AshikhminShirley(Model):
     specular_reflectance = Reflectance(0.05, "reflectance Rs of the specular lobe at normal incidence")
     exponent = Number(100, (0, 1e6), "exponent n: the higher, the narrower the highlight", anisotropic=True)
     rotation = Rotation()
+
+    energy = Energy(0.508, [({}, 1)])
 
     def lobes(self, p):
         specular = MicrofacetLobe(

@@ -5,7 +5,7 @@ from ..microfacet.distributions import Blinn
 from ..microfacet.fresnel import Unit
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import implicit
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -23,7 +23,7 @@ class BlinnPhong(Model):
       grazing; so ρd + ρs <= 1 conserves energy.
     * approximate: K = (n+8)/(8π), the approximation common in games. The albedo exceeds ρs by up to 7.5 % (n = 10).
     * ndf: K = (n+2)/(2π), which normalises the power as a distribution of facets. It stands in published fits of
-      measured materials. The albedo is 2.9 ρs (n = 10) to 3.9 ρs (n = 100) at normal incidence.
+      measured materials. The albedo is 2.9 ρs (n = 10) to 3.85 ρs (n = 100) at normal incidence.
     * none: K = 1. Gains energy for small n: the albedo is 8π/((n+2)(n+4)) (2^(-n/2) + n) ρs at normal incidence.
     * original: f cosθ_o = ρs cosθ_h^n/π, where the term is the whole response to a light and π belongs to the light.
       As a BRDF it is neither reciprocal nor bounded at grazing.
@@ -50,6 +50,17 @@ class BlinnPhong(Model):
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")
     normalization = Choice(("energy", "approximate", "ndf", "none", "original"), "scale of the specular lobe")
+
+    energy = Energy(
+        0.7,
+        [
+            ({"normalization": "energy"}, 1),
+            ({"normalization": "approximate"}, 1.075),
+            ({"normalization": "ndf"}, 4),
+            ({"normalization": "none"}, 3.14),
+            ({"normalization": "original"}, 2),
+        ],
+    )
 
     def lobes(self, p):
         n = p.exponent

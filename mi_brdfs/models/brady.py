@@ -4,7 +4,7 @@ from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 
 
@@ -35,11 +35,12 @@ class Brady(Model):
     Example
     -------
     <bsdf type="brady">
+        <float name="f0" value="0.6"/>
         <float name="exponent" value="0.8"/>
-        <float name="beta" value="0.25"/>
+        <float name="diffuse_reflectance" value="0.1"/>
     </bsdf>
 
-    {"type": "brady", "exponent": 0.8, "beta": 0.25}
+    {"type": "brady", "f0": 0.6, "exponent": 0.8, "diffuse_reflectance": 0.1}
     """
 
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
@@ -48,6 +49,8 @@ class Brady(Model):
     exponent = Number(2, (0.1, 3), "exponent α: the lower, the longer the tail of the lobe")
     beta = Number(0.3, (0.01, 2), "width β of the lobe, the square root of a slope")
     normalization = Choice(("unit", "none"), "scale K")
+
+    energy = Energy(0.56, [({"normalization": "unit"}, 1), ({"normalization": "none"}, 1.13)])
 
     def lobes(self, p):
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")

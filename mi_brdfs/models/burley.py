@@ -11,7 +11,7 @@ from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import SmithGGX
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Number, NumberSlot, Reflectance, Rotation
 
 
@@ -91,6 +91,8 @@ class Burley(Model):
     clearcoat = Number(0, (0, 1), "scale of the clear coat, in units of 0.25")
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
     rotation = Rotation()
+
+    energy = Energy(0.687, [({"metallic": 1.0, "clearcoat": 0.0}, 1), ({}, 1.82)])
 
     def lobes(self, p):
         brightness = luminance(p.base_color)

@@ -4,7 +4,7 @@ from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import GGX, Beckmann, Blinn
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import vcavity
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance
 
 
@@ -53,6 +53,8 @@ class CookTorrance(Model):
     fresnel = FresnelSet()
     distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")
     normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
+
+    energy = Energy(1, [({"normalization": "modern"}, 1), ({"normalization": "tog82"}, 4)])
 
     def lobes(self, p):
         α = p.alpha

@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes.diffuse import RoughDiffuseLobe
 from ..math import safe_sqrt
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Number, Reflectance
 
 
@@ -41,6 +41,8 @@ class EON(Model):
 
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     roughness = Number(0.5, (0, 1), "roughness r")
+
+    energy = Energy(0.5, [({}, 1)])
 
     def lobes(self, p):
         return (EONLobe(p.reflectance, p.roughness),)

@@ -3,7 +3,7 @@ from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import Kurt as Shadowing
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Number, PerLobe, Reflectance, Rotation
 
 
@@ -47,6 +47,8 @@ class Kurt(Model):
         kurt_exponent=Number(0.25, (0, 0.5), "exponent κ of lobe i: the higher, the brighter at grazing"),
     )
     rotation = Rotation()
+
+    energy = Energy(0.809, [({"kurt_exponent": 0.0}, 1), ({"kurt_exponent": 0.25}, 3.08), ({}, 16.5)])
 
     def lobes(self, p):
         glossy = [

@@ -4,7 +4,7 @@ import mitsuba as mi
 from ..lobes import LambertLobe, PowerLobe
 from ..lobes.mirror import AxisFrame
 from ..math import log1p
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
 
@@ -57,6 +57,8 @@ class Lafortune(Model):
     )
     normalization = Choice(("energy", "none"), "scale of the lobes")
     rotation = Rotation()
+
+    energy = Energy(0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, float("inf"))])
 
     def lobes(self, p):
         energy = self.normalization == "energy"

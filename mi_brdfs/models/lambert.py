@@ -1,5 +1,5 @@
 from ..lobes import LambertLobe
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Reflectance
 
 
@@ -25,6 +25,8 @@ class Lambert(Model):
     """
 
     reflectance = Reflectance(0.5, "albedo ρ")
+
+    energy = Energy(0.5, [({}, 1)])
 
     def lobes(self, p):
         return (LambertLobe(p.reflectance),)

@@ -7,8 +7,8 @@ from ..microfacet.distributions import ABC, PowerLaw
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import vcavity
-from ..model import Model
-from ..parameters import Choice, Colour, Number, Reflectance
+from ..model import Energy, Model
+from ..parameters import Choice, Colour, Number, OneOf, Reflectance
 
 
 class Low(Model):
@@ -40,12 +40,13 @@ class Low(Model):
     Example
     -------
     <bsdf type="low">
-        <rgb name="a" value="8, 6, 4"/>
+        <rgb name="diffuse_reflectance" value="0.1, 0.3, 0.2"/>
+        <float name="a" value="50"/>
         <float name="b" value="2000"/>
         <float name="c" value="1.2"/>
     </bsdf>
 
-    {"type": "low", "a": {"type": "rgb", "value": [8, 6, 4]}, "b": 2000, "c": 1.2}
+    {"type": "low", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.2]}, "a": 50.0, "b": 2000, "c": 1.2}
     """
 
     diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
@@ -53,15 +54,27 @@ class Low(Model):
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
     c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
     int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum")
-    variant = Choice(("microfacet", "smooth"), "which of the paper's two models")
-    normalization = Choice(("fit", "paper", "unit"), "scale of the microfacet variant")
+    variant = OneOf(
+        {"microfacet": {"normalization": Choice(("fit", "paper", "unit"), "scale of the lobe")}, "smooth": {}},
+        "which of the paper's two models",
+    )
+
+    energy = Energy(
+        0.069,
+        [
+            ({"variant": "microfacet", "normalization": "fit"}, 3.62),
+            ({"variant": "microfacet", "normalization": "paper"}, 11.4),
+            ({"variant": "microfacet", "normalization": "unit"}, 0.961),
+            ({"variant": "smooth"}, 3.02),
+        ],
+    )
 
     def lobes(self, p):
         fresnel = Dielectric(p.int_ior)
-        if self.variant == "smooth":
+        if p.variant.choice == "smooth":
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
-            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[self.normalization]
+            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
             specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, Orbit(8))
         return LambertLobe(p.diffuse_reflectance), specular
 

@@ -6,7 +6,7 @@ from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import SchlickSmith, SmithGGX
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -52,6 +52,16 @@ class MetallicRoughness(Model):
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
     roughness = Number(0.5, (0.01, 1), "roughness r; the facets' is its square")
     shadowing = Choice(("direct", "ibl", "smith"), "shadowing term")
+
+    energy = Energy(
+        0.528,
+        [
+            ({"metallic": 1.0}, 1),
+            ({"shadowing": "direct"}, 1.1),
+            ({"shadowing": "ibl"}, 1.88),
+            ({"shadowing": "smith"}, 1.92),
+        ],
+    )
 
     def lobes(self, p):
         fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))

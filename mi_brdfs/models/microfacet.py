@@ -5,11 +5,13 @@ import drjit as dr
 from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet import distributions, shadowing
 from ..microfacet.sampling import Orbit
-from ..model import Model
-from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation
+from ..model import Energy, Model
+from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
 
 ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
 ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
+
+NEARLY_ALL = ("beckmann", "ggx", "blinn", "abc", "hepd")
 
 
 class Microfacet(Model):
@@ -98,7 +100,13 @@ class Microfacet(Model):
     )
     shadowing = OneOf(
         {
-            **dict.fromkeys(("smith", "smith-correlated", "vcavity", "schlick", "implicit", "neumann", "kelemen"), {}),
+            "smith": {},
+            "smith-correlated": {},
+            "vcavity": {},
+            "schlick": {},
+            "implicit": {},
+            "neumann": {},
+            "kelemen": {},
             "ashikhmin-shirley": {},
             "ashikhmin-premoze": {},
             "kurt": {"kurt_exponent": Number(0.25, (0, 0.5), "exponent κ: the higher, the brighter at grazing")},
@@ -107,6 +115,36 @@ class Microfacet(Model):
     )
     fresnel = FresnelSet()
     rotation = Rotation()
+    energy = Energy(
+        1,
+        [
+            ({"shadowing": "smith", "distribution": ("beckmann", "ggx")}, 1),
+            ({"shadowing": "smith", "distribution": "blinn"}, 1.34),
+            ({"shadowing": "smith-correlated", "distribution": ("beckmann", "ggx")}, 1),
+            ({"shadowing": "smith-correlated", "distribution": "blinn"}, 1.75),
+            ({"shadowing": "vcavity"}, 1),
+            ({"shadowing": "schlick", "distribution": "blinn"}, 1),
+            ({"shadowing": "schlick", "distribution": ("beckmann", "ggx")}, 13.1),
+            ({"shadowing": "schlick", "distribution": "gtr"}, float("inf")),
+            ({"shadowing": "schlick", "distribution": "epd"}, float("inf")),
+            ({"shadowing": "implicit"}, 1),
+            ({"shadowing": "kelemen"}, 1),
+            ({"shadowing": ("neumann", "ashikhmin-premoze"), "distribution": NEARLY_ALL}, 1),
+            ({"shadowing": "neumann", "distribution": "gtr"}, 2.83),
+            ({"shadowing": "ashikhmin-premoze", "distribution": "gtr"}, 2.74),
+            ({"shadowing": "neumann", "distribution": "epd"}, 43.1),
+            ({"shadowing": "ashikhmin-premoze", "distribution": "epd"}, 30.2),
+            ({"shadowing": "ashikhmin-shirley", "distribution": ("blinn", "abc", "hepd")}, 1),
+            ({"shadowing": "ashikhmin-shirley", "distribution": "beckmann"}, 1.04),
+            ({"shadowing": "ashikhmin-shirley", "distribution": "ggx"}, 1.69),
+            ({"shadowing": "ashikhmin-shirley", "distribution": "gtr"}, 4.4),
+            ({"shadowing": "ashikhmin-shirley", "distribution": "epd"}, 54.1),
+            ({"shadowing": "kurt", "kurt_exponent": 0.25, "distribution": NEARLY_ALL}, 3.51),
+            ({"shadowing": "kurt", "distribution": NEARLY_ALL}, 20.2),
+            ({"shadowing": "kurt", "distribution": "gtr"}, 34.9),
+            ({"shadowing": "kurt", "distribution": "epd"}, 96.9),
+        ],
+    )
 
     def __init__(self, props):
         super().__init__(props)
@@ -116,7 +154,7 @@ class Microfacet(Model):
         if distribution not in suited:
             raise ParameterError(
                 f'microfacet: shadowing = "{term}" is not known for distribution = "{distribution}"; '
-                f'take it with {", ".join(suited)}, or another one such as "vcavity".'
+                f'take it with {listed(list(suited))}, or another one such as "vcavity".'
             )
 
     def lobes(self, p):

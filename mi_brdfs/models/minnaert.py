@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes.diffuse import ZonalLobe
 from ..math import safe_sqrt
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -43,6 +43,15 @@ class Minnaert(Model):
     reflectance = Reflectance(0.5, "scale ρ; for k >= 1 the albedo at normal incidence")
     exponent = Number(1.5, (0, 100), "exponent k: above 1 the limb darkens, below it brightens")
     normalization = Choice(("energy", "published", "none"), "what becomes of the formula at grazing")
+
+    energy = Energy(
+        0.5,
+        [
+            ({"normalization": "energy"}, 1),
+            ({"normalization": "published"}, float("inf")),
+            ({"normalization": "none"}, 2),
+        ],
+    )
 
     def lobes(self, p):
         return (MinnaertLobe(p.reflectance, p.exponent, self.normalization),)

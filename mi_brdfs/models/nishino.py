@@ -3,7 +3,7 @@ from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import implicit, vcavity
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
 
 
@@ -52,6 +52,8 @@ class Nishino(Model):
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")
     gamma = Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe")
     variant = OneOf({"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}}, "facets of that distribution, or itself")
+
+    energy = Energy(1, [({"variant": "microfacet"}, 1), ({"variant": "dsbrdf"}, 1)])
 
     def lobes(self, p):
         distribution = HemiEPD(p.kappa, p.gamma)

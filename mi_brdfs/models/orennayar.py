@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes.diffuse import RoughDiffuseLobe
 from ..math import clamp, safe_sqrt
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Flag, Number, Reflectance, Spelling
 
 
@@ -50,6 +50,8 @@ class OrenNayar(Model):
                    spelling=Spelling("alpha", (0, 2.2), math.sqrt(0.5), "√2 σ, as a Beckmann roughness"))  # fmt: skip
     model = Choice(("qualitative", "full"), "which fit of the paper")
 
+    energy = Energy(0.497, [({"model": "qualitative"}, 1.015), ({"model": "full"}, 1.05)])
+
     def lobes(self, p):
         lobe = FullLobe if self.model == "full" else QualitativeLobe
         return (lobe(p.reflectance, p.sigma),)
@@ -82,6 +84,8 @@ class RoughDiffuse(Model):
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     alpha = Number(0.2, (0, 2.2), "roughness α of the surface, as of a Beckmann distribution")
     use_fast_approx = Flag(False, "leave out interreflection, and simplify the rest")
+
+    energy = Energy(0.507, [({"use_fast_approx": False}, 1.05), ({"use_fast_approx": True}, 1.015)])
 
     def lobes(self, p):
         lobe = QualitativeLobe if self.use_fast_approx else FullLobe

@@ -1,7 +1,7 @@
 import drjit as dr
 
 from ..lobes import LambertLobe, PowerLobe, PowerResponseLobe
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -42,6 +42,10 @@ class Phong(Model):
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")
     normalization = Choice(("energy", "none", "original"), "scale of the specular lobe")
+
+    energy = Energy(
+        0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, 3.14), ({"normalization": "original"}, 2)]
+    )
 
     def lobes(self, p):
         diffuse, n = LambertLobe(p.diffuse_reflectance), p.exponent

@@ -2,7 +2,7 @@ from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.sampling import BoundedVisibleNormals
 from ..microfacet.shadowing import SmithGGX
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
 
 
@@ -46,6 +46,8 @@ class Walter(Model):
     fresnel = FresnelSet()
     shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")
     rotation = Rotation()
+
+    energy = Energy(0.988, [({}, 1)])
 
     def lobes(self, p):
         specular = MicrofacetLobe(

@@ -6,7 +6,7 @@ from ..microfacet.distributions import Beckmann, Distribution, log_complement, t
 from ..microfacet.fresnel import Unit
 from ..microfacet.sampling import Orbit
 from ..microfacet.shadowing import kelemen
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
 
 
@@ -56,6 +56,16 @@ class Ward(Model):
     variant = Choice(("balanced", "ward", "ward-duer", "approximate"), "scale of the specular lobe")
     rotation = Rotation()
 
+    energy = Energy(
+        0.698,
+        [
+            ({"variant": "balanced"}, 1),
+            ({"variant": "ward"}, 2.2),
+            ({"variant": "ward-duer"}, 62.7),
+            ({"variant": "approximate"}, 4.23),
+        ],
+    )
+
     def lobes(self, p):
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)
         lobe = DarkeningLobe if self.variant in ("ward", "approximate") else MicrofacetLobe
@@ -76,6 +86,7 @@ class ApproximateBeckmann(Distribution):
     As sin²/(1+cos) = 1-cos, D is exp(-2g(1-cosθ_h)) at a given azimuth: its integral over the hemisphere converges to
     one as α → 0, and can be inverted; q = D/(1 - exp(-2g)).
     """
+
     def eval(self, facet):
         return dr.exp(-2 * self.steepness(facet) / (1 + facet.cos_h)) / (dr.pi * self.alpha_u * self.alpha_v)
 

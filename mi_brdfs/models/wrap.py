@@ -1,7 +1,7 @@
 import drjit as dr
 
 from ..lobes.diffuse import ZonalLobe
-from ..model import Model
+from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -52,6 +52,15 @@ class Wrap(Model):
     exponent = Number(2, (0, 100), "exponent n: the higher, the darker the terminator")
     domain = Choice(("hemisphere", "sphere"), "which light counts")
     normalization = Choice(("energy", "none"), "scale Z")
+
+    energy = Energy(
+        0.5,
+        [
+            ({"normalization": "energy"}, 1),
+            ({"normalization": "none", "domain": "hemisphere"}, 2),
+            ({"normalization": "none", "domain": "sphere"}, 4),
+        ],
+    )
 
     def lobes(self, p):
         w, n = p.wrap, p.exponent

@@ -9,7 +9,8 @@ def row(name, ρd, abc, ior=1.5, variant="microfacet", normalization="fit", shar
     reference = partial(
         ref.low, diffuse_reflectance=ρd, a=a, b=b, c=c, int_ior=ior, variant=variant, normalization=normalization
     )
-    bsdf = {"type": "low", "variant": variant, "normalization": normalization, **given}
+    scale = {"normalization": normalization} if variant == "microfacet" else {}
+    bsdf = {"type": "low", "variant": variant, **scale, **given}
     return Row(f"low {name}", bsdf, reference, sharp=sharp)
 
 
@@ -35,9 +36,10 @@ EXTREME = [
 ]  # fmt: skip
 
 SMOOTH = {
-    f"low {variant} {normalization}": {
-        "type": "low", "variant": variant, "normalization": normalization, "diffuse_reflectance": 0.3, "a": 0.7,
-        "b": 150.0, "c": 1.3, "int_ior": 2.5,
+    f"low {variant} {' '.join(given.values())}".strip(): {
+        "type": "low", "variant": variant, "diffuse_reflectance": 0.3, "a": 0.7, "b": 150.0, "c": 1.3, "int_ior": 2.5,
+        **given,
     }
-    for variant, normalization in (("microfacet", "fit"), ("microfacet", "unit"), ("smooth", "fit"))
+    for variant, given in (("microfacet", {"normalization": "fit"}), ("microfacet", {"normalization": "unit"}),
+                           ("smooth", {}))
 }  # fmt: skip

@@ -8,9 +8,7 @@ def row(name, ρd, ρs, n, normalization="energy", sharp=False, **given):
     return Row(
         f"phong {name}",
         {"type": "phong", "normalization": normalization, **given},
-        partial(
-            ref.phong, diffuse_reflectance=ρd, specular_reflectance=ρs, exponent=n, normalization=normalization
-        ),
+        partial(ref.phong, diffuse_reflectance=ρd, specular_reflectance=ρs, exponent=n, normalization=normalization),
         reciprocal=normalization != "original",
         sharp=sharp,
     )
