@@ -24,36 +24,41 @@ def clamp(x, low: float, high: float):
 def log1p(x):
     """log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
     small = abs(x) < 0.5
-    y = dr.select(small, x, 0)
-    y = y / (2 + y)
-    y2 = y * y
-    # log(1 + x) = 2 atanh(y); |y| < 1/3, so the next term is below 1e-8.
-    series = 2 * y * (1 + y2 * (1 / 3 + y2 * (1 / 5 + y2 * (1 / 7 + y2 * (1 / 9 + y2 * (1 / 11 + y2 / 13))))))
-    return dr.select(small, series, dr.log(dr.select(small, 1, 1 + x)))
+    near = dr.select(small, x, 0)
+    return dr.select(small, near * _log1p_series(near), dr.log(dr.select(small, 1, 1 + x)))
 
 
 def expm1(x):
     """exp(x) - 1, accurate to a few ulp."""
     small = abs(x) < 0.5
-    y = dr.select(small, x, 0)
-    series = y * (1 + y / 2 * (1 + y / 3 * (1 + y / 4 * (1 + y / 5 * (1 + y / 6 * (1 + y / 7 * (1 + y / 8)))))))
-    return dr.select(small, series, dr.exp(dr.select(small, 0, x)) - 1)
+    near = dr.select(small, x, 0)
+    return dr.select(small, near * _expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
 
 
 def log1p_ratio(x):
     """log(1 + x)/x, and its limit 1 at x = 0."""
-    small = abs(x) < 1e-3
-    series = 1 - x * (1 / 2 - x * (1 / 3 - x / 4))
-    safe = dr.select(small, 1, x)
-    return dr.select(small, series, log1p(safe) / safe)
+    small = abs(x) < 0.5
+    near, far = dr.select(small, x, 0), dr.select(small, 1, x)
+    return dr.select(small, _log1p_series(near), dr.log(1 + far) / far)
 
 
 def expm1_ratio(x):
     """(exp(x) - 1)/x, and its limit 1 at x = 0."""
-    small = abs(x) < 1e-3
-    series = 1 + x * (1 / 2 + x * (1 / 6 + x / 24))
-    safe = dr.select(small, 1, x)
-    return dr.select(small, series, expm1(safe) / safe)
+    small = abs(x) < 0.5
+    near, far = dr.select(small, x, 0), dr.select(small, 1, x)
+    return dr.select(small, _expm1_series(near), (dr.exp(far) - 1) / far)
+
+
+def _log1p_series(x):
+    """log(1 + x)/x for |x| <= 0.5: log(1 + x) = 2 atanh(y) with |y| <= 1/3, so the next term is below 1e-8."""
+    half = 1 / (2 + x)
+    y2 = dr.square(x * half)
+    return 2 * half * (1 + y2 * (1 / 3 + y2 * (1 / 5 + y2 * (1 / 7 + y2 * (1 / 9 + y2 * (1 / 11 + y2 / 13))))))
+
+
+def _expm1_series(x):
+    """(exp(x) - 1)/x for |x| <= 0.5; the next term is below 1e-8."""
+    return 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8))))))
 
 
 def log_cos(cos, sin2):

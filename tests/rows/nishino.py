@@ -17,18 +17,16 @@ def row(name, ρd, ρs, κ, γ, variant="microfacet", F=np.ones_like, sharp=Fals
 ROWS = [
     row("default", 0, 1, -5, 100),
     row("peaked", 0.4, 0.5, 4, 25, kappa=4, gamma=25, **BOTH),
-    row("broad", 0.4, 0.5, -2, 2, kappa=-2, gamma=2, **BOTH),
     row("flat", 0, 1, -30, 0.5, kappa=-30, gamma=0.5),
-    row("Blinn's", 0, 1, 0, 20, kappa=0, gamma=20),
+    row("broad conductor", 0, 1, -2, 2, F=COPPER_LIKE, kappa=-2, gamma=2, eta=0.2, k=3.0),
     row("dsbrdf", 0.4, 0.5, -8, 40, "dsbrdf", kappa=-8, gamma=40, **BOTH),
     row("dsbrdf peaked", 0, 1, 6, 5, "dsbrdf", kappa=6, gamma=5),
-    row("conductor", 0, 1, -20, 60, F=COPPER_LIKE, kappa=-20, gamma=60, eta=0.2, k=3.0),
     row("sharp", 0.4, 0.5, -10, 4000, sharp=True, kappa=-10, gamma=4000, **BOTH),
 ]  # fmt: skip
 
 EXTREME = [
     row(f"kappa {κ:g} gamma {γ:g}", 0.4, 0.5, κ, γ, kappa=κ, gamma=γ, **BOTH)
-    for κ, γ in ((-80, 0.1), (-80, 1e5), (-1e-3, 10), (1e-3, 10), (80, 0.1), (80, 1e4), (5, 0), (80, 1))
+    for κ, γ in ((0, 20), (-80, 0.1), (-80, 1e5), (-1e-3, 10), (1e-3, 10), (80, 0.1), (80, 1e4), (5, 0), (80, 1))
 ]
 
 BRIGHT = {"diffuse_reflectance": 0.2, "specular_reflectance": 0.8}
