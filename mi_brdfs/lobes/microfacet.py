@@ -39,11 +39,9 @@ class MicrofacetLobe(Lobe):
         """f cosθ_o as a number, for ρ = 1."""
         return luminance(self.fresnel(facet.cos_d)) * self._facets(facet)
 
-    def half_vector_weight(self, facet):
-        """The ``response`` times 4cosθ_d/q: the weight of a sample of the distribution's half-vector density. D cancels
-        from it."""
-        visible = self.shadowing(facet) * facet.cos_d / facet.cos_i
-        return luminance(self.fresnel(facet.cos_d)) * visible * self.distribution.over_density(facet)
+    def over_facets(self, facet):
+        """``response``·4cosθ_d/D, which with D/q makes the weight of a half vector of the density q."""
+        return luminance(self.fresnel(facet.cos_d)) * self.shadowing(facet) * facet.cos_d / facet.cos_i
 
 
 class DimmedLobe(MicrofacetLobe):

@@ -40,9 +40,9 @@ class Distribution:
         """D(h)."""
         raise NotImplementedError
 
-    def over_density(self, facet):
-        """D(h)/q(h); by default q = D cosθ_h."""
-        return 1 / facet.cos_h
+    def over_density(self, tan2, g):
+        """D(h)/q(h) on the line; by default q = D cosθ_h."""
+        return dr.sqrt(1 + tan2)
 
     def cdf(self, tan2, g):
         """``(C, 1 - C)``: the cumulative distribution in t on the line, and its complement with digits of its own."""
@@ -130,7 +130,7 @@ class AshikhminShirley(Distribution):
         exponent = (self.steepness(facet) - sin2) * dr.select(sin2 < 0.5, near, far)
         return dr.inv_two_pi / (self.alpha_u * self.alpha_v) * dr.exp(exponent)
 
-    def over_density(self, facet):
+    def over_density(self, tan2, g):
         return mi.Float(1)
 
     def cdf(self, tan2, g):
@@ -218,7 +218,7 @@ class ABC(Isotropic):
     def eval(self, facet):
         return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
 
-    def over_density(self, facet):
+    def over_density(self, tan2, g):
         return self.scale * self.law.norm * dr.two_pi
 
     def cdf(self, tan2, g):
@@ -296,19 +296,14 @@ class HemiEPD(Isotropic):
         # That of Blinn's distribution with the same slope at the normal.
         return dr.minimum(2 / (2 + self.gamma / dr.maximum(expm1_ratio(-self.kappa), 1e-30)), 1)
 
-    def _shape(self, facet):
-        """``(cosᵞθ_h, e(κ cosᵞθ_h))``"""
-        power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
-        return power, expm1_ratio(self.kappa * power)
-
     def eval(self, facet):
-        power, shape = self._shape(facet)
-        return (self.gamma + 2) * dr.inv_two_pi * power * shape / self.integral
+        power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
+        return (self.gamma + 2) * dr.inv_two_pi * power * expm1_ratio(self.kappa * power) / self.integral
 
-    def over_density(self, facet):
-        power, shape = self._shape(facet)
-        s = power * dr.square(facet.cos_h)
-        return shape / (self.integral * self.law.eval(s) * facet.cos_h)
+    def over_density(self, tan2, g):
+        power = dr.exp(-0.5 * self.gamma * log1p(tan2))
+        law = self.law.eval(power / (1 + tan2)) * self.integral
+        return expm1_ratio(self.kappa * power) / law * dr.sqrt(1 + tan2)
 
     def cdf(self, tan2, g):
         return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
@@ -340,12 +335,12 @@ class Steps:
 
     def _mass(self, heights, c):
         c = c * len(heights)
-        return sum(height * clamp(c - k, 0, 1) for k, height in enumerate(heights)) / self.total
+        return sum(height * dr.clip(c - k, 0, 1) for k, height in enumerate(heights)) / self.total
 
     def _quantile(self, heights, mass):
         left, c = mass * self.total, 0
         for height in heights:
-            c += clamp(left / height, 0, 1)
+            c += dr.clip(left / height, 0, 1)
             left -= height
         return c / len(heights)
 
@@ -389,11 +384,11 @@ class EPD(Isotropic):
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-14)
         return self.scale * self._power(facet.sin2_h / cos2) / dr.square(cos2)
 
-    def over_density(self, facet):
-        tan2 = facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14)
+    def over_density(self, tan2, g):
+        tan2 = dr.minimum(tan2, 1e14)
         x = dr.minimum(tan2 / self.width, 1e15)
         ratio = self._per_slope(tan2) * dr.square(1 + x) / self.steps.eval(x / (1 + x))
-        return self.scale * dr.pi * self.width * ratio / facet.cos_h
+        return self.scale * dr.pi * self.width * ratio * dr.sqrt(1 + tan2)
 
     def cdf(self, tan2, g):
         x = dr.minimum(tan2 / self.width, 1e30)

@@ -41,15 +41,16 @@ class Orbit:
             x, y, g, mass, rest = self._line(lobe.distribution, wi, cos_psi, sin_psi)
             fractions = [(u, complement), (complement, u)] if self.lines == 2 else [(u, complement)]
             for inner, outer in fractions:
-                tan = safe_sqrt(lobe.distribution.inverse_cdf(inner * mass, rest + outer * mass, g))
+                tan2 = lobe.distribution.inverse_cdf(inner * mass, rest + outer * mass, g)
+                scale, tan = mass * lobe.distribution.over_density(tan2, g), safe_sqrt(tan2)
                 for side in (tan, -tan):
                     facet = Facet.at(wi, side * x, side * y)
-                    images.append((facet, mass * self._weight(lobe, facet)))
+                    images.append((facet, scale * self._reflected(lobe, facet)))
             cos_psi, sin_psi = -sin_psi, cos_psi
         return images
 
     @staticmethod
-    def _weight(lobe, facet):
+    def _reflected(lobe, facet):
         valid = (facet.cos_d > 0) & (facet.cos_o > 0)
         # Elsewhere the formulas need not make sense: give them the mirror direction.
         facet = Facet(
@@ -58,7 +59,7 @@ class Orbit:
             dr.select(valid, facet.h, mi.Vector3f(0, 0, 1)),
             dr.select(valid, facet.cos_d, 1),
         )
-        return dr.select(valid, lobe.half_vector_weight(facet), 0)
+        return dr.select(valid, lobe.over_facets(facet), 0)
 
     def sample(self, lobe, wi, u, v):
         sin_psi, cos_psi = dr.sincos(dr.two_pi * v.x)

@@ -90,10 +90,7 @@ class ApproximateBeckmann(Distribution):
     def eval(self, facet):
         return dr.exp(-2 * self.steepness(facet) / (1 + facet.cos_h)) / (dr.pi * self.alpha_u * self.alpha_v)
 
-    def over_density(self, facet):
-        sin2 = facet.sin2_h
-        off_axis = sin2 > 1e-30
-        g = dr.select(off_axis, self.steepness(facet), 1) / dr.select(off_axis, sin2, dr.square(self.alpha_u))
+    def over_density(self, tan2, g):
         return -expm1(-2 * g)
 
     def cdf(self, tan2, g):
