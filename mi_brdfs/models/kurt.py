@@ -21,8 +21,9 @@ class Kurt(Model):
     single lobe drops the number. As a microfacet model each is Beckmann's with the shadowing term
     G = (cosθ_i cosθ_o)^(1-κ)/(wi·h).
 
-    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1, and in practice to κ = 0.25: there the albedo begins to
-    exceed 1 beyond 89.5° only. For κ = 0.5 it diverges at grazing: α = 0.1, F = 1 reach 1.05 at 88° and 3.7 at 89.9°.
+    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1. For κ = 0.25 the albedo (F = 1) exceeds 1 beyond 89.9°
+    for α <= 0.3, and beyond 88° for α = 1. For κ = 0.5 it diverges at grazing: α = 0.1 reaches 1.05 at 88° and 3.7 at
+    89.9°.
     That D's cosine power is 4 was not checked against the paper. One-sided.
 
     Sampling: eight images of a half vector, one of them chosen by what it reflects

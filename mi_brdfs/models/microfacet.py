@@ -58,8 +58,8 @@ class Microfacet(Model):
     with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and the
     specular lobe of ``metallicroughness`` (ggx with smith).
 
-    Reciprocal. Energy-conserving with ρd + ρs <= 1 for smith, smith-correlated and vcavity, which describe surfaces,
-    and otherwise as the table below has it. Of Ashikhmin and Premoze's term, of Neumann's and of the EPD only the
+    Reciprocal. With ρd + ρs <= 1 vcavity conserves energy for every D, as do smith and smith-correlated for beckmann and
+    ggx; for the others see the table below. Of Ashikhmin and Premoze's term, of Neumann's and of the EPD only the
     formulas were known, from later papers and public code. One-sided.
 
     Sampling: eight images of a half vector, one of them chosen by what it reflects
