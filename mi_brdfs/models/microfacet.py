@@ -58,7 +58,7 @@ class Microfacet(Model):
     with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and the
     specular lobe of ``metallicroughness`` (ggx with smith).
 
-    Reciprocal. With ρd + ρs <= 1 vcavity conserves energy for every D, as do smith and smith-correlated for beckmann and
+    Reciprocal. With ρd + ρs <= 1 vcavity conserves energy for every D, and smith and smith-correlated for beckmann and
     ggx; for the others see the table below. Of Ashikhmin and Premoze's term, of Neumann's and of the EPD only the
     formulas were known, from later papers and public code. One-sided.
 
