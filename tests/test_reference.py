@@ -7,13 +7,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import mi_brdfs
 from mi_brdfs.registry import MODELS
 
-ROOT = Path(mi_brdfs.__file__).parents[1]
-sys.path.insert(0, str(ROOT / "docs"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 
-import reference_page as page  # noqa: E402
+import reference_page as page
 
 STALE = "stale: run python docs/reference_page.py"
 

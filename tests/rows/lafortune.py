@@ -30,7 +30,7 @@ ROWS = [
 
 EXTREME = [
     row("mirror exponent 1e5", 0.4, [(0.5, -1, -1, 1, 1e5)], exponent=100000, **BOTH),
-    row("mirror 1.5 exponent 1e5", 0.4, [(0.5, -1.5, -1.5, 1.5, 1e5)], cx=-1.5, cy=-1.5, cz=1.5, exponent=100000, **BOTH),
+    row("factors 1.5", 0.4, [(0.5, -1.5, -1.5, 1.5, 1e5)], cx=-1.5, cy=-1.5, cz=1.5, exponent=100000, **BOTH),
     row("off-specular exponent 1000", 0.4, [(0.5, -1, -1, 0.75, 1000)], cz=0.75, exponent=1000, **BOTH),
 ]
 
