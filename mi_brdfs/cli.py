@@ -1,10 +1,11 @@
-"""The command line ``mi-brdfs``: list, info, doctor, render.
+"""The command line ``mi-brdfs``: list, info, doctor, render, check.
 
 Results go to stdout, errors and progress to stderr. Exit status: 0 fine, 1 error, 2 wrong usage, 130 after Ctrl-C.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -16,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -33,6 +35,7 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 
 if TYPE_CHECKING:
     from .render import Picture
+    from .validation import Report
 
 out = Console(markup=False, highlight=False, soft_wrap=True)
 err = Console(markup=False, highlight=False, soft_wrap=True, stderr=True)
@@ -136,6 +139,118 @@ def render(
         err.print(f"Interrupted; the image has the {picture.spp} of {picture.total} samples per pixel finished so far.")
         raise typer.Exit(Exit.INTERRUPTED)
     err.print(f"{picture.spp} samples per pixel in {seconds:.1f} s, {chosen}.")
+
+
+@app.command()
+def check(
+    targets: Annotated[
+        list[str] | None, typer.Argument(metavar="TYPE|SCENE.xml…", help="Plugins, of the pack or not, or scene files.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all findings to this file, too.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Run this check alone; may be repeated.")
+    ] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+    ] = None,
+) -> None:
+    """Check BSDFs: sampling, density, energy, reciprocity, components, derivatives. Exit status 1 if any fails."""
+    from .validation import CHECKS
+    from .validation import check as run_checks
+
+    for name in only or []:
+        if name not in CHECKS:
+            _fail(f"--only {name}: there is no such check; there are {', '.join(CHECKS)}", Exit.USAGE)
+    if bool(targets) == every:
+        _fail("name plugins or scene files to check, or give --all", Exit.USAGE)
+    if json_file is not None and not json_file.absolute().parent.is_dir():
+        _fail(f"--json {json_file}: there is no folder {json_file.parent}", Exit.USAGE)
+    chosen = _set_variant(variant)
+    if chosen.startswith("scalar") or "polarized" in chosen:
+        _fail(f"checks need a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
+    reports = []
+    columns = [TextColumn("Checking {task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    start = time.perf_counter()
+    with _stdout_to_stderr():
+        materials = list(_materials(targets or _unaliased()))
+        with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+            task = progress.add_task("", total=len(materials) * len(only or CHECKS))
+            for name, bsdf in materials:
+                progress.update(task, description=name)
+                reports.append(
+                    run_checks(bsdf, name=name, only=only or None, on_progress=partial(progress.advance, task))
+                )
+    if json_file is not None:
+        json_file.write_text(json.dumps([report.to_dict() for report in reports], indent=1) + "\n")
+    _print_reports(reports)
+    err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
+    if not all(report.passed for report in reports):
+        raise typer.Exit(Exit.ERROR)
+
+
+def _unaliased() -> list[str]:
+    """The plugins of the pack, without their aliases."""
+    pages = {manual(name): name for name in reversed(list_models())}
+    return sorted(pages.values())
+
+
+def _materials(targets: list[str]) -> Iterator[tuple[str, dict | mi.BSDF]]:
+    """The BSDFs of plugin names and of scene files, by name; the errors of both end the command."""
+    for target in targets:
+        if target.endswith(".xml"):
+            yield from _of_scene(Path(target))
+            continue
+        try:
+            loaded = mi.load_dict({"type": target})
+        except Exception as error:
+            _fail(f"{target}: {one_line(error)}", Exit.USAGE)
+        if not isinstance(loaded, mi.BSDF):
+            _fail(f"{target} is not a BSDF", Exit.USAGE)
+        yield target, {"type": target}
+
+
+def _of_scene(path: Path) -> Iterator[tuple[str, mi.BSDF]]:
+    """Each material of a scene once, by its id."""
+    from .validation.runner import name_of
+
+    if not path.is_file():
+        _fail(f"{path}: {'not a file' if path.exists() else 'no such file'}", Exit.USAGE)
+    try:
+        scene = mi.load_file(str(path))
+    except Exception as error:
+        _fail(one_line(error))
+    found = []
+    for shape in scene.shapes():
+        bsdf = shape.bsdf()
+        if bsdf is None or any(bsdf is other for other in found):
+            continue
+        found.append(bsdf)
+        yield f"{path.name}: {name_of(bsdf)}", bsdf
+    if not found:
+        _fail(f"{path}: the scene has no material")
+
+
+def _print_reports(reports: list[Report]) -> None:
+    """A row for each report, and below what failed."""
+    words = {"fail": ("FAIL", "red"), "pass": ("pass", "green"), "skip": ("skip", "yellow"), "info": ("info", "dim")}
+    checks = list(dict.fromkeys(finding.check for report in reports for finding in report.findings))
+    table = Table("type", *checks, box=None, pad_edge=False)
+    for report in reports:
+        row = []
+        for name in checks:
+            verdicts = {finding.verdict for finding in report.of(name)}
+            row.append(next((Text(*words[verdict]) for verdict in words if verdict in verdicts), Text("-", "dim")))
+        table.add_row(report.name, *row)
+    _print_table(table)
+    for report in reports:
+        for finding in report.failures:
+            out.print(f"{report.name}: {finding.check}: {finding.subject}: {finding.message}")
+        if not any(finding.verdict in ("pass", "fail") for finding in report.findings):
+            reasons = dict.fromkeys(finding.message for finding in report.findings)
+            out.print(f"{report.name}: nothing was judged. {' '.join(reasons)}")
 
 
 def one_line(error: BaseException) -> str:

@@ -26,25 +26,25 @@ def scene_of(bsdf):
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("name", SMOOTH)
 def test_updates_compile_no_kernel(name):
-    """After the first update of a parameter no value of it makes a kernel that was not there."""
+    """After the first update of a parameter no value of it makes a kernel that was not there. Whether one is compiled
+    depends on the cache that earlier runs left on the disk: so kernels are told by their hashes."""
     scene = mi.load_dict(scene_of(SMOOTH[name]))
     params = mi.traverse(scene)
     keys = [key for key in params.keys() if key.startswith("shape.bsdf.")]
 
-    def compiled():
-        history = dr.kernel_history([dr.KernelType.JIT])
-        return sum(not kernel["cache_hit"] for kernel in history), len(history)
+    def launched():
+        return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         for key in keys:
+            known = set()
             for step in range(4):
                 params[key] = params[key] * 0.95
                 params.update()
                 dr.eval(mi.render(scene, params, spp=4, seed=step))
-                fresh, all_of_them = compiled()
-                assert all_of_them > 0
-                if step > 0:
-                    assert fresh == 0, key
+                kernels = launched()
+                assert kernels and (step == 0 or kernels <= known), key
+                known |= kernels
 
 
 CYCLES = """

@@ -1,0 +1,55 @@
+"""What a check found."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+Verdict = Literal["pass", "fail", "skip", "info"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The verdict of one check on one part of a BSDF."""
+
+    check: str
+    """The name of the check, one of ``mi_brdfs.validation.CHECKS``."""
+    subject: str
+    """What was checked: the whole, or one of its components or parameters."""
+    verdict: Verdict
+    """``fail``, ``pass``, ``skip`` if it could not be checked, or ``info`` if there is nothing to judge."""
+    message: str
+    """One sentence: what is wrong and by how much, or how good it is."""
+    data: dict[str, Any] = field(default_factory=dict)
+    """The numbers behind it."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """All findings on one BSDF."""
+
+    name: str
+    findings: list[Finding]
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return not self.failures
+
+    @property
+    def failures(self) -> list[Finding]:
+        return [finding for finding in self.findings if finding.verdict == "fail"]
+
+    def of(self, check: str) -> list[Finding]:
+        """The findings of one check."""
+        return [finding for finding in self.findings if finding.check == check]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report in types that JSON has."""
+        return {"name": self.name, "passed": self.passed, "findings": [asdict(finding) for finding in self.findings]}
+
+    def __str__(self) -> str:
+        rows = [(f.verdict, f.check, f.subject, f.message) for f in self.findings]
+        widths = [max((len(row[column]) for row in rows), default=0) for column in range(3)]
+        lines = ["  ".join([*map(str.ljust, row, widths), row[3]]) for row in rows]
+        return "\n".join([f"{self.name}: {'passed' if self.passed else 'failed'}", *lines])

@@ -1,0 +1,210 @@
+"""Checks of ``eval`` and ``pdf`` at given directions."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+
+from .outcome import Findings, Outcome
+from .report import Finding
+from .subject import Part, direction, hemisphere, random
+
+
+def angles_of(w) -> str:
+    """A direction in words."""
+    theta = np.degrees(np.arctan2(np.hypot(w[0], w[1]), w[2]))
+    return f"θ = {theta:.4g}°, φ = {np.degrees(np.arctan2(w[1], w[0])):.4g}°"
+
+
+def _pairs(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of incidence and of reflection where formulas break: normal, grazing, mirrored, equal, opposite."""
+    thetas = [0, 1e-3, 0.1, 30, 60, 80, 89, 89.9, 89.99, 89.9999]
+    edge = np.array([direction(theta, phi) for theta in thetas for phi in (0, 30, 90, 180, 210)])
+    wi, wo = (w.reshape(-1, 3) for w in np.broadcast_arrays(edge[:, None], edge[None]))
+    generic = hemisphere(4000, 1), hemisphere(4000, 2)
+    wi, wo = np.concatenate([wi, edge, generic[0]]), np.concatenate([wo, edge * np.float32([-1, -1, 1]), generic[1]])
+    sides = [(i, o) for i in part.sides for o in (1, -1)]
+    wi, wo = (
+        np.concatenate([w * np.float32([1, 1, side[which]]) for side in sides]) for which, w in enumerate((wi, wo))
+    )
+    return np.ascontiguousarray(wi), np.ascontiguousarray(wo)
+
+
+def _bad(values: np.ndarray) -> np.ndarray:
+    return ~(np.isfinite(values) & (values >= 0)).reshape(len(values), -1).all(axis=1)
+
+
+def finite(run) -> Findings:
+    """Values, densities and weights are finite and not negative: at normal incidence, at grazing, at the mirror
+    direction, towards the light, and for samples with variates of 0 and just below 1."""
+    for part in run.subject.parts:
+        outcome = Outcome("finite", part.name)
+        wi, wo = _pairs(part)
+        for name, values in (("eval", run.subject.eval(part, wi, wo)), ("pdf", run.subject.pdf(part, wi, wo))):
+            bad = _bad(values)
+            if bad.any():
+                k = int(np.argmax(bad))
+                outcome.fault(
+                    f"{name} is {_shown(values[k])} for light from {angles_of(wi[k])} towards {angles_of(wo[k])}, and "
+                    f"{bad.mean():.1%} of the pairs tried are negative or not finite",
+                    bad.sum(),
+                )
+        corners = np.float32([0, 2**-24, 0.5, 1 - 2**-24])
+        u = np.stack(np.meshgrid(corners, corners, corners), axis=-1).reshape(-1, 3)
+        u = np.concatenate([u, random(2000, 4)])
+        for side in part.sides:
+            for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
+                samples = run.subject.sample(part, direction(theta, 30) * np.float32([1, 1, side]), u)
+                length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
+                bad = _bad(samples.weight) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
+                if bad.any():
+                    k = int(np.argmax(bad))
+                    outcome.fault(
+                        f"for light from {theta:g}° a sample has the weight {_shown(samples.weight[k])}, the density "
+                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}",
+                        bad.sum(),
+                    )
+        yield outcome.finding(f"{len(wi)} pairs of directions, to 0.0001° above the horizon.")
+
+
+def _shown(values) -> str:
+    values = np.atleast_1d(values)
+    return f"{next((v for v in values if not (np.isfinite(v) and v >= 0)), values[0]):.4g}"
+
+
+def horizon(run) -> Findings:
+    """A component is zero on the side that its flags exclude, and so is its density; and it sends no samples there."""
+    flags = mi.BSDFFlags
+    for part in run.subject.parts:
+        outcome = Outcome("horizon", part.name)
+        wi, wo = _pairs(part)
+        same = wi[:, 2] * wo[:, 2] > 0
+        for flag, where, words in ((flags.Reflection, same, "above"), (flags.Transmission, ~same, "below")):
+            if part.has(flag):
+                continue
+            for name, values in (
+                ("eval", run.subject.eval(part, wi[where], wo[where]).max(axis=1)),
+                ("pdf", run.subject.pdf(part, wi[where], wo[where])),
+            ):
+                if (values != 0).any():
+                    k = int(np.argmax(values != 0))
+                    outcome.fault(
+                        f"{name} is {values[k]:.4g} for light from {angles_of(wi[where][k])} towards "
+                        f"{angles_of(wo[where][k])}, {words} the horizon, where the flags allow nothing",
+                        np.inf,
+                    )
+            for incident in run.subject.incidents(part):
+                samples = run.samples(part, incident)
+                there = (samples.wo[:, 2] * incident.wi[2] > 0) == (words == "above")
+                lost = there & samples.lit
+                if lost.any():
+                    outcome.fault(
+                        f"for light from {incident.name} {lost.mean():.2%} of the samples go {words} the horizon with "
+                        f"a weight, where the flags allow nothing",
+                        lost.sum(),
+                    )
+        blind = [side for side in (1, -1) if side not in part.sides]
+        for side in blind:
+            unseen = np.ascontiguousarray(wi * np.float32([1, 1, side * np.sign(wi[0, 2])]))[: len(wi) // 2]
+            value = run.subject.eval(part, unseen, wo[: len(unseen)])
+            if value.any():
+                outcome.fault("light from the side that the flags exclude is reflected")
+        yield outcome.finding("Nothing on the sides that the flags exclude.")
+
+
+def support(run) -> Findings:
+    """Wherever there is light, it can be sampled: pdf > 0 where eval > 0. Values below 1e-9 of the largest do not
+    count."""
+    for part in run.subject.parts:
+        outcome, tried = Outcome("support", part.name), 0
+        for incident in run.subject.incidents(part):
+            wo = np.concatenate([hemisphere(8000, 3), run.samples(part, incident).wo[:8000]])
+            if part.has(mi.BSDFFlags.Transmission):
+                wo = np.concatenate([wo, hemisphere(8000, 4) * np.float32([1, 1, -1])])
+            value = np.nan_to_num(run.subject.eval(part, incident.wi, wo).max(axis=1))
+            pdf = run.subject.pdf(part, incident.wi, wo)
+            missed = (value > 1e-9 * value.max()) & ~(pdf > 0)
+            tried += len(wo)
+            if missed.any():
+                k = int(np.argmax(np.where(missed, value, 0)))
+                outcome.fault(
+                    f"for light from {incident.name} eval is {value[k]:.4g} towards {angles_of(wo[k])}, but pdf is 0: "
+                    "this light is never sampled",
+                    missed.sum(),
+                )
+        yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
+
+
+def eval_pdf(run) -> Findings:
+    """``eval_pdf`` says what ``eval`` and ``pdf`` say, and ``eval_pdf_sample`` what they and ``sample`` say, to
+    float32's rounding: some plugins compute a shared term differently."""
+    for part in run.subject.parts:
+        outcome, tolerance, worst = Outcome("eval_pdf", part.name), run.subject.rounding(part), 0.0
+        for incident in run.subject.incidents(part):
+            wi, u = incident.wi, random(4000, 6)
+            samples = run.subject.sample(part, wi, u)
+            wo = np.where(np.arange(4000)[:, None] % 2, samples.wo, hemisphere(4000, 7)).astype(np.float32)
+            value, density = run.subject.eval(part, wi, wo), run.subject.pdf(part, wi, wo)
+            pair, triple = run.subject.eval_pdf(part, wi, wo), run.subject.eval_pdf_sample(part, wi, wo, u)
+            drawn = samples.drawn
+            comparisons = [
+                ("eval_pdf", "eval", pair[0], value),
+                ("eval_pdf", "pdf", pair[1], density),
+                ("eval_pdf_sample", "eval", triple[0], value),
+                ("eval_pdf_sample", "pdf", triple[1], density),
+                ("eval_pdf_sample", "sample's density", triple[3][drawn], samples.density[drawn]),
+                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight),
+                ("eval_pdf_sample", "sample's direction", triple[2][drawn] + 2.0, samples.wo[drawn] + 2.0),
+            ]
+            for name, of, got, expected in comparisons:
+                error = _relative(got, expected)
+                if not error.size:
+                    continue
+                worst = max(worst, error.max())
+                if error.max() > tolerance:
+                    k = np.unravel_index(int(np.argmax(error)), error.shape)
+                    outcome.fault(
+                        f"for light from {incident.name} {name} gives {got[k]:.6g} where {of} is {expected[k]:.6g}",
+                        error.max(),
+                    )
+        yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
+
+
+def _relative(got, expected):
+    scale = np.maximum(np.maximum(abs(got), abs(expected)), 1e-7 * np.max(abs(expected), initial=0) + 1e-12)
+    error = abs(got - expected) / scale
+    return np.where(np.isfinite(error), error, np.where(np.isfinite(expected), np.inf, 0))
+
+
+def reciprocity(run) -> Findings:
+    """f(wi, wo) = f(wo, wi) for reflection, unless the component is flagged NonSymmetric: at generic pairs, and at
+    pairs that the sampler draws, where narrow lobes are."""
+    for part in run.subject.parts:
+        if part.has(mi.BSDFFlags.NonSymmetric) or not part.has(mi.BSDFFlags.Reflection):
+            reason = "flagged NonSymmetric" if part.has(mi.BSDFFlags.NonSymmetric) else "does not reflect"
+            yield Finding("reciprocity", part.name, "skip", f"Not checked, as it is {reason}."
+                          if reason.startswith("flagged") else f"Not checked, as it {reason}.")  # fmt: skip
+            continue
+        outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.subject.rounding(part), 0.0
+        for side in part.sides:
+            turn = np.float32([1, 1, side])
+            wi, wo = hemisphere(8000, 8) * turn, hemisphere(8000, 9) * turn
+            drawn = run.subject.sample(part, wi, random(8000, 10)).wo
+            near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * side > 0.01)
+            wo[near] = drawn[near]
+            forth = run.subject.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
+            back = run.subject.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
+            larger = np.nan_to_num(np.maximum(forth, back))
+            scale = np.maximum(larger, 1e-6 * larger.max() + 1e-12)
+            error = np.nan_to_num(abs(forth - back) / scale, nan=0).max(axis=1)
+            off = error > tolerance
+            worst = max(worst, float(np.quantile(error, 0.999)))
+            if off.mean() > 1e-3:
+                k = int(np.argmax(error))
+                f, g = (x[k].max() / (abs(wi[k, 2]) * abs(wo[k, 2])) for x in (forth, back))
+                outcome.fault(
+                    f"f from {angles_of(wi[k])} to {angles_of(wo[k])} is {f:.4g}, but {g:.4g} from there back, and "
+                    f"{off.mean():.1%} of the pairs differ",
+                    off.mean(),
+                )
+        yield outcome.finding(f"f(wi, wo) = f(wo, wi) to {worst:.1g}, within {tolerance:.1g}.")

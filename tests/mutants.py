@@ -1,0 +1,372 @@
+"""Models with a fault each, as a hurried author may leave them, and the checks that must name it.
+
+Each mutant is a plugin of its own, ``mutant_NAME``, made of a model or lobe of the pack with one thing changed; for
+``MUTANTS`` see the end.
+"""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+
+from mi_brdfs import bsdf as adapter
+from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, PowerLobe
+from mi_brdfs.microfacet.distributions import GGX, Beckmann
+from mi_brdfs.microfacet.facet import Facet
+from mi_brdfs.microfacet.fresnel import Unit
+from mi_brdfs.microfacet.sampling import BoundedVisibleNormals, Orbit
+from mi_brdfs.microfacet.shadowing import SmithGGX, kelemen
+from mi_brdfs.models.lambert import Lambert
+from mi_brdfs.models.phong import Phong
+from mi_brdfs.models.walter import Walter
+from mi_brdfs.models.ward import Ward
+
+# --- Diffuse lobes --------------------------------------------------------------------------------------------------
+
+
+class TimesPi(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * dr.pi, pdf
+
+
+class OverPi(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * dr.inv_pi, pdf
+
+
+class NoCosine(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        return self.reflectance * dr.inv_pi, super().eval_pdf(wi, wo)[1]
+
+
+class UniformDensity(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        return super().eval_pdf(wi, wo)[0], mi.Float(dr.inv_two_pi)
+
+
+class UniformSampler(LambertLobe):
+    def sample(self, wi, u, v):
+        return mi.warp.square_to_uniform_hemisphere(v)
+
+
+class DensityWithoutPi(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        return super().eval_pdf(wi, wo)[0], wo.z
+
+
+class OneVariate(LambertLobe):
+    def sample(self, wi, u, v):
+        return super().sample(wi, u, mi.Point2f(v.x, 0.3))
+
+
+class NotANumber(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (dr.sqrt(wo.z - 0.01) / dr.sqrt(wo.z - 0.01)), pdf
+
+
+class Negative(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (1 - 1.1 * dr.square(dr.square(1 - wo.z))), pdf
+
+
+class MissingDensity(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value, dr.select(wo.z > 0.2, pdf, 0)
+
+
+class OneWay(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (0.5 + 0.5 * wo.z), pdf
+
+
+class Detached(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return dr.detach(value), pdf
+
+
+class RootOfSquare(LambertLobe):
+    """The absolute value as √x², which has the derivative 0·∞ at x = 0."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (1 + 0.01 * dr.sqrt(dr.square(self.reflectance - 0.5))), pdf
+
+
+# --- Glossy lobes ---------------------------------------------------------------------------------------------------
+
+
+class SkewedPower(PowerLobe):
+    def sample(self, wi, u, v):
+        wo = super().sample(wi, u, v)
+        sin, cos = dr.sincos(0.1)
+        return mi.Vector3f(cos * wo.x - sin * wo.y, cos * wo.y + sin * wo.x, wo.z)
+
+
+class PowerFlaggedDiffuse(PowerLobe):
+    glossy = False
+
+
+class UnnormalisedPower(PowerLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value, pdf * (self.exponent + 1) / (self.exponent + 2)
+
+
+class HalfVectorDensity(MicrofacetLobe):
+    """The density of the half vector, without the Jacobian 1/(4 cosθ_d) of its reflection."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value, pdf * 4 * Facet.between(wi, wo).cos_d
+
+
+class WithoutFour(MicrofacetLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return 4 * value, pdf
+
+
+class SwappedDensity(MicrofacetLobe):
+    """αu and αv change places in the density only."""
+
+    def eval_pdf(self, wi, wo):
+        value, _ = super().eval_pdf(wi, wo)
+        d = self.distribution
+        swapped = MicrofacetLobe(1, type(d)(d.alpha_v, d.alpha_u), self.shadowing, self.fresnel, self.sampler)
+        return value, swapped.eval_pdf(wi, wo)[1]
+
+
+class LostHalf(MicrofacetLobe):
+    """Throws away every other direction that it draws, which the density does not know."""
+
+    def sample(self, wi, u, v):
+        wo = super().sample(wi, u, v)
+        return dr.select(v.x < 0.5, wo, -wo)
+
+
+class UnnormalisedGGX(GGX):
+    def eval(self, facet):
+        return super().eval(facet) * 1.3
+
+
+def one_sided_shadowing(facet):
+    """Smith's masking of wo alone."""
+    z = facet.cos_o
+    return 2 / (1 + dr.sqrt(1 + 0.36 * (1 - z * z) / (z * z)))
+
+
+def lambert(lobe):
+    class Mutant(Lambert):
+        def lobes(self, p):
+            return (lobe(p.reflectance),)
+
+    return Mutant
+
+
+def phong(lobe):
+    class Mutant(Phong):
+        def lobes(self, p):
+            scale = (p.exponent + 2) * dr.inv_two_pi
+            return LambertLobe(p.diffuse_reflectance), lobe(p.specular_reflectance, p.exponent, scale)
+
+    return Mutant
+
+
+def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=BoundedVisibleNormals):
+    class Mutant(Walter):
+        def lobes(self, p):
+            smith = shadowing or SmithGGX(*p.alpha, correlated=False)
+            specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, p.fresnel, sampler())
+            return LambertLobe(p.diffuse_reflectance), specular
+
+    return Mutant
+
+
+def ward(lobe):
+    class Mutant(Ward):
+        def lobes(self, p):
+            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), kelemen, Unit(), Orbit(8))
+            return LambertLobe(p.diffuse_reflectance), specular
+
+    return Mutant
+
+
+class BakedIn(Lambert):
+    """Makes a number of Python of its texture's: a literal in the kernel."""
+
+    def lobes(self, p):
+        return (LambertLobe(float(mi.traverse(self.textures["reflectance"])["value"][0])),)
+
+
+# --- Adapters -------------------------------------------------------------------------------------------------------
+
+
+class IgnoresMasks(adapter.ModelBSDF):
+    def _mixture(self, ctx, si, active):
+        return adapter.ModelBSDF._mixture(self, mi.BSDFContext(), si, active)
+
+
+class WeightNotDivided(adapter.ModelBSDF):
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
+        return bs, weight * bs.pdf
+
+
+class CosineTwice(adapter.ModelBSDF):
+    """eval has another cosine, sample's weight has not."""
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
+        return value * dr.maximum(wo.z, 0), pdf
+
+    def eval(self, ctx, si, wo, active=True):
+        return self.eval_pdf(ctx, si, wo, active)[0]
+
+
+class PairDisagrees(adapter.ModelBSDF):
+    """eval_pdf alone forgets the cosine."""
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
+        return value / dr.maximum(wo.z, 0.01), pdf
+
+    def eval(self, ctx, si, wo, active=True):
+        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)[0]
+
+    def pdf(self, ctx, si, wo, active=True):
+        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)[1]
+
+
+class SumOfDensities(adapter.ModelBSDF):
+    """The mixture's density leaves out the lobes' probabilities."""
+
+    @staticmethod
+    def _eval_pdf(valid, mixture, frame, wo):
+        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
+        return value, pdf * len(mixture.lobes)
+
+
+class WrongComponent(adapter.ModelBSDF):
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
+        bs.sampled_component = mi.UInt32(0)
+        return bs, weight
+
+
+class WrongType(adapter.ModelBSDF):
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
+        bs.sampled_type = mi.UInt32(int(mi.BSDFFlags.DiffuseReflection))
+        return bs, weight
+
+
+class ShinesThrough(adapter.ModelBSDF):
+    """Takes the cosine's absolute value where it should be zero below the horizon."""
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        return adapter.ModelBSDF.eval_pdf(self, ctx, si, mi.Vector3f(wo.x, wo.y, abs(wo.z)), active)
+
+
+class SamplesBelow(adapter.ModelBSDF):
+    """A tenth of the samples leaves below the horizon, with its weight."""
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
+        bs.wo = dr.select(sample1 < 0.1, mi.Vector3f(bs.wo.x, bs.wo.y, -bs.wo.z), bs.wo)
+        return bs, weight
+
+
+class NoAnisotropicFlag(adapter.ModelBSDF):
+    def __init__(self, props):
+        adapter.ModelBSDF.__init__(self, props)
+        self.m_components = [c & ~int(mi.BSDFFlags.Anisotropic) for c in self.m_components]
+        self.m_flags = int(self.m_flags) & ~int(mi.BSDFFlags.Anisotropic)
+
+
+class FlagsDisagree(adapter.ModelBSDF):
+    """The flags of the whole leave a component out."""
+
+    def __init__(self, props):
+        adapter.ModelBSDF.__init__(self, props)
+        self.m_flags = self.m_components[0]
+
+
+# --- The catalogue --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A fault, and the checks of which each must fail."""
+
+    name: str
+    caught_by: tuple[str, ...]
+    model: type
+    methods: type = adapter.ModelBSDF
+    given: tuple = ()
+
+    def __str__(self):
+        return self.name
+
+    def register(self) -> dict:
+        """Make it a plugin of the active variant; its dict."""
+        plugin = "mutant_" + self.name.replace(" ", "_")
+        for variant in {mi.variant(), "scalar_rgb"}:
+            module = importlib.import_module(f"mitsuba.{variant}")
+            members = {k: v for base in reversed(self.methods.__mro__[:-1]) for k, v in vars(base).items()}
+            members = {k: v for k, v in members.items() if k not in ("__dict__", "__weakref__")}
+            made = type(self.model.__name__, (module.BSDF,), members | {"model_class": self.model})
+            module.register_bsdf(plugin, made)
+        return {"type": plugin, **dict(self.given)}
+
+
+def mutant(name, caught_by, model, methods=adapter.ModelBSDF, **given):
+    return Mutant(name, tuple(caught_by.split()), model, methods, tuple(given.items()))
+
+
+MUTANTS = [
+    mutant("pi forgotten in the denominator", "albedo", lambert(TimesPi)),
+    mutant("pi twice in the denominator", "albedo", lambert(OverPi)),
+    mutant("missing cosine", "reciprocity", lambert(NoCosine)),
+    mutant("missing factor four", "albedo", walter(WithoutFour), alpha=0.3),
+    mutant("unnormalised D", "pdf", walter(distribution=UnnormalisedGGX), alpha=0.05),
+    mutant("density without pi", "pdf chi2", lambert(DensityWithoutPi)),
+    mutant("uniform density of a cosine sampler", "chi2", lambert(UniformDensity)),
+    mutant("uniform sampler of a cosine density", "chi2", lambert(UniformSampler)),
+    mutant("a variate ignored", "chi2", lambert(OneVariate)),
+    mutant("normalisation of a power off by one", "pdf", phong(UnnormalisedPower), exponent=30.0),
+    mutant("rotated sampler", "chi2", phong(SkewedPower), exponent=300.0),
+    mutant("density of the half vector", "pdf chi2", walter(HalfVectorDensity), alpha=0.3),
+    mutant("density of the half vector, sharp", "pdf chi2", walter(HalfVectorDensity), alpha=1e-3),
+    mutant("alphas swapped in the density", "chi2", ward(SwappedDensity), alpha_u=0.1, alpha_v=0.3),
+    mutant("half of the samples lost", "pdf chi2", walter(LostHalf), alpha=0.3),
+    mutant("lobe probability omitted", "pdf components", phong(PowerLobe), SumOfDensities),
+    mutant("weight not divided", "weight", Phong, WeightNotDivided),
+    mutant("weight without eval's second cosine", "weight", Ward, CosineTwice),
+    mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
+    mutant("mask forgotten", "components", Ward, IgnoresMasks),
+    mutant("wrong component", "components", Ward, WrongComponent),
+    mutant("wrong type", "components", Ward, WrongType),
+    mutant("flags of the whole", "components", Ward, FlagsDisagree),
+    mutant("glossy flagged diffuse", "flags", phong(PowerFlaggedDiffuse), exponent=300.0),
+    mutant("anisotropy not flagged", "flags", Ward, NoAnisotropicFlag, alpha_u=0.1, alpha_v=0.3),
+    mutant("one-way shadowing", "reciprocity", walter(shadowing=one_sided_shadowing), alpha=0.6),
+    mutant("one-way diffuse", "reciprocity", lambert(OneWay)),
+    mutant("not a number at grazing", "finite", lambert(NotANumber)),
+    mutant("negative at grazing", "finite", lambert(Negative)),
+    mutant("density zero where light is", "support", lambert(MissingDensity)),
+    mutant("shines through", "horizon", Lambert, ShinesThrough),
+    mutant("samples below the horizon", "horizon", Lambert, SamplesBelow),
+    mutant("gradient cut", "gradients", lambert(Detached)),
+    mutant("gradient not a number", "gradients", lambert(RootOfSquare)),
+    mutant("parameter baked in", "recompiles", BakedIn),
+]

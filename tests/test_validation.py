@@ -1,0 +1,228 @@
+"""The checker passes what is right, and says what is wrong."""
+
+import json
+import subprocess
+import sys
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from mutants import MUTANTS
+
+from mi_brdfs.validation import CHECKS, check
+from mi_brdfs.validation.partition import chi_square, partition
+from mi_brdfs.validation.sampling import variates
+from mi_brdfs.validation.subject import direction
+
+TWO = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.5}
+RIGHT = {
+    "lambert": {"type": "lambert"},
+    "phong": {"type": "phong"},
+    "phong sharp": {"type": "phong", "exponent": 300.0, **TWO},
+    "ward": {"type": "ward"},
+    "ward anisotropic": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3},
+    "walter": {"type": "walter", "alpha": 0.3, **TWO},
+    "walter rough": {"type": "walter", "alpha": 0.6},
+    "walter glossy": {"type": "walter", "alpha": 0.05},
+    "walter sharp": {"type": "walter", "alpha": 1e-3},
+    "burley": {"type": "burley", "clearcoat": 0.5, "sheen": 0.5},
+    "transmission": {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5},
+    "diffuse": {"type": "diffuse"},
+    "roughconductor": {"type": "roughconductor"},
+    "roughconductor sharp": {"type": "roughconductor", "alpha": 1e-3},
+    "twosided": {"type": "twosided", "inner": {"type": "ward"}},
+    "textured": {"type": "ward", "specular_reflectance": {"type": "checkerboard"}},
+}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("mutant", MUTANTS, ids=str)
+def test_mutants_are_caught(mutant):
+    """By each check that is named for them."""
+    report = check(mutant.register(), only=mutant.caught_by)
+    assert {finding.check for finding in report.failures} == set(mutant.caught_by), report
+    assert all(finding.message.endswith(".") for finding in report.failures)
+    assert not report.passed
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in ("burley", "textured") else []) for name in RIGHT]
+)
+def test_what_is_right_passes(name):
+    """The models that the mutants are made of among them."""
+    report = check(RIGHT[name], name=name)
+    assert report.passed, report
+    assert {finding.check for finding in report.findings} == set(CHECKS)
+    judged = {finding.check for finding in report.findings if finding.verdict == "pass"}
+    assert judged >= set(CHECKS) - {"reciprocity", "albedo", "efficiency", "gradients", "recompiles"}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_density_of_roughplastic_goes_below_the_horizon():
+    """A fault of Mitsuba 3.9's: its pdf is not cut off at the horizon, and negative there."""
+    report = check({"type": "roughplastic"}, only=["horizon", "finite", "weight", "eval_pdf", "support", "components"])
+    assert {finding.check for finding in report.failures} == {"horizon", "finite"}
+    assert all("pdf is" in finding.message for finding in report.failures)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_refraction():
+    """A rough dielectric, whose samples lie on both sides, seen from both. With Beckmann's distribution the integral of
+    its density is off by 0.3 % at 80°: Mitsuba approximates the masking in it."""
+    bsdf = {"type": "roughdielectric", "alpha": 0.3}
+    only = ["finite", "horizon", "support", "eval_pdf", "flags", "components", "pdf", "chi2"]
+    report = check(bsdf | {"distribution": "ggx"}, only=only)
+    assert not [finding for finding in report.failures if finding.subject == "whole"], report
+    approximate = check(bsdf, only=["pdf"]).failures[0]
+    assert approximate.subject == "whole" and "for light from 80° pdf integrates to 0.97" in approximate.message
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_kinks_have_the_derivatives_of_both_sides():
+    """The largest of the lobe's three factors, which are equal by default, scales it."""
+    report = check({"type": "lafortune"}, only=["gradients"])
+    assert report.passed and len(report.findings) == 6, report
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_delta_functions_are_skipped_with_a_reason():
+    report = check({"type": "dielectric"})
+    assert report.passed and {finding.verdict for finding in report.findings} == {"skip"}
+    assert "delta function" in report.findings[0].message
+    mixed = check({"type": "plastic"}, only=["chi2", "pdf", "weight"])
+    assert mixed.passed and [f.verdict for f in mixed.findings] == [
+        "skip",
+        "pass",
+        "pass",
+        "pass",
+        "pass",
+        "pass",
+        "pass",
+    ]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_energy_is_judged_by_the_manual_page_or_when_asked():
+    gains = {"type": "phong", "normalization": "none", "exponent": 0.0, "specular_reflectance": 1.0}
+    (whole, diffuse, glossy) = check(gains, only=["albedo"]).findings
+    assert [f.verdict for f in (whole, diffuse, glossy)] == ["info", "pass", "pass"]
+    (whole, *_) = check(gains, only=["albedo"], conserves=True).failures
+    assert "more than it receives" in whole.message
+    assert check({"type": "roughconductor"}, only=["albedo"], conserves=True).passed
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_loaded_bsdfs_and_reports():
+    report = check(mi.load_dict({"type": "ward"}), only=["finite", "efficiency"], angles=(45,))
+    assert report.name == "Ward" and "passed" in str(report) and "45°" in str(report)
+    again = json.loads(json.dumps(report.to_dict()))
+    assert again["passed"] and [f["check"] for f in again["findings"]] == ["finite"] * 3 + ["efficiency"] * 3
+    assert check(mi.load_dict({"type": "ward"}), only=["finite", "efficiency"], angles=(45,)) == report
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_unknown_checks_are_named():
+    with pytest.raises(ValueError, match="no check 'chi'; there are finite, horizon"):
+        check({"type": "ward"}, only=["chi"])
+
+
+def test_variants():
+    """Spectral variants do; in scalar ones a dict is checked in another, and a loaded BSDF is refused."""
+    with mi.variant_context("llvm_ad_spectral"):
+        assert check({"type": "walter", "material": "Au", "alpha": 0.3}).passed
+    with mi.variant_context("scalar_rgb"):
+        assert check({"type": "ward"}, only=["weight"]).passed and mi.variant() == "scalar_rgb"
+        with pytest.raises(ValueError, match="scalar_rgb cannot be checked"):
+            check(mi.load_dict({"type": "ward"}))
+
+
+# --- Its tools ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [1e-3, 0.03, 1])
+def test_partitions_integrate_densities_of_any_width(width):
+    """Here a von Mises-Fisher density about a direction at 60°, cut off at the horizon, to 1e-4 of its integral on a
+    fine grid in its own angles; and its cells hold what they should of its own samples."""
+    axis, count = direction(60, 20).astype(np.float64), 200_000
+    kappa = 1 / width**2
+    rng = np.random.default_rng(1)
+    versine = -np.log1p(-rng.random(2 * count) * -np.expm1(-2 * kappa)) / kappa
+    phi, sin = rng.uniform(0, 2 * np.pi, 2 * count), np.sqrt(versine * (2 - versine))
+    side = np.cross(axis, [0, 0, 1])
+    side /= np.linalg.norm(side)
+    frame = np.stack([side, np.cross(axis, side), axis])
+    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), 1 - versine], axis=-1) @ frame
+    pilot, samples = w[:count], w[count:]
+
+    def pdf(wo):
+        versine = 0.5 * ((wo - axis) ** 2).sum(axis=1)
+        return np.where(wo[:, 2] > 0, np.exp(-kappa * versine) * kappa / (2 * np.pi * -np.expm1(-2 * kappa)), 0)
+
+    cells = partition(pdf, pilot[pilot[:, 2] > 0], axis, count)
+    above = samples[samples[:, 2] > 0]
+    share = (w[:, 2] > 0).mean()
+    assert cells.integrals.sum() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / len(w)) + 1e-4)
+    test = chi_square(cells.histogram(above), count * cells.integrals)
+    assert test.p_value > 1e-3 and test.degrees > 500
+    shifted = chi_square(cells.histogram(above + 0.1 * width * side), count * cells.integrals)
+    assert shifted.p_value < 1e-6
+
+
+def test_chi_square_has_its_distribution():
+    """Of 500 tests, 5 % have a p-value below 0.05, whether cells are pooled or not."""
+    rng = np.random.default_rng(2)
+    for expected in (np.full(300, 50.0), np.geomspace(0.01, 200, 300)):
+        p = [chi_square(rng.poisson(expected), expected).p_value for _ in range(500)]
+        assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.035)
+
+
+def test_lattices_fill_the_cube():
+    points = variates(12, 1).astype(np.float64)
+    assert points.shape[1] == 3 and points.min() >= 0 and points.max() < 1
+    product = np.prod(points, axis=1).reshape(16, -1).mean(axis=1)
+    assert abs(product - 1 / 8).max() < 2e-3
+
+
+# --- The command ----------------------------------------------------------------------------------------------------
+
+
+def run(*arguments, cwd=None):
+    command = [sys.executable, "-m", "mi_brdfs.cli", "check", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=180)
+
+
+def test_command_reports_verdicts(tmp_path):
+    done = run("lambert", "roughplastic", "--only", "horizon", "--only", "weight", "--json", tmp_path / "out.json")
+    assert done.returncode == 1, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].split() == ["type", "horizon", "weight"]
+    assert lines[1].split() == ["lambert", "pass", "pass"] and lines[2].split() == ["roughplastic", "FAIL", "pass"]
+    assert lines[3].startswith("roughplastic: horizon: whole: pdf is ")
+    assert [report["passed"] for report in json.loads((tmp_path / "out.json").read_text())] == [True, False]
+    assert "2 checked in" in done.stderr
+
+
+def test_command_on_a_scene(pytestconfig):
+    done = run("scenes/first_light.xml", "--only", "weight", cwd=pytestconfig.rootpath)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("first_light.xml: ") == 7
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ([], "name plugins or scene files to check, or give --all"),
+        (["ward", "--all"], "name plugins or scene files to check, or give --all"),
+        (["wrad"], "wrad: "),
+        (["path"], "path is not a BSDF"),
+        (["nowhere.xml"], "nowhere.xml: no such file"),
+        (["ward", "--only", "chi"], "there is no such check; there are finite"),
+        (["ward", "--variant", "scalar_rgb"], "need a vectorized and unpolarized variant"),
+        (["ward", "--json", "/nowhere/out.json"], "there is no folder /nowhere"),
+    ],
+)
+def test_wrong_usage(arguments, message):
+    done = run(*arguments)
+    assert done.returncode == 2 and done.stdout == ""
+    assert message in done.stderr and done.stderr.count("\n") == 1
