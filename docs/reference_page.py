@@ -16,8 +16,7 @@ from pathlib import Path
 
 import mi_brdfs
 from mi_brdfs.model import Energy, Model
-from mi_brdfs.parameters import Row
-from mi_brdfs.registry import MODELS
+from mi_brdfs.registry import all_models
 from mi_brdfs.render import display_image, render, write
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
@@ -45,7 +44,7 @@ value is limited to the range where it is evaluated. Pictures show the examples.
 
 def reference() -> str:
     """The text of the plugin reference."""
-    models = list(dict.fromkeys(MODELS.values()))
+    models = all_models()
     parts = [INTRODUCTION, _overview(models), *map(_page, models), CHAPTER.read_text(encoding="utf-8")]
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
@@ -53,15 +52,11 @@ def reference() -> str:
 def readme() -> str:
     """The text of README.md, with its table of models anew."""
     rows = ["| type | model |", "|---|---|"]
-    for model in dict.fromkeys(MODELS.values()):
+    for model in all_models():
         link = f"[`{model.plugins[0]}`](mi_brdfs/models/README.md#{model.plugins[0]})"
         aliases = "".join(f", `{alias}`" for alias in model.plugins[1:])
-        rows.append(f"| {link}{aliases} | {summary(model)} |")
+        rows.append(f"| {link}{aliases} | {_code(model.summary())} |")
     return TABLE.sub("\n" + "\n".join(rows) + "\n\n", README.read_text(encoding="utf-8"))
-
-
-def summary(model: type[Model]) -> str:
-    return _code(inspect.cleandoc(model.__doc__).splitlines()[0])
 
 
 def _code(text: str) -> str:
@@ -97,8 +92,6 @@ def _page(model: type[Model]) -> str:
     text, _, examples = inspect.cleandoc(model.__doc__).partition("\n\nExample\n-------\n")
     xml, _, dictionary = examples.partition("\n\n")
     text = _code(text)
-    parameters = [Row("parameter", "type", "default", "range", "meaning")]
-    parameters += [row for parameter in model.declared() for row in parameter.rows()]
     return "\n\n".join(
         [
             f"## {name}",
@@ -107,7 +100,7 @@ def _page(model: type[Model]) -> str:
             text,
             f"```xml\n{xml}\n```",
             f"```python\n{dictionary}\n```",
-            _table(parameters),
+            _table(model.parameter_rows()),
             _table(model.energy.rows()),
             Energy.NOTE,
         ]
@@ -126,7 +119,7 @@ def main():
     README.write_text(readme(), encoding="utf-8")
     if names := sys.argv[1:]:
         mi.set_variant("llvm_ad_rgb")
-        for model in dict.fromkeys(MODELS.values()):
+        for model in all_models():
             if model.plugins[0] in names or "all" in names:
                 write(thumbnail(model), THUMBNAILS / f"{model.plugins[0]}.png")
 

@@ -29,7 +29,8 @@ from rich.text import Text
 
 from . import doctor as doctor_module
 from . import info as manual
-from . import list_models, llvm
+from . import llvm
+from .registry import all_models
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -66,12 +67,9 @@ def _describe() -> None:
 @app.command("list")
 def list_() -> None:
     """List the BRDFs: type, aliases, summary."""
-    groups: dict[str, list[str]] = {}
-    for name in list_models():
-        groups.setdefault(manual(name), []).append(name)
     table = Table("type", "aliases", "summary", box=None, pad_edge=False)
-    for page, names in groups.items():
-        table.add_row(names[0], " ".join(names[1:]), page.splitlines()[0])
+    for model in all_models():
+        table.add_row(model.plugins[0], " ".join(model.plugins[1:]), model.summary())
     _print_table(table)
 
 
@@ -175,7 +173,7 @@ def check(
     columns = [TextColumn("Checking {task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     start = time.perf_counter()
     with _stdout_to_stderr():
-        materials = list(_materials(targets or _unaliased()))
+        materials = list(_materials(targets or [model.plugins[0] for model in all_models()]))
         with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
             task = progress.add_task("", total=len(materials) * len(only or CHECKS))
             for name, bsdf in materials:
@@ -189,12 +187,6 @@ def check(
     err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
     if not all(report.passed for report in reports):
         raise typer.Exit(Exit.ERROR)
-
-
-def _unaliased() -> list[str]:
-    """The plugins of the pack, without their aliases."""
-    pages = {manual(name): name for name in reversed(list_models())}
-    return sorted(pages.values())
 
 
 def _materials(targets: list[str]) -> Iterator[tuple[str, dict | mi.BSDF]]:

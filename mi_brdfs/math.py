@@ -7,6 +7,8 @@ They work on every variant's floats and spectra, and their derivatives are finit
 
 from __future__ import annotations
 
+import functools
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -91,6 +93,7 @@ def choose(u, probability):
     return chosen, dr.minimum(left, ONE_MINUS_EPSILON)
 
 
+@functools.cache
 def gauss_legendre(count: int) -> list[tuple[float, float]]:
     """The nodes and weights of Gauss-Legendre quadrature on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(count)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
-from .parameters import Given, Parameter, Row, Slot
+from .parameters import Given, Parameter, Row, Slot, textures_of
 
 
 class Energy(NamedTuple):
@@ -67,7 +67,7 @@ class Model:
                 self.slots[parameter.name] = bound
             else:
                 setattr(self, parameter.name, bound)
-        self.textures = {name: texture for slot in self.slots.values() for name, texture in slot.textures.items()}
+        self.textures = textures_of(self.slots.values())
         for name in props.keys():
             props.mark_queried(name)
 
@@ -92,15 +92,24 @@ class Model:
         return SimpleNamespace(**{p.name: p.placeholder(self.slots[p.name]) for p in declared})
 
     @classmethod
+    def summary(cls) -> str:
+        """The first line of the manual page."""
+        return inspect.cleandoc(cls.__doc__).splitlines()[0]
+
+    @classmethod
+    def parameter_rows(cls) -> list[Row]:
+        """The table of parameters, with its heading."""
+        rows = [row for parameter in cls.declared() for row in parameter.rows()]
+        return [Row("parameter", "type", "default", "range", "meaning"), *rows]
+
+    @classmethod
     def manual(cls) -> str:
         """The manual page: the docstring, the table of parameters, and that of the largest albedos."""
-        parameters = [Row("parameter", "type", "default", "range", "meaning")]
-        parameters += [row for parameter in cls.declared() for row in parameter.rows()]
         return "\n".join(
             [
                 inspect.cleandoc(cls.__doc__),
                 "",
-                *_section("Parameters", [[*row[:3], _shortened(row.range), row.text] for row in parameters]),
+                *_section("Parameters", [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]),
                 "",
                 *_section("Largest albedo", [list(row) for row in cls.energy.rows()]),
                 "",

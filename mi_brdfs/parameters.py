@@ -18,6 +18,7 @@ from __future__ import annotations
 import copy
 import difflib
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -301,6 +302,11 @@ class RotationSlot(Slot):
         return cos, sin
 
 
+def textures_of(slots: Iterable[Slot]) -> dict[str, Any]:
+    """The textures of several slots together, by property name."""
+    return {name: texture for slot in slots for name, texture in slot.textures.items()}
+
+
 # --- Declarations ---------------------------------------------------------------------------------------------------
 
 
@@ -481,8 +487,7 @@ class OneOf(Parameter):
                 has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
                 raise given.error(name, f'does not belong to {self.name} = "{choice}", which {has} of its own')
         own = {name: parameter.bind(given) for name, parameter in declared.items()}
-        textures = {n: t for slot in own.values() if isinstance(slot, Slot) for n, t in slot.textures.items()}
-        return OneOfSlot(textures, self.name, choice, own)
+        return OneOfSlot(textures_of(s for s in own.values() if isinstance(s, Slot)), self.name, choice, own)
 
     def placeholder(self, slot):
         declared = self.words[slot.choice]
@@ -535,8 +540,7 @@ class PerLobe(Parameter):
                 problem = f"leaves a gap; number the lobes from 1, so that this one is {expected[1:]}"
                 raise given.error(first[number], problem)
         lobes = [{p.name: p.bind(given) for p in self._lobe(number)} for number in numbers]
-        slots = [slot for lobe in lobes for slot in lobe.values()]
-        return LobesSlot({name: texture for slot in slots for name, texture in slot.textures.items()}, lobes)
+        return LobesSlot(textures_of(slot for lobe in lobes for slot in lobe.values()), lobes)
 
     def placeholder(self, slot):
         return [

@@ -33,6 +33,11 @@ def list_models() -> list[str]:
     return list(MODELS)
 
 
+def all_models() -> list[type[Model]]:
+    """The models in the same order, each once."""
+    return list(dict.fromkeys(MODELS.values()))
+
+
 def find_model(name: str) -> type[Model]:
     """The model of a plugin name.
 

@@ -10,9 +10,9 @@ from scipy.stats import qmc
 from support import context, direction, interaction
 
 from mi_brdfs.parameters import Choice, Colour, Flag, Number, OneOf, PerLobe
-from mi_brdfs.registry import MODELS
+from mi_brdfs.registry import all_models
 
-PLUGINS = {model: name for name, model in reversed(MODELS.items())}
+PLUGINS = {model: model.plugins[0] for model in all_models()}
 ANGLES = [0, 20, 40, 60, 70, 75, 80, 83, 86, 88, 89, 89.5, 89.9]
 INF = float("inf")
 SETTINGS = 120

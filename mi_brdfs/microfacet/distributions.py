@@ -301,7 +301,7 @@ class HemiEPD(Isotropic):
         return (self.gamma + 2) * dr.inv_two_pi * power * expm1_ratio(self.kappa * power) / self.integral
 
     def over_density(self, tan2, g):
-        power = dr.exp(-0.5 * self.gamma * log1p(tan2))
+        _, power = cosine_power_cdf(tan2, self.gamma)
         law = self.law.eval(power / (1 + tan2)) * self.integral
         return expm1_ratio(self.kappa * power) / law * dr.sqrt(1 + tan2)
 

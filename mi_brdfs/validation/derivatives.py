@@ -8,7 +8,7 @@ import numpy as np
 
 from .outcome import Findings, Outcome
 from .report import Finding
-from .subject import direction, hemisphere, interaction, numbers, random, vectors
+from .subject import direction, hemisphere, interaction, numbers, on_side, random, vectors
 
 TOLERANCE = 0.02
 COUNT = 2000
@@ -45,7 +45,7 @@ def gradients(run) -> Findings:
     subject, part = run.subject, run.subject.whole
     params, keys, findings = _floats(run, "gradients")
     yield from findings
-    wi = hemisphere(COUNT, 12) * np.float32([1, 1, part.sides[0]])
+    wi = on_side(hemisphere(COUNT, 12), part.sides[0])
     samples = subject.sample(part, wi, random(COUNT, 13))
     kept = samples.drawn & (samples.pdf > 0) & (wi[:, 2] * part.sides[0] > 0.05)
     wi, wo = np.ascontiguousarray(wi[kept]), np.ascontiguousarray(samples.wo[kept])
@@ -93,7 +93,7 @@ def gradients(run) -> Findings:
 
 def _edges(part):
     edge = np.array([direction(t, phi) for t in (0, 1e-3, 45, 89, 89.9, 89.99) for phi in (0, 50, 180)])
-    edge *= np.float32([1, 1, part.sides[0]])
+    edge = on_side(edge, part.sides[0])
     wi, wo = (np.ascontiguousarray(w.reshape(-1, 3)) for w in np.broadcast_arrays(edge[:, None], edge[None]))
     return wi, wo
 
@@ -157,7 +157,7 @@ def recompiles(run) -> Findings:
     subject, part = run.subject, run.subject.whole
     params, keys, findings = _floats(run, "recompiles")
     yield from findings
-    wi, u = hemisphere(64, 1) * np.float32([1, 1, part.sides[0]]), random(64, 2)
+    wi, u = on_side(hemisphere(64, 1), part.sides[0]), random(64, 2)
 
     def launched():
         """The kernels of a use, by hash: whether one was compiled depends on the cache that earlier runs left."""

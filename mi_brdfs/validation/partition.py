@@ -14,11 +14,12 @@ from math import erfc, sqrt
 
 import numpy as np
 
+from ..math import gauss_legendre
+
 FIRST_LEVEL, LAST_LEVEL = 3, 17
 """Cells at level L are 2^-L of the sphere's extent."""
 NODES = 5
-_x, _w = np.polynomial.legendre.leggauss(NODES)
-_NODES, _WEIGHTS = (_x + 1) / 2, _w / 2
+_NODES, _WEIGHTS = np.array(gauss_legendre(NODES)).T
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from .outcome import Findings, Outcome
 from .partition import ChiSquare, chi_square, partition
 from .report import Finding
-from .subject import Part, Samples, brightness, direction, random
+from .subject import Part, Samples, brightness, direction, on_side, random
 from .values import angles_of
 
 COUNT = 1 << 18
@@ -199,7 +199,7 @@ def albedo(run) -> Findings:
 def _white_furnace(run, part):
     for side in part.sides:
         for theta in sorted({*run.subject.angles, 0, 45, 70, 85, 89, 89.9}):
-            yield f"{theta:g}°" + (" behind" if side < 0 else ""), direction(theta, 17) * np.float32([1, 1, side])
+            yield f"{theta:g}°" + (" behind" if side < 0 else ""), on_side(direction(theta, 17), side)
 
 
 def efficiency(run) -> Findings:

@@ -104,7 +104,7 @@ class Subject:
     def incidents(self, part: Part) -> list[Incident]:
         """The directions that a part is looked at from."""
         return [
-            Incident(_named(theta, side), direction(theta, AZIMUTH_STEP * k) * np.float32([1, 1, side]))
+            Incident(_named(theta, side), on_side(direction(theta, AZIMUTH_STEP * k), side))
             for side in part.sides
             for k, theta in enumerate(self.angles)
         ]
@@ -148,7 +148,7 @@ class Subject:
         """How narrow a part is, in radians: half of the samples for light from 30° lie within this angle of another
         sample's direction, the one that has most of them around it."""
         if part.name not in self._spreads:
-            samples = self.sample(part, direction(30) * np.float32([1, 1, part.sides[0]]), random(1 << 12, 1))
+            samples = self.sample(part, on_side(direction(30), part.sides[0]), random(1 << 12, 1))
             wo = samples.wo[samples.drawn].astype(np.float64)
             if len(wo) < 64:
                 return np.pi
@@ -174,6 +174,11 @@ def direction(theta: float, phi: float = 0) -> np.ndarray:
     """The float32 unit vector at these angles, in degrees."""
     theta, phi = np.radians([theta, phi])
     return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], np.float32)
+
+
+def on_side(w, side: int) -> np.ndarray:
+    """Directions above the horizon, or for a side of -1 their mirror images below."""
+    return w * np.float32([1, 1, side])
 
 
 def random(count: int, seed: int) -> np.ndarray:

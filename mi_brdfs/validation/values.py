@@ -7,7 +7,7 @@ import numpy as np
 
 from .outcome import Findings, Outcome
 from .report import Finding
-from .subject import Part, direction, hemisphere, random
+from .subject import Part, direction, hemisphere, on_side, random
 
 
 def angles_of(w) -> str:
@@ -24,9 +24,7 @@ def _pairs(part: Part) -> tuple[np.ndarray, np.ndarray]:
     generic = hemisphere(4000, 1), hemisphere(4000, 2)
     wi, wo = np.concatenate([wi, edge, generic[0]]), np.concatenate([wo, edge * np.float32([-1, -1, 1]), generic[1]])
     sides = [(i, o) for i in part.sides for o in (1, -1)]
-    wi, wo = (
-        np.concatenate([w * np.float32([1, 1, side[which]]) for side in sides]) for which, w in enumerate((wi, wo))
-    )
+    wi, wo = (np.concatenate([on_side(w, side[which]) for side in sides]) for which, w in enumerate((wi, wo)))
     return np.ascontiguousarray(wi), np.ascontiguousarray(wo)
 
 
@@ -54,7 +52,7 @@ def finite(run) -> Findings:
         u = np.concatenate([u, random(2000, 4)])
         for side in part.sides:
             for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
-                samples = run.subject.sample(part, direction(theta, 30) * np.float32([1, 1, side]), u)
+                samples = run.subject.sample(part, on_side(direction(theta, 30), side), u)
                 length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
                 bad = _bad(samples.weight) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
                 if bad.any():
@@ -105,7 +103,7 @@ def horizon(run) -> Findings:
                     )
         blind = [side for side in (1, -1) if side not in part.sides]
         for side in blind:
-            unseen = np.ascontiguousarray(wi * np.float32([1, 1, side * np.sign(wi[0, 2])]))[: len(wi) // 2]
+            unseen = np.ascontiguousarray(on_side(wi, side * np.sign(wi[0, 2])))[: len(wi) // 2]
             value = run.subject.eval(part, unseen, wo[: len(unseen)])
             if value.any():
                 outcome.fault("light from the side that the flags exclude is reflected")
@@ -120,7 +118,7 @@ def support(run) -> Findings:
         for incident in run.subject.incidents(part):
             wo = np.concatenate([hemisphere(8000, 3), run.samples(part, incident).wo[:8000]])
             if part.has(mi.BSDFFlags.Transmission):
-                wo = np.concatenate([wo, hemisphere(8000, 4) * np.float32([1, 1, -1])])
+                wo = np.concatenate([wo, on_side(hemisphere(8000, 4), -1)])
             value = np.nan_to_num(run.subject.eval(part, incident.wi, wo).max(axis=1))
             pdf = run.subject.pdf(part, incident.wi, wo)
             missed = (value > 1e-9 * value.max()) & ~(pdf > 0)
@@ -181,14 +179,12 @@ def reciprocity(run) -> Findings:
     pairs that the sampler draws, where narrow lobes are."""
     for part in run.subject.parts:
         if part.has(mi.BSDFFlags.NonSymmetric) or not part.has(mi.BSDFFlags.Reflection):
-            reason = "flagged NonSymmetric" if part.has(mi.BSDFFlags.NonSymmetric) else "does not reflect"
-            yield Finding("reciprocity", part.name, "skip", f"Not checked, as it is {reason}."
-                          if reason.startswith("flagged") else f"Not checked, as it {reason}.")  # fmt: skip
+            reason = "is flagged NonSymmetric" if part.has(mi.BSDFFlags.NonSymmetric) else "does not reflect"
+            yield Finding("reciprocity", part.name, "skip", f"Not checked, as it {reason}.")
             continue
         outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.subject.rounding(part), 0.0
         for side in part.sides:
-            turn = np.float32([1, 1, side])
-            wi, wo = hemisphere(8000, 8) * turn, hemisphere(8000, 9) * turn
+            wi, wo = on_side(hemisphere(8000, 8), side), on_side(hemisphere(8000, 9), side)
             drawn = run.subject.sample(part, wi, random(8000, 10)).wo
             near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * side > 0.01)
             wo[near] = drawn[near]
