@@ -28,11 +28,14 @@ class ModelBSDF:
     def __init__(self, props):
         mi.BSDF.__init__(self, props)
         self.model = self.model_class(props)
+        # A member, too: what a frozen function reads of a BSDF, Dr.Jit looks for among its members and their lists and
+        # dicts, but not in other Python objects.
+        self.textures = self.model.textures
 
         flags = mi.BSDFFlags
         slots = self.model.slots.values()
         common = flags.FrontSide
-        if any(texture.is_spatially_varying() for texture in self.model.textures.values()):
+        if any(texture.is_spatially_varying() for texture in self.textures.values()):
             common |= flags.SpatiallyVarying
         self.kinds, components = [], []
         for lobe in self.model.lobes(self.model.placeholders()):
@@ -136,7 +139,7 @@ class ModelBSDF:
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 
     def has_attribute(self, name, active=True):
-        return mi.Bool(name in self.model.textures)
+        return mi.Bool(name in self.textures)
 
     def eval_attribute(self, name, si, active=True):
         return self._attribute(name).eval(si, active)
@@ -148,13 +151,12 @@ class ModelBSDF:
         return self._attribute(name).eval_3(si, active)
 
     def _attribute(self, name):
-        textures = self.model.textures
-        if name not in textures:
-            raise ValueError(f"{self.model.plugins[0]}: no attribute {name}; there are {', '.join(textures)}.")
-        return textures[name]
+        if name not in self.textures:
+            raise ValueError(f"{self.model.plugins[0]}: no attribute {name}; there are {', '.join(self.textures)}.")
+        return self.textures[name]
 
     def traverse(self, callback):
-        for name, texture in self.model.textures.items():
+        for name, texture in self.textures.items():
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
     def to_string(self):
@@ -162,7 +164,7 @@ class ModelBSDF:
         for slot in self.model.slots.values():
             words |= slot.words
         lines = [f"  {name} = {value}" for name, value in words.items()]
-        lines += [f"  {name} = {texture}" for name, texture in self.model.textures.items()]
+        lines += [f"  {name} = {texture}" for name, texture in self.textures.items()]
         return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 
 

@@ -72,6 +72,7 @@ def call(method, ctx, wi, *arrays):
         given = [types[array.shape[-1]](array.T if array.shape[-1] > 1 else array.ravel()) for array in arrays]
         result = method(ctx, interaction(wi), *given, True)
         result = result if isinstance(result, tuple) else (result,)
+        dr.eval(result)  # in one kernel
         flat = []
         for value in result:
             flat += [value.wo, value.pdf] if isinstance(value, mi.BSDFSample3f) else [value]

@@ -119,7 +119,7 @@ class SmoothLobe(Lobe):
         mass = self._mass(wi, x, y)
         _, other = self._end(wi, -x, -y, clamp(self.law.mass(d2) / mass, 0, 1))
         own = luminance(self._reflectance(wi, wo.x, wo.y))
-        return self.reflectance * value, 2 * dr.inv_pi * own * shape / (mass * own + other)
+        return self.reflectance * value, 2 * dr.inv_pi * own * shape / dr.maximum(mass * own + other, 1e-30)
 
     def sample(self, wi, u, v):
         y, x = dr.sincos(dr.two_pi * v.x)

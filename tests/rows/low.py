@@ -33,6 +33,9 @@ EXTREME = [
         int_ior=2)
     for variant, normalization in (("microfacet", "fit"), ("microfacet", "unit"), ("smooth", "fit"))
     for b, c in ((1.0, 0.5), (8e6, 1.0))
+] + [
+    row(f"{variant} of vacuum", 0.4, (0.5, 100, 1.5), 1, variant, diffuse_reflectance=0.4, a=0.5, int_ior=1)
+    for variant in ("microfacet", "smooth")
 ]  # fmt: skip
 
 SMOOTH = {
