@@ -15,9 +15,11 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from enum import IntEnum
 from functools import partial
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -37,6 +39,7 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 if TYPE_CHECKING:
     from .render import Picture
     from .validation import Report
+    from .validation.targets import Target
 
 out = Console(markup=False, highlight=False, soft_wrap=True)
 err = Console(markup=False, highlight=False, soft_wrap=True, stderr=True)
@@ -142,107 +145,119 @@ def render(
 @app.command()
 def check(
     targets: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE|SCENE.xml…", help="Plugins, of the pack or not, or scene files.")
+        list[str] | None,
+        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins, of the pack or not; files with a scene or BSDF."),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
+    html_file: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Write a report with pictures to this file, too.")
+    ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write all findings to this file, too.")
     ] = None,
     only: Annotated[
         list[str] | None, typer.Option("--only", metavar="NAME", help="Run this check alone; may be repeated.")
     ] = None,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check so many BSDFs at the same time.")] = 1,
     variant: Annotated[
         str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
     ] = None,
 ) -> None:
-    """Check BSDFs: sampling, density, energy, reciprocity, components, derivatives. Exit status 1 if any fails."""
+    """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit status 1 if one
+    fails."""
     from .validation import CHECKS
-    from .validation import check as run_checks
+    from .validation.targets import find_targets
 
     for name in only or []:
         if name not in CHECKS:
             _fail(f"--only {name}: there is no such check; there are {', '.join(CHECKS)}", Exit.USAGE)
     if bool(targets) == every:
-        _fail("name plugins or scene files to check, or give --all", Exit.USAGE)
-    if json_file is not None and not json_file.absolute().parent.is_dir():
-        _fail(f"--json {json_file}: there is no folder {json_file.parent}", Exit.USAGE)
+        _fail("name plugins or files to check, or give --all", Exit.USAGE)
+    for option, file in (("--html", html_file), ("--json", json_file)):
+        if file is not None and not file.absolute().parent.is_dir():
+            _fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
     chosen = _set_variant(variant)
     if chosen.startswith("scalar") or "polarized" in chosen:
         _fail(f"checks need a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
-    reports = []
-    columns = [TextColumn("Checking {task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     start = time.perf_counter()
     with _stdout_to_stderr():
-        materials = list(_materials(targets or [model.plugins[0] for model in all_models()]))
-        with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-            task = progress.add_task("", total=len(materials) * len(only or CHECKS))
-            for name, bsdf in materials:
-                progress.update(task, description=name)
-                reports.append(
-                    run_checks(bsdf, name=name, only=only or None, on_progress=partial(progress.advance, task))
-                )
+        found = []
+        for word in targets or [model.plugins[0] for model in all_models()]:
+            try:
+                found += find_targets(word)
+            except Exception as error:
+                text = one_line(error)
+                _fail(text if text.startswith(word) else f"{word}: {text}", Exit.USAGE)
+        try:
+            reports = _check_all(found, only or None, chosen, min(jobs, len(found)))
+        except KeyboardInterrupt:
+            err.print("Interrupted; nothing was written.")
+            raise typer.Exit(Exit.INTERRUPTED) from None
     if json_file is not None:
         json_file.write_text(json.dumps([report.to_dict() for report in reports], indent=1) + "\n")
+    if html_file is not None:
+        from .validation.html import page
+
+        html_file.write_text(page(reports), encoding="utf-8")
     _print_reports(reports)
     err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
     if not all(report.passed for report in reports):
         raise typer.Exit(Exit.ERROR)
 
 
-def _materials(targets: list[str]) -> Iterator[tuple[str, dict | mi.BSDF]]:
-    """The BSDFs of plugin names and of scene files, by name; the errors of both end the command."""
-    for target in targets:
-        if target.endswith(".xml"):
-            yield from _of_scene(Path(target))
-            continue
-        try:
-            loaded = mi.load_dict({"type": target})
-        except Exception as error:
-            _fail(f"{target}: {one_line(error)}", Exit.USAGE)
-        if not isinstance(loaded, mi.BSDF):
-            _fail(f"{target} is not a BSDF", Exit.USAGE)
-        yield target, {"type": target}
+def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs: int) -> list[Report]:
+    """The reports on all targets, from processes of their own if there are several jobs."""
+    from .validation import CHECKS
+
+    columns = [TextColumn("Checking {task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    each = len(only or CHECKS)
+    reports = []
+    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("", total=len(targets) * each)
+        if jobs == 1:
+            for target in targets:
+                progress.update(task, description=target.name)
+                reports.append(target.check(only, on_progress=partial(progress.advance, task)))
+            return reports
+        # Started anew: a process with Dr.Jit's threads must not be forked.
+        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=(variant,))
+        with pool, _ending_processes():
+            for future in [pool.submit(target.check, only) for target in targets]:
+                reports.append(future.result())
+                progress.update(task, description=reports[-1].name, advance=each)
+    return reports
 
 
-def _of_scene(path: Path) -> Iterator[tuple[str, mi.BSDF]]:
-    """Each material of a scene once, by its id."""
-    from .validation.runner import name_of
+def _start_job(variant: str) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
+    mi.set_variant(variant)
 
-    if not path.is_file():
-        _fail(f"{path}: {'not a file' if path.exists() else 'no such file'}", Exit.USAGE)
+
+@contextmanager
+def _ending_processes() -> Iterator[None]:
+    """Let the processes end at once after an error or Ctrl-C."""
     try:
-        scene = mi.load_file(str(path))
-    except Exception as error:
-        _fail(one_line(error))
-    found = []
-    for shape in scene.shapes():
-        bsdf = shape.bsdf()
-        if bsdf is None or any(bsdf is other for other in found):
-            continue
-        found.append(bsdf)
-        yield f"{path.name}: {name_of(bsdf)}", bsdf
-    if not found:
-        _fail(f"{path}: the scene has no material")
+        yield
+    except BaseException:
+        for process in active_children():
+            process.terminate()
+        raise
 
 
 def _print_reports(reports: list[Report]) -> None:
     """A row for each report, and below what failed."""
-    words = {"fail": ("FAIL", "red"), "pass": ("pass", "green"), "skip": ("skip", "yellow"), "info": ("info", "dim")}
+    words = {"fail": ("FAIL", "red"), "pass": ("pass", "green"), "skip": ("skip", "yellow"), None: ("-", "dim")}
     checks = list(dict.fromkeys(finding.check for report in reports for finding in report.findings))
     table = Table("type", *checks, box=None, pad_edge=False)
     for report in reports:
-        row = []
-        for name in checks:
-            verdicts = {finding.verdict for finding in report.of(name)}
-            row.append(next((Text(*words[verdict]) for verdict in words if verdict in verdicts), Text("-", "dim")))
-        table.add_row(report.name, *row)
+        verdicts = [report.verdict(name) for name in checks]
+        table.add_row(report.name, *(Text(*words.get(verdict, (verdict, "dim"))) for verdict in verdicts))
     _print_table(table)
     for report in reports:
         for finding in report.failures:
             out.print(f"{report.name}: {finding.check}: {finding.subject}: {finding.message}")
-        if not any(finding.verdict in ("pass", "fail") for finding in report.findings):
-            reasons = dict.fromkeys(finding.message for finding in report.findings)
-            out.print(f"{report.name}: nothing was judged. {' '.join(reasons)}")
+        if report.why_not_judged:
+            out.print(f"{report.name}: {report.why_not_judged}")
 
 
 def one_line(error: BaseException) -> str:

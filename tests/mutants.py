@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import drjit as dr
 import mitsuba as mi
@@ -74,6 +75,28 @@ class Negative(LambertLobe):
     def eval_pdf(self, wi, wo):
         value, pdf = super().eval_pdf(wi, wo)
         return value * (1 - 1.1 * dr.square(dr.square(1 - wo.z))), pdf
+
+
+class BlackAtNormal(LambertLobe):
+    """A guard of a division by sinθ that leaves nothing."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return dr.select(dr.maximum(wi.z, wo.z) == 1, 0, value), pdf
+
+
+class HalfAzimuth(LambertLobe):
+    """A function of half the azimuth, which jumps where azimuths start again."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (1 - 0.1 * dr.sin(dr.atan2(wi.y, wi.x) / 2) * dr.sin(dr.atan2(wo.y, wo.x) / 2)), pdf
+
+
+class CutAtGrazing(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return dr.select(dr.minimum(wi.z, wo.z) < 4e-4, 1e-4 * value, value), pdf
 
 
 class MissingDensity(LambertLobe):
@@ -206,6 +229,18 @@ class BakedIn(Lambert):
 
     def lobes(self, p):
         return (LambertLobe(float(mi.traverse(self.textures["reflectance"])["value"][0])),)
+
+
+class AverageColour(Lambert):
+    def evaluate(self, si, active):
+        return SimpleNamespace(reflectance=self.textures["reflectance"].mean())
+
+
+class FixedPoint(Lambert):
+    """Looks at its texture in the sampler and elsewhere alike, but always at the same point."""
+
+    def evaluate(self, si, active):
+        return super().evaluate(dr.zeros(mi.SurfaceInteraction3f), active)
 
 
 # --- Adapters -------------------------------------------------------------------------------------------------------
@@ -363,6 +398,11 @@ MUTANTS = [
     mutant("one-way diffuse", "reciprocity", lambert(OneWay)),
     mutant("not a number at grazing", "finite", lambert(NotANumber)),
     mutant("negative at grazing", "finite", lambert(Negative)),
+    mutant("black at exactly normal incidence", "continuity", lambert(BlackAtNormal)),
+    mutant("half of an azimuth", "continuity", lambert(HalfAzimuth)),
+    mutant("cut at grazing", "continuity", lambert(CutAtGrazing)),
+    mutant("mean of a texture", "textures", AverageColour),
+    mutant("texture at a fixed point", "textures", FixedPoint),
     mutant("density zero where light is", "support", lambert(MissingDensity)),
     mutant("shines through", "horizon", Lambert, ShinesThrough),
     mutant("samples below the horizon", "horizon", Lambert, SamplesBelow),

@@ -1,8 +1,10 @@
 """The checker passes what is right, and says what is wrong."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 
 import mitsuba as mi
 import numpy as np
@@ -33,6 +35,7 @@ RIGHT = {
     "twosided": {"type": "twosided", "inner": {"type": "ward"}},
     "textured": {"type": "ward", "specular_reflectance": {"type": "checkerboard"}},
 }
+QUICK = ("lambert", "ward", "walter sharp", "transmission", "roughconductor", "textured")
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -47,7 +50,7 @@ def test_mutants_are_caught(mutant):
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in ("burley", "textured") else []) for name in RIGHT]
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name not in QUICK else []) for name in RIGHT]
 )
 def test_what_is_right_passes(name):
     """The models that the mutants are made of among them."""
@@ -55,7 +58,7 @@ def test_what_is_right_passes(name):
     assert report.passed, report
     assert {finding.check for finding in report.findings} == set(CHECKS)
     judged = {finding.check for finding in report.findings if finding.verdict == "pass"}
-    assert judged >= set(CHECKS) - {"reciprocity", "albedo", "efficiency", "gradients", "recompiles"}
+    assert judged >= set(CHECKS) - {"reciprocity", "albedo", "efficiency", "textures", "gradients", "recompiles"}
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -203,6 +206,36 @@ def test_command_reports_verdicts(tmp_path):
     assert "2 checked in" in done.stderr
 
 
+def test_command_in_several_processes(tmp_path):
+    """The same reports as in one, in the same order, and all of them on one page."""
+    several = run("lambert", "wrap", "diffuse", "-j", 2, "--json", tmp_path / "2.json", "--html", tmp_path / "2.html")
+    one = run("lambert", "wrap", "diffuse", "--json", tmp_path / "1.json")
+    assert several.returncode == one.returncode == 0, several.stderr
+    assert several.stdout == one.stdout
+    assert (tmp_path / "1.json").read_text() == (tmp_path / "2.json").read_text()
+    page = (tmp_path / "2.html").read_text(encoding="utf-8")
+    assert page.count("<section") == 3 and page.count("<image") >= 9
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_ends_the_command_at_once(jobs):
+    """Also if only the first of its processes receives the signal."""
+    command = [sys.executable, "-m", "mi_brdfs.cli", "check", "--all", "-j", str(jobs)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(8)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=10)
+    assert (process.returncode, stdout, stderr) == (130, "", "Interrupted; nothing was written.\n")
+
+
+def test_command_on_xml(tmp_path):
+    text = '<bsdf type="phong" id="mine"><float name="exponent" value="50"/></bsdf>'
+    (tmp_path / "one.xml").write_text(text.replace("<bsdf", '<bsdf version="3.0.0"'))
+    done = run(text, tmp_path / "one.xml", "--only", "weight")
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["type", "mine", "one.xml"]
+
+
 def test_command_on_a_scene(pytestconfig):
     done = run("scenes/first_light.xml", "--only", "weight", cwd=pytestconfig.rootpath)
     assert done.returncode == 0, done.stderr
@@ -212,14 +245,18 @@ def test_command_on_a_scene(pytestconfig):
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ([], "name plugins or scene files to check, or give --all"),
-        (["ward", "--all"], "name plugins or scene files to check, or give --all"),
+        ([], "name plugins or files to check, or give --all"),
+        (["ward", "--all"], "name plugins or files to check, or give --all"),
         (["wrad"], "wrad: "),
         (["path"], "path is not a BSDF"),
         (["nowhere.xml"], "nowhere.xml: no such file"),
         (["ward", "--only", "chi"], "there is no such check; there are finite"),
         (["ward", "--variant", "scalar_rgb"], "need a vectorized and unpolarized variant"),
         (["ward", "--json", "/nowhere/out.json"], "there is no folder /nowhere"),
+        (["ward", "--html", "/nowhere/out.html"], "there is no folder /nowhere"),
+        (["<bsdf"], "<bsdf: XML parsing failed"),
+        (['<emitter type="constant"/>'], "is not a BSDF"),
+        (['<bsdf type="ward"><float name="alpa" value="1"/></bsdf>'], "did you mean alpha?"),
     ],
 )
 def test_wrong_usage(arguments, message):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
+
 from .report import Finding
 
 
@@ -38,3 +40,10 @@ class Outcome:
 
 
 Findings = Iterator[Finding]
+
+
+def relative(got: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """The relative errors of numbers; those far below the largest count as much as a ten-millionth of it would."""
+    scale = np.maximum(np.maximum(abs(got), abs(expected)), 1e-7 * np.max(abs(expected), initial=0) + 1e-12)
+    error = abs(got - expected) / scale
+    return np.where(np.isfinite(error), error, np.where(np.isfinite(expected), np.inf, 0))

@@ -36,17 +36,29 @@ class Partition:
 
     def histogram(self, w) -> np.ndarray:
         """How many of the directions lie in each cell."""
-        return np.bincount(self._cell(w), minlength=len(self.starts))
+        return np.bincount(self.cells(w), minlength=len(self.starts))
 
-    def _cell(self, w):
+    def cells(self, w) -> np.ndarray:
+        """The cell that each of the directions lies in."""
         points = (_to_square(w, self.axis) * (1 << LAST_LEVEL)).astype(np.int64).clip(0, (1 << LAST_LEVEL) - 1)
         return np.searchsorted(self.starts, _interleaved(points[:, 0], points[:, 1]), side="right") - 1
 
-    def centre(self, cell: int) -> np.ndarray:
-        """A direction in the middle of a cell."""
-        size = 2.0 ** -self.level[cell]
-        middle = np.array([[self.x[cell] + 0.5, self.y[cell] + 0.5]]) * size
-        return _to_sphere(middle, self.axis)[0][0]
+    @property
+    def centres(self) -> np.ndarray:
+        """A direction in the middle of each cell."""
+        middles = np.stack([self.x + 0.5, self.y + 0.5], axis=-1) * 2.0 ** -self.level[:, None]
+        return _to_sphere(middles, self.axis)[0]
+
+    @property
+    def solid_angles(self) -> np.ndarray:
+        size = 2.0**-self.level
+        latitude = np.pi * ((self.x + 0.5) * size - 0.5)
+        return 4 * np.pi * size * np.cos(latitude) * np.sin(np.pi / 2 * size)
+
+    def merged(self, level: int) -> np.ndarray:
+        """The number that each cell gets when all that are finer than a level are merged into cells of that level."""
+        ancestors = self.starts >> 2 * max(LAST_LEVEL - level, 0)
+        return np.cumsum(np.diff(ancestors, prepend=-1) > 0) - 1
 
 
 def partition(pdf: Callable, pilot: np.ndarray, wi: np.ndarray, count: int, cells: int = 1024) -> Partition:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-Verdict = Literal["pass", "fail", "skip", "info"]
+if TYPE_CHECKING:
+    from .sampling import Trial
+
+Verdict = Literal["fail", "pass", "skip", "info"]
+"""The gravest first."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,8 @@ class Report:
 
     name: str
     findings: list[Finding]
+    trials: list[Trial] = field(default_factory=list, repr=False, compare=False)
+    """The histograms that the checks of the sampler were made of."""
 
     @property
     def passed(self) -> bool:
@@ -39,6 +45,18 @@ class Report:
     @property
     def failures(self) -> list[Finding]:
         return [finding for finding in self.findings if finding.verdict == "fail"]
+
+    @property
+    def why_not_judged(self) -> str:
+        """A sentence for the user if nothing passed or failed, and else none."""
+        if any(finding.verdict in ("pass", "fail") for finding in self.findings):
+            return ""
+        return " ".join(["Nothing was judged.", *dict.fromkeys(finding.message for finding in self.findings)])
+
+    def verdict(self, check: str) -> Verdict | None:
+        """The gravest verdict of a check, if it was made."""
+        found = [finding.verdict for finding in self.of(check)]
+        return next((verdict for verdict in get_args(Verdict) if verdict in found), None)
 
     def of(self, check: str) -> list[Finding]:
         """The findings of one check."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from . import components, derivatives, sampling, values
+from . import components, derivatives, sampling, textures, values
 from .energy import energy_limits
 from .outcome import Findings
 from .report import Finding, Report
@@ -23,6 +23,7 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         values.support,
         values.eval_pdf,
         values.reciprocity,
+        values.continuity,
         sampling.weight,
         sampling.pdf,
         sampling.chi2,
@@ -30,6 +31,7 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         sampling.efficiency,
         components.components,
         components.flags,
+        textures.textures,
         derivatives.gradients,
         derivatives.recompiles,
     )
@@ -50,8 +52,8 @@ class Run:
     """How many statistical tests there are in all."""
     conserves: bool | None
     """Whether the whole is judged to conserve energy; None if its manual page says so or not."""
-    default: bool
-    """Whether it is a plugin with nothing but default parameters."""
+    given: dict | None
+    """The dict that the BSDF was given as, if it was."""
     trials: list | None = None
     """Of the sampler, once they are made."""
     _samples: dict = field(default_factory=dict)
@@ -65,7 +67,8 @@ class Run:
 
     @property
     def energy(self):
-        return energy_limits(self.subject.bsdf, self.conserves, self.default)
+        default = self.given is not None and set(self.given) == {"type"}
+        return energy_limits(self.subject.bsdf, self.conserves, default)
 
 
 def check(
@@ -108,8 +111,7 @@ def check(
         subject = Subject(bsdf if loaded else mi.load_dict(bsdf), tuple(angles))
         name = name or (bsdf["type"] if not loaded else name_of(subject.bsdf))
         tests = max(1, 2 * sum(len(subject.incidents(part)) for part in subject.parts))
-        default = not loaded and set(bsdf) == {"type"}
-        run = Run(subject, significance, tests, conserves, default)
+        run = Run(subject, significance, tests, conserves, None if loaded else bsdf)
         findings = [
             Finding("components", f"component {k}", "skip", "A delta function, which cannot be evaluated or tested.")
             for k in subject.deltas
@@ -118,7 +120,7 @@ def check(
             if subject.parts:
                 findings += CHECKS[word](run)
             on_progress()
-    return Report(name, findings)
+    return Report(name, findings, run.trials or [])
 
 
 def name_of(bsdf: mi.BSDF) -> str:

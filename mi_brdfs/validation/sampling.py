@@ -2,34 +2,59 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from math import erfc, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
 from .outcome import Findings, Outcome
-from .partition import ChiSquare, chi_square, partition
+from .partition import ChiSquare, Partition, chi_square, partition
 from .report import Finding
-from .subject import Part, Samples, brightness, direction, on_side, random
+from .subject import Incident, Samples, brightness, direction, on_side, random
 from .values import angles_of
 
 COUNT = 1 << 18
 PILOT = 1 << 16
 
 
-class Trial(NamedTuple):
+@dataclass(frozen=True)
+class Trial:
     """A histogram of samples against the integrals of the density."""
 
-    part: Part
-    where: str
-    share: float
-    """The part of the samples that is drawn."""
-    integral: float
-    """The integral of the density over the sphere."""
-    test: ChiSquare
-    cells: int
-    message: str
-    """Where the two deviate most."""
+    part: str
+    incident: Incident
+    partition: Partition
+    counts: np.ndarray
+    """How many of ``COUNT`` samples are drawn in each cell."""
+
+    @property
+    def share(self) -> float:
+        """The part of the samples that is drawn."""
+        return float(self.counts.sum()) / COUNT
+
+    @property
+    def integral(self) -> float:
+        """The integral of the density over the sphere."""
+        return float(self.partition.integrals.sum())
+
+    @cached_property
+    def expected(self) -> np.ndarray:
+        """The counts that the density expects."""
+        return COUNT * np.maximum(self.partition.integrals, 0)
+
+    @cached_property
+    def test(self) -> ChiSquare:
+        return chi_square(self.counts, self.expected)
+
+    @property
+    def deviation(self) -> str:
+        """Where the two deviate most."""
+        worst = self.test.worst
+        return (
+            f"at {angles_of(self.partition.centres[worst])}, {self.counts[worst]} of {COUNT} samples fall where pdf "
+            f"expects {self.expected[worst]:.1f}"
+        )
 
 
 def trials(run) -> list[Trial]:
@@ -49,15 +74,9 @@ def _trial(run, part, incident, seed) -> Trial:
     cells = partition(lambda wo: np.nan_to_num(subject.pdf(part, wi, wo)), pilot.wo[pilot.drawn], wi, COUNT)
     samples = subject.sample(part, wi, random(COUNT, 2 * seed + 1))
     # What is rejected may look as if it were drawn: let the integral decide whether black samples count.
-    integral = float(cells.integrals.sum())
+    integral = cells.integrals.sum()
     counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
-    counts, expected = cells.histogram(samples.wo[counted]), COUNT * np.maximum(cells.integrals, 0)
-    test = chi_square(counts, expected)
-    message = (
-        f"at {angles_of(cells.centre(test.worst))}, {counts[test.worst]} of {COUNT} samples fall where pdf expects "
-        f"{expected[test.worst]:.1f}"
-    )
-    return Trial(part, incident.name, float(counted.mean()), integral, test, len(counts), message)
+    return Trial(part.name, incident, cells, cells.histogram(samples.wo[counted]))
 
 
 def significance(run) -> float:
@@ -71,15 +90,16 @@ def chi2(run) -> Findings:
     level = significance(run)
     for part in run.subject.parts:
         outcome, smallest = Outcome("chi2", part.name), 1.0
-        own = [trial for trial in trials(run) if trial.part is part]
+        own = [trial for trial in trials(run) if trial.part == part.name]
         for trial in own:
             smallest = min(smallest, trial.test.p_value)
-            outcome.data[trial.where] = trial.test.__dict__ | {"cells": trial.cells, "drawn": trial.share}
-            if trial.test.p_value < level:
+            name = trial.incident.name
+            outcome.data[name] = trial.test.__dict__ | {"cells": len(trial.counts), "drawn": trial.share}
+            if not trial.test.p_value >= level:
                 outcome.fault(
-                    f"for light from {trial.where} the directions drawn are not distributed as pdf says "
+                    f"for light from {name} the directions drawn are not distributed as pdf says "
                     f"(p = {trial.test.p_value:.2g}, χ² = {trial.test.statistic:.0f} for {trial.test.degrees} degrees "
-                    f"of freedom): {trial.message}",
+                    f"of freedom): {trial.deviation}",
                     trial.test.statistic / max(trial.test.degrees, 1),
                 )
         if not any(trial.share or trial.integral for trial in own):
@@ -94,14 +114,15 @@ def pdf(run) -> Findings:
     level = significance(run)
     for part in run.subject.parts:
         outcome, largest = Outcome("pdf", part.name), 0.0
-        for trial in (trial for trial in trials(run) if trial.part is part):
+        for trial in (trial for trial in trials(run) if trial.part == part.name):
+            name = trial.incident.name
             noise = sqrt(max(trial.share * (1 - trial.share), 1 / COUNT) / COUNT)
             excess = max(abs(trial.integral - trial.share) - 1e-3, 0) / noise
             largest = max(largest, abs(trial.integral - trial.share))
-            outcome.data[trial.where] = {"integral": trial.integral, "drawn": trial.share}
+            outcome.data[name] = {"integral": trial.integral, "drawn": trial.share}
             if not erfc(excess / sqrt(2)) >= level:
                 outcome.fault(
-                    f"for light from {trial.where} pdf integrates to {trial.integral:.4g}, but "
+                    f"for light from {name} pdf integrates to {trial.integral:.4g}, but "
                     f"{'all' if trial.share == 1 else f'{100 * trial.share:.2f} % of the'} samples are drawn",
                     excess,
                 )

@@ -12,6 +12,8 @@ import numpy as np
 
 AZIMUTH_STEP = 137.5
 """In degrees: each incident direction has an azimuth of its own, so that what is turned wrongly shows."""
+CENTRE = 0.4, 0.3
+"""The texture coordinates of what is looked at, but for textures."""
 
 
 class Part(NamedTuple):
@@ -111,9 +113,9 @@ class Subject:
 
     # --- Calls ------------------------------------------------------------------------------------------------------
 
-    def eval(self, part: Part, wi, wo) -> np.ndarray:
+    def eval(self, part: Part, wi, wo, uv=CENTRE) -> np.ndarray:
         """f |cosθ_o|, shape (N, channels)."""
-        return numbers(self.bsdf.eval(part.context, interaction(wi), vectors(wo), True), len(wo))
+        return numbers(self.bsdf.eval(part.context, interaction(wi, uv), vectors(wo), True), len(wo))
 
     def pdf(self, part: Part, wi, wo) -> np.ndarray:
         """The density of ``wo``, shape (N,)."""
@@ -131,8 +133,8 @@ class Subject:
         value, pdf, sampled, density, weight = (numbers(x, count) for x in (value, pdf, bs.wo, bs.pdf, weight))
         return value, pdf[:, 0], sampled, density[:, 0], weight
 
-    def sample(self, part: Part, wi, variates) -> Samples:
-        si, (u, v), count = interaction(wi), _variates(variates), len(variates)
+    def sample(self, part: Part, wi, variates, uv=CENTRE) -> Samples:
+        si, (u, v), count = interaction(wi, uv), _variates(variates), len(variates)
         bs, weight = self.bsdf.sample(part.context, si, u, v, True)
         drawn = bs.pdf > 0
         wo = dr.select(drawn, bs.wo, mi.Vector3f(0, 0, 1))
@@ -146,14 +148,18 @@ class Subject:
 
     def spread(self, part: Part) -> float:
         """How narrow a part is, in radians: half of the samples for light from 30° lie within this angle of another
-        sample's direction, the one that has most of them around it."""
+        sample's direction, the one that has most of them around it. Half, that is, of a lobe without long tails: it is
+        four times the angle for a twentieth of them. Of the whole, that of its narrowest component counts."""
+        if part.component is None and len(self.components) > 1:
+            return min(self.spread(each) for each in self.components)
         if part.name not in self._spreads:
             samples = self.sample(part, on_side(direction(30), part.sides[0]), random(1 << 12, 1))
             wo = samples.wo[samples.drawn].astype(np.float64)
             if len(wo) < 64:
                 return np.pi
             apart = np.linalg.norm(wo[:64, None] - wo[None], axis=-1)
-            self._spreads[part.name] = float(2 * np.arcsin(np.clip(np.median(apart, axis=1).min() / 2, 0, 1)))
+            near = np.quantile(apart, 0.05, axis=1).min()
+            self._spreads[part.name] = float(4 * 2 * np.arcsin(min(near / 2, 1)))
         return self._spreads[part.name]
 
     @cached_property
@@ -163,8 +169,7 @@ class Subject:
     def rounding(self, part: Part) -> float:
         """The relative error that float32 may make in f and in the density. A direction is known to 6e-8, a half
         vector to about 1e-7, and a lobe of the width σ changes by some of them over σ: in its tails by ten."""
-        narrowest = min(self.spread(each) for each in (self.components if part.component is None else [part]))
-        return 1e-4 + 3e-6 / max(narrowest, 1e-6)
+        return 1e-4 + 3e-6 / max(self.spread(part), 1e-6)
 
 
 # --- Helpers --------------------------------------------------------------------------------------------------------
@@ -194,14 +199,14 @@ def hemisphere(count: int, seed: int) -> np.ndarray:
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), z], axis=-1).astype(np.float32)
 
 
-def interaction(wi):
+def interaction(wi, uv=CENTRE):
     """A surface interaction for one direction of the local frame, or for an array of shape (N, 3)."""
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi = vectors(wi)
     si.n = mi.Normal3f(0, 0, 1)
     si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
     si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
-    si.uv = mi.Point2f(0.4, 0.3)
+    si.uv = mi.Point2f(uv)
     if mi.is_spectral:
         si.wavelengths = mi.UnpolarizedSpectrum(450, 520, 580, 640)
     return si

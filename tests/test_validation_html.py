@@ -1,0 +1,330 @@
+"""The page of the checker: complete, harmless and by itself; and its pictures show the histograms as they are."""
+
+import base64
+import math
+import pickle
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from mutants import MUTANTS
+
+from mi_brdfs.validation import Finding, Report, check
+from mi_brdfs.validation.html import HEMISPHERE, View, flattened, page, raised, rasters, views
+from mi_brdfs.validation.partition import partition
+from mi_brdfs.validation.sampling import COUNT, Trial
+from mi_brdfs.validation.subject import Incident, direction, on_side
+
+HOSTILE = """</h2><script>alert("1")</script> 'x' & <b"""
+
+
+class Page(HTMLParser):
+    """What a browser would make of a page."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.open, self.elements, self.text = [], [], ""
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.handle_startendtag(tag, attributes)
+        if tag != "meta":
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        assert len(dict(attributes)) == len(attributes), "an attribute is given twice"
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+    def attributes(self, name: str) -> list[str]:
+        return [attributes[name] for _, attributes in self.elements if name in attributes]
+
+    def pictures(self) -> list[str]:
+        """The descriptions of all pictures."""
+        return [attributes["aria-label"] for tag, attributes in self.elements if attributes.get("role") == "img"]
+
+
+def lobe(width: float, turn: float = 0, theta: float = 60, side: int = 1) -> tuple[Trial, np.ndarray]:
+    """The trial of a von Mises-Fisher lobe about the mirror direction of light from 60°, or turned from it, and the
+    samples. Pilot and samples are the same: this is no test of a sampler."""
+    wi = direction(60, 20)
+    axis, kappa = on_side(direction(theta, 200 + turn), side).astype(np.float64), width**-2
+    rng = np.random.default_rng(1)
+    versine = -np.log1p(rng.random(COUNT) * np.expm1(-2 * kappa)) / kappa
+    phi, sin = rng.uniform(0, 2 * np.pi, COUNT), np.sqrt(versine * (2 - versine))
+    across = np.cross(axis, [0, 0, 1])
+    across /= np.linalg.norm(across)
+    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), 1 - versine], axis=-1) @ [across, np.cross(axis, across), axis]
+
+    def pdf(wo):
+        return np.exp(-kappa * 0.5 * ((wo - axis) ** 2).sum(axis=1)) * kappa / (2 * np.pi * -np.expm1(-2 * kappa))
+
+    cells = partition(pdf, w, wi, COUNT)
+    return Trial("whole", Incident("60°", wi), cells, cells.histogram(w)), w
+
+
+# --- The page -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def reports() -> list[Report]:
+    """One that fails and has a hostile name, one that transmits and one without histograms."""
+    import mitsuba as mi
+
+    wrong = next(mutant for mutant in MUTANTS if mutant.name == "rotated sampler")
+    with mi.variant_context("llvm_ad_rgb"):
+        wrap = {"type": "wrap", "domain": "sphere", "wrap": 0.8}
+        only = ["pdf", "chi2", "albedo", "efficiency"]
+        return [
+            check(wrong.register(), name=HOSTILE, only=only, angles=(50,)),
+            check(wrap, only=only, angles=(50,)),
+            check({"type": "lambert"}, only=["flags"]),
+            check({"type": "dielectric"}),
+        ]
+
+
+def test_the_page_is_complete(reports):
+    """Verdicts, sentences, and for each part its pictures, described."""
+    text = page(reports)
+    parsed = Page(text)
+    assert "4 BSDFs checked, 1 failed" in parsed.text and "Nothing was judged. A delta function" in parsed.text
+    assert parsed.text.count("FAIL") == 1 + len(reports[0].failures) > 1
+    for report in reports:
+        assert all(finding.message in parsed.text for finding in report.findings)
+        assert all(f"{f.check}, {f.subject}: {f.message}" in parsed.text for f in report.failures)
+    for report in reports[:2]:
+        for part in ("whole", "component 0", "component 1"):
+            drawn = f"{report.name}, {part}, light from 50°, "
+            assert any(told.startswith(drawn) for told in parsed.pictures())
+            assert f"{report.name}, {part}: albedo and efficiency over the angle of incidence" in parsed.pictures()
+    below = [told for told in parsed.pictures() if "below the surface" in told]
+    assert [told.split(", ")[:2] for told in below] == [["wrap", "whole"], ["wrap", "component 1"]]
+    assert not any(told.startswith(("lambert", "dielectric")) for told in parsed.pictures())
+
+
+def test_all_faults_are_told_once():
+    """The sentence has the largest, and the table of all findings the others."""
+    finding = Finding("weight", "whole", "fail", "one is 2 (and 1 more like it).", {"faults": ["one is 1", "one is 2"]})
+    text = Page(page([Report("x", [finding])])).text
+    assert text.count("one is 1") == 1 and text.count("one is 2") == text.count("one is 2 (and 1 more like it).") == 2
+
+
+def test_the_page_needs_nothing_else(reports):
+    text = page(reports)
+    parsed = Page(text)
+    ids = parsed.attributes("id")
+    assert len(set(ids)) == len(ids)
+    pictures = [target for target in parsed.attributes("href") if target.startswith("data:")]
+    assert len(pictures) == 3 * sum("the samples drawn" in told for told in parsed.pictures())
+    assert {target[1:] for target in parsed.attributes("href") if target not in pictures} <= set(ids)
+    assert set(re.findall(r"url\((.*?)\)", text)) == {"#density", "#deviation"} <= {f"#{name}" for name in ids}
+    assert not {tag for tag, _ in parsed.elements} & {"script", "link", "img", "iframe", "object", "base", "form"}
+    assert not {"src", "style", "onload", "srcset"} & {name for _, given in parsed.elements for name in given}
+    assert not re.search(r"https?:|file:|@import", re.sub(r"base64,[\w+/=]+", "", text))
+
+
+def test_hostile_words_are_harmless(reports):
+    """Wherever they come from."""
+    finding = Finding(HOSTILE, HOSTILE, "fail", HOSTILE, {"faults": [HOSTILE, f"2 {HOSTILE}"]})
+    trial, _ = lobe(1)
+    trials = [replace(trial, part=HOSTILE, incident=Incident(HOSTILE, trial.incident.wi))]
+    data = {"0°": {"albedo": 0.5, "noise": 0}}
+    parsed = Page(page([*reports, Report(HOSTILE, [finding, Finding("albedo", HOSTILE, "info", "", data)], trials)]))
+    assert "script" not in {tag for tag, _ in parsed.elements} and "b" not in {tag for tag, _ in parsed.elements}
+    assert parsed.text.count(HOSTILE) >= 10
+    assert sum(told.startswith(f"{HOSTILE}, {HOSTILE}") for told in parsed.pictures()) == 3
+
+
+def test_reports_cross_processes(reports):
+    again = pickle.loads(pickle.dumps(reports))
+    assert again == reports and page(again) == page(reports)
+
+
+def images(text: str) -> list[np.ndarray]:
+    """The colours of all pictures, red to opacity."""
+    files = [target for target in Page(text).attributes("href") if target.startswith("data:")]
+    found = []
+    for file in files:
+        data = base64.b64decode(file.removeprefix("data:image/png;base64,"), validate=True)
+        assert data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) < 25_000
+        stream = mi.MemoryStream()
+        stream.write(data)
+        stream.seek(0)
+        found.append(np.array(mi.Bitmap(stream)))
+    return found
+
+
+def test_pictures_are_sound(reports):
+    """And small, and the hemisphere stands out from what is around it."""
+    for picture in images(page(reports)):
+        assert picture.shape == (190, 190, 4) and len(np.unique(picture.reshape(-1, 4), axis=0)) > 10
+    for drawn, density, difference in zip(*[iter(images(page(reports[1:2])))] * 3, strict=True):
+        assert drawn[0, 0, 3] == density[0, 0, 3] == difference[0, 0, 3] == 0
+        assert density[95, 95, 3] == difference[95, 95, 3] == 255
+        shown = difference[difference[..., 3] > 0]
+        assert (np.median(shown[:, :3], axis=0) > 200).all()  # about zero is white
+
+
+def test_charts_show_albedo_and_efficiency():
+    """What cannot be drawn is left out, and what exceeds the chart leaves it."""
+    albedos = {"0°": 0.5, "45°": math.nan, "90°": 0.25, "0° behind": 1.0, "90° behind": 1e30}
+    albedo = {name: {"albedo": value, "noise": 0} for name, value in albedos.items()} | {"faults": ["a", "b"]}
+    findings = [Finding("albedo", "whole", "fail", "a.", albedo), Finding("efficiency", "whole", "info", "", {"0°": 1})]
+    parsed = Page(page([Report("x", findings)]))
+    (chart,) = parsed.pictures()
+    assert chart == "x, whole: albedo and efficiency over the angle of incidence"
+    paths = {
+        given["class"].strip(): [[float(number) for number in point.split()] for point in given["d"][1:].split("L")]
+        for tag, given in parsed.elements
+        if tag == "path" and given["class"].startswith(("albedo", "efficiency"))
+    }
+    # The chart is 300 wide and 120 high, for albedos up to 4.
+    assert paths["albedo"] == [[0, 105], [300, 112.5]] and paths["efficiency"] == [[0, 90]]
+    assert paths["albedo behind"][0] == [0, 90] and paths["albedo behind"][1][1] < -1000
+
+
+# --- The pictures ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_plane_of_pictures(side):
+    """Seen from above, the light to the left: its mirror direction is on the right, and what is to the right of
+    somebody who looks along the light is further down. Distances from the centre are angles."""
+    wi = direction(40, 70).astype(np.float64)
+    axis = wi[:2] / np.hypot(*wi[:2])
+    right = np.cross(wi * [-1, -1, 0], [0, 0, 1])
+    w = np.stack([wi, wi * [-1, -1, 1], right / np.linalg.norm(right) * np.sin(0.3) + [0, 0, np.cos(0.3)]])
+    x, y = flattened(on_side(w, side), axis)
+    np.testing.assert_allclose([x, y], [[-40, 40, 0], [0, 0, np.degrees(0.3)]], atol=1e-5)
+    np.testing.assert_allclose(raised(x, y, side, axis), on_side(w, side), atol=1e-6)
+
+
+def solid_angles(x, y):
+    """Of the pixels of a window."""
+    theta = np.radians(np.hypot(x, y))
+    return np.radians(x[0, 1] - x[0, 0]) ** 2 * np.sin(theta) / theta
+
+
+def grid(view: View):
+    steps = (np.arange(190) - 94.5) / 95 * view.half
+    return np.meshgrid(view.x + steps, view.y + steps)
+
+
+@pytest.mark.parametrize("width, turn, side", [(1e-3, 0, 1), (1e-3, 0.1, -1), (0.03, 4, 1), (0.3, 20, -1), (1, 0, 1)])
+def test_pictures_show_the_samples(width, turn, side):
+    """Each window, from the samples: the part of them in it, and their mean direction, to a tenth of their spread.
+    It holds 99 % of those on its side and shows narrow lobes large; the density is what it is."""
+    trial, w = lobe(width, turn, side=side)
+    azimuth = np.radians(20) - np.arctan2(w[:, 1], w[:, 0])  # from that of the light, clockwise
+    theta = np.degrees(np.arctan2(np.hypot(w[:, 0], w[:, 1]), abs(w[:, 2])))
+    px, py = -theta * np.cos(azimuth), -theta * np.sin(azimuth)
+    seen = list(views(trial))
+    assert {view.side for view in seen} == set(np.sign(w[:, 2])) and (width > 0.1 or len(seen) == 1)
+    for view in seen:
+        here = w[:, 2] * view.side > 0
+        inside = here & (abs(px - view.x) < view.half) & (abs(py - view.y) < view.half)
+        assert inside.sum() > 0.99 * here.sum()
+        assert view == (view.side, 0, 0, HEMISPHERE) if width == 1 else view.half < 10 * np.degrees(width)
+        x, y = grid(view)
+        drawn, density, deviation = rasters(trial, view)
+        assert (np.isnan(drawn) == (np.hypot(x, y) >= 90)).all()
+        weights = np.nan_to_num(drawn) * solid_angles(x, y)
+        assert weights.sum() == pytest.approx(inside.mean(), rel=0.02)
+        for pixel, sample in ((x, px), (y, py)):
+            spread = sample[inside].std()
+            assert np.average(pixel, weights=weights) == pytest.approx(sample[inside].mean(), abs=0.1 * spread)
+        assert (np.nan_to_num(density) * solid_angles(x, y)).sum() == pytest.approx(inside.mean(), rel=0.02)
+        assert np.nanmean(deviation**2) < 2
+
+
+def test_pictures_show_where_samples_are_wrong():
+    """Samples turned about the normal: too many on one side of the lobe, too few on the other."""
+    trial, w = lobe(0.05)
+    cos, sin = np.cos(0.1), np.sin(0.1)
+    turned = w @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]
+    wrong = replace(trial, counts=trial.partition.histogram(turned))
+    (view,) = views(wrong)
+    deviation = rasters(wrong, view)[2]
+    x, y = grid(view)
+    lit = abs(x - 60) < 3
+    assert np.median(deviation[lit & (y < -5) & (y > -10)]) > 5
+    assert np.median(deviation[lit & (y > 2) & (y < 7)]) < -5
+
+
+def test_dots_are_not_missed():
+    """A lobe far smaller than a pixel is one in a picture of the hemisphere, of the density that the pixel has."""
+    trial, _ = lobe(1e-3)
+    view = View(1, 0, 0, HEMISPHERE)
+    drawn, density, _ = rasters(trial, view)
+    for picture in (drawn, density):
+        x, y = grid(view)
+        assert 0.3 < (np.nan_to_num(picture) * solid_angles(x, y)).sum() < 3
+        bright = picture > 0.1 * np.nanmax(picture)
+        assert abs(x[bright] - 60).max() < 3 and abs(y[bright]).max() < 3
+
+
+def test_faint_deviations_are_in_the_window():
+    """A thousandth of the samples goes where the density has nothing, far from a narrow lobe or on the other side."""
+    trial, w = lobe(0.01)
+    stray = np.where(np.arange(len(w))[:, None] % 1000, w, direction(20, 110))
+    wrong = replace(trial, counts=trial.partition.histogram(stray))
+    (right_view,), (view,) = views(trial), views(wrong)
+    x, y = flattened(direction(20, 110)[None].astype(np.float64), trial.partition.axis)
+    assert right_view.half < 5 and (right_view.x - x) ** 2 + (right_view.y - y) ** 2 > 30**2
+    assert abs(view.x - x) < view.half and abs(view.y - y) < view.half
+    stray = np.where(np.arange(len(w))[:, None] % 1000, w, direction(180))
+    wrong = replace(trial, counts=trial.partition.histogram(stray))
+    assert [view.side for view in views(wrong)] == [1, -1]
+    nothing = replace(trial, partition=replace(trial.partition, integrals=0 * trial.expected), counts=0 * trial.counts)
+    assert not list(views(nothing)) and "next to nothing is drawn" in page([Report("x", [], [nothing])])
+
+
+@pytest.mark.parametrize("below", [-0.1, math.inf])
+def test_impossible_densities_are_marked(below):
+    """And do not spoil the colours of others."""
+
+    def pdf(wo):
+        return np.where(wo[:, 2] > 0, abs(wo[:, 2]) / np.pi, below)
+
+    trial, w = lobe(1)
+    with np.errstate(all="ignore"):
+        cells = partition(pdf, w[w[:, 2] > 0], trial.incident.wi, COUNT)
+        impossible = replace(trial, partition=cells, counts=cells.histogram(w[w[:, 2] > 0]))
+        p = impossible.test.p_value
+    with np.errstate(all="raise", under="ignore"):
+        text = page([Report("x", [], [impossible])])
+    assert f'<span class="fail">p = {p:.2g}</span>' in text and text.count("red where negative or infinite") == 1
+    assert ["below" in told for told in Page(text).pictures()] == [False, True]
+    scales = [float(scale) for scale in re.findall(r">(\S+) per sr<", text)]
+    assert len(scales) == 4 and max(scales) < 10
+    above, below = images(text)[:3], images(text)[3:]
+    red = [(picture == [230, 0, 60, 255]).all(axis=-1) for picture in (*above, *below)]
+    assert [picture.any() for picture in red] == [False, False, False, False, True, False]
+    shown = [picture[..., 3] > 0 for picture in (*above, *below)]
+    assert (red[4] == shown[1]).all() and not shown[3].any() and (shown[5] == shown[2]).all()
+
+
+def test_cells_can_be_merged():
+    """Those of the same square of a level get the same number, coarser ones keep their own; and cells cover the
+    sphere."""
+    cells = lobe(0.03)[0].partition
+    assert cells.solid_angles.sum() == pytest.approx(4 * np.pi, rel=1e-12)
+    assert cells.level.max() > 8 and cells.level.min() < 5
+    squares = {}
+    for k, number in enumerate(cells.merged(5)):
+        level = min(cells.level[k], 5)
+        shift = cells.level[k] - level
+        squares.setdefault(number, set()).add((level, cells.x[k] >> shift, cells.y[k] >> shift))
+    assert all(len(square) == 1 for square in squares.values())
+    assert len(set.union(*squares.values())) == len(squares) == cells.merged(5).max() + 1
+    assert len(set(cells.merged(17))) == len(cells.level)
