@@ -13,6 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 
 @dataclass(frozen=True)
 class Row:
@@ -41,3 +43,10 @@ _files = [
 ROWS = [row for file in _files for row in file.ROWS]
 EXTREME = [row for file in _files for row in getattr(file, "EXTREME", [])]
 SMOOTH = {name: bsdf for file in _files for name, bsdf in file.SMOOTH.items()}
+
+
+def mostly_slow(names):
+    """The names or rows as parameters of a test that takes its time: but for the first of each plugin they are slow."""
+    names = list(names)
+    first = {str(name).split()[0]: name for name in reversed(names)}.values()
+    return [pytest.param(name, id=str(name), marks=[] if name in first else pytest.mark.slow) for name in names]

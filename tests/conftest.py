@@ -13,8 +13,11 @@ def llvm_rgb():
         yield
 
 
-@pytest.fixture(params=["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono_polarized", "scalar_rgb", "scalar_spectral"])
+OTHERS = ("llvm_ad_spectral", "llvm_ad_mono_polarized", "scalar_rgb", "scalar_spectral")
+
+
+@pytest.fixture(params=["llvm_ad_rgb", *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)])
 def variant(request):
-    """Each kind of variant in turn."""
+    """Each kind of variant in turn; the one that users have most by default."""
     with mi.variant_context(request.param):
         yield request.param

@@ -4,7 +4,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import SMOOTH
+from catalogue import SMOOTH, mostly_slow
 from support import direction, interaction
 
 LINEAR = ("reflectance", "subsurface", "metallic", "specular.", "tint", "sheen", "clearcoat.")
@@ -36,7 +36,7 @@ def scene_of(bsdf):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", mostly_slow(SMOOTH))
 def test_prb_agrees_with_finite_differences(name):
     """To 2 %, for every continuous parameter; the picture's brightest parts, so the highlight, weigh most. (The weights
     show a turned frame: the highlight that they would be symmetric to has no derivative for the rotation.)
@@ -79,7 +79,9 @@ def test_prb_agrees_with_finite_differences(name):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", ["phong energy", "ward isotropic", "walter correlated", "walter conductor"])
+@pytest.mark.parametrize(
+    "name", mostly_slow(["phong energy", "ward isotropic", "walter correlated", "walter conductor"])
+)
 def test_sample_carries_the_gradient_of_the_albedo(name):
     """E[weight] is the albedo, so the derivative of the weights averages to that of the albedo, here taken from the
     quadrature of eval over a fixed grid. It would not if the density or the sampled direction were differentiated as

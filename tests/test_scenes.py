@@ -20,11 +20,9 @@ def picture(scene, size=32, spp=16):
     return image
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral", "scalar_rgb"])
 @pytest.mark.parametrize("name", ["first_light", "legacy_06"])
 def test_scene_files(name, variant, pytestconfig):
-    with mi.variant_context(variant):
-        picture(mi.load_file(str(pytestconfig.rootpath / "scenes" / f"{name}.xml")))
+    picture(mi.load_file(str(pytestconfig.rootpath / "scenes" / f"{name}.xml")))
 
 
 @pytest.mark.usefixtures("llvm_rgb")
