@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from .lobes import Mixture
-from .math import clamp
+from .math import clamp, select
 from .model import Model
 
 
@@ -60,13 +60,13 @@ class ModelBSDF:
     def _mixture(self, ctx, si, active):
         """``(valid, mixture, components, frame)``: the lobes that the context enables, seen from si.wi."""
         components = [k for k, kind in enumerate(self.kinds) if ctx.is_enabled(kind, k)]
-        valid = dr.select(si.wi.z > 0, active, False)
+        valid = select(si.wi.z > 0, active, False)
         if not components or valid is False:
             return None
         p = self.model.evaluate(si, valid)
         frame = Turn(getattr(p, "rotation", None))
         # Lanes that do not count get a direction that does not harm: else their NaNs would enter derivatives.
-        wi = frame.to_local(dr.select(valid, si.wi, mi.Vector3f(0, 0, 1)))
+        wi = frame.to_local(select(valid, si.wi, mi.Vector3f(0, 0, 1)))
         lobes = self.model.lobes(p)
         return valid, Mixture([lobes[k] for k in components], wi), components, frame
 
@@ -74,24 +74,24 @@ class ModelBSDF:
     def _eval_pdf(valid, mixture, frame, wo):
         value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
         for transmitted in sorted({lobe.transmits for lobe in mixture.lobes}):
-            here = dr.select(wo.z < 0 if transmitted else wo.z > 0, valid, False)
+            here = select(wo.z < 0 if transmitted else wo.z > 0, valid, False)
             if here is False:
                 continue
             harmless = mi.Vector3f(0, 0, -1 if transmitted else 1)
-            side = mixture.eval_pdf(frame.to_local(dr.select(here, wo, harmless)), transmitted)
-            value, pdf = value + dr.select(here, side[0], 0), pdf + dr.select(here, side[1], 0)
+            side = mixture.eval_pdf(frame.to_local(select(here, wo, harmless)), transmitted)
+            value, pdf = value + select(here, side[0], 0), pdf + select(here, side[1], 0)
         return value, pdf
 
     def _sample(self, valid, mixture, components, frame, sample1, sample2):
-        bs = dr.zeros(mi.BSDFSample3f)
+        bs = mi.BSDFSample3f()
         # The estimator f/pdf of a fixed direction is differentiated, not the direction: then the choice among lobes
         # and what the direction hits need no derivative for an unbiased gradient.
         with dr.suspend_grad():
             wo, index = mixture.sample(sample1, sample2)
             wo = frame.to_world(wo)
         value, pdf = self._eval_pdf(valid, mixture, frame, wo)
-        drawn = pdf > 0
-        weight = value / dr.detach(dr.select(drawn, pdf, 1))
+        drawn, density = pdf > 0, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
+        weight = value / select(drawn, density, 1)
 
         bs.wo, bs.pdf, bs.eta = wo, pdf, 1
         component, kind = mi.UInt32(components[0]), mi.UInt32(int(self.kinds[components[0]]))
@@ -99,7 +99,7 @@ class ModelBSDF:
             component = dr.select(index == k, c, component)
             kind = dr.select(index == k, int(self.kinds[c]), kind)
         bs.sampled_component, bs.sampled_type = component, kind
-        return bs, mi.depolarizer(dr.select(drawn, weight, 0))
+        return bs, mi.depolarizer(select(drawn, weight, mi.UnpolarizedSpectrum(0)))
 
     def sample(self, ctx, si, sample1, sample2, active=True):
         evaluated = self._mixture(ctx, si, active)

@@ -17,9 +17,18 @@ ONE_MINUS_EPSILON = 1 - 2**-24
 """The largest float32 below one: uniform variates are clamped to it."""
 
 
+def select(mask, a, b):
+    """``dr.select``, without the time that it takes with vectors where the mask is a bool, as in scalar variants."""
+    if isinstance(mask, bool):
+        return a if mask else b
+    return dr.select(mask, a, b)
+
+
 def clamp(x, low: float, high: float):
     """x limited to [low, high]. Unlike ``dr.clip``, the derivative at the limits is one: a parameter that starts at
     its limit can be optimised away from it."""
+    if not dr.is_diff_v(x):
+        return dr.minimum(dr.maximum(x, float(low)), float(high))
     return dr.select(x < low, low, dr.select(x > high, high, x))
 
 

@@ -78,10 +78,9 @@ def test_prb_agrees_with_finite_differences(name):
         assert gradients[key] == pytest.approx((losses[0] - losses[1]) / (2 * step), rel=0.02), key
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize(
-    "name", mostly_slow(["phong energy", "ward isotropic", "walter correlated", "walter conductor"])
-)
+@pytest.mark.parametrize("name", ["phong energy", "ward isotropic", "walter correlated", "walter conductor"])
 def test_sample_carries_the_gradient_of_the_albedo(name):
     """E[weight] is the albedo, so the derivative of the weights averages to that of the albedo, here taken from the
     quadrature of eval over a fixed grid. It would not if the density or the sampled direction were differentiated as

@@ -153,7 +153,9 @@ def turns(turn):
     return [(name, wrappers[(k + turn) % len(wrappers)]) for k, name in enumerate(NAMES)]
 
 
-@pytest.mark.parametrize("variant", COMPILED)
+@pytest.mark.parametrize(
+    "variant", [pytest.param(name, marks=[pytest.mark.slow] if name != "llvm_ad_rgb" else []) for name in COMPILED]
+)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_compiled(integrator, variant):
     """Pictures are finite, nonnegative and not black, and albedos in [0, 1].

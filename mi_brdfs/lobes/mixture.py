@@ -24,13 +24,17 @@ class Mixture:
 
     def eval_pdf(self, wo, transmitted):
         """``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
-        of_side = [(p, lobe) for p, lobe in zip(self.probabilities, self.lobes, strict=True)
-                   if lobe.transmits == transmitted]  # fmt: skip
-        parts = [(p, *lobe.eval_pdf(self.wi, wo)) for p, lobe in of_side]
-        return mi.UnpolarizedSpectrum(sum(value for _, value, _ in parts)), sum(p * pdf for p, _, pdf in parts)
+        total, density = 0, 0
+        for probability, lobe in zip(self.probabilities, self.lobes, strict=True):
+            if lobe.transmits == transmitted:
+                value, pdf = lobe.eval_pdf(self.wi, wo)
+                total, density = total + value, density + probability * pdf
+        return mi.UnpolarizedSpectrum(total), density
 
     def sample(self, u, v):
         """``(wo, k)``: a direction and the index of the lobe that it was drawn from."""
+        if len(self.lobes) == 1:
+            return self.lobes[0].sample(self.wi, u, v), 0
         index, start, share = mi.UInt32(0), mi.Float(0), self.probabilities[0]
         end = share
         for k, probability in enumerate(self.probabilities[1:], start=1):

@@ -23,7 +23,7 @@ class Facet:
     def between(cls, wi, wo) -> Facet:
         """The facet that reflects ``wi`` into ``wo``, both above the horizon."""
         h = wi + wo
-        length2 = dr.maximum(dr.squared_norm(h), 1e-36)  # opposite directions within the horizon
+        length2 = dr.maximum(dr.dot(h, h), 1e-36)  # opposite directions within the horizon
         inv_length = dr.rsqrt(length2)
         return cls(wi, wo, h * inv_length, 0.5 * length2 * inv_length)
 

@@ -98,7 +98,7 @@ class BoundedVisibleNormals:
         """``(stretched wi, its unit vector, k, b, l)``"""
         alpha_u, alpha_v = distribution.alpha_u, distribution.alpha_v
         stretched = mi.Vector3f(alpha_u * wi.x, alpha_v * wi.y, wi.z)
-        length = dr.norm(stretched)
+        length = dr.sqrt(dr.dot(stretched, stretched))
         alpha = dr.minimum(dr.minimum(alpha_u, alpha_v), 1)
         s = 1 + dr.sqrt(wi.x * wi.x + wi.y * wi.y)
         s2, a2 = s * s, alpha * alpha
@@ -114,16 +114,14 @@ class BoundedVisibleNormals:
         sin = safe_sqrt(1 - z * z)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.x)
         normal = unit + mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
-        h = dr.normalize(mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, normal.z))
-        return 2 * dr.dot(wi, h) * h - wi
+        h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, normal.z)
+        return h * (2 * dr.dot(wi, h) / dr.dot(h, h)) - wi
 
     def pdf(self, lobe, facet):
         distribution = lobe.distribution
         unit, length, k, b, tilt = self._cap(distribution, facet.wi)
-        normal = dr.normalize(
-            mi.Vector3f(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, facet.cos_h)
-        )
-        z = 2 * dr.dot(unit, normal) * normal.z - unit.z
+        normal = mi.Vector3f(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, facet.cos_h)
+        z = 2 * dr.dot(unit, normal) * normal.z / dr.dot(normal, normal) - unit.z
         height = dr.maximum(z + b, 0) / (1 + b)
         uniform = distribution.eval(facet) / (2 * (k * facet.cos_i + length))
         return uniform * (1 - tilt + 2 * tilt * height)
