@@ -1,4 +1,4 @@
-"""The command line ``mi-brdfs``: list, info, doctor, render, check.
+"""The command line ``mi-brdfs``: list, info, doctor, render, check, bench.
 
 Results go to stdout, errors and progress to stderr. Exit status: 0 fine, 1 error, 2 wrong usage, 130 after Ctrl-C.
 """
@@ -173,12 +173,9 @@ def check(
             _fail(f"--only {name}: there is no such check; there are {', '.join(CHECKS)}", Exit.USAGE)
     if bool(targets) == every:
         _fail("name plugins or files to check, or give --all", Exit.USAGE)
-    for option, file in (("--html", html_file), ("--json", json_file)):
-        if file is not None and not file.absolute().parent.is_dir():
-            _fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
-    chosen = _set_variant(variant)
-    if chosen.startswith("scalar") or "polarized" in chosen:
-        _fail(f"checks need a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
+    _check_folder("--html", html_file)
+    _check_folder("--json", json_file)
+    chosen = _set_tracing_variant(variant)
     start = time.perf_counter()
     with _stdout_to_stderr():
         found = []
@@ -231,6 +228,47 @@ def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs
 def _start_job(variant: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
     mi.set_variant(variant)
+
+
+@app.command()
+def bench(
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="SECTION", help="Measure this alone; may be repeated.")
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file, too.")
+    ] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+    ] = None,
+) -> None:
+    """Measure efficiency, time and noise beside Mitsuba's BSDFs, some ten minutes on a machine that is not busy."""
+    from .bench import SECTIONS
+    from .bench import bench as measure
+
+    for name in only or []:
+        if name not in SECTIONS:
+            _fail(f"--only {name}: there is no such section; there are {', '.join(SECTIONS)}", Exit.USAGE)
+    _check_folder("--json", json_file)
+    chosen = _set_tracing_variant(variant)
+    start = time.perf_counter()
+    columns = [TextColumn("Measuring {task.description}"), BarColumn(), MofNCompleteColumn()]
+    with _stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("")
+        try:
+            results = measure(only or None, lambda section, done, of: progress.update(
+                task, description=section, completed=done, total=of))  # fmt: skip
+        except KeyboardInterrupt:
+            err.print("Interrupted; nothing was written.")
+            raise typer.Exit(Exit.INTERRUPTED) from None
+    if json_file is not None:
+        json_file.write_text(json.dumps(results.to_dict(), indent=1) + "\n", encoding="utf-8")
+    for table in results.tables():
+        _print_table(table)
+        out.print()
+    for sentence in results.missed:
+        out.print(sentence)
+    err.print(f"Measured in {time.perf_counter() - start:.0f} s, {chosen}; {len(results.missed)} targets are missed.")
 
 
 @contextmanager
@@ -325,6 +363,11 @@ def _output_files(output: Path) -> tuple[Path, Path]:
     return files
 
 
+def _check_folder(option: str, file: Path | None) -> None:
+    if file is not None and not file.absolute().parent.is_dir():
+        _fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
+
+
 def _set_variant(wanted: str | None) -> str:
     """Activate the variant asked for, or the fastest that works."""
     if wanted:
@@ -347,6 +390,14 @@ def _set_variant(wanted: str | None) -> str:
             continue
     mi.set_variant("scalar_rgb")
     return "scalar_rgb"
+
+
+def _set_tracing_variant(wanted: str | None) -> str:
+    """The same, of those that check and bench work in."""
+    chosen = _set_variant(wanted)
+    if chosen.startswith("scalar") or "polarized" in chosen:
+        _fail(f"this needs a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if wanted else Exit.ERROR)
+    return chosen
 
 
 def _refuse(variant: str) -> None:

@@ -254,7 +254,7 @@ def test_command_on_a_scene(pytestconfig):
         (["path"], "path is not a BSDF"),
         (["nowhere.xml"], "nowhere.xml: no such file"),
         (["ward", "--only", "chi"], "there is no such check; there are finite"),
-        (["ward", "--variant", "scalar_rgb"], "need a vectorized and unpolarized variant"),
+        (["ward", "--variant", "scalar_rgb"], "needs a vectorized and unpolarized variant"),
         (["ward", "--json", "/nowhere/out.json"], "there is no folder /nowhere"),
         (["ward", "--html", "/nowhere/out.html"], "there is no folder /nowhere"),
         (["<bsdf"], "<bsdf: XML parsing failed"),

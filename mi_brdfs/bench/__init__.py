@@ -1,0 +1,10 @@
+"""How little noise a BSDF makes, and what it costs, beside Mitsuba's own: ``bench()``, or ``bench(["efficiency"])``.
+
+:func:`bench` returns :class:`Results`: figures with the targets that they have to reach. :data:`SECTIONS` lists what is
+measured by name; their docstrings say how.
+"""
+
+from .report import Figure, Results, Target
+from .runner import SECTIONS, bench
+
+__all__ = ["SECTIONS", "Figure", "Results", "Target", "bench"]

@@ -1,0 +1,119 @@
+"""What BSDFs cost over time: kernels compiled for changes, time and memory lost on loading."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from time import thread_time
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from . import sizes
+from .cases import CASES, DEFAULTS, Plugin
+from .process import in_new_process
+from .report import Figure, Target
+from .scenes import PATH, sphere
+
+SIZE = 16
+
+
+# --- Kernels --------------------------------------------------------------------------------------------------------
+
+
+def recompiles(run) -> Iterator[Figure]:
+    """The kernels compiled for a new value of a parameter, each in turn, and for loading the same scene again after it
+    was discarded; of all sets of parameters of a model together. Whether one is compiled depends on what earlier runs
+    left on the disk, so they are told by their hashes: what counts are those that the first picture did not need.
+
+    Target: 0.
+    """
+    counts: dict[str, np.ndarray] = {}
+    for case in run.steps(CASES):
+        model = case.bsdf["type"]
+        counts[model] = counts.get(model, 0) + np.array(fresh_kernels(case.bsdf))
+    for model, (parameters, changed, loaded) in counts.items():
+        yield Figure("recompiles", model, "parameters changed", int(parameters), 0)
+        for name, kernels in (("kernels for new values", changed), ("kernels for loading again", loaded)):
+            yield Figure("recompiles", model, name, int(kernels), 0, targets=(Target("≤", 0, "no compilation"),))
+
+
+def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
+    """``(parameters, changed, loaded)``: how many parameters were changed, and how many kernels were compiled for that
+    and for loading the scene again."""
+    scene = sphere(bsdf, PATH, SIZE)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        loaded = mi.load_dict(scene)
+        known = _launched(loaded)
+        params = mi.traverse(loaded)
+        keys = [key for key in params.keys() if ".bsdf." in key and dr.is_float_v(params[key])]
+        changed = set()
+        for key in keys:
+            value = params[key] * 0.95 + 1e-4
+            dr.make_opaque(value)
+            params[key] = value
+            params.update()
+            changed |= _launched(loaded) - known
+        del loaded, params
+        return len(keys), len(changed), len(_launched(mi.load_dict(scene)) - known)
+
+
+def _launched(scene: mi.Scene) -> set[int]:
+    """The kernels of a picture, by hash."""
+    dr.kernel_history_clear()
+    dr.eval(mi.render(scene, spp=1))
+    return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
+
+
+# --- Time and memory ------------------------------------------------------------------------------------------------
+
+
+def cycles(run) -> Iterator[Figure]:
+    """Loading, rendering and discarding scenes in a process of its own, each with one model, round after round over all
+    of them: how long the last rounds take over the first after a warm-up, and how much the memory grows. The time is
+    that of the thread that loads and traces, the best of a model in each part, which other processes disturb least,
+    and the median over the models. Memory is measured on Linux.
+
+    Targets: within 1.1 of the first rounds, and below 5 MB.
+    """
+    edge = -(-sizes.EDGE // len(DEFAULTS))
+    rounds = max(2 * edge, -(-sizes.CYCLES // len(DEFAULTS)))
+    for _ in run.steps([rounds]):
+        seconds, memory = in_new_process(load_render_discard, DEFAULTS, rounds)
+    subject = f"{rounds * len(DEFAULTS)} cycles"
+    limit = (Target("≤", 1.1, "flat"),)
+    yield Figure("cycles", subject, "last over first", slowdown(seconds, edge), 2, "×", targets=limit)
+    if memory:
+        yield Figure("cycles", subject, "growth", memory[-1] - memory[0], 1, " MB", targets=(Target("≤", 5, "flat"),))
+
+
+def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[float]], list[float]]:
+    """``(seconds, memory)``: the time of each BSDF in each round after the first, which compiles, and the megabytes
+    that the process holds after each of these rounds, and before the first of them."""
+    seconds, memory = [], []
+    for seed in range(rounds + 1):
+        seconds.append([])
+        for bsdf in bsdfs:
+            start = thread_time()
+            dr.eval(mi.render(mi.load_dict(sphere(bsdf, PATH, SIZE)), spp=1, seed=seed))
+            dr.sync_thread()
+            seconds[-1].append(thread_time() - start)
+        memory += _resident()
+    return seconds[1:], memory
+
+
+def slowdown(seconds: list[list[float]], edge: int) -> float:
+    """How much longer the last rounds take than the first."""
+    early, late = (np.min(part, axis=0) for part in (seconds[:edge], seconds[-edge:]))
+    return float(median(late / early))
+
+
+def _resident() -> list[float]:
+    """The megabytes that the process holds, where that can be told."""
+    if sys.platform != "linux":
+        return []
+    return [float(line.split()[1]) / 1024 for line in Path("/proc/self/status").read_text().splitlines()
+            if line.startswith("VmRSS:")]  # fmt: skip
