@@ -18,7 +18,7 @@ from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, PowerLobe
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
 from mi_brdfs.microfacet.fresnel import Unit
-from mi_brdfs.microfacet.sampling import BoundedVisibleNormals, Orbit
+from mi_brdfs.microfacet.sampling import BoundedVisibleNormals, Pair
 from mi_brdfs.microfacet.shadowing import SmithGGX, kelemen
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.models.phong import Phong
@@ -218,7 +218,7 @@ def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=Bounde
 def ward(lobe):
     class Mutant(Ward):
         def lobes(self, p):
-            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), kelemen, Unit(), Orbit(8))
+            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), kelemen, Unit(), Pair())
             return LambertLobe(p.diffuse_reflectance), specular
 
     return Mutant

@@ -31,6 +31,10 @@ class Distribution:
         """About the mean square slope, over both axes."""
         return 0.5 * (dr.square(self.alpha_u) + dr.square(self.alpha_v))
 
+    def slope2(self, v):
+        """The same along a direction, times sin²θ of that."""
+        return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
+
     def albedo(self, cos):
         """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
         have in the direction of that cosine."""
@@ -58,6 +62,9 @@ class Isotropic(Distribution):
 
     def __init__(self):
         super().__init__(mi.Float(1), mi.Float(1))
+
+    def slope2(self, v):
+        return self.roughness2() * (v.x * v.x + v.y * v.y)
 
 
 class Beckmann(Distribution):
@@ -120,7 +127,10 @@ class AshikhminShirley(Distribution):
         super().__init__(dr.rsqrt(exponent_u + 1), dr.rsqrt(exponent_v + 1))
 
     def roughness2(self):
-        return dr.square(self.alpha_u) + dr.square(self.alpha_v)
+        return 2 * super().roughness2()
+
+    def slope2(self, v):
+        return 2 * super().slope2(v)
 
     def eval(self, facet):
         # e log(cosθ), where steepness is (e + 1) sin²θ

@@ -35,6 +35,12 @@ class Facet:
         cos_d = dr.dot(wi, h)
         return cls(wi, 2 * cos_d * h - wi, h, cos_d)
 
+    def image(self) -> Facet:
+        """The facet on the other side of the normal, which reflects the same ``wi``."""
+        h = mi.Vector3f(-self.h.x, -self.h.y, self.h.z)
+        cos_d = dr.dot(self.wi, h)
+        return Facet(self.wi, 2 * cos_d * h - self.wi, h, cos_d)
+
     @property
     def cos_i(self):
         return self.wi.z

@@ -5,82 +5,91 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import clamp, normalize_or, safe_sqrt
+from ..math import choose, clamp, luminance, normalize_or, safe_sqrt, select
 from .facet import Facet
 
 
-class Orbit:
-    r"""Draws a half vector from the distribution's own density q, clipped to what can reflect above the horizon, and
-    then one of its images with probability ∝ what they reflect. Exact for any shadowing and Fresnel term.
+class Pair:
+    r"""Draws a half vector, clipped to what can reflect above the horizon, and then it or its mirror image on the other
+    side of the normal, with probability ∝ what they reflect. Exact for any shadowing and Fresnel term.
 
-    A half vector is a point (ψ, u) of the unit square: an azimuth, and a fraction u of the mass on that line within
-    |tanθ_h| <= R(ψ), beyond which neither end of the line reflects ``wi`` above the horizon. Opposite points of a line
-    (2 images), and with them a quarter turn of ψ and u → 1 - u (8 images), map the uniform measure of that square to
-    itself. With W = f cosθ_o · 4 cosθ_d · C(R)/q of an image and W̄ the mean over its orbit, choosing an image ∝ W
-    gives the density f cosθ_o / W̄ and the weight W̄. (Two images, unclipped, would be the V-cavity sampler of Heitz
-    and d'Eon 2014, doi:10.1111/cgf.12417, with W in place of its visibility.)
+    The line through both has the azimuth ψ, which is uniform in the space stretched by the roughness. On it the
+    distribution's own density q has the mass C(R) within |tanθ_h| <= R(ψ), beyond which neither end of the line
+    reflects ``wi`` above the horizon; m is the part of that mass nearer to the normal. With W = f cosθ_o · 4 cosθ_d ·
+    C(R)/q of a half vector, and W' of its image, choosing ∝ W gives the density 2 f cosθ_o / (W + W') and the weight
+    (W + W')/2. (Unclipped, and with the visibility in place of W, it would be the V-cavity sampler of Heitz and d'Eon
+    2014, doi:10.1111/cgf.12417.)
+
+    Two things that W does over the line are anticipated. Rough lobes are shadowed at its ends: m has the density
+    1 + τ - 2 τ m. And at grazing those half vectors are seen that lean towards ``wi``, along the plane of incidence: a
+    part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and m ∝ √m.
     """
 
-    def __init__(self, images: int):
-        self.lines = {2: 1, 8: 2}[images]
+    TILT, STEEPEST = 0.75, 1.5
+    """τ = TILT cosθ_i for slopes of a mean square of 1/STEEPEST and more. Chosen by measurement."""
 
-    def _line(self, distribution, wi, cos_psi, sin_psi):
-        """``(x, y, g, C(R), 1 - C(R))`` of the line of azimuth ψ, of unit slope direction (x, y)."""
-        x, y = distribution.alpha_u * cos_psi, distribution.alpha_v * sin_psi
-        scale = dr.rsqrt(x * x + y * y)
-        x, y = x * scale, y * scale
-        along = abs(x * wi.x + y * wi.y)
-        limit = (along + dr.sqrt(along * along + wi.z * wi.z)) / wi.z
-        g = scale * scale
-        return x, y, g, *distribution.cdf(limit * limit, g)
-
-    def _orbit(self, lobe, wi, cos_psi, sin_psi, u, complement):
-        """The images of a half vector and their weights W: ``[(facet, W), …]``, itself among the first two."""
-        images = []
-        for _ in range(self.lines):
-            x, y, g, mass, rest = self._line(lobe.distribution, wi, cos_psi, sin_psi)
-            fractions = [(u, complement), (complement, u)] if self.lines == 2 else [(u, complement)]
-            for inner, outer in fractions:
-                tan2 = lobe.distribution.inverse_cdf(inner * mass, rest + outer * mass, g)
-                scale, tan = mass * lobe.distribution.over_density(tan2, g), safe_sqrt(tan2)
-                for side in (tan, -tan):
-                    facet = Facet.at(wi, side * x, side * y)
-                    images.append((facet, scale * self._reflected(lobe, facet)))
-            cos_psi, sin_psi = -sin_psi, cos_psi
-        return images
+    def _proposal(self, lobe, wi):
+        """``(x, y, λ, τ)``, where (x, y) is the stretched azimuth of ``wi``."""
+        distribution = lobe.distribution
+        x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
+        # Facets are seen by n·wi, and by the typical slope along wi: they lean as far as the second one counts.
+        seen = dr.inv_pi * distribution.slope2(wi) / dr.square(wi.z)
+        fresnel = luminance(lobe.fresnel(mi.Float(1))) / dr.maximum(luminance(lobe.fresnel(wi.z)), 1e-9)
+        tilt = self.TILT * wi.z * dr.minimum(self.STEEPEST * distribution.roughness2(), 1)
+        return x, y, dr.minimum(seen / (1 + seen) * fresnel, 0.95), tilt
 
     @staticmethod
-    def _reflected(lobe, facet):
-        valid = (facet.cos_d > 0) & (facet.cos_o > 0)
-        # Elsewhere the formulas need not make sense: give them the mirror direction.
-        facet = Facet(
-            facet.wi,
-            dr.select(valid, facet.wo, mi.Vector3f(0, 0, 1)),
-            dr.select(valid, facet.h, mi.Vector3f(0, 0, 1)),
-            dr.select(valid, facet.cos_d, 1),
-        )
-        return dr.select(valid, lobe.over_facets(facet), 0)
+    def _line(distribution, wi, x, y):
+        """``(g, C(R), 1 - C(R))`` of the line along the slope (x, y), which is of length one."""
+        along = abs(x * wi.x + y * wi.y)
+        limit = (along + dr.sqrt(along * along + wi.z * wi.z)) / wi.z
+        g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
+        return g, *distribution.cdf(limit * limit, g)
 
     def sample(self, lobe, wi, u, v):
-        sin_psi, cos_psi = dr.sincos(dr.two_pi * v.x)
-        images = self._orbit(lobe, wi, cos_psi, sin_psi, v.y, 1 - v.y)
-        threshold = u * sum(weight for _, weight in images)
-        wo = images[0][0].wo
-        for facet, weight in images:
-            wo = dr.select(threshold >= 0, facet.wo, wo)
-            threshold -= weight
-        return wo
+        distribution = lobe.distribution
+        along_x, along_y, leaning, tilt = self._proposal(lobe, wi)
+        leans, u = choose(u, leaning)
+        sin, cos = dr.sincos(dr.two_pi * v.x)
+        sin = dr.select(leans, 2 * v.x - 1, sin)
+        cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
+        cos, sin = cos * along_x - sin * along_y, cos * along_y + sin * along_x
+        x, y = normalize_or(distribution.alpha_u * cos, distribution.alpha_v * sin, (1, 0))
+
+        g, mass, rest = self._line(distribution, wi, x, y)
+        tilted = 2 * v.y / (1 + tilt + safe_sqrt(dr.square(1 + tilt) - 4 * tilt * v.y))
+        m = dr.select(leans, dr.power(v.y, 2 / 3), tilted)
+        tan = safe_sqrt(distribution.inverse_cdf(m * mass, rest + (1 - m) * mass, g))
+        facet = Facet.at(wi, tan * x, tan * y)
+        image = facet.image()
+        weight, other = reflected(lobe, facet), reflected(lobe, image)
+        return select(u * (weight + other) < weight, facet.wo, image.wo)
 
     def pdf(self, lobe, facet):
         distribution = lobe.distribution
-        cos_psi, sin_psi = normalize_or(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, (1, 0))
-        _, _, g, mass, rest = self._line(distribution, facet.wi, cos_psi, sin_psi)
-        c, complement = distribution.cdf(facet.sin2_h / dr.square(facet.cos_h), g)
-        u, v = clamp(c / mass, 0, 1), clamp((complement - rest) / mass, 0, 1)
-        images = self._orbit(lobe, facet.wi, cos_psi, sin_psi, u, v)
-        mean = sum(weight for _, weight in images) / len(images)
-        valid = mean > 0
-        return dr.select(valid, lobe.response(facet) / dr.select(valid, mean, 1), 0)
+        along_x, along_y, leaning, tilt = self._proposal(lobe, facet.wi)
+        x, y = normalize_or(facet.h.x, facet.h.y, (1, 0))
+        g, mass, _ = self._line(distribution, facet.wi, x, y)
+        cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
+        tan2 = facet.sin2_h / dr.square(facet.cos_h)
+        m = clamp(distribution.cdf(tan2, g)[0] / mass, 0, 1)
+        lean = (0.75 * dr.pi) * abs(cos * along_x + sin * along_y) * safe_sqrt(m)
+        proposal = (1 - leaning) * (1 + tilt - 2 * tilt * m) + leaning * lean
+
+        weights = distribution.over_density(tan2, g) * mass * (reflected(lobe, facet) + reflected(lobe, facet.image()))
+        valid = weights > 1e-30
+        return select(valid, 2 * proposal * lobe.response(facet) / select(valid, weights, 1), 0)
+
+
+def reflected(lobe, facet):
+    """What a facet reflects, ``lobe.over_facets``; nothing if that leads below the horizon."""
+    valid = (facet.cos_d > 0) & (facet.cos_o > 0)
+    # Elsewhere the formulas need not make sense: give them the mirror direction.
+    normal = mi.Vector3f(0, 0, 1)
+    safe = Facet(
+        facet.wi, select(valid, facet.wo, normal), select(valid, facet.h, normal), select(valid, facet.cos_d, 1)
+    )
+    return select(valid, lobe.over_facets(safe), 0)
 
 
 class BoundedVisibleNormals:
@@ -105,23 +114,64 @@ class BoundedVisibleNormals:
         k = (1 - a2) * s2 / (s2 + a2 * wi.z * wi.z)
         return stretched / length, length, k, k * wi.z / length, self.TILT * alpha
 
-    def sample(self, lobe, wi, u, v):
-        distribution = lobe.distribution
+    def _draw(self, distribution, wi, v):
+        """``(unit vector of the stretched wi, point of the cap)``"""
         unit, _, _, b, tilt = self._cap(distribution, wi)
         # The inverse of the linear density; the small tilt of narrow lobes must not cancel.
         height = 2 * v.y / (1 - tilt + dr.sqrt(dr.square(1 - tilt) + 4 * tilt * v.y))
         z = height * (1 + b) - b
         sin = safe_sqrt(1 - z * z)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.x)
-        normal = unit + mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
-        h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, normal.z)
-        return h * (2 * dr.dot(wi, h) / dr.dot(h, h)) - wi
+        return unit, mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
 
-    def pdf(self, lobe, facet):
-        distribution = lobe.distribution
+    @staticmethod
+    def _facet(distribution, wi, unit, point):
+        """The facet whose stretched normal is the half vector of the unit vector and a point."""
+        normal = unit + point
+        h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, normal.z)
+        h = h * dr.rsqrt(dr.dot(h, h))
+        cos_d = dr.dot(wi, h)
+        return Facet(wi, 2 * cos_d * h - wi, h, cos_d)
+
+    def _density(self, distribution, facet):
+        """``(density, unit vector of the stretched wi, point of the cap)``"""
         unit, length, k, b, tilt = self._cap(distribution, facet.wi)
         normal = mi.Vector3f(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, facet.cos_h)
-        z = 2 * dr.dot(unit, normal) * normal.z / dr.dot(normal, normal) - unit.z
-        height = dr.maximum(z + b, 0) / (1 + b)
+        point = normal * (2 * dr.dot(unit, normal) / dr.dot(normal, normal)) - unit
+        height = dr.maximum(point.z + b, 0) / (1 + b)
         uniform = distribution.eval(facet) / (2 * (k * facet.cos_i + length))
-        return uniform * (1 - tilt + 2 * tilt * height)
+        return uniform * (1 - tilt + 2 * tilt * height), unit, point
+
+    def sample(self, lobe, wi, u, v):
+        return self._facet(lobe.distribution, wi, *self._draw(lobe.distribution, wi, v)).wo
+
+    def pdf(self, lobe, facet):
+        return self._density(lobe.distribution, facet)[0]
+
+
+class PairOfVisibleNormals(BoundedVisibleNormals):
+    """One of two such normals, whose points in the cap are mirror images about its axis, with probability ∝ what they
+    reflect: Fresnel's term is larger for the one and smaller for the other, and so is the shadowing."""
+
+    def sample(self, lobe, wi, u, v):
+        unit, point = self._draw(lobe.distribution, wi, v)
+        facet, image = (self._facet(lobe.distribution, wi, unit, w) for w in (point, self._image(point)))
+        weight, other = self._weight(lobe, facet), self._weight(lobe, image)
+        return select(u * (weight + other) < weight, facet.wo, image.wo)
+
+    def pdf(self, lobe, facet):
+        density, unit, point = self._density(lobe.distribution, facet)
+        image = self._facet(lobe.distribution, facet.wi, unit, self._image(point))
+        weight = self._weight(lobe, facet)
+        total = weight + self._weight(lobe, image)
+        valid = total > 0
+        return select(valid, 2 * density * weight / select(valid, total, 1), 0)
+
+    @staticmethod
+    def _image(point):
+        return mi.Vector3f(-point.x, -point.y, point.z)
+
+    @staticmethod
+    def _weight(lobe, facet):
+        """f cosθ_o over the density, but for what is the same for both."""
+        return reflected(lobe, facet) / dr.maximum(facet.cos_d, 1e-9)

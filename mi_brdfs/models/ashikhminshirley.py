@@ -3,7 +3,7 @@ import mitsuba as mi
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import AshikhminShirley as Distribution
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import ashikhmin_shirley
 from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
@@ -27,8 +27,8 @@ class AshikhminShirley(Model):
     These exponents are not those of microfacet distributions called "phong" elsewhere, which normalise with n+2.
     One-sided.
 
-    Sampling: fs by eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit), so that no sample falls below the horizon; fd cosine-weighted.
+    Sampling: fs by a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair), so that no sample falls below the horizon; fd cosine-weighted.
 
     Example
     -------
@@ -53,7 +53,7 @@ class AshikhminShirley(Model):
             Distribution(*p.exponent),
             ashikhmin_shirley,
             Schlick(p.specular_reflectance),
-            Orbit(8),
+            Pair(),
         )
         return CoupledDiffuseLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)), specular
 

@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 
@@ -29,8 +29,8 @@ class Brady(Model):
     Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: towards grazing the albedo falls like cosθ_i, and F
     raises it less than that. One-sided.
 
-    Sampling: eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+    Sampling: a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -56,7 +56,7 @@ class Brady(Model):
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")
         return (
             LambertLobe(p.diffuse_reflectance),
-            FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), Orbit(8)),
+            FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), Pair()),
         )
 
 

@@ -9,7 +9,7 @@ from ..math import choose, expm1, log1p, luminance, safe_sqrt
 from ..microfacet.distributions import GGX, GTR
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair, PairOfVisibleNormals
 from ..microfacet.shadowing import SmithGGX
 from ..model import Energy, Model
 from ..parameters import Number, NumberSlot, Reflectance, Rotation
@@ -62,9 +62,9 @@ class Burley(Model):
     and 1.82 for a smooth surface with everything switched on, all of them beyond 80°; with metallic = 1 it stays
     below 1, and below 1.05 with a clear coat. One-sided.
 
-    Sampling: the base lobe by cosine with a few uniform directions, the sheen by a density of its own, the specular
-    lobe and the clear coat by eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit). No sample falls below the horizon.
+    Sampling: the base lobe by cosine with a few uniform directions, the sheen by a density of its own, the clear
+    coat by a half vector or its mirror image and the specular lobe by one of two visible normals, chosen by what they
+    reflect (mi_brdfs.microfacet.sampling.Pair and PairOfVisibleNormals). No sample falls below the horizon.
 
     Example
     -------
@@ -106,9 +106,9 @@ class Burley(Model):
         return (
             BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface),
             SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)),
-            DimmedLobe(1, GGX(*alpha), SmithGGX(*alpha, correlated=False), Schlick(f0), Orbit(8)),
+            DimmedLobe(1, GGX(*alpha), SmithGGX(*alpha, correlated=False), Schlick(f0), PairOfVisibleNormals()),
             DimmedLobe(
-                0.25 * p.clearcoat, GTR(coat_alpha, 1), SmithGGX(0.25, 0.25, correlated=False), Schlick(0.04), Orbit(8)
+                0.25 * p.clearcoat, GTR(coat_alpha, 1), SmithGGX(0.25, 0.25, correlated=False), Schlick(0.04), Pair()
             ),
         )
 

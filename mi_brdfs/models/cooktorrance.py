@@ -2,7 +2,7 @@ import drjit as dr
 
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import GGX, Beckmann, Blinn
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import vcavity
 from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance
@@ -34,8 +34,8 @@ class CookTorrance(Model):
     Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. The paper's sum of several D of different roughness
     is a ``blendbsdf``. One-sided.
 
-    Sampling: eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+    Sampling: a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -64,5 +64,5 @@ class CookTorrance(Model):
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1
-        specular = MicrofacetLobe(p.specular_reflectance * scale, distribution, vcavity, p.fresnel, Orbit(8))
+        specular = MicrofacetLobe(p.specular_reflectance * scale, distribution, vcavity, p.fresnel, Pair())
         return LambertLobe(p.diffuse_reflectance), specular

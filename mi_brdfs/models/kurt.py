@@ -1,7 +1,7 @@
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import Kurt as Shadowing
 from ..model import Energy, Model
 from ..parameters import Number, PerLobe, Reflectance, Rotation
@@ -26,8 +26,8 @@ class Kurt(Model):
     89.9°.
     That D's cosine power is 4 was not checked against the paper. One-sided.
 
-    Sampling: eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+    Sampling: a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -58,7 +58,7 @@ class Kurt(Model):
                 Beckmann(*lobe.alpha),
                 Shadowing(lobe.kurt_exponent),
                 Schlick(lobe.f0),
-                Orbit(8),
+                Pair(),
             )
             for lobe in p.specular
         ]

@@ -5,7 +5,7 @@ from ..lobes import LambertLobe, Lobe, MicrofacetLobe
 from ..math import clamp, luminance, normalize_or, safe_sqrt
 from ..microfacet.distributions import ABC, PowerLaw
 from ..microfacet.fresnel import Dielectric
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import vcavity
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, OneOf, Reflectance
@@ -33,8 +33,8 @@ class Low(Model):
     Reciprocal. Energy-conserving for ``unit`` with ρd + A <= 1; otherwise A is whatever a fit made it, and the albedo
     may exceed 1. The factor 1/π was inferred from the fits. One-sided.
 
-    Sampling: microfacet by eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); smooth exactly in S on the disc of projected directions, clipped to it. No
+    Sampling: microfacet by a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); smooth exactly in S on the disc of projected directions, clipped to it. No
     sample falls below the horizon.
 
     Example
@@ -75,7 +75,7 @@ class Low(Model):
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
             scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
-            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, Orbit(8))
+            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, Pair())
         return LambertLobe(p.diffuse_reflectance), specular
 
 

@@ -4,7 +4,7 @@ from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import PairOfVisibleNormals
 from ..microfacet.shadowing import SchlickSmith, SmithGGX
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
@@ -35,8 +35,8 @@ class MetallicRoughness(Model):
     more: for C = 1, metallic = 0 the albedo reaches, for r = 0.5 and r = 0.1, 1.00 and 1.09 (direct), 1.10 and 1.57
     (ibl), 1.12 and 1.72 (smith). One-sided.
 
-    Sampling: the diffuse lobe by cosine, the specular one by eight images of a half vector, one of them chosen by what
-    it reflects (mi_brdfs.microfacet.sampling.Orbit). No sample falls below the horizon.
+    Sampling: the diffuse lobe by cosine, the specular one by one of two visible normals, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.PairOfVisibleNormals). No sample falls below the horizon.
 
     Example
     -------
@@ -71,7 +71,7 @@ class MetallicRoughness(Model):
         else:
             shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
         diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
-        return diffuse, DimmedLobe(1, GGX(alpha, alpha), shadowing, fresnel, Orbit(8))
+        return diffuse, DimmedLobe(1, GGX(alpha, alpha), shadowing, fresnel, PairOfVisibleNormals())
 
 
 class FresnelDiffuseLobe(LambertLobe):

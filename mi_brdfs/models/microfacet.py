@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet import distributions, shadowing
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair, PairOfVisibleNormals
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
 
@@ -62,8 +62,9 @@ class Microfacet(Model):
     ggx; for the others see the table below. Of Ashikhmin and Premoze's term, of Neumann's and of the EPD only the
     formulas were known, from later papers and public code. One-sided.
 
-    Sampling: eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+    Sampling: a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); ggx with smith by one of two visible normals (PairOfVisibleNormals). No sample
+    falls below the horizon.
 
     Example
     -------
@@ -160,7 +161,9 @@ class Microfacet(Model):
     def lobes(self, p):
         distribution = DISTRIBUTIONS[p.distribution.choice](p.distribution)
         term = SHADOWING[p.shadowing.choice](p)
-        specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, Orbit(8))
+        visible = p.distribution.choice == "ggx" and p.shadowing.choice == "smith"
+        sampler = PairOfVisibleNormals() if visible else Pair()
+        specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
         return LambertLobe(p.diffuse_reflectance), specular
 
 

@@ -1,7 +1,7 @@
 from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import implicit, vcavity
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
@@ -33,8 +33,8 @@ class Nishino(Model):
     Reciprocal. Energy-conserving for ``microfacet`` with ρd + ρs <= 1. For ``dsbrdf`` the albedo falls like cosθ_i
     towards grazing. One-sided.
 
-    Sampling: eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+    Sampling: a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -61,5 +61,5 @@ class Nishino(Model):
             shadowing, fresnel = vcavity, p.variant.fresnel
         else:
             shadowing, fresnel = implicit, Unit()
-        specular = DimmedLobe(p.specular_reflectance, distribution, shadowing, fresnel, Orbit(8))
+        specular = DimmedLobe(p.specular_reflectance, distribution, shadowing, fresnel, Pair())
         return LambertLobe(p.diffuse_reflectance), specular

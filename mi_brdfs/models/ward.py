@@ -4,7 +4,7 @@ from ..lobes import LambertLobe, MicrofacetLobe
 from ..math import expm1
 from ..microfacet.distributions import Beckmann, Distribution, log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import Orbit
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import kelemen
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
@@ -36,8 +36,8 @@ class Ward(Model):
     Reciprocal. Energy-conserving for ``balanced`` with ρd + ρs <= 1. Same parameters as ``ward`` of Mitsuba 0.6.
     One-sided.
 
-    Sampling: eight images of a half vector, one of them chosen by what it reflects
-    (mi_brdfs.microfacet.sampling.Orbit); no sample falls below the horizon.
+    Sampling: a half vector or its mirror image, chosen by what they reflect
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -69,7 +69,7 @@ class Ward(Model):
     def lobes(self, p):
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)
         lobe = DarkeningLobe if self.variant in ("ward", "approximate") else MicrofacetLobe
-        specular = lobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), Orbit(8))
+        specular = lobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), Pair())
         return LambertLobe(p.diffuse_reflectance), specular
 
 
