@@ -1,6 +1,6 @@
 import mitsuba as mi
 
-from ..lobes import LambertLobe, MicrofacetLobe
+from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet.distributions import AshikhminShirley as Distribution
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Pair
@@ -48,7 +48,7 @@ class AshikhminShirley(Model):
     energy = Energy(0.508, [({}, 1)])
 
     def lobes(self, p):
-        specular = MicrofacetLobe(
+        specular = DimmedLobe(
             mi.UnpolarizedSpectrum(1),
             Distribution(*p.exponent),
             ashikhmin_shirley,

@@ -1,4 +1,4 @@
-from ..lobes import LambertLobe, MicrofacetLobe
+from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Pair
@@ -53,7 +53,7 @@ class Kurt(Model):
 
     def lobes(self, p):
         glossy = [
-            MicrofacetLobe(
+            DimmedLobe(
                 lobe.specular_reflectance,
                 Beckmann(*lobe.alpha),
                 Shadowing(lobe.kurt_exponent),
