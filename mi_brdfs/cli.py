@@ -206,7 +206,8 @@ def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs
     """The reports on all targets, from processes of their own if there are several jobs."""
     from .validation import CHECKS
 
-    columns = [TextColumn("Checking {task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    subject = TextColumn("Checking {task.description}", markup=False)
+    columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     each = len(only or CHECKS)
     reports = []
     with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
@@ -252,7 +253,7 @@ def bench(
     _check_folder("--json", json_file)
     chosen = _set_tracing_variant(variant)
     start = time.perf_counter()
-    columns = [TextColumn("Measuring {task.description}"), BarColumn(), MofNCompleteColumn()]
+    columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
     with _stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
         task = progress.add_task("")
         try:
@@ -304,7 +305,7 @@ def one_line(error: BaseException) -> str:
         error = error.__cause__
     text = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)) or type(error).__name__
     place = None
-    for match in re.finditer(r"(?:At|[Ww]hile loading) (\S+) \(line (\d+), col \d+\): ", text):
+    for match in re.finditer(r"(?:At|[Ww]hile loading) (.+?) \(line (\d+), col \d+\): ", text):
         place, rest = match, text[match.end() :]
     broken = re.search(r'Parsing of XML file "(.+)" failed: (.+) \(line (\d+), col \d+\)', text)
     unused = re.findall(r"^ +- \$([^=]+)=", text, re.MULTILINE) if "unused parameters" in text else []
@@ -321,12 +322,13 @@ def _last_of_traceback(text: str) -> str:
     _, traceback, tail = text.partition("Traceback (most recent call last):")
     if traceback:
         text = re.split(r"^[\w.]+(?:Error|Exception|Warning): ", tail, flags=re.MULTILINE)[-1]
-    return " ".join(text.split())
+    # Nothing that a scene file says may command the terminal.
+    return "".join(character for character in " ".join(text.split()) if character.isprintable())
 
 
 def _print_table(table: Table) -> None:
     """One line a row where another program reads it."""
-    console = Console(highlight=False, width=None if out.is_terminal else 400)
+    console = Console(markup=False, highlight=False, width=None if out.is_terminal else 400)
     console.print(table)
 
 

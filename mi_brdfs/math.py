@@ -88,7 +88,7 @@ def safe_sqrt(x):
 def normalize_or(x, y, fallback: tuple[float, float]):
     """The 2-vector (x, y) scaled to length one, or ``fallback`` where its length is zero."""
     length2 = x * x + y * y
-    valid = length2 > 1e-37
+    valid = length2 > 1e-30  # smaller ones may have lost a square to underflow
     scale = dr.rsqrt(dr.select(valid, length2, 1))
     return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
 

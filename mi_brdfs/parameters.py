@@ -74,7 +74,7 @@ class Given:
                 )
             closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
             raise ParameterError(
-                f"{self.plugin}: unknown parameter {name}; did you mean {closest}? Known are {', '.join(shown)}."
+                f"{self.plugin}: unknown parameter {brief(name)}; did you mean {closest}? Known are {', '.join(shown)}."
             )
 
     def number(self, name: str, default: float, limits: Range) -> mi.Texture:
@@ -118,7 +118,7 @@ class Given:
         if name not in self:
             return choices[0]
         value = self.props[name]
-        if value not in choices:
+        if not isinstance(value, str) or value not in choices:
             raise self.error(name, f"= {_shown(value)} is unknown; it must be one of {listed(choices, quote=True)}")
         return value
 
@@ -167,8 +167,14 @@ def _shown(value) -> str:
     if hasattr(value, "wavelengths"):
         shown = ", ".join(f"{number:g}" for number in value.values[:6])
         return f"[{shown}, …]" if len(value.values) > 6 else f"[{shown}]"
-    shown = f'"{value}"' if isinstance(value, str) else f"{value:.6g}" if isinstance(value, float) else str(value)
-    return " ".join(shown.split())
+    shown = brief(f"{value:.6g}" if isinstance(value, float) else str(value))
+    return f'"{shown}"' if isinstance(value, str) else shown
+
+
+def brief(text: str) -> str:
+    """A text of whoever wrote the scene, on one line, of moderate length and without what a terminal would obey."""
+    text = "".join(character if character.isprintable() else "�" for character in " ".join(text.split()))
+    return text if len(text) <= 80 else f"{text[:80]}…"
 
 
 def _interval(limits: Range) -> str:
@@ -298,7 +304,8 @@ class RotationSlot(Slot):
     def evaluate(self, si, active):
         if not self.textures:
             return None
-        sin, cos = dr.sincos(dr.two_pi * self.textures["rotation"].eval_1(si, active))
+        turns = self.textures["rotation"].eval_1(si, active)
+        sin, cos = dr.sincos(dr.two_pi * (turns - dr.round(turns)))  # whole turns would take the digits
         return cos, sin
 
 

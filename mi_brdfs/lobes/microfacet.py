@@ -21,7 +21,7 @@ class MicrofacetLobe(Lobe):
         self.shadowing, self.fresnel, self.sampler = shadowing, fresnel, sampler
 
     def albedo(self, wi):
-        return self.reflectance * (self.fresnel(wi.z) * self.distribution.albedo(wi.z))
+        return self.reflectance * (self.fresnel(tilted(wi.z)) * self.distribution.albedo(wi.z))
 
     def eval_pdf(self, wi, wo):
         facet = Facet.between(wi, wo)
@@ -54,4 +54,9 @@ class DimmedLobe(MicrofacetLobe):
         z = dr.maximum(wi.z, 1e-4)  # the terms must not vanish
         mirror = Facet(mi.Vector3f(wi.x, wi.y, z), mi.Vector3f(-wi.x, -wi.y, z), mi.Vector3f(0, 0, 1), z)
         shadowing = self.shadowing(mirror) / SmithGGX(alpha, alpha, correlated=False)(mirror)
-        return self.reflectance * (self.fresnel(cos) * (self.distribution.albedo(wi.z) * shadowing))
+        return self.reflectance * (self.fresnel(tilted(cos)) * (self.distribution.albedo(wi.z) * shadowing))
+
+
+def tilted(cos):
+    """A cosine that facets see, of one to the normal. None is 1: Schlick's reflectance with f0 = 0 must not vanish."""
+    return dr.minimum(cos, 0.9)

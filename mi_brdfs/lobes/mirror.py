@@ -73,7 +73,7 @@ class PowerLobe(MirrorLobe):
 
     def _share(self, frame):
         upright, tilted = self._masses(frame)
-        return upright / (upright + tilted)
+        return upright / dr.maximum(upright + tilted, 1e-30)  # an axis straight below the surface has neither
 
     def albedo(self, wi):
         # Exact where the axis lies along the normal or in the horizon.

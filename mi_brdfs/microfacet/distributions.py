@@ -71,8 +71,8 @@ class Beckmann(Distribution):
     """D = exp(-((h_x/αu)² + (h_y/αv)²)/h_z²) / (π αu αv h_z⁴); q = D cosθ_h."""
 
     def eval(self, facet):
-        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-14)  # α² cos⁴ must not underflow
-        return dr.exp(-self.steepness(facet) / cos2) / (dr.pi * self.alpha_u * self.alpha_v * cos2 * cos2)
+        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-6)  # no facets are that steep; its powers must not underflow
+        return dr.exp(-self.steepness(facet) / cos2) / dr.square(cos2) / (dr.pi * self.alpha_u * self.alpha_v)
 
     def cdf(self, tan2, g):
         return -expm1(-g * tan2), dr.exp(-g * tan2)
@@ -391,8 +391,8 @@ class EPD(Isotropic):
         return dr.minimum(self.width, 1)
 
     def eval(self, facet):
-        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-14)
-        return self.scale * self._power(facet.sin2_h / cos2) / dr.square(cos2)
+        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)
+        return self.scale * self._power(facet.sin2_h / cos2) * dr.square(dr.rcp(cos2))
 
     def over_density(self, tan2, g):
         tan2 = dr.minimum(tan2, 1e14)

@@ -77,7 +77,7 @@ class Pair:
         proposal = (1 - leaning) * (1 + tilt - 2 * tilt * m) + leaning * lean
 
         weights = distribution.over_density(tan2, g) * mass * (reflected(lobe, facet) + reflected(lobe, facet.image()))
-        valid = weights > 1e-30
+        valid = weights > 1e-37
         return select(valid, 2 * proposal * lobe.response(facet) / select(valid, weights, 1), 0)
 
 
@@ -128,7 +128,8 @@ class BoundedVisibleNormals:
     def _facet(distribution, wi, unit, point):
         """The facet whose stretched normal is the half vector of the unit vector and a point."""
         normal = unit + point
-        h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, normal.z)
+        z = dr.maximum(normal.z, 1e-15)  # a cap that is nearly the whole sphere ends where the normal vanishes
+        h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
         h = h * dr.rsqrt(dr.dot(h, h))
         cos_d = dr.dot(wi, h)
         return Facet(wi, 2 * cos_d * h - wi, h, cos_d)

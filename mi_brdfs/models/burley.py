@@ -96,7 +96,7 @@ class Burley(Model):
 
     def lobes(self, p):
         brightness = luminance(p.base_color)
-        black = brightness <= 0
+        black = brightness < 1e-15
         tint = dr.select(black, 1, p.base_color / dr.select(black, 1, brightness))
         dielectric = 1 - p.metallic
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)

@@ -72,7 +72,7 @@ class EONLobe(RoughDiffuseLobe):
 
     def eval(self, wi, wo):
         s = wi.x * wo.x + wi.y * wo.y
-        s = s / dr.select(s > 0, dr.maximum(wi.z, wo.z), 1)
+        s = dr.maximum(s / dr.select(s > 0, dr.maximum(wi.z, wo.z), 1), -1)
         single = self.reflectance * (self.a * (1 + self.retro * s))
         multiple = self.multiple * (self.a * self.retro * self._loss(wi) * self._loss(wo) / self.MEAN)
         return dr.inv_pi * (single + multiple)

@@ -1,0 +1,361 @@
+"""Every model over all that it declares: values are finite, what is seen can be sampled, and nothing raises.
+
+The inputs come from the declarations alone. Parameters are textures that have another value in each lane: so one call
+evaluates thousands of settings and pairs of directions, and all examples of the same options share a kernel.
+"""
+
+from __future__ import annotations
+
+import re
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from fuzzing import examples, ways
+from hypothesis import strategies as st
+from support import context, interaction, numbers
+
+from mi_brdfs.registry import all_models
+
+EVALUATIONS = 1_000_000
+"""How many settings and pairs of directions a run tries, or more: with the first way to give each model's parameters,
+and as many again with the others, which take long to compile."""
+LANES, EXAMPLES = 1 << 13, 6
+
+MODELS = all_models()
+CASES = [
+    pytest.param(model, options, id=f"{model.plugins[0]} {options}", marks=[pytest.mark.slow] if k else [])
+    for model in MODELS
+    for k, options in enumerate(ways(model.declared()))
+]
+
+
+@pytest.fixture(scope="module")
+def llvm_rgb():
+    """One for all tests, as it takes a tenth of a second to enter a variant."""
+    with mi.variant_context("llvm_ad_rgb"):
+        yield
+
+
+# --- Inputs: each function has its own way to fill the lanes --------------------------------------------------------
+
+
+def magnitudes(low, high, rng, count):
+    """Numbers of all magnitudes between two that are above zero."""
+    return np.exp(rng.uniform(np.log(low), np.log(high), count))
+
+
+def mixture(functions):
+    """Any of the functions in each lane."""
+
+    def mixed(*arguments):
+        *_, rng, count = arguments
+        filled = np.stack([function(*arguments) for function in functions])
+        return filled[rng.integers(len(functions), size=count), np.arange(count)]
+
+    return mixed
+
+
+def usual(quantity, rng, count):
+    return np.full(count, float(quantity.default))
+
+
+def uniform(quantity, rng, count):
+    return rng.uniform(*quantity.limits, count)
+
+
+def ends(quantity, rng, count):
+    return rng.choice(quantity.limits, count)
+
+
+def near_the_ends(quantity, rng, count):
+    low, high = quantity.limits
+    inside = (high - low) * magnitudes(1e-7, 0.1, rng, count)
+    return np.where(rng.random(count) < 0.5, low + inside, high - inside)
+
+
+def tiny_and_huge(quantity, rng, count):
+    """Of either sign if the range has both, and down to denormal numbers if it includes zero."""
+    low, high = quantity.limits
+    if low > 0:
+        return magnitudes(low, high, rng, count)
+    size = magnitudes(rng.choice([1e-44, 1e-8, 1e-3], count), high, rng, count)
+    return np.where(rng.random(count) < 0.5, size, np.maximum(-size, low))
+
+
+def beyond(quantity, rng, count):
+    """Outside the range, to which textured values are limited where they are evaluated."""
+    low, high = quantity.limits
+    outside = magnitudes(1e-8, 1e30, rng, count)
+    return np.where(rng.random(count) < 0.5, low - outside, high + outside)
+
+
+def directions(cos, sin, rng):
+    phi = rng.uniform(0, 2 * np.pi, len(cos))
+    return np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], axis=-1)
+
+
+def generic(rng, count):
+    cos = rng.random(count)
+    return directions(cos, np.sqrt(1 - cos * cos), rng)
+
+
+def normal(rng, count):
+    return np.tile([0.0, 0.0, 1.0], (count, 1))
+
+
+def near_normal(rng, count):
+    sin = magnitudes(rng.choice([1e-20, 1e-7], count), 1e-2, rng, count)
+    return directions(np.sqrt(1 - sin * sin), sin, rng)
+
+
+def grazing(rng, count):
+    cos = magnitudes(1e-7, 0.1, rng, count)
+    return directions(cos, np.sqrt(1 - cos * cos), rng)
+
+
+def along_an_axis(rng, count):
+    w = generic(rng, count)
+    w[np.arange(count), rng.integers(2, size=count)] = 0
+    return normalized(w)
+
+
+def horizontal(rng, count):
+    return directions(np.zeros(count), 1, rng)
+
+
+def below(rng, count):
+    return generic(rng, count) * [1, 1, -1]
+
+
+def normalized(w):
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)
+
+
+def independent(wi, rng, count):
+    return mixture(INCIDENT)(rng, count)
+
+
+def mirrored(wi, rng, count):
+    return wi * [-1, -1, 1]
+
+
+def nearly_mirrored(wi, rng, count):
+    return nearly_back(mirrored(wi, rng, count), rng, count)
+
+
+def back(wi, rng, count):
+    return wi
+
+
+def nearly_back(wi, rng, count):
+    return normalized(wi + rng.normal(size=(count, 3)) * magnitudes(1e-8, 0.3, rng, count)[:, None])
+
+
+def straight_on(wi, rng, count):
+    return -wi
+
+
+SETTINGS = (usual, uniform, ends, near_the_ends, tiny_and_huge, beyond)
+INCIDENT = (generic, normal, near_normal, grazing, along_an_axis, horizontal, below)
+REFLECTED = (independent, mirrored, nearly_mirrored, back, nearly_back, straight_on)
+
+
+def variates(rng, count):
+    """Three for each lane, some of them at the ends of [0, 1)."""
+    special = rng.choice([0, 2**-24, 0.5, 1 - 2**-24], (count, 3))
+    return np.where(rng.random((count, 3)) < 0.3, special, rng.random((count, 3), np.float32)).astype(np.float32)
+
+
+def some_of(functions):
+    """One of the functions, or as often all of them."""
+    return st.sampled_from(functions) | st.just(mixture(functions))
+
+
+def lanes(options):
+    """Arguments for :meth:`Subject.fill`."""
+    filled = st.fixed_dictionaries({quantity.name: some_of(SETTINGS) for quantity in options.quantities})
+    return st.tuples(filled, some_of(INCIDENT), some_of(REFLECTED), st.integers(0, 2**32 - 1))
+
+
+# --- Outputs --------------------------------------------------------------------------------------------------------
+
+
+class Subject:
+    """A plugin with some options, whose quantities differ from lane to lane. A range without an end has ``largest``."""
+
+    def __init__(self, model, options, largest, lanes=LANES):
+        class Lanes(mi.Texture):
+            def __init__(self):
+                super().__init__(mi.Properties())
+
+            def eval(self, si, active=True):
+                return self.value
+
+            def eval_1(self, si, active=True):
+                return self.value
+
+        self.given = {"type": model.plugins[0], **options.words}
+        self.quantities, self.largest, self.lanes = options.quantities, largest, lanes
+        self.textures = {quantity.name: Lanes() for quantity in self.quantities}
+        self.bsdf = mi.load_dict(self.given | self.textures)
+
+    def fill(self, settings, incident, reflected, seed):
+        """Fill the lanes with settings, of which colours are grey at times, directions and variates."""
+        rng = np.random.default_rng(seed)
+        self.values = {}
+        for quantity in self.quantities:
+            values, *others = (self._values(quantity, settings, rng) for _ in range(3 if quantity.colour else 1))
+            if quantity.colour:
+                values = np.where(rng.random(self.lanes) < 0.3, values, [values, *others])
+            self.values[quantity.name] = np.float32(values)
+        wi = incident(rng, self.lanes)
+        self.wi, self.wo = np.float32(wi), np.float32(reflected(wi, rng, self.lanes))
+        self.u = variates(rng, self.lanes)
+
+    def _values(self, quantity, settings, rng):
+        low, high = quantity.limits
+        end = min(high, self.largest)
+        values = settings[quantity.name](quantity._replace(limits=(low, end)), rng, self.lanes)
+        return values if high == end else np.minimum(values, end)
+
+    def enter(self, lane=slice(None)):
+        """Give the quantities their values in all lanes, or in one."""
+        for quantity in self.quantities:
+            kind = mi.UnpolarizedSpectrum if quantity.colour else mi.Float
+            self.textures[quantity.name].value = kind(self.values[quantity.name][..., lane])
+
+    def answers(self, lane=slice(None)):
+        """What each method answers, by name, for the whole BSDF (None) and for each of its components."""
+        self.enter(lane)
+        count = self.bsdf.component_count()
+        parts = {part: context(part) for part in [None, *range(count if count > 1 else 0)]}
+        si, wo = interaction(self.wi[lane]), mi.Vector3f(self.wo[lane].T)
+        u, *v = self.u[lane].T
+        u, v = mi.Float(u), mi.Point2f(np.array(v))
+        found = {}
+        for part, ctx in parts.items():
+            value, pdf = self.bsdf.eval_pdf(ctx, si, wo, True)
+            sample, weight = self.bsdf.sample(ctx, si, u, v, True)
+            found[part] = {
+                "eval": self.bsdf.eval(ctx, si, wo, True),
+                "pdf": self.bsdf.pdf(ctx, si, wo, True),
+                "the value of eval_pdf": value,
+                "the density of eval_pdf": pdf,
+                "the direction of sample": sample.wo,
+                "the density of sample": sample.pdf,
+                "the weight of sample": weight,
+            }
+        dr.eval(found)
+        return {part: {name: numbers(x) for name, x in answers.items()} for part, answers in found.items()}
+
+    def reproduction(self, part, lane):
+        """The call that shows a lane alone."""
+        given = dict(self.given)
+        for (low, high), name in ((quantity.limits, quantity.name) for quantity in self.quantities):
+            values = self.values[name][..., lane]
+            if values.ndim:
+                given[name] = {"type": "rgb", "value": shortest(values.clip(low, high))}
+            else:
+                (value,) = shortest([values])
+                given[name] = value if low <= value <= high else {"type": "uniform", "value": value}
+        u, v = np.split(self.u[lane], [1])
+        arrays = ", ".join(f"np.float32([{shortest(array)}])" for array in (self.wi[lane], self.wo[lane], u, v))
+        return f"call(mi.load_dict({given}).eval_pdf_sample, context({part}), {arrays})"
+
+
+def shortest(values):
+    """Numbers as Python writes them with the fewest digits that float32 tells apart."""
+    return [float(str(np.float32(value))) for value in values]
+
+
+def faults(answers):
+    """``(what is wrong, in which lanes)``"""
+    direction = answers["the direction of sample"]
+    for name, values in answers.items():
+        if values is not direction:
+            yield f"{name} is negative or not finite", ~(np.isfinite(values) & (values >= 0)).all(axis=1)
+    yield "the direction of sample is not finite", ~np.isfinite(direction).all(axis=1)
+    lengths = np.linalg.norm(direction, axis=1)
+    yield (
+        "the direction of sample is not of length one",
+        (answers["the density of sample"][:, 0] > 0) & ~(abs(lengths - 1) < 1e-5),
+    )
+    # Light a billion times fainter than 1, or than what a sample from there carries, may lose its lobe to rounding.
+    faint = 1e-9 * np.maximum(1, answers["the weight of sample"].max(axis=1))
+    yield "pdf is 0 where eval is not", (answers["eval"].max(axis=1) > faint) & (answers["pdf"][:, 0] <= 0)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model, options", CASES)
+def test_values(model, options):
+    """Finite, not negative, of a density wherever they are positive."""
+    subject, evaluated = Subject(model, options, largest=1e20), 0  # the rest of float32 is for the height of lobes
+
+    @examples(EXAMPLES, lanes(options))
+    def fuzz(drawn):
+        nonlocal evaluated
+        subject.fill(*drawn)
+        for part, answers in subject.answers().items():
+            for fault, wrong in faults(answers):
+                assert not wrong.any(), f"{fault}: {subject.reproduction(part, np.argmax(wrong))}"
+        evaluated += subject.lanes
+
+    fuzz()
+    assert evaluated * len(MODELS) >= EVALUATIONS
+
+
+@pytest.mark.parametrize("model, options", CASES)
+def test_values_of_a_scalar_variant(model, options):
+    """Where Python's floats divide: by zero they raise an error, and they go on below the least of float32."""
+    with mi.variant_context("scalar_rgb"):
+        subject = Subject(model, options, largest=1e20, lanes=50)
+
+        @examples(2, lanes(options))
+        def fuzz(drawn):
+            subject.fill(*drawn)
+            for lane in range(subject.lanes):
+                try:
+                    found = subject.answers(lane)
+                except Exception as error:
+                    raise AssertionError(subject.reproduction(None, lane)) from error
+                for part, answers in found.items():
+                    for fault, wrong in faults(answers):
+                        assert not wrong.any(), f"{fault}: {subject.reproduction(part, lane)}"
+
+        fuzz()
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model, options", CASES)
+def test_derivatives(model, options):
+    """Finite, for every quantity."""
+    subject = Subject(model, options, largest=1e3)
+
+    @examples(2, lanes(options))
+    def fuzz(drawn):
+        subject.fill(*drawn)
+        subject.enter()
+        values = {name: texture.value for name, texture in subject.textures.items()}
+        dr.enable_grad(values)
+        dr.backward(subject.bsdf.eval(context(), interaction(subject.wi), mi.Vector3f(subject.wo.T), True))
+        derivatives = dr.grad(values)
+        dr.eval(derivatives)
+        for name, derivative in derivatives.items():
+            wrong = ~np.isfinite(numbers(derivative)).all(axis=1)
+            assert not wrong.any(), f"the derivative for {name}: {subject.reproduction(None, np.argmax(wrong))}"
+
+    fuzz()
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.plugins[0])
+def test_everything_declared_is_fuzzed(model):
+    """Every property name, but for the numbers of lobes, and every word that the manual page lists."""
+    fuzzed = ways(model.declared())
+    names = {name for options in fuzzed for name in [*options.words, *(q.name for q in options.quantities)]}
+    unnumbered = {re.sub(r"_\d$", "", name) for parameter in model.declared() for name in parameter.names}
+    assert {re.sub(r"_\d$", "", name) for name in names} == unnumbered
+    for row in model.parameter_rows():
+        if row.type in ("string", "boolean") and row.name != "material":
+            assert {str(options.words.get(row.name)).lower() for options in fuzzed} >= set(row.range.split(" | "))

@@ -1,0 +1,403 @@
+"""Malformed input: one sentence that says what is wrong and what would be right, no crash, and nothing left behind."""
+
+from __future__ import annotations
+
+import difflib
+import gc
+import itertools
+import re
+import subprocess
+import sys
+from functools import singledispatch
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from fuzzing import examples, ways
+from hypothesis import assume
+from hypothesis import strategies as st
+from support import call, direction
+from test_resources import scene_of
+
+from mi_brdfs.cli import one_line
+from mi_brdfs.model import Model
+from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
+from mi_brdfs.registry import all_models
+
+MODELS = pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+
+
+@pytest.fixture(scope="module")
+def llvm_rgb():
+    """One for all tests: it takes longer to enter a variant than to load a plugin."""
+    with mi.variant_context("llvm_ad_rgb"):
+        yield
+
+
+def refusal(load, *arguments):
+    """The error of loading something, as a user sees it: in one line that a terminal shows as it is."""
+    with pytest.raises(RuntimeError) as caught:
+        load(*arguments)
+    sentence = one_line(caught.value)
+    assert sentence.isprintable() and len(sentence) < 600 and "Traceback" not in sentence, ascii(sentence[:600])
+    return sentence
+
+
+def usual(options):
+    """A plugin's properties, as good as any."""
+    return options.words | {quantity.name: quantity.default for quantity in options.quantities}
+
+
+# --- Values ---------------------------------------------------------------------------------------------------------
+
+
+def neither_numbers_nor_textures():
+    plugins = ("constant", "sphere", "diffuse", "ward", "hdrfilm", "independent", "path", "isotropic", "box")
+    others = [
+        mi.ScalarTransform4f(),
+        [0.1, 0.2, 0.3],
+        mi.ScalarPoint2f(1, 2),
+        mi.Float(0.5),
+        mi.Bitmap(np.zeros((2, 2))),
+    ]
+    texts = st.sampled_from(["", "\0", "\x1b[31m", "x" * 10_000]) | st.text().map("?{}".format)
+    return st.sampled_from([{"type": plugin} for plugin in plugins] + others) | texts
+
+
+def colours(channels):
+    """Colours and spectra."""
+    values = st.tuples(channels, channels, channels)
+    rgb = values.map(lambda value: {"type": "rgb", "value": list(value)})
+    return rgb | values.map(lambda value: {"type": "spectrum", "value": list(zip((400, 550, 700), value, strict=True))})
+
+
+def wrong_quantity(quantity):
+    """What a number or a colour may not be."""
+    low, high = quantity.limits
+    beyond = st.floats(max_value=low, exclude_max=True) | st.integers(max_value=int(low) - 1) | st.just(np.nan)
+    if high < np.inf:
+        beyond |= st.floats(min_value=high, exclude_min=True) | st.integers(min_value=int(high) + 1)
+    wrong_colours = colours(beyond) if quantity.colour else colours(st.just(quantity.default))
+    return neither_numbers_nor_textures() | st.booleans() | beyond | wrong_colours
+
+
+def wrong_word(words):
+    """What a choice among some words may not be."""
+    textures = st.sampled_from([{"type": "uniform", "value": 0.5}, {"type": "checkerboard"}])
+    wrong = neither_numbers_nor_textures() | st.floats() | st.integers() | colours(st.just(0.5)) | textures
+    return wrong if True in words else wrong | st.booleans()
+
+
+@MODELS
+@pytest.mark.usefixtures("llvm_rgb")
+def test_values(model):
+    """Every parameter is given as what it may not be, one after the other."""
+    known, plugin = ways(model.declared()), model.plugins[0]
+    wrong, given_beside = {}, {}
+    for options in known:
+        for quantity in options.quantities:
+            wrong.setdefault(quantity.name, wrong_quantity(quantity))
+        for name in options.words:
+            wrong.setdefault(name, wrong_word([other.words.get(name) for other in known]))
+        given_beside = {name: usual(options) for name in usual(options)} | given_beside
+
+    @examples(30, st.fixed_dictionaries(wrong))
+    def fuzz(values):
+        for name, value in values.items():
+            sentence = refusal(mi.load_dict, {"type": plugin, **given_beside[name], name: value})
+            assert sentence.startswith(f"{plugin}: {name} = ") and sentence.endswith("."), sentence
+            assert "; it must be " in sentence or "; the closest of Mitsuba's" in sentence, sentence
+
+    fuzz()
+
+
+# --- Names ----------------------------------------------------------------------------------------------------------
+
+
+@singledispatch
+def contradictions(parameter) -> list[dict]:
+    """Names that exclude each other or miss another one, with a word where it matters and else None."""
+    return []
+
+
+@contradictions.register
+def _(number: Number):
+    single, *others = number.names
+    lone = [] if number.lone_default else number.pair
+    return [*({single: None, other: None} for other in others), *({name: None} for name in lone)]
+
+
+@contradictions.register
+def _(fresnel: FresnelSet):
+    pairs = itertools.combinations(fresnel.SETS.values(), 2)
+    return [*(dict.fromkeys(one + other) for one, other in pairs), {"eta": None}, {"k": None}]
+
+
+@contradictions.register
+def _(lobes: PerLobe):
+    lobe = [[p.numbered(number) for p in lobes.declared.values()] for number in lobes.numbers[:4]]
+    (alone, *_), (first, *_), (second, *_), (*_, third) = ([p.names[0] for p in each] for each in lobe)
+    own = [names for p in lobe[0] + lobe[1] for names in contradictions(p)]
+    return [*own, {alone: None, first: None}, {second: None}, {first: None, third: None}]
+
+
+@contradictions.register
+def _(one_of: OneOf):
+    found = []
+    for word, declared in one_of.words.items():
+        own = [name for parameter in declared.values() for name in parameter.names]
+        found += [{one_of.name: word, name: None} for name in one_of.names[1:] if name not in own]
+        found += [{one_of.name: word} | names for p in declared.values() for names in contradictions(p)]
+    return found
+
+
+@MODELS
+@pytest.mark.usefixtures("llvm_rgb")
+def test_contradictions(model):
+    """Both ways to say the same, half of a pair, and what belongs to another choice."""
+    plugin, values = model.plugins[0], {}
+    for options in ways(model.declared()):
+        values |= usual(options)
+    for names in (names for parameter in model.declared() for names in contradictions(parameter)):
+        wrong = {name: values[name] if value is None else value for name, value in names.items()}
+        sentence = refusal(mi.load_dict, {"type": plugin, **wrong})
+        found = re.match(rf"{plugin}: (\w+) (?:excludes|needs|leaves a gap|does not belong to)\b.+\.$", sentence)
+        assert found and found[1] in wrong, sentence
+
+
+def likeness(*words):
+    return difflib.SequenceMatcher(None, *words).ratio()
+
+
+@st.composite
+def misspelt(draw, names):
+    """A name, and how someone may write it in a hurry."""
+    name = draw(st.sampled_from(names))
+    k = draw(st.integers(0, len(name) - 1))
+    letter = draw(st.sampled_from("aeiou_xyz1"))
+    wrong = draw(
+        st.sampled_from([name[k + 1 :], letter + name[k:], letter + name[k + 1 :], name[k::-1] + name[k + 1 :]])
+    )
+    return name, name[:k] + wrong
+
+
+@MODELS
+@pytest.mark.usefixtures("llvm_rgb")
+def test_unknown_names(model):
+    """Messages name the nearest known one; whatever the name is."""
+    plugin, known = model.plugins[0], [name for parameter in model.declared() for name in parameter.names]
+
+    @examples(30, st.tuples(misspelt(known), st.text(min_size=1)))
+    def fuzz(names):
+        (name, wrong), text = names
+        assume(wrong not in [*known, "type", "id", ""] and text not in known)
+        sentence = refusal(mi.load_dict, {"type": plugin, wrong: 0.5})
+        found = re.match(rf"{plugin}: unknown parameter {wrong}; did you mean (\w+)\? Known are .+\.$", sentence)
+        assert found and found[1] in known and likeness(found[1], wrong) >= likeness(name, wrong), sentence
+        refusal(mi.load_dict, {"type": plugin, text: 0.5})
+
+    fuzz()
+
+
+# --- Scene files ----------------------------------------------------------------------------------------------------
+
+VALID = """<bsdf type="twosided" version="3.0.0"><bsdf type="ward" id="paint">
+    <float name="alpha_u" value="0.1"/>
+    <texture name="alpha_v" type="checkerboard"><float name="color0" value="0.2"/></texture>
+    <rgb name="diffuse_reflectance" value="0.1, 0.2, 0.3"/>
+    <spectrum name="specular_reflectance" value="400:0.1, 700:0.2"/>
+    <string name="variant" value="ward-duer"/>
+</bsdf></bsdf>"""
+
+ENTITIES = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10}">' for k in range(1, 12))
+
+DOCUMENTS = {
+    "empty": "",
+    "no XML": "hello",
+    "binary": bytes(range(256)).decode("latin-1"),
+    "nulls": "\0" * 1000,
+    "cut": VALID[:200],
+    "unclosed": VALID.replace("</bsdf>", ""),
+    "crossed": VALID.replace("</bsdf>", "</texture>"),
+    "deep": "<bsdf>" * 100_000,
+    "deep and closed": VALID.replace("<float", '<bsdf type="ward">' * 2000 + "</bsdf>" * 2000 + "<float", 1),
+    "entities": f'<!DOCTYPE s [<!ENTITY e0 "lots">{ENTITIES}]>' + VALID.replace("ward-duer", "&e11;"),
+    "an entity from outside": '<!DOCTYPE s [<!ENTITY e SYSTEM "/etc/passwd">]>' + VALID.replace("ward-duer", "&e;"),
+    "no version": VALID.replace(' version="3.0.0"', ""),
+    "no type": VALID.replace(' type="ward"', ""),
+    "a type that is a path": VALID.replace("ward", "../../ward"),
+    "a type of something else": '<emitter type="ward" version="3.0.0"/>',
+    "itself inside": VALID.replace("<texture", '<ref name="rotation" id="paint"/><texture'),
+    "a circle": '<scene version="3.0.0"><bsdf type="ward" id="a"><ref name="alpha" id="b"/></bsdf>'
+    '<bsdf type="ward" id="b"><ref name="alpha" id="a"/></bsdf></scene>',
+}
+"""Whole documents. Left out is what breaks Mitsuba with its own plugins, too: None as a value in a dict, a ``bitmap``
+with no file, and a ``twosided`` in dozens of others, which takes it a time that is exponential in their number."""
+
+
+def ward(body):
+    return f'<bsdf type="ward" version="3.0.0">{body}</bsdf>'
+
+
+def bitmap(file):
+    return f'<texture name="alpha" type="bitmap"><string name="filename" value="{file}"/></texture>'
+
+
+PARAMETERS = {
+    "no number": '<float name="alpha" value="rough"/>',
+    "two points": '<float name="alpha" value="0.1.2"/>',
+    "no value": '<float name="alpha"/>',
+    "no name": '<float value="0.1"/>',
+    "an empty name": '<float name="" value="0.1"/>',
+    "twice": '<float name="alpha" value="0.1"/><float name="alpha" value="0.1"/>',
+    "infinite": '<float name="alpha" value="1e999"/>',
+    "5000 digits": f'<float name="alpha" value="{"9" * 5000}"/>',
+    "too tiny": '<float name="alpha" value="1e-320"/>',
+    "a huge integer": f'<integer name="alpha" value="{"9" * 30}"/>',
+    "two channels": '<rgb name="diffuse_reflectance" value="0.1, 0.2"/>',
+    "too bright": '<rgb name="diffuse_reflectance" value="0.1, 0.2, 3"/>',
+    "no colour": '<rgb name="diffuse_reflectance" value="#ff00zz"/>',
+    "half a spectrum": '<spectrum name="diffuse_reflectance" value="400:0.1, 500"/>',
+    "a spectrum without a file": '<spectrum name="diffuse_reflectance" filename="gone.spd"/>',
+    "a file name of escapes": '<spectrum name="diffuse_reflectance" filename="&#27;[31m&#7;&#10;gone"/>',
+    "a texture without a file": bitmap("gone.png"),
+    "a folder as a texture": bitmap("."),
+    "a number as a string": '<string name="alpha" value="0.1"/>',
+    "a megabyte": f'<string name="variant" value="{"x" * 10**6}"/>',
+    "a long name": f'<float name="{"x" * 10**5}" value="1"/>',
+    "escapes": '<string name="variant" value="&#27;[31mred&#7;&#10;&#9;"/>',
+    "escapes in a name": '<float name="&#27;[31mred&#7;" value="1"/>',
+    "Greek": '<float name="α" value="0.1"/>',
+    "right to left": '<string name="variant" value="\u202edraw"/>',
+    "a boolean": '<boolean name="alpha" value="true"/>',
+    "a vector": '<vector name="alpha" value="1, 2, 3"/>',
+    "a transform": '<transform name="alpha"><translate x="1"/></transform>',
+    "a BSDF": '<bsdf name="alpha" type="diffuse"/>',
+    "a BSDF without a name": '<bsdf type="ward"/>',
+    "an emitter": '<emitter name="alpha" type="area"/>',
+    "a shape without a name": '<shape type="sphere"/>',
+    "a reference to nowhere": '<ref name="alpha" id="nowhere"/>',
+    "an undefined variable": '<float name="alpha" value="$alpha"/>',
+    "an unknown tag": '<roughness name="alpha" value="0.1"/>',
+    "20000 names": "".join(f'<float name="p{k}" value="1"/>' for k in range(20_000)),
+}
+"""What stands inside a plugin."""
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "document", [*DOCUMENTS.values(), *map(ward, PARAMETERS.values())], ids=[*DOCUMENTS, *PARAMETERS]
+)
+def test_hostile_documents(document):
+    refusal(mi.load_string, document)
+
+
+@st.composite
+def edited(draw, text):
+    """A text with some characters gone and others put in, at one to three places."""
+    for _ in range(draw(st.integers(1, 3))):
+        start = draw(st.integers(0, len(text)))
+        added = draw(st.text("<>&\"'=/\0 \n0-9eE+.,:;#$%[]{}π\x1b", max_size=2))
+        text = text[:start] + added + text[start + draw(st.integers(0, 3)) :]
+    return text
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_edited_documents():
+    """They load, or they do not."""
+    assert mi.load_string(VALID)
+
+    @examples(500, edited(VALID))
+    def fuzz(document):
+        try:
+            mi.load_string(document)
+        except RuntimeError:
+            refusal(mi.load_string, document)
+
+    fuzz()
+
+
+FILES = {
+    "empty": b"",
+    "binary": bytes(range(256)) * 100,
+    "latin-1": ward('<string name="variant" value="é"/>').encode("latin-1"),
+    "itself": b'<scene version="3.0.0"><include filename="itself.xml"/></scene>',
+    "escapes": ward(PARAMETERS["escapes"]).encode(),
+    "a name with spaces": ward(PARAMETERS["infinite"]).encode(),
+}
+
+
+def command_line(folder, *arguments):
+    command = [sys.executable, "-m", "mi_brdfs.cli", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("command, name", [("check", "binary"), *(("render", name) for name in FILES)])
+def test_hostile_files(command, name, tmp_path):
+    """On the command line: an error in one line that names the file and the line."""
+    (tmp_path / f"{name}.xml").write_bytes(FILES[name])
+    done = command_line(tmp_path, command, f"{name}.xml")
+    assert done.returncode in (1, 2) and done.stdout == ""
+    assert done.stderr.startswith(f"mi-brdfs: {name}.xml: line 1") and done.stderr[:-1].isprintable(), done.stderr
+
+
+def test_ids_are_no_markup(tmp_path):
+    """A report names materials by their ids, whatever stands in them."""
+    body = '<shape type="sphere"><bsdf type="lambert" id="[/red]"/></shape>'
+    (tmp_path / "[b].xml").write_text(f'<scene version="3.0.0">{body}</scene>')
+    done = command_line(tmp_path, "check", "--only", "finite", "[b].xml")
+    assert done.returncode == 0 and "[b].xml: [/red]" in done.stdout, done.stderr
+
+
+# --- What is left behind --------------------------------------------------------------------------------------------
+
+
+def failures(count):
+    """Fail to load plugins, at one point or another, and as parts of others."""
+    texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.zeros((64, 64, 3), np.float32))}
+    wrong = [
+        {"type": "lambert", "reflectance": texture, "nope": 1},
+        {"type": "ward", "diffuse_reflectance": texture, "alpha": 7},
+        {"type": "ward", "alpha": texture, "variant": "wrad"},
+        {"type": "microfacet", "specular_reflectance": texture, "distribution": "abc"},
+        {"type": "walter", "f0": texture, "eta": 1.5},
+        {"type": "twosided", "nested": {"type": "ward", "diffuse_reflectance": texture, "alpha": 7}},
+    ]
+    for given, _ in zip(itertools.cycle(wrong), range(count), strict=False):
+        with pytest.raises(RuntimeError):
+            mi.load_dict(given)
+
+
+def alive():
+    """How many models there are."""
+    gc.collect()
+    return sum(isinstance(thing, Model) for thing in gc.get_objects())
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_failures_leave_no_model_behind():
+    """And what is right still loads and works."""
+    before, bsdf = alive(), mi.load_dict({"type": "lambert"})
+    assert alive() == before + 1
+    failures(200)
+    assert alive() == before + 1
+    (value,) = call(bsdf.eval, mi.BSDFContext(), direction(0)[None], direction(0)[None])
+    np.testing.assert_allclose(value, 0.5 / np.pi, rtol=1e-6)
+    picture = np.array(mi.render(mi.load_dict(scene_of({"type": "ward"})), spp=1))
+    assert np.isfinite(picture).all() and picture.any()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
+@pytest.mark.usefixtures("llvm_rgb")
+def test_failures_keep_no_memory():
+    """A thousand, each with a texture of 48 kB, leave less than 10 MB of the 48, once as many before them have filled
+    the pools that memory is kept in."""
+
+    def resident():
+        with open("/proc/self/statm") as statm:
+            return int(statm.read().split()[1]) * 4096 / 2**20
+
+    failures(1000)
+    before = resident()
+    failures(1000)
+    assert resident() - before < 10
