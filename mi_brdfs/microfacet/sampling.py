@@ -32,11 +32,11 @@ class Pair:
         """``(x, y, λ, τ)``, where (x, y) is the stretched azimuth of ``wi``."""
         distribution = lobe.distribution
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
-        # Facets are seen by n·wi, and by the typical slope along wi: they lean as far as the second one counts.
-        seen = dr.inv_pi * distribution.slope2(wi) / dr.square(wi.z)
+        # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
+        seen = dr.inv_pi * distribution.slope2(wi)
         fresnel = luminance(lobe.fresnel(mi.Float(1))) / dr.maximum(luminance(lobe.fresnel(wi.z)), 1e-9)
         tilt = self.TILT * wi.z * dr.minimum(self.STEEPEST * distribution.roughness2(), 1)
-        return x, y, dr.minimum(seen / (1 + seen) * fresnel, 0.95), tilt
+        return x, y, dr.minimum(seen / (seen + dr.square(wi.z)) * fresnel, 0.95), tilt
 
     @staticmethod
     def _line(distribution, wi, x, y):

@@ -206,20 +206,21 @@ STEP = 5e-4
 
 def continuity(run) -> Findings:
     """Values do not jump where formulas treat directions apart: at exactly normal incidence and reflection, and where
-    azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides, or a twentieth
-    of the lobe's width, for all but one pair in a hundred, but for its curvature and float32's rounding. And from 0.03°
-    above the horizon to half of it, eval changes at most as a fifth power does."""
+    azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides (or, of narrow
+    lobes, a twentieth of their width), to float32's rounding and for all but one pair in a hundred; or it comes nearer
+    to that the smaller the angle is. And from 0.03° above the horizon to half of it, eval changes at most as a fifth
+    power does."""
     for part in run.subject.parts:
         outcome, worst = Outcome("continuity", part.name), 0.0
         step = min(STEP, run.subject.spread(part) / 20)
-        tolerance = 10 * run.subject.rounding(part) + 10 * (step / run.subject.spread(part)) ** 2
+        tolerance = 10 * run.subject.rounding(part)
         for side in part.sides:
             for where, crossing in _crossings(np.degrees(step)):
                 crossing = [on_side(w, side) for w in crossing]
-                for word, (before, at, behind) in _both_ways(run, part, crossing, _companions(run, part, crossing[1])):
-                    mean = (before + behind) / 2
+                for word, (at, *around) in _both_ways(run, part, crossing, _companions(run, part, crossing[0])):
+                    mean, farther = (around[0] + around[1]) / 2, (around[2] + around[3]) / 2
                     scale = np.maximum(np.maximum(at, mean), 1e-6 * np.max(at) + 1e-12)
-                    jump = np.nan_to_num(abs(at - mean) / scale)
+                    jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), np.nan_to_num(abs(at - mean) / scale), 0)
                     typical = float(np.quantile(jump, 0.99))
                     worst = max(worst, typical)
                     if typical > tolerance:
@@ -245,11 +246,12 @@ def continuity(run) -> Findings:
 
 
 def _crossings(step: float):
-    """``(name, (before, at, behind))``: directions where formulas may break, with their neighbours."""
+    """``(name, directions)``: one where formulas may break, with its neighbours on both sides, near and farther."""
+    turns = 0, -step, step, -4 * step, 4 * step
     for phi in (0, 90, 135):
-        yield "the normal", [direction(theta, phi) for theta in (-step, 0, step)]
+        yield "the normal", [direction(turn, phi) for turn in turns]
     for phi in (0, 90, 180, 270):
-        yield f"θ = 50°, φ = {phi}°", [direction(50, phi + turn) for turn in (-step, 0, step)]
+        yield f"θ = 50°, φ = {phi}°", [direction(50, phi + turn) for turn in turns]
 
 
 def _companions(run, part: Part, wi) -> np.ndarray:
