@@ -395,7 +395,7 @@ class EPD(Isotropic):
         return self.scale * self._power(facet.sin2_h / cos2) * dr.square(dr.rcp(cos2))
 
     def over_density(self, tan2, g):
-        tan2 = dr.minimum(tan2, 1e14)
+        tan2 = dr.minimum(tan2, 1e12)
         x = dr.minimum(tan2 / self.width, 1e15)
         ratio = self._per_slope(tan2) * dr.square(1 + x) / self.steps.eval(x / (1 + x))
         return self.scale * dr.pi * self.width * ratio * dr.sqrt(1 + tan2)

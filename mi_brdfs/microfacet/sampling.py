@@ -76,9 +76,10 @@ class Pair:
         lean = (0.75 * dr.pi) * abs(cos * along_x + sin * along_y) * safe_sqrt(m)
         proposal = (1 - leaning) * (1 + tilt - 2 * tilt * m) + leaning * lean
 
-        weights = distribution.over_density(tan2, g) * mass * (reflected(lobe, facet) + reflected(lobe, facet.image()))
-        valid = weights > 1e-37
-        return select(valid, 2 * proposal * lobe.response(facet) / select(valid, weights, 1), 0)
+        total, ratio = reflected(lobe, facet) + reflected(lobe, facet.image()), distribution.over_density(tan2, g)
+        valid = (total > 1e-37) & (ratio > 1e-37)
+        share, ratio = lobe.response(facet) / select(valid, total, 1), select(valid, ratio, 1)
+        return select(valid, 2 * proposal * share / (ratio * mass), 0)
 
 
 def reflected(lobe, facet):
