@@ -41,8 +41,8 @@ class Pair:
     @staticmethod
     def _line(distribution, wi, x, y):
         """``(g, C(R), 1 - C(R))`` of the line along the slope (x, y), which is of length one."""
-        along = abs(x * wi.x + y * wi.y)
-        limit = (along + dr.sqrt(along * along + wi.z * wi.z)) / wi.z
+        along, z = abs(x * wi.x + y * wi.y), dr.maximum(wi.z, 1e-15)  # of which the square is not 0
+        limit = (along + dr.sqrt(along * along + z * z)) / z
         g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
         return g, *distribution.cdf(limit * limit, g)
 
