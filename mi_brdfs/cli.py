@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from enum import IntEnum
@@ -168,9 +168,7 @@ def check(
     from .validation import CHECKS
     from .validation.targets import find_targets
 
-    for name in only or []:
-        if name not in CHECKS:
-            _fail(f"--only {name}: there is no such check; there are {', '.join(CHECKS)}", Exit.USAGE)
+    _check_names(only, CHECKS, "check")
     if bool(targets) == every:
         _fail("name plugins or files to check, or give --all", Exit.USAGE)
     _check_folder("--html", html_file)
@@ -185,13 +183,9 @@ def check(
             except Exception as error:
                 text = one_line(error)
                 _fail(text if text.startswith(word) else f"{word}: {text}", Exit.USAGE)
-        try:
+        with _interruptible():
             reports = _check_all(found, only or None, chosen, min(jobs, len(found)))
-        except KeyboardInterrupt:
-            err.print("Interrupted; nothing was written.")
-            raise typer.Exit(Exit.INTERRUPTED) from None
-    if json_file is not None:
-        json_file.write_text(json.dumps([report.to_dict() for report in reports], indent=1) + "\n")
+    _write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
         from .validation.html import page
 
@@ -231,6 +225,17 @@ def _start_job(variant: str) -> None:
     mi.set_variant(variant)
 
 
+@contextmanager
+def _ending_processes() -> Iterator[None]:
+    """Let the processes end at once after an error or Ctrl-C."""
+    try:
+        yield
+    except BaseException:
+        for process in active_children():
+            process.terminate()
+        raise
+
+
 @app.command()
 def bench(
     only: Annotated[
@@ -247,40 +252,23 @@ def bench(
     from .bench import SECTIONS
     from .bench import bench as measure
 
-    for name in only or []:
-        if name not in SECTIONS:
-            _fail(f"--only {name}: there is no such section; there are {', '.join(SECTIONS)}", Exit.USAGE)
+    _check_names(only, SECTIONS, "section")
     _check_folder("--json", json_file)
     chosen = _set_tracing_variant(variant)
     start = time.perf_counter()
     columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
     with _stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
         task = progress.add_task("")
-        try:
+        with _interruptible():
             results = measure(only or None, lambda section, done, of: progress.update(
                 task, description=section, completed=done, total=of))  # fmt: skip
-        except KeyboardInterrupt:
-            err.print("Interrupted; nothing was written.")
-            raise typer.Exit(Exit.INTERRUPTED) from None
-    if json_file is not None:
-        json_file.write_text(json.dumps(results.to_dict(), indent=1) + "\n", encoding="utf-8")
+    _write_json(json_file, results.to_dict())
     for table in results.tables():
         _print_table(table)
         out.print()
     for sentence in results.missed:
         out.print(sentence)
     err.print(f"Measured in {time.perf_counter() - start:.0f} s, {chosen}; {len(results.missed)} targets are missed.")
-
-
-@contextmanager
-def _ending_processes() -> Iterator[None]:
-    """Let the processes end at once after an error or Ctrl-C."""
-    try:
-        yield
-    except BaseException:
-        for process in active_children():
-            process.terminate()
-        raise
 
 
 def _print_reports(reports: list[Report]) -> None:
@@ -363,6 +351,26 @@ def _output_files(output: Path) -> tuple[Path, Path]:
     except OSError as error:
         _fail(f"cannot write to the folder {output.parent}: {error.strerror}")
     return files
+
+
+def _check_names(names: list[str] | None, known: Collection[str], kind: str) -> None:
+    for name in names or []:
+        if name not in known:
+            _fail(f"--only {name}: there is no such {kind}; there are {', '.join(known)}", Exit.USAGE)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        err.print("Interrupted; nothing was written.")
+        raise typer.Exit(Exit.INTERRUPTED) from None
+
+
+def _write_json(file: Path | None, data: list | dict) -> None:
+    if file is not None:
+        file.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 def _check_folder(option: str, file: Path | None) -> None:

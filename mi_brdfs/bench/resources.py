@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..validation.derivatives import kernels_of
 from . import sizes
 from .cases import CASES, DEFAULTS, Plugin
 from .process import in_new_process
@@ -62,10 +63,8 @@ def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
 
 
 def _launched(scene: mi.Scene) -> set[int]:
-    """The kernels of a picture, by hash."""
-    dr.kernel_history_clear()
-    dr.eval(mi.render(scene, spp=1))
-    return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
+    """The kernels of a picture."""
+    return kernels_of(lambda: dr.eval(mi.render(scene, spp=1)))
 
 
 # --- Time and memory ------------------------------------------------------------------------------------------------

@@ -31,15 +31,17 @@ class Facet:
     def at(cls, wi, slope_x, slope_y) -> Facet:
         """The facet whose normal is ∝ (slope_x, slope_y, 1)."""
         inv_length = dr.rsqrt(slope_x * slope_x + slope_y * slope_y + 1)
-        h = mi.Vector3f(slope_x * inv_length, slope_y * inv_length, inv_length)
+        return cls.reflecting(wi, mi.Vector3f(slope_x * inv_length, slope_y * inv_length, inv_length))
+
+    @classmethod
+    def reflecting(cls, wi, h) -> Facet:
+        """The facet of the normal ``h``."""
         cos_d = dr.dot(wi, h)
         return cls(wi, 2 * cos_d * h - wi, h, cos_d)
 
     def image(self) -> Facet:
         """The facet on the other side of the normal, which reflects the same ``wi``."""
-        h = mi.Vector3f(-self.h.x, -self.h.y, self.h.z)
-        cos_d = dr.dot(self.wi, h)
-        return Facet(self.wi, 2 * cos_d * h - self.wi, h, cos_d)
+        return self.reflecting(self.wi, mi.Vector3f(-self.h.x, -self.h.y, self.h.z))
 
     @property
     def cos_i(self):

@@ -131,9 +131,7 @@ class BoundedVisibleNormals:
         normal = unit + point
         z = dr.maximum(normal.z, 1e-15)  # a cap that is nearly the whole sphere ends where the normal vanishes
         h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
-        h = h * dr.rsqrt(dr.dot(h, h))
-        cos_d = dr.dot(wi, h)
-        return Facet(wi, 2 * cos_d * h - wi, h, cos_d)
+        return Facet.reflecting(wi, h * dr.rsqrt(dr.dot(h, h)))
 
     def _density(self, distribution, facet):
         """``(density, unit vector of the stretched wi, point of the cap)``"""

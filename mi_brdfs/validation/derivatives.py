@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -152,6 +154,14 @@ def _differences(params, key, values, step):
     return low, high, trusted & np.isfinite(low) & np.isfinite(high), noise
 
 
+def kernels_of(work: Callable[[], object]) -> set[int]:
+    """The kernels that some work launches, by hash: whether one is compiled depends on the cache that earlier runs
+    left. They must be recorded, by ``dr.JitFlag.KernelHistory``."""
+    dr.kernel_history_clear()
+    work()
+    return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
+
+
 def recompiles(run) -> Findings:
     """A new value of a parameter compiles no kernel, after its first update."""
     subject, part = run.subject, run.subject.whole
@@ -160,10 +170,7 @@ def recompiles(run) -> Findings:
     wi, u = on_side(hemisphere(64, 1), part.sides[0]), random(64, 2)
 
     def launched():
-        """The kernels of a use, by hash: whether one was compiled depends on the cache that earlier runs left."""
-        dr.kernel_history_clear()
-        subject.sample(part, wi, u)
-        return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
+        return kernels_of(lambda: subject.sample(part, wi, u))
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         for key in keys:
