@@ -46,6 +46,13 @@ def expm1(x):
     return dr.select(small, near * _expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
 
 
+def expm1_exp(x):
+    """``(exp(x) - 1, exp(x))``, each with its digits, for x <= 0."""
+    small = x > -0.5
+    near, whole = dr.select(small, x, 0), dr.exp(x)
+    return dr.select(small, near * _expm1_series(near), whole - 1), whole
+
+
 def log1p_ratio(x):
     """log(1 + x)/x, and its limit 1 at x = 0."""
     small = abs(x) < 0.5
@@ -75,8 +82,8 @@ def _expm1_series(x):
 def log_cos(cos, sin2):
     """log(cosθ), from sin²θ where the cosine has lost its digits."""
     near = sin2 < 0.5
-    from_sin = 0.5 * log1p(-dr.select(near, sin2, 0))
-    return dr.select(near, from_sin, dr.log(dr.select(near, 1, dr.maximum(cos, 1e-30))))
+    x = dr.select(near, -sin2, 0)
+    return dr.select(near, 0.5 * x * _log1p_series(x), dr.log(dr.select(near, 1, dr.maximum(cos, 1e-30))))
 
 
 def safe_sqrt(x):

@@ -182,6 +182,10 @@ def _interval(limits: Range) -> str:
     return f"[{low:g}, {high:g}]" if math.isfinite(high) else f"[{low:g}, ∞)"
 
 
+def _default(value: float | None) -> str:
+    return "none" if value is None else f"{value:g}"
+
+
 def listed(words, last: str = "or", quote: bool = False) -> str:
     """Words as a sentence lists them."""
     words = [f'"{word}"' if quote else word for word in words]
@@ -202,6 +206,13 @@ class Slot:
 
     def evaluate(self, si, active):
         raise NotImplementedError
+
+
+class AbsentSlot(Slot):
+    """A parameter without a default that was not given; evaluated, None."""
+
+    def evaluate(self, si, active):
+        return None
 
 
 @dataclass
@@ -295,15 +306,11 @@ class OneOfSlot(Slot):
 
 
 class RotationSlot(Slot):
-    """The turn of the tangent frame, if one was given; evaluated, its (cosine, sine)."""
+    """The turn of the tangent frame; evaluated, its (cosine, sine)."""
 
-    @property
-    def anisotropic(self) -> bool:
-        return bool(self.textures)
+    anisotropic = True
 
     def evaluate(self, si, active):
-        if not self.textures:
-            return None
         turns = self.textures["rotation"].eval_1(si, active)
         sin, cos = dr.sincos(dr.two_pi * (turns - dr.round(turns)))  # whole turns would take the digits
         return cos, sin
@@ -369,11 +376,11 @@ class Spelling(NamedTuple):
 class Number(Parameter):
     """A scalar within ``limits``. An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and
     evaluates to a pair; with ``lone_default``, one of the pair alone leaves the other at the default. One with another
-    ``spelling`` may be given as that instead."""
+    ``spelling`` may be given as that instead. Without a default it is None where it is not given."""
 
     def __init__(
         self,
-        default: float,
+        default: float | None,
         limits: Range,
         text: str,
         *,
@@ -397,7 +404,9 @@ class Number(Parameter):
     def other(self) -> str:
         return self.spelling.name + self.number
 
-    def bind(self, given: Given) -> NumberSlot:
+    def bind(self, given: Given) -> Slot:
+        if self.default is None and self.name not in given:
+            return AbsentSlot()
         if self.spelling and self.other in given:
             if self.names[0] in given:
                 raise given.error(self.names[0], f"excludes {self.other}; give either {self.names[0]} or {self.other}")
@@ -409,15 +418,19 @@ class Number(Parameter):
         if len(names) == 1 and not self.lone_default:
             missing = next(name for name in self.pair if name not in given)
             raise given.error(names[0], f"needs {missing} beside it; give both, or {single} alone")
-        textures = {name: given.number(name, self.default, self.limits) for name in (self.pair if names else [single])}
+        textures = {
+            name: given.number(name, self.default or 0, self.limits) for name in (self.pair if names else [single])
+        }
         return NumberSlot(textures, self.limits, self.anisotropic)
 
     def placeholder(self, slot):
-        value = mi.Float(self.default)
+        if isinstance(slot, AbsentSlot):
+            return None
+        value = mi.Float(self.default or 0)
         return (value, value) if self.anisotropic else value
 
     def rows(self) -> list[Row]:
-        rows = [Row(self.names[0], "number", f"{self.default:g}", _interval(self.limits), self.text)]
+        rows = [Row(self.names[0], "number", _default(self.default), _interval(self.limits), self.text)]
         if self.anisotropic:
             lone = f"; one alone leaves the other at {self.default:g}" if self.lone_default else ""
             rows.append(
@@ -431,27 +444,29 @@ class Number(Parameter):
 
 
 class Colour(Parameter):
-    """A spectral quantity within ``limits``."""
+    """A spectral quantity within ``limits``. Without a default it is None where it is not given."""
 
-    def __init__(self, default: float, limits: Range, text: str):
+    def __init__(self, default: float | None, limits: Range, text: str):
         super().__init__(text)
         self.default, self.limits = default, limits
 
-    def bind(self, given: Given) -> ColourSlot:
+    def bind(self, given: Given) -> Slot:
         (name,) = self.names
-        return ColourSlot({name: given.colour(name, self.default, self.limits)}, self.limits)
+        if self.default is None and name not in given:
+            return AbsentSlot()
+        return ColourSlot({name: given.colour(name, self.default or 0, self.limits)}, self.limits)
 
     def placeholder(self, slot):
-        return mi.UnpolarizedSpectrum(self.default)
+        return None if isinstance(slot, AbsentSlot) else mi.UnpolarizedSpectrum(self.default or 0)
 
     def rows(self) -> list[Row]:
-        return [Row(self.names[0], "colour", f"{self.default:g}", _interval(self.limits), self.text)]
+        return [Row(self.names[0], "colour", _default(self.default), _interval(self.limits), self.text)]
 
 
 class Reflectance(Colour):
     """A colour in [0, 1]."""
 
-    def __init__(self, default: float, text: str):
+    def __init__(self, default: float | None, text: str):
         super().__init__(default, (0, 1), text)
 
 
@@ -665,8 +680,10 @@ class Rotation(Parameter):
     def __init__(self):
         super().__init__("turn of the tangent frame, counter-clockwise about n from dp_du, in turns (1 is 360°)")
 
-    def bind(self, given: Given) -> RotationSlot:
-        return RotationSlot({self.name: given.number(self.name, 0, (-1e4, 1e4))} if self.name in given else {})
+    def bind(self, given: Given) -> Slot:
+        if self.name not in given:
+            return AbsentSlot()
+        return RotationSlot({self.name: given.number(self.name, 0, (-1e4, 1e4))})
 
     def placeholder(self, slot):
         return None

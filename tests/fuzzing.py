@@ -62,7 +62,7 @@ def _(number: Number):
     spellings = [number.names[:1]]
     if number.anisotropic:
         spellings += [number.pair, *([name] for name in number.pair if number.lone_default)]
-    known = [Options({}, tuple(Quantity(n, number.limits, number.default) for n in names)) for names in spellings]
+    known = [Options({}, tuple(Quantity(n, number.limits, number.default or 0) for n in names)) for names in spellings]
     if number.spelling:
         default = number.default / number.spelling.scale
         known.append(Options({}, (Quantity(number.other, number.spelling.limits, default),)))
@@ -72,7 +72,7 @@ def _(number: Number):
 @alternatives.register
 def _(colour: Colour):
     (name,) = colour.names
-    return [Options({}, (Quantity(name, colour.limits, colour.default, colour=True),))]
+    return [Options({}, (Quantity(name, colour.limits, colour.default or 0, colour=True),))]
 
 
 @alternatives.register

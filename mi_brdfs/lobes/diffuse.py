@@ -28,6 +28,11 @@ class LambertLobe(Lobe):
         return mi.warp.square_to_cosine_hemisphere(v)
 
 
+def over_diffuse(reflectance, *lobes):
+    """Lobes over a diffuse one, if its reflectance was given."""
+    return lobes if reflectance is None else (LambertLobe(reflectance), *lobes)
+
+
 class ZonalLobe(Lobe):
     """f |cosθ_o| = albedo(wi)·p(cosθ_o)/2π: wherever it is seen from, light comes from the same density p of the
     cosine, by whose inverse it is sampled. The weight is the albedo."""

@@ -13,7 +13,7 @@ import functools
 import drjit as dr
 import mitsuba as mi
 
-from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
+from ..math import clamp, expm1, expm1_exp, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
 
 
 class Distribution:
@@ -38,7 +38,8 @@ class Distribution:
     def albedo(self, cos):
         """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
         have in the direction of that cosine."""
-        return 1 / (1 + self.LOSS * dr.power(self.roughness2(), 1.15) * (0.5 + 0.5 * cos))
+        r2 = self.roughness2()
+        return 1 / (1 + self.LOSS * r2 * dr.sqrt(dr.sqrt(dr.sqrt(r2))) * (0.5 + 0.5 * cos))
 
     def eval(self, facet):
         """D(h)."""
@@ -75,7 +76,8 @@ class Beckmann(Distribution):
         return dr.exp(-self.steepness(facet) / cos2) / dr.square(cos2) / (dr.pi * self.alpha_u * self.alpha_v)
 
     def cdf(self, tan2, g):
-        return -expm1(-g * tan2), dr.exp(-g * tan2)
+        expm1, exp = expm1_exp(-g * tan2)
+        return -expm1, exp
 
     def inverse_cdf(self, c, complement, g):
         return -log_complement(c, complement) / g
@@ -428,8 +430,8 @@ def tan2_of_versine(v):
 
 def cosine_power_cdf(tan2, power):
     """``(C, 1 - C)`` for 1 - C = cosθ^power."""
-    logarithm = -0.5 * power * log1p(dr.minimum(tan2, 1e30))
-    return -expm1(logarithm), dr.exp(logarithm)
+    expm1, exp = expm1_exp(-0.5 * power * log1p(dr.minimum(tan2, 1e30)))
+    return -expm1, exp
 
 
 def inverse_cosine_power_cdf(c, complement, power):
@@ -438,7 +440,5 @@ def inverse_cosine_power_cdf(c, complement, power):
 
 
 def log_complement(c, complement):
-    """log(1 - c), from whichever of c and 1 - c has its digits."""
-    in_peak = c < 0.5
-    peak = log1p(-dr.select(in_peak, c, 0))
-    return dr.select(in_peak, peak, dr.log(dr.select(in_peak, 1, dr.maximum(complement, 1e-37))))
+    """log(1 - c), from both c and 1 - c, of which the smaller one has the digits."""
+    return -log1p(c / dr.maximum(complement, 1e-37))

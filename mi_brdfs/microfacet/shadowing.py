@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import drjit as dr
 
 
@@ -40,12 +42,20 @@ class SmithGGX(Smith):
 
 
 class SmithBeckmann(Smith):
-    """Λ = ½(exp(-a²)/(a √π) - erfc(a)), a as for GGX: exact for Beckmann's distribution."""
+    """Λ = ½(exp(-a²)/(a √π) - erfc(a)), a as for GGX: exact for Beckmann's distribution.
+
+    That is ½ i(a)/a, where i(a) = exp(-a²)/√π - a erfc(a), the integral of erfc from a on, is fitted by an eighth power
+    to 3e-8: it takes a tenth of the time of the error function and the exponential.
+    """
+
+    FIT = (1, 0.221556308, 0.0959011886, 0.0280231588, 5.94910138e-3, 9.66725376e-4, 6.13396596e-4, -1.03606616e-4,
+           4.20437499e-5)  # fmt: skip
 
     def stretched(self, v):
         slope = dr.sqrt(dr.maximum(self.slope2(v), 1e-30))
         a = dr.minimum(v.z / slope, 10)
-        return v.z * dr.erf(a) + slope * dr.inv_sqrt_pi * dr.exp(-a * a)
+        root = dr.rcp(functools.reduce(lambda sum, factor: sum * a + factor, reversed(self.FIT)))
+        return v.z + slope * dr.inv_sqrt_pi * dr.square(dr.square(dr.square(root)))
 
 
 class SmithBlinn(Smith):

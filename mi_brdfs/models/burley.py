@@ -86,9 +86,9 @@ class Burley(Model):
     spec_tint = Number(0, (0, 1), "tint of the dielectric's reflection towards the hue of C")
     roughness = Number(0.5, (0, 1), "roughness of the base and the specular lobe; the facets' is its square")
     anisotropic = Anisotropy(0, (0, 1), "how far the highlight is drawn out along dp_du")
-    sheen = Number(0, (0, 1), "scale of the sheen")
+    sheen = Number(None, (0, 1), "scale of the sheen; not given, there is none")
     sheen_tint = Number(0.5, (0, 1), "tint of the sheen towards the hue of C")
-    clearcoat = Number(0, (0, 1), "scale of the clear coat, in units of 0.25")
+    clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; not given, there is none")
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
     rotation = Rotation()
 
@@ -102,15 +102,15 @@ class Burley(Model):
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)
         alpha, aspect = dr.square(p.roughness), dr.sqrt(1 - 0.9 * p.anisotropic)
         alpha = dr.maximum(0.001, alpha / aspect), dr.maximum(0.001, alpha * aspect)
-        coat_alpha = dr.lerp(0.1, 0.001, p.clearcoat_gloss)
-        return (
-            BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface),
-            SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)),
-            DimmedLobe(1, GGX(*alpha), SmithGGX(*alpha, correlated=False), Schlick(f0), PairOfVisibleNormals()),
-            DimmedLobe(
-                0.25 * p.clearcoat, GTR(coat_alpha, 1), SmithGGX(0.25, 0.25, correlated=False), Schlick(0.04), Pair()
-            ),
-        )
+        lobes = [BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface)]
+        if p.sheen is not None:
+            lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
+        facets = GGX(*alpha), SmithGGX(*alpha, correlated=False)
+        lobes.append(DimmedLobe(1, *facets, Schlick(f0), PairOfVisibleNormals()))
+        if p.clearcoat is not None:
+            facets = GTR(dr.lerp(0.1, 0.001, p.clearcoat_gloss), 1), SmithGGX(0.25, 0.25, correlated=False)
+            lobes.append(DimmedLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), Pair()))
+        return tuple(lobes)
 
 
 def schlick_weight(cos):
@@ -154,7 +154,10 @@ class BaseLobe(Lobe):
 
     def sample(self, wi, u, v):
         uniform, _ = choose(u, self._uniform(wi))
-        return dr.select(uniform, mi.warp.square_to_uniform_hemisphere(v), mi.warp.square_to_cosine_hemisphere(v))
+        cos = dr.select(uniform, v.x, dr.sqrt(v.x))
+        sin = dr.sqrt(1 - cos * cos)
+        sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
+        return mi.Vector3f(sin * cos_phi, sin * sin_phi, cos)
 
 
 class SheenLobe(Lobe):

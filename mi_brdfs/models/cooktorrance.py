@@ -1,6 +1,6 @@
 import drjit as dr
 
-from ..lobes import LambertLobe, MicrofacetLobe
+from ..lobes import MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import GGX, Beckmann, Blinn
 from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import vcavity
@@ -47,7 +47,7 @@ class CookTorrance(Model):
     {"type": "cooktorrance", "material": "Cu", "alpha": 0.25}
     """
 
-    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     alpha = Number(0.1, (1e-4, 2), "roughness α (the paper's m), the root mean square slope of the facets")
     fresnel = FresnelSet()
@@ -65,4 +65,4 @@ class CookTorrance(Model):
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1
         specular = MicrofacetLobe(p.specular_reflectance * scale, distribution, vcavity, p.fresnel, Pair())
-        return LambertLobe(p.diffuse_reflectance), specular
+        return over_diffuse(p.diffuse_reflectance, specular)

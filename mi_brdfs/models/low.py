@@ -1,7 +1,7 @@
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import LambertLobe, Lobe, MicrofacetLobe
+from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import clamp, luminance, normalize_or, safe_sqrt
 from ..microfacet.distributions import ABC, PowerLaw
 from ..microfacet.fresnel import Dielectric
@@ -49,7 +49,7 @@ class Low(Model):
     {"type": "low", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.2]}, "a": 50.0, "b": 2000, "c": 1.2}
     """
 
-    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
     a = Colour(1, (0, float("inf")), "scale A")
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
     c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
@@ -76,7 +76,7 @@ class Low(Model):
         else:
             scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
             specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, Pair())
-        return LambertLobe(p.diffuse_reflectance), specular
+        return over_diffuse(p.diffuse_reflectance, specular)
 
 
 class SmoothLobe(Lobe):

@@ -2,7 +2,7 @@ import math
 
 import drjit as dr
 
-from ..lobes import DimmedLobe, LambertLobe
+from ..lobes import DimmedLobe, over_diffuse
 from ..microfacet import distributions, shadowing
 from ..microfacet.sampling import Pair, PairOfVisibleNormals
 from ..model import Energy, Model
@@ -79,7 +79,7 @@ class Microfacet(Model):
     {"type": "microfacet", "distribution": "gtr", "alpha": 0.2, "gamma": 1.5, "shadowing": "vcavity", "material": "Al"}
     """
 
-    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     distribution = OneOf(
         {
@@ -164,7 +164,7 @@ class Microfacet(Model):
         visible = p.distribution.choice == "ggx" and p.shadowing.choice == "smith"
         sampler = PairOfVisibleNormals() if visible else Pair()
         specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
-        return LambertLobe(p.diffuse_reflectance), specular
+        return over_diffuse(p.diffuse_reflectance, specular)
 
 
 DISTRIBUTIONS = {

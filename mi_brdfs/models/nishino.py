@@ -1,4 +1,4 @@
-from ..lobes import DimmedLobe, LambertLobe
+from ..lobes import DimmedLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.sampling import Pair
@@ -47,7 +47,7 @@ class Nishino(Model):
     {"type": "nishino", "kappa": -8, "gamma": 40, "material": "Cu"}
     """
 
-    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe")
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")
     gamma = Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe")
@@ -62,4 +62,4 @@ class Nishino(Model):
         else:
             shadowing, fresnel = implicit, Unit()
         specular = DimmedLobe(p.specular_reflectance, distribution, shadowing, fresnel, Pair())
-        return LambertLobe(p.diffuse_reflectance), specular
+        return over_diffuse(p.diffuse_reflectance, specular)

@@ -1,4 +1,4 @@
-from ..lobes import LambertLobe, MicrofacetLobe
+from ..lobes import MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import GGX
 from ..microfacet.sampling import BoundedVisibleNormals
 from ..microfacet.shadowing import SmithGGX
@@ -40,7 +40,7 @@ class Walter(Model):
     {"type": "walter", "material": "Au", "alpha": 0.2}
     """
 
-    diffuse_reflectance = Reflectance(0, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     alpha = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
     fresnel = FresnelSet()
@@ -57,4 +57,4 @@ class Walter(Model):
             p.fresnel,
             BoundedVisibleNormals(),
         )
-        return LambertLobe(p.diffuse_reflectance), specular
+        return over_diffuse(p.diffuse_reflectance, specular)
