@@ -46,13 +46,6 @@ def expm1(x):
     return dr.select(small, near * _expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
 
 
-def expm1_exp(x):
-    """``(exp(x) - 1, exp(x))``, each with its digits, for x <= 0."""
-    small = x > -0.5
-    near, whole = dr.select(small, x, 0), dr.exp(x)
-    return dr.select(small, near * _expm1_series(near), whole - 1), whole
-
-
 def log1p_ratio(x):
     """log(1 + x)/x, and its limit 1 at x = 0."""
     small = abs(x) < 0.5

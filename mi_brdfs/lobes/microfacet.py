@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import luminance, safe_sqrt
+from ..math import safe_sqrt
 from ..microfacet.facet import Facet
 from ..microfacet.shadowing import SmithGGX
 from .lobe import Lobe
@@ -36,12 +36,12 @@ class MicrofacetLobe(Lobe):
         return self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
 
     def response(self, facet):
-        """f cosθ_o as a number, for ρ = 1."""
-        return luminance(self.fresnel(facet.cos_d)) * self._facets(facet)
+        """f cosθ_o for ρ = 1, as the one number that samplers go by."""
+        return self.fresnel.brightness(facet.cos_d) * self._facets(facet)
 
     def over_facets(self, facet):
         """``response``·4cosθ_d/D, which with D/q makes the weight of a half vector of the density q."""
-        return luminance(self.fresnel(facet.cos_d)) * self.shadowing(facet) * facet.cos_d / facet.cos_i
+        return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet) * facet.cos_d / facet.cos_i
 
 
 class DimmedLobe(MicrofacetLobe):

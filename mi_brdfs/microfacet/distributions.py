@@ -13,7 +13,7 @@ import functools
 import drjit as dr
 import mitsuba as mi
 
-from ..math import clamp, expm1, expm1_exp, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
+from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
 
 
 class Distribution:
@@ -50,7 +50,8 @@ class Distribution:
         return dr.sqrt(1 + tan2)
 
     def cdf(self, tan2, g):
-        """``(C, 1 - C)``: the cumulative distribution in t on the line, and its complement with digits of its own."""
+        """``(C, 1 - C)``: the cumulative distribution in t on the line, to 1e-7, and its complement with digits of its
+        own."""
         raise NotImplementedError
 
     def inverse_cdf(self, c, complement, g):
@@ -76,11 +77,11 @@ class Beckmann(Distribution):
         return dr.exp(-self.steepness(facet) / cos2) / dr.square(cos2) / (dr.pi * self.alpha_u * self.alpha_v)
 
     def cdf(self, tan2, g):
-        expm1, exp = expm1_exp(-g * tan2)
-        return -expm1, exp
+        complement = dr.exp(-g * tan2)
+        return 1 - complement, complement
 
     def inverse_cdf(self, c, complement, g):
-        return -log_complement(c, complement) / g
+        return -dr.log(dr.maximum(complement, 1e-37)) / g
 
 
 class GGX(Distribution):
@@ -198,6 +199,31 @@ class GTR(Isotropic):
 
     def inverse_cdf(self, c, complement, g):
         s = clamp(self.law.inverse(c * self.law.norm), 0, 1 - 1e-7)
+        return s / (1 - s)
+
+
+class Berry(Isotropic):
+    """D = k/(π log(1+k) (1 + k sin²θ_h)), k = 1/α² - 1 (Berry 1923): GTR of γ = 1."""
+
+    def __init__(self, alpha):
+        super().__init__()
+        self.alpha2 = dr.square(alpha)
+        self.k = (1 - self.alpha2) / self.alpha2
+        self.range = dr.log(1 + self.k)
+
+    def roughness2(self):
+        return self.alpha2
+
+    def eval(self, facet):
+        return self.k / (dr.pi * self.range * (1 + self.k * facet.sin2_h))
+
+    def cdf(self, tan2, g):
+        tan2 = dr.minimum(tan2, 1e30)
+        c = dr.minimum(dr.log(1 + self.k * (tan2 / (1 + tan2))) / self.range, 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        s = clamp((dr.exp(c * self.range) - 1) / self.k, 0, 1 - 1e-7)
         return s / (1 - s)
 
 
@@ -430,15 +456,15 @@ def tan2_of_versine(v):
 
 def cosine_power_cdf(tan2, power):
     """``(C, 1 - C)`` for 1 - C = cosθ^power."""
-    expm1, exp = expm1_exp(-0.5 * power * log1p(dr.minimum(tan2, 1e30)))
-    return -expm1, exp
+    complement = dr.exp(-0.5 * power * log1p(dr.minimum(tan2, 1e30)))
+    return 1 - complement, complement
 
 
 def inverse_cosine_power_cdf(c, complement, power):
     """The tan²θ of a ``cosine_power_cdf`` value."""
-    return dr.minimum(expm1(log_complement(c, complement) * (-2 / power)), 1e30)
+    return dr.minimum(expm1(log_complement(complement) * (-2 / power)), 1e30)
 
 
-def log_complement(c, complement):
-    """log(1 - c), from both c and 1 - c, of which the smaller one has the digits."""
-    return -log1p(c / dr.maximum(complement, 1e-37))
+def log_complement(complement):
+    """log(1 - c) of the complement 1 - c. Where c has more digits it is 1e-7 off: so little that no sample shows it."""
+    return dr.log(dr.maximum(complement, 1e-37))

@@ -1,10 +1,11 @@
-"""Fresnel reflectance F(cosθ_d): each class holds its parameters, and is called with the cosine."""
+"""Fresnel reflectance F(cosθ_d): each class holds its parameters, and is called with the cosine. Its ``brightness``
+is one number for a reflectance that may have a colour, about the luminance: samplers choose by it."""
 
 from __future__ import annotations
 
 import drjit as dr
 
-from ..math import safe_sqrt
+from ..math import luminance, safe_sqrt
 
 
 class Unit:
@@ -12,6 +13,8 @@ class Unit:
 
     def __call__(self, cos):
         return 1.0
+
+    brightness = __call__
 
 
 class Schlick:
@@ -24,6 +27,9 @@ class Schlick:
         m = dr.maximum(1 - cos, 0)
         m2 = m * m
         return self.f0 + (1 - self.f0) * (m2 * m2 * m)
+
+    def brightness(self, cos):
+        return Schlick(luminance(self.f0))(cos)
 
 
 class Dielectric:
@@ -43,6 +49,8 @@ class Dielectric:
         s = dr.square(difference / (g + cos))
         p = dr.square((cos * (g + cos) - 1) / (cos * difference + 1))
         return dr.select(total, 1, 0.5 * s * (1 + p))
+
+    brightness = __call__
 
 
 class Conductor:
@@ -64,3 +72,6 @@ class Conductor:
         even_p, odd_p = modulus * cos2 + sin2 * sin2, odd_s * sin2
         p = (even_p - odd_p) / (even_p + odd_p)
         return 0.5 * s * (1 + p)
+
+    def brightness(self, cos):
+        return Conductor(luminance(self.eta), luminance(self.k))(cos)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, clamp, luminance, normalize_or, safe_sqrt, select
+from ..math import choose, clamp, normalize_or, safe_sqrt, select
 from .facet import Facet
 
 
@@ -35,7 +35,7 @@ class Pair:
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
         seen = dr.inv_pi * distribution.slope2(wi)
-        fresnel = luminance(lobe.fresnel(mi.Float(1))) / dr.maximum(luminance(lobe.fresnel(wi.z)), 1e-9)
+        fresnel = lobe.fresnel.brightness(1) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9)
         tilt = self.TILT * wi.z * dr.minimum(self.STEEPEST * distribution.roughness2(), 1)
         return x, y, dr.minimum(seen / (seen + dr.square(wi.z)) * fresnel, 0.95), tilt
 

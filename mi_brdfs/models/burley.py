@@ -5,8 +5,8 @@ import mitsuba as mi
 
 from ..lobes import DimmedLobe, Lobe
 from ..lobes.mirror import AxisFrame
-from ..math import choose, expm1, log1p, luminance, safe_sqrt
-from ..microfacet.distributions import GGX, GTR
+from ..math import choose, luminance, safe_sqrt
+from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Pair, PairOfVisibleNormals
@@ -108,7 +108,7 @@ class Burley(Model):
         facets = GGX(*alpha), SmithGGX(*alpha, correlated=False)
         lobes.append(DimmedLobe(1, *facets, Schlick(f0), PairOfVisibleNormals()))
         if p.clearcoat is not None:
-            facets = GTR(dr.lerp(0.1, 0.001, p.clearcoat_gloss), 1), SmithGGX(0.25, 0.25, correlated=False)
+            facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), SmithGGX(0.25, 0.25, correlated=False)
             lobes.append(DimmedLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), Pair()))
         return tuple(lobes)
 
@@ -203,16 +203,15 @@ class SheenLobe(Lobe):
     def sample(self, wi, u, v):
         frame = AxisFrame(-wi)
         shape_a, shape_b = self._shape(wi)
-        power = -expm1(log1p(-v.x) / shape_b)
-        cos = dr.power(power, 1 / shape_a) * (1 + frame.sin) - 1
+        cos = dr.power(1 - dr.power(1 - v.x, 1 / shape_b), 1 / shape_a) * (1 + frame.sin) - 1
         sin = safe_sqrt(1 - cos * cos)
 
         upright, tilted = -wi.z * cos, frame.sin * sin
         whole = upright >= tilted
-        flip = 2 * u * upright > upright + tilted * dr.cos(dr.two_pi * v.y)
-        circle = dr.two_pi * v.y + dr.select(flip, dr.pi, 0)
+        sin_psi, cos_psi = dr.sincos(dr.two_pi * v.y)
+        flip = dr.select(2 * u * upright > upright + tilted * cos_psi, -1, 1)
         half = safe_sqrt(0.5 * (upright + tilted) / dr.select(whole, 1, dr.maximum(tilted, 1e-30)))
         s = 2 * dr.sin(dr.asin(2 * v.y - 1) / 3) * dr.minimum(half, 1)
-        psi = dr.select(whole, circle, 2 * dr.safe_asin(s))
-        sin_psi, cos_psi = dr.sincos(psi)
+        sin_psi = dr.select(whole, flip * sin_psi, 2 * s * safe_sqrt(1 - s * s))
+        cos_psi = dr.select(whole, flip * cos_psi, 1 - 2 * s * s)
         return frame.axis * cos + frame.up * (sin * cos_psi) + frame.side * (sin * sin_psi)

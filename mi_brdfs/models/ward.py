@@ -99,7 +99,7 @@ class ApproximateBeckmann(Distribution):
 
     def inverse_cdf(self, c, complement, g):
         total = -expm1(-2 * g)
-        return tan2_of_versine(-log_complement(c * total, complement * total + (1 - total)) / (2 * g))
+        return tan2_of_versine(-log_complement(complement * total + (1 - total)) / (2 * g))
 
 
 SHADOWING = {
