@@ -7,6 +7,7 @@ import mitsuba as mi
 
 from ..math import choose, clamp, normalize_or, safe_sqrt, select
 from .facet import Facet
+from .fresnel import Dielectric, Schlick
 
 
 class Pair:
@@ -181,3 +182,9 @@ class PairOfVisibleNormals(BoundedVisibleNormals):
     def _weight(lobe, facet):
         """f cosθ_o over the density, but for what is the same for both."""
         return reflected(lobe, facet) / dr.maximum(facet.cos_d, 1e-9)
+
+
+def visible_normals(fresnel):
+    """A sampler of visible normals for a lobe of GGX facets and Smith's shadowing: the pair where the reflectance rises
+    from a few percent to one, as it does for dielectrics. Elsewhere its time is worth more than its noise."""
+    return PairOfVisibleNormals() if isinstance(fresnel, Dielectric | Schlick) else BoundedVisibleNormals()

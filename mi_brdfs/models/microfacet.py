@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes import DimmedLobe, over_diffuse
 from ..microfacet import distributions, shadowing
-from ..microfacet.sampling import Pair, PairOfVisibleNormals
+from ..microfacet.sampling import Pair, visible_normals
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
 
@@ -63,8 +63,7 @@ class Microfacet(Model):
     formulas were known, from later papers and public code. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); ggx with smith by one of two visible normals (PairOfVisibleNormals). No sample
-    falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair), so that no sample falls below the horizon; ggx with smith as ``walter``.
 
     Example
     -------
@@ -162,7 +161,7 @@ class Microfacet(Model):
         distribution = DISTRIBUTIONS[p.distribution.choice](p.distribution)
         term = SHADOWING[p.shadowing.choice](p)
         visible = p.distribution.choice == "ggx" and p.shadowing.choice == "smith"
-        sampler = PairOfVisibleNormals() if visible else Pair()
+        sampler = visible_normals(p.fresnel) if visible else Pair()
         specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
         return over_diffuse(p.diffuse_reflectance, specular)
 

@@ -1,6 +1,6 @@
-from ..lobes import MicrofacetLobe, over_diffuse
+from ..lobes import DimmedLobe, over_diffuse
 from ..microfacet.distributions import GGX
-from ..microfacet.sampling import BoundedVisibleNormals
+from ..microfacet.sampling import visible_normals
 from ..microfacet.shadowing import SmithGGX
 from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
@@ -27,8 +27,8 @@ class Walter(Model):
     ``roughconductor`` with ``distribution="ggx"`` (separable), but in polarized variants the light is depolarised.
     One-sided.
 
-    Sampling: bounded visible normals, tilted towards the normal
-    (mi_brdfs.microfacet.sampling.BoundedVisibleNormals).
+    Sampling: bounded visible normals, tilted towards the normal; for dielectrics one of two, chosen by what they
+    reflect (mi_brdfs.microfacet.sampling.BoundedVisibleNormals and PairOfVisibleNormals).
 
     Example
     -------
@@ -50,11 +50,11 @@ class Walter(Model):
     energy = Energy(0.988, [({}, 1)])
 
     def lobes(self, p):
-        specular = MicrofacetLobe(
+        specular = DimmedLobe(
             p.specular_reflectance,
             GGX(*p.alpha),
             SmithGGX(*p.alpha, correlated=self.shadowing == "correlated"),
             p.fresnel,
-            BoundedVisibleNormals(),
+            visible_normals(p.fresnel),
         )
         return over_diffuse(p.diffuse_reflectance, specular)
