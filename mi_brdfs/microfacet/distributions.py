@@ -331,8 +331,10 @@ class HemiEPD(Isotropic):
         return integral * log_k / k
 
     def roughness2(self):
-        # That of Blinn's distribution with the same slope at the normal.
-        return dr.minimum(2 / (2 + self.gamma / dr.maximum(expm1_ratio(-self.kappa), 1e-30)), 1)
+        # That of Blinn's distribution with about the same mean of log(cosθ).
+        up, down = dr.maximum(self.kappa, 0), dr.maximum(-self.kappa, 0)
+        narrower = dr.select(self.kappa > 0, 1 + up * up / (up + 7), 1 / (1 + 0.35 * dr.log(1 + 0.5 * down)))
+        return 2 / (2 + self.gamma * narrower)
 
     def eval(self, facet):
         power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))

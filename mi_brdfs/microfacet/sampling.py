@@ -21,24 +21,23 @@ class Pair:
     (W + W')/2. (Unclipped, and with the visibility in place of W, it would be the V-cavity sampler of Heitz and d'Eon
     2014, doi:10.1111/cgf.12417.)
 
-    Two things that W does over the line are anticipated. Rough lobes are shadowed at its ends: m has the density
-    1 + τ - 2 τ m. And at grazing those half vectors are seen that lean towards ``wi``, along the plane of incidence: a
-    part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and more of their mass outside, τ = -0.6.
+    Rough lobes are shadowed at the ends of the line: m has the density 1 + τ - 2 τ m.
     """
 
-    TILT, STEEPEST, OUTWARD = 0.75, 1.5, -0.6
-    """τ = TILT cosθ_i for slopes of a mean square of 1/STEEPEST and more, and OUTWARD along the plane of incidence.
-    Chosen by measurement."""
+    TILT, STEEPEST = 0.75, 1.5
+    """τ = TILT cosθ_i for slopes of a mean square of 1/STEEPEST and more. Chosen by measurement."""
 
-    def _proposal(self, lobe, wi):
-        """``(x, y, λ, τ)``, where (x, y) is the stretched azimuth of ``wi``."""
-        distribution = lobe.distribution
-        x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
-        # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        seen = dr.inv_pi * distribution.slope2(wi)
-        fresnel = lobe.fresnel.brightness(1) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9)
-        tilt = self.TILT * wi.z * dr.minimum(self.STEEPEST * distribution.roughness2(), 1)
-        return x, y, dr.minimum(seen / (seen + dr.square(wi.z)) * fresnel, 0.95), tilt
+    def _tilt(self, lobe, wi):
+        return self.TILT * wi.z * dr.minimum(self.STEEPEST * lobe.distribution.roughness2(), 1)
+
+    def _draw(self, lobe, wi, u, v):
+        """``(u, cosψ, sinψ, m)``, with what is left of ``u``."""
+        sin, cos = dr.sincos(dr.two_pi * v.x)
+        return u, cos, sin, draw_tilted(self._tilt(lobe, wi), v.y)
+
+    def _density(self, lobe, wi, cos, sin, m):
+        """Of that draw, times 2π."""
+        return tilted(self._tilt(lobe, wi), m)
 
     @staticmethod
     def _line(distribution, wi, x, y):
@@ -50,17 +49,9 @@ class Pair:
 
     def sample(self, lobe, wi, u, v):
         distribution = lobe.distribution
-        along_x, along_y, leaning, tilt = self._proposal(lobe, wi)
-        leans, u = choose(u, leaning)
-        sin, cos = dr.sincos(dr.two_pi * v.x)
-        sin = dr.select(leans, 2 * v.x - 1, sin)
-        cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
-        cos, sin = cos * along_x - sin * along_y, cos * along_y + sin * along_x
+        u, cos, sin, m = self._draw(lobe, wi, u, v)
         x, y = normalize_or(distribution.alpha_u * cos, distribution.alpha_v * sin, (1, 0))
-
         g, mass, rest = self._line(distribution, wi, x, y)
-        tilt = dr.select(leans, self.OUTWARD, tilt)
-        m = 2 * v.y / (1 + tilt + safe_sqrt(dr.square(1 + tilt) - 4 * tilt * v.y))
         tan = safe_sqrt(distribution.inverse_cdf(m * mass, rest + (1 - m) * mass, g))
         facet = Facet.at(wi, tan * x, tan * y)
         image = facet.image()
@@ -69,24 +60,64 @@ class Pair:
 
     def pdf(self, lobe, facet):
         distribution = lobe.distribution
-        along_x, along_y, leaning, tilt = self._proposal(lobe, facet.wi)
         x, y = normalize_or(facet.h.x, facet.h.y, (1, 0))
         g, mass, _ = self._line(distribution, facet.wi, x, y)
         cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
         tan2 = facet.sin2_h / dr.square(facet.cos_h)
         m = clamp(distribution.cdf(tan2, g)[0] / mass, 0, 1)
-        across_lines = 0.5 * dr.pi * abs(cos * along_x + sin * along_y)
-        proposal = (1 - leaning) * tilted(tilt, m) + leaning * across_lines * tilted(self.OUTWARD, m)
 
         total, ratio = reflected(lobe, facet) + reflected(lobe, facet.image()), distribution.over_density(tan2, g)
         valid = (total > 1e-37) & (ratio > 1e-37)
         share, ratio = lobe.response(facet) / select(valid, total, 1), select(valid, ratio, 1)
-        return select(valid, 2 * proposal * share / (ratio * mass), 0)
+        density = self._density(lobe, facet.wi, cos, sin, m)
+        return select(valid, 2 * density * share / (ratio * mass), 0)
+
+
+class LeaningPair(Pair):
+    """The pair for shadowing terms under which, at grazing, those facets count that lean towards ``wi``, along the
+    plane of incidence: a part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and τ = -0.6.
+
+    Smith's term leans by 1, the implicit one by 4; V-cavities do not, nor do dielectrics, which reflect less where it
+    leans to.
+    """
+
+    OUTWARD = -0.6
+    """Chosen by measurement, as is the lean."""
+
+    def __init__(self, lean: float):
+        self.lean = lean
+
+    def _along(self, lobe, wi):
+        """``(x, y, λ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
+        distribution, fresnel = lobe.distribution, lobe.fresnel
+        x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
+        # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
+        brighter = fresnel.brightness(1) / dr.maximum(fresnel.brightness(wi.z), 1e-9)
+        seen = self.lean * dr.inv_pi * distribution.slope2(wi) * dr.square(brighter)
+        return x, y, dr.minimum(seen / (seen + dr.square(wi.z)), 0.95)
+
+    def _draw(self, lobe, wi, u, v):
+        x, y, leaning = self._along(lobe, wi)
+        leans, u = choose(u, leaning)
+        sin, cos = dr.sincos(dr.two_pi * v.x)
+        sin = dr.select(leans, 2 * v.x - 1, sin)
+        cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
+        tilt = dr.select(leans, self.OUTWARD, self._tilt(lobe, wi))
+        return u, cos * x - sin * y, cos * y + sin * x, draw_tilted(tilt, v.y)
+
+    def _density(self, lobe, wi, cos, sin, m):
+        x, y, leaning = self._along(lobe, wi)
+        lines = 0.5 * dr.pi * abs(cos * x + sin * y)
+        return dr.lerp(super()._density(lobe, wi, cos, sin, m), lines * tilted(self.OUTWARD, m), leaning)
 
 
 def tilted(tilt, m):
     """The density 1 + τ - 2 τ m on [0, 1]."""
     return 1 + tilt - 2 * tilt * m
+
+
+def draw_tilted(tilt, u):
+    return 2 * u / (1 + tilt + safe_sqrt(dr.square(1 + tilt) - 4 * tilt * u))
 
 
 def reflected(lobe, facet):

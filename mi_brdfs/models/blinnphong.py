@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import Blinn
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import LeaningPair
 from ..microfacet.shadowing import implicit
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
@@ -34,7 +34,7 @@ class BlinnPhong(Model):
     Reciprocal, but for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.LeaningPair); no sample falls below the horizon.
 
     Example
     -------
@@ -74,7 +74,7 @@ class BlinnPhong(Model):
         # ρs scale cosⁿθ_h in terms of D, of which G has the rest
         reflectance = p.specular_reflectance * (4 * dr.two_pi / (n + 2) * scale)
         lobe, shadowing = (BlinnResponseLobe, cosine) if self.normalization == "original" else (BlinnLobe, implicit)
-        return LambertLobe(p.diffuse_reflectance), lobe(reflectance, Blinn(n), shadowing, Unit(), Pair())
+        return LambertLobe(p.diffuse_reflectance), lobe(reflectance, Blinn(n), shadowing, Unit(), LeaningPair(4))
 
 
 class BlinnLobe(MicrofacetLobe):

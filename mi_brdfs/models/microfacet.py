@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes import DimmedLobe, over_diffuse
 from ..microfacet import distributions, shadowing
-from ..microfacet.sampling import Pair, visible_normals
+from ..microfacet.sampling import LeaningPair, Pair, visible_normals
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
 
@@ -63,7 +63,8 @@ class Microfacet(Model):
     formulas were known, from later papers and public code. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair), so that no sample falls below the horizon; ggx with smith as ``walter``.
+    (mi_brdfs.microfacet.sampling.Pair and LeaningPair), so that no sample falls below the horizon; ggx with smith as
+    ``walter``.
 
     Example
     -------
@@ -161,7 +162,10 @@ class Microfacet(Model):
         distribution = DISTRIBUTIONS[p.distribution.choice](p.distribution)
         term = SHADOWING[p.shadowing.choice](p)
         visible = p.distribution.choice == "ggx" and p.shadowing.choice == "smith"
-        sampler = visible_normals(p.fresnel) if visible else Pair()
+        if visible:
+            sampler = visible_normals(p.fresnel)
+        else:
+            sampler = LeaningPair(LEAN[p.shadowing.choice]) if p.shadowing.choice in LEAN else Pair()
         specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
         return over_diffuse(p.diffuse_reflectance, specular)
 
@@ -207,3 +211,14 @@ SHADOWING = {
     "ashikhmin-premoze": lambda p: shadowing.ashikhmin_premoze,
     "kurt": lambda p: shadowing.Kurt(p.shadowing.kurt_exponent),
 }
+
+LEAN = {
+    "smith": 1,
+    "smith-correlated": 1,
+    "schlick": 2,
+    "implicit": 4,
+    "neumann": 1,
+    "ashikhmin-premoze": 2,
+    "kurt": 1,
+}
+"""For the sampler, how far the facets seen at grazing lean: not at all under the other terms. Chosen by measurement."""

@@ -1,7 +1,7 @@
 from ..lobes import DimmedLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import LeaningPair, Pair
 from ..microfacet.shadowing import implicit, vcavity
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
@@ -34,7 +34,7 @@ class Nishino(Model):
     towards grazing. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair and LeaningPair); no sample falls below the horizon.
 
     Example
     -------
@@ -58,8 +58,8 @@ class Nishino(Model):
     def lobes(self, p):
         distribution = HemiEPD(p.kappa, p.gamma)
         if p.variant.choice == "microfacet":
-            shadowing, fresnel = vcavity, p.variant.fresnel
+            terms = vcavity, p.variant.fresnel, Pair()
         else:
-            shadowing, fresnel = implicit, Unit()
-        specular = DimmedLobe(p.specular_reflectance, distribution, shadowing, fresnel, Pair())
+            terms = implicit, Unit(), LeaningPair(4)
+        specular = DimmedLobe(p.specular_reflectance, distribution, *terms)
         return over_diffuse(p.diffuse_reflectance, specular)
