@@ -21,14 +21,19 @@ class Pair:
     (W + W')/2. (Unclipped, and with the visibility in place of W, it would be the V-cavity sampler of Heitz and d'Eon
     2014, doi:10.1111/cgf.12417.)
 
-    Rough lobes are shadowed at the ends of the line: m has the density 1 + τ - 2 τ m.
+    Rough lobes are shadowed at the ends of the line, and the reflectance of dielectrics rises less than it seems at
+    grazing: m has the density 1 + τ - 2 τ m.
     """
 
-    TILT, STEEPEST = 0.75, 1.5
-    """τ = TILT cosθ_i for slopes of a mean square of 1/STEEPEST and more. Chosen by measurement."""
-
     def _tilt(self, lobe, wi):
-        return self.TILT * wi.z * dr.minimum(self.STEEPEST * lobe.distribution.roughness2(), 1)
+        """τ, chosen by measurement."""
+        shadowed = wi.z * dr.minimum(1.5 * lobe.distribution.roughness2(), 1)
+        return 0.75 * shadowed + 0.35 * (1 - self._brighter(lobe, wi))
+
+    @staticmethod
+    def _brighter(lobe, wi):
+        """How much brighter the reflectance is at normal incidence."""
+        return dr.minimum(lobe.fresnel.brightness(1) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9), 1)
 
     def _draw(self, lobe, wi, u, v):
         """``(u, cosψ, sinψ, m)``, with what is left of ``u``."""
@@ -89,11 +94,10 @@ class LeaningPair(Pair):
 
     def _along(self, lobe, wi):
         """``(x, y, λ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
-        distribution, fresnel = lobe.distribution, lobe.fresnel
+        distribution = lobe.distribution
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        brighter = fresnel.brightness(1) / dr.maximum(fresnel.brightness(wi.z), 1e-9)
-        seen = self.lean * dr.inv_pi * distribution.slope2(wi) * dr.square(brighter)
+        seen = self.lean * dr.inv_pi * distribution.slope2(wi) * dr.square(self._brighter(lobe, wi))
         return x, y, dr.minimum(seen / (seen + dr.square(wi.z)), 0.95)
 
     def _draw(self, lobe, wi, u, v):

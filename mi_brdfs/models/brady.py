@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import LeaningPair
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 
@@ -30,7 +30,7 @@ class Brady(Model):
     raises it less than that. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.LeaningPair); no sample falls below the horizon.
 
     Example
     -------
@@ -56,7 +56,7 @@ class Brady(Model):
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")
         return (
             LambertLobe(p.diffuse_reflectance),
-            FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), Pair()),
+            FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), LeaningPair(1)),
         )
 
 
