@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mi_brdfs import bsdf as adapter
-from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, PowerLobe
+from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, PowerLobe, over_diffuse
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
 from mi_brdfs.microfacet.fresnel import Unit
@@ -210,7 +210,7 @@ def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=Bounde
         def lobes(self, p):
             smith = shadowing or SmithGGX(*p.alpha, correlated=False)
             specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, p.fresnel, sampler())
-            return LambertLobe(p.diffuse_reflectance), specular
+            return over_diffuse(p.diffuse_reflectance, specular)
 
     return Mutant
 

@@ -23,6 +23,36 @@ def test_flags(name, variant):
     assert bsdf.flags() == bsdf.flags(0) | bsdf.flags(1)
 
 
+OPTIONAL = [
+    ("walter", {}, 1, "diffuse_reflectance"),
+    ("cooktorrance", {}, 1, "diffuse_reflectance"),
+    ("microfacet", {}, 1, "diffuse_reflectance"),
+    ("low", {}, 1, "diffuse_reflectance"),
+    ("nishino", {}, 1, "diffuse_reflectance"),
+    ("burley", {}, 2, "sheen"),
+    ("burley", {"sheen": 1.0}, 3, "clearcoat"),
+]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name, given, count, optional", OPTIONAL)
+def test_a_lobe_is_there_if_it_is_given(name, given, count, optional):
+    """Even as 0: then it is black, but can be optimised."""
+    without = mi.load_dict({"type": name, **given})
+    black = mi.load_dict({"type": name, **given, optional: 0.0})
+    assert (without.component_count(), black.component_count()) == (count, count + 1)
+    keys = [{key.split(".")[0] for key in mi.traverse(bsdf).keys()} for bsdf in (without, black)]
+    assert keys[1] - keys[0] == {optional}
+    wi, wo = hemisphere(50, 3), hemisphere(50, 4)
+    np.testing.assert_allclose(*(call(bsdf.eval, context(), wi, wo)[0] for bsdf in (without, black)), rtol=1e-6)
+
+    params = mi.traverse(black)
+    key = next(key for key in params.keys() if key.startswith(optional))
+    params[key] = params[key] + 0.5
+    params.update()
+    assert (call(black.eval, context(), wi, wo)[0] > call(without.eval, context(), wi, wo)[0]).all()
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 def test_flags_tell_anisotropy_textures_and_reciprocity():
     flags = mi.BSDFFlags
@@ -125,9 +155,7 @@ def test_optimised_values_are_limited_to_the_range():
         params["alpha.value"] = value
         params.update()
         limited = mi.load_dict({"type": "ward", "alpha": limit})
-        np.testing.assert_array_equal(
-            call(bsdf.eval, context(), wi, wo)[0], call(limited.eval, context(), wi, wo)[0]
-        )
+        np.testing.assert_array_equal(call(bsdf.eval, context(), wi, wo)[0], call(limited.eval, context(), wi, wo)[0])
 
 
 @pytest.mark.parametrize("name", TWO_LOBES)

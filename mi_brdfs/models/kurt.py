@@ -1,7 +1,7 @@
 from ..lobes import DimmedLobe, LambertLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import LeaningPair
+from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import Kurt as Shadowing
 from ..model import Energy, Model
 from ..parameters import Number, PerLobe, Reflectance, Rotation
@@ -27,7 +27,7 @@ class Kurt(Model):
     That D's cosine power is 4 was not checked against the paper. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.LeaningPair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -58,7 +58,7 @@ class Kurt(Model):
                 Beckmann(*lobe.alpha),
                 Shadowing(lobe.kurt_exponent),
                 Schlick(lobe.f0),
-                LeaningPair(0.5),
+                Pair(),
             )
             for lobe in p.specular
         ]
