@@ -50,7 +50,8 @@ def test_a_lobe_is_there_if_it_is_given(name, given, count, optional):
     key = next(key for key in params.keys() if key.startswith(optional))
     params[key] = params[key] + 0.5
     params.update()
-    assert (call(black.eval, context(), wi, wo)[0] > call(without.eval, context(), wi, wo)[0]).all()
+    gained = call(black.eval, context(), wi, wo)[0] - call(without.eval, context(), wi, wo)[0]
+    assert (gained >= 0).all() and gained.max() > 1e-3
 
 
 @pytest.mark.usefixtures("llvm_rgb")
