@@ -52,7 +52,8 @@ class DimmedLobe(MicrofacetLobe):
         alpha, tilt = dr.sqrt(self.distribution.roughness2()), 1 - wi.z
         cos = dr.sqrt(wi.z * wi.z + 0.45 * alpha * tilt * safe_sqrt(tilt))  # fitted to GGX
         z = dr.maximum(wi.z, 1e-4)  # the terms must not vanish
-        mirror = Facet(mi.Vector3f(wi.x, wi.y, z), mi.Vector3f(-wi.x, -wi.y, z), mi.Vector3f(0, 0, 1), z)
+        seen = mi.Vector3f(wi.x, wi.y, z)
+        mirror = Facet(seen, seen, mi.Vector3f(0, 0, 1), z)  # they do not tell wo from its opposite side
         shadowing = self.shadowing(mirror) / SmithGGX(alpha, alpha, correlated=False)(mirror)
         return self.reflectance * (self.fresnel(tilted(cos)) * (self.distribution.albedo(wi.z) * shadowing))
 
