@@ -9,6 +9,7 @@ t = tan²θ_h, which may depend on ``g`` = 1/((αu cosψ)² + (αv sinψ)²).
 from __future__ import annotations
 
 import functools
+import math
 
 import drjit as dr
 import mitsuba as mi
@@ -403,7 +404,9 @@ class EPD(Isotropic):
         self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
 
         borders = [k / (self.STEPS - k) for k in range(self.STEPS)]
-        at = [self._per_slope(x * self.width) * (1 + x) ** 2 for x in borders]
+        power = -dr.power(self.width / self.alpha2, gamma)
+        falls = [1, *(dr.exp(power * dr.exp(gamma * math.log(x))) for x in borders[1:])]
+        at = [fall * self._rest(x * self.width) * (1 + x) ** 2 for fall, x in zip(falls, borders, strict=True)]
         self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
 
     def _width(self, median):
@@ -413,9 +416,9 @@ class EPD(Isotropic):
         """exp(-(tan²θ/α²)ᵞ)"""
         return dr.exp(-dr.power(dr.maximum(tan2 / self.alpha2, 1e-30), self.gamma))
 
-    def _per_slope(self, tan2):
-        """What D cosθ dω is proportional to, per tan²θ."""
-        return self._power(tan2)
+    def _rest(self, tan2):
+        """What D cosθ dω is proportional to, per tan²θ, but for that power."""
+        return 1
 
     def roughness2(self):
         return dr.minimum(self.width, 1)
@@ -427,7 +430,7 @@ class EPD(Isotropic):
     def over_density(self, tan2, g):
         tan2 = dr.minimum(tan2, 1e12)
         x = dr.minimum(tan2 / self.width, 1e15)
-        ratio = self._per_slope(tan2) * dr.square(1 + x) / self.steps.eval(x / (1 + x))
+        ratio = self._power(tan2) * self._rest(tan2) * dr.square(1 + x) / self.steps.eval(x / (1 + x))
         return self.scale * dr.pi * self.width * ratio * dr.sqrt(1 + tan2)
 
     def cdf(self, tan2, g):

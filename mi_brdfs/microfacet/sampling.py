@@ -28,7 +28,7 @@ class Pair:
     def _tilt(self, lobe, wi):
         """τ, chosen by measurement."""
         shadowed = wi.z * dr.minimum(1.5 * lobe.distribution.roughness2(), 1)
-        return 0.75 * shadowed + 0.35 * (1 - self._brighter(lobe, wi))
+        return dr.minimum(0.75 * shadowed + 0.35 * (1 - self._brighter(lobe, wi)), 0.9)
 
     @staticmethod
     def _brighter(lobe, wi):

@@ -76,8 +76,8 @@ class Exponential(EPD):
     def _width(self, median):
         return median / (1 + median)
 
-    def _per_slope(self, tan2):
-        return super()._per_slope(tan2) / dr.square(1 + tan2)
+    def _rest(self, tan2):
+        return 1 / dr.square(1 + tan2)
 
     def eval(self, facet):
         return self.scale * self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14))
