@@ -1,5 +1,5 @@
 """Write what is generated from the models' declarations: the plugin reference mi_brdfs/models/README.md with its
-thumbnails, and the table of models in README.md.
+thumbnails and sweeps, and in README.md the table of models and the picture above it.
 
     python docs/reference_page.py                 # the text
     python docs/reference_page.py ward walter     # and the pictures of some models
@@ -8,16 +8,18 @@ thumbnails, and the table of models in README.md.
 
 from __future__ import annotations
 
-import ast
 import inspect
 import re
 import sys
 from pathlib import Path
 
-import mi_brdfs
+from PIL import Image
+
+from mi_brdfs.gallery import example, overview, picture
+from mi_brdfs.gallery.sheet import Row, sheet
+from mi_brdfs.gallery.sweeps import SWEEPS, shown
 from mi_brdfs.model import Energy, Model
 from mi_brdfs.registry import all_models
-from mi_brdfs.render import display_image, render, write
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -25,10 +27,12 @@ ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "mi_brdfs" / "models" / "README.md"
 README = ROOT / "README.md"
 THUMBNAILS = ROOT / "docs" / "thumbnails"
+STRIPS = ROOT / "docs" / "sweeps"
+GALLERY = ROOT / "docs" / "gallery.jpg"
 CHAPTER = ROOT / "docs" / "folklore.md"
 TABLE = re.compile(r"(?<=<!-- models -->\n).*?(?=<!-- end of models -->)", re.DOTALL)
 PICTURES_PER_LINE = 5
-SIZE, SAMPLES = 144, 512
+SIZE, SAMPLES, STRIP_SAMPLES = 160, 256, 64
 
 INTRODUCTION = """\
 # The plugins
@@ -38,7 +42,8 @@ INTRODUCTION = """\
 Directions are unit vectors away from the surface: wi is the known one (towards the viewer), wo the sampled one
 (towards the light), n the normal, h the half vector; cosθ_i, cosθ_o and cosθ_h are their cosines to n. f is the BRDF.
 Every colour and every number is a texture slot; a literal outside its range is an error, and a textured or optimised
-value is limited to the range where it is evaluated. Pictures show the examples.
+value is limited to the range where it is evaluated. Pictures show the examples, and strips what one parameter does;
+`mi-brdfs gallery` renders all of them.
 """
 
 
@@ -64,20 +69,31 @@ def _code(text: str) -> str:
     return re.sub(r"``(.+?)``", r"`\1`", text)
 
 
-def example(model: type[Model]) -> dict:
-    """The plugin dict that a page has as its example."""
-    return ast.literal_eval(inspect.cleandoc(model.__doc__).rpartition("\n\n")[2])
+def thumbnail(model: type[Model], size: int = SIZE, spp: int = SAMPLES) -> Image.Image:
+    """The example in the preview scene."""
+    return picture(example(model), size, spp)
 
 
-def thumbnail(model: type[Model], size: int = SIZE, spp: int = SAMPLES) -> mi.Bitmap:
-    """The example in the preview scene, as a display image."""
-    scene = mi_brdfs.preview_scene(example(model))
-    scene["sensor"]["film"] |= {"width": size, "height": size}
-    return display_image(render(mi.load_dict(scene), spp).bitmap)
+def strip(model: type[Model], spp: int = STRIP_SAMPLES) -> Image.Image:
+    """The main sweep."""
+    name = model.plugins[0]
+    main = SWEEPS[name][0]
+    pictures = [picture(bsdf, SIZE, spp) for bsdf in main.bsdfs(name)]
+    return sheet([Row(main.heading(name), pictures, [shown(value) for value in main.values])])
+
+
+def all_thumbnails() -> Image.Image:
+    """The picture in README.md."""
+    return overview([(model, Image.open(THUMBNAILS / f"{model.plugins[0]}.png")) for model in all_models()])
 
 
 def _picture(model: type[Model]) -> str:
     return f"![{model.plugins[0]}](../../docs/thumbnails/{model.plugins[0]}.png)"
+
+
+def _strip(model: type[Model]) -> str:
+    name, main = model.plugins[0], SWEEPS[model.plugins[0]][0]
+    return f"![{main.heading(name)}: {', '.join(map(shown, main.values))}](../../docs/sweeps/{name}.jpg)"
 
 
 def _overview(models: list[type[Model]]) -> str:
@@ -100,6 +116,7 @@ def _page(model: type[Model]) -> str:
             text,
             f"```xml\n{xml}\n```",
             f"```python\n{dictionary}\n```",
+            _strip(model),
             _table(model.parameter_rows()),
             _table(model.energy.rows()),
             Energy.NOTE,
@@ -121,7 +138,9 @@ def main():
         mi.set_variant("llvm_ad_rgb")
         for model in all_models():
             if model.plugins[0] in names or "all" in names:
-                write(thumbnail(model), THUMBNAILS / f"{model.plugins[0]}.png")
+                thumbnail(model).save(THUMBNAILS / f"{model.plugins[0]}.png", optimize=True)
+                strip(model).save(STRIPS / f"{model.plugins[0]}.jpg", quality=88, optimize=True)
+        all_thumbnails().save(GALLERY, quality=92, optimize=True)
 
 
 if __name__ == "__main__":

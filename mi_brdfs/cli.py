@@ -1,4 +1,4 @@
-"""The command line ``mi-brdfs``: list, info, doctor, render, check, bench.
+"""The command line ``mi-brdfs``: list, info, doctor, render, gallery, plot, check, bench.
 
 Results go to stdout, errors and progress to stderr. Exit status: 0 fine, 1 error, 2 wrong usage, 130 after Ctrl-C.
 """
@@ -140,6 +140,125 @@ def render(
         err.print(f"Interrupted; the image has the {picture.spp} of {picture.total} samples per pixel finished so far.")
         raise typer.Exit(Exit.INTERRUPTED)
     err.print(f"{picture.spp} samples per pixel in {seconds:.1f} s, {chosen}.")
+
+
+@app.command()
+def gallery(
+    types: Annotated[
+        list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases that `list` shows. Default: all.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="It is made if it does not exist.")
+    ] = Path("gallery"),
+    spp: Annotated[
+        int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; pictures are denoised.")
+    ] = 16,
+    size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 192,
+    variant: Annotated[
+        str | None,
+        typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
+    ] = None,
+) -> None:
+    """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps what is
+    finished."""
+    try:
+        from .gallery import gallery as render_gallery
+    except ImportError as error:
+        _fail(str(error))
+    chosen = _set_variant(variant)
+    start, finished, total = time.perf_counter(), 0, 0
+    columns = [TextColumn("Rendering {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
+    columns += [TextColumn("pictures,"), TimeRemainingColumn(), TextColumn("left")]
+    with _stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("", total=None)
+
+        def advance(type: str, done: int, of: int) -> None:
+            nonlocal finished, total
+            finished, total = done, of
+            progress.update(task, description=type, completed=done, total=of)
+
+        try:
+            render_gallery(types or (), output, spp, size, advance)
+        except ValueError as error:
+            _fail(one_line(error), Exit.USAGE)
+        except OSError as error:
+            _fail(f"cannot write to the folder {output}: {error.strerror}")
+        except RuntimeError as error:
+            _fail(one_line(error))
+        except KeyboardInterrupt:
+            pass
+    if finished:
+        out.print(str(output / "index.html"))
+    if not finished or finished < total:
+        kept = f"it has {finished} of {total} pictures" if finished else "nothing is finished, nothing was written"
+        err.print(f"Interrupted; {kept}.")
+        raise typer.Exit(Exit.INTERRUPTED)
+    err.print(f"{total} pictures in {time.perf_counter() - start:.0f} s, {chosen}.")
+
+
+@app.command()
+def plot(
+    targets: Annotated[
+        list[str],
+        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins, of the pack or not; files with a scene or BSDF."),
+    ],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--param",
+            metavar="name=value",
+            help="Set a parameter of each TYPE, to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws "
+            "each of the values.",
+        ),
+    ] = None,
+    kind: Annotated[
+        str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere, albedo or sphere.")
+    ] = "polar",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A .png, .svg, .pdf or .jpg; of sphere .html.")
+    ] = None,
+    angles: Annotated[
+        str | None, typer.Option(metavar="DEGREES", help="Of incidence. Default: 10,40,70; of sphere 45.")
+    ] = None,
+    azimuth: Annotated[
+        float | None, typer.Option(metavar="DEGREES", help="Of incidence, from dp_du. Default: 0.")
+    ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(metavar="SCALE", help="linear, log or both, of polar, cartesian, sphere. Default: both."),
+    ] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+    ] = None,
+) -> None:
+    """Draw the lobes of BSDFs, one or several to compare: in the plane of incidence (polar, cartesian), over the
+    hemisphere, their albedos, or as bodies to turn in a browser (sphere)."""
+    try:
+        from .plot import command
+    except ImportError as error:
+        _fail(str(error))
+    if kind not in command.KINDS:
+        _fail(f"--kind {kind}: there is no such kind; there are {', '.join(command.KINDS)}", Exit.USAGE)
+    try:
+        bsdfs = command.asked_for(targets, parameters or [])
+        options = command.options_of(kind, angles, azimuth, scale)
+        file = command.output_file(output, kind, targets)
+    except ValueError as error:
+        _fail(str(error), Exit.USAGE)
+    _check_folder("-o", output)
+    _set_tracing_variant(variant)
+    with _stdout_to_stderr(), _interruptible():
+        try:
+            figure = command.KINDS[kind](*bsdfs, **options)
+        except ImportError as error:
+            _fail(str(error))
+        except (ValueError, RuntimeError) as error:  # Mitsuba's are of both kinds
+            _fail(one_line(error), Exit.USAGE)
+        try:
+            command.write(figure, file)
+        except OSError as error:
+            _fail(f"cannot write {file}: {error.strerror}")
+    out.print(str(file))
 
 
 @app.command()

@@ -19,8 +19,8 @@ def preview_scene(bsdf: dict | mi.BSDF) -> dict:
     """The dict of a scene that shows a material: ``mi.render(mi.load_dict(preview_scene({"type": "ward"})))``.
 
     A turned body, whose curves show highlight, grazing reflection and anisotropy (dp_du runs around its axis), stands
-    in a round cove under a soft key light from the left, a narrow rim light from the right and a dim sky. The picture
-    has 512 x 512 pixels and 128 samples.
+    in a round cove under a soft key light from the left, a rim light from behind on the right and a dim sky. The
+    picture has 512 x 512 pixels and 128 samples.
 
     Args:
         bsdf: the material, a plugin dict or a loaded BSDF.
@@ -34,24 +34,24 @@ def preview_scene(bsdf: dict | mi.BSDF) -> dict:
         "integrator": {"type": "path", "max_depth": 6},
         "sensor": {
             "type": "perspective",
-            "fov": 26,
+            "fov": 24.5,
             "to_world": T().look_at(origin=[0, -6.2, 2.9], target=[0, 0, 1.08], up=[0, 0, 1]),
             "film": {"type": "hdrfilm", "width": 512, "height": 512},
             "sampler": {"type": "independent", "sample_count": 128},
         },
         "body": _revolve(_smooth(OUTLINE, 160), 192, bsdf),
-        "cove": _revolve(_smooth(COVE, 64), 64, {"type": "diffuse", "reflectance": 0.3}),
+        "cove": _revolve(_smooth(COVE, 64), 64, {"type": "diffuse", "reflectance": 0.22}),
         "key": {
             "type": "rectangle",
-            "to_world": T().look_at(origin=[-4, -3.5, 5], target=[0, 0, 1], up=[0, 0, 1]).scale([1.6, 1.6, 1]),
-            "emitter": {"type": "area", "radiance": 8.0},
+            "to_world": T().look_at(origin=[-4.8, -2.2, 4.4], target=[0, 0, 1], up=[0, 0, 1]).scale([1.4, 1.4, 1]),
+            "emitter": {"type": "area", "radiance": 13.0},
         },
         "rim": {
             "type": "rectangle",
-            "to_world": T().look_at(origin=[4.5, 1.5, 2.2], target=[0, 0, 1.2], up=[0, 0, 1]).scale([0.3, 1.8, 1]),
-            "emitter": {"type": "area", "radiance": 12.0},
+            "to_world": T().look_at(origin=[4.2, 2.8, 2.4], target=[0, 0, 1.2], up=[0, 0, 1]).scale([0.6, 1.8, 1]),
+            "emitter": {"type": "area", "radiance": 13.0},
         },
-        "sky": {"type": "constant", "radiance": 0.3},
+        "sky": {"type": "constant", "radiance": 0.25},
     }
 
 

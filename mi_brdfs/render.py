@@ -70,7 +70,7 @@ def render(
     try:
         passes = _pass_sizes(sampler, spp or own_count, _samples_per_pass() // _pixel_count(film, averaged))
         total, done, raw = sum(passes), 0, 0
-        with _ctrl_c() as interrupt:
+        with ctrl_c() as interrupt:
             for index, count in enumerate(passes):
                 integrator.render(scene, camera, seed=_pass_seed(seed, index), spp=count, evaluate=False)
                 passed = film.develop(raw=True)
@@ -177,7 +177,7 @@ def _fill(film: mi.Film, raw: mi.TensorXf) -> None:
 
 
 @contextmanager
-def _ctrl_c() -> Iterator[SimpleNamespace]:
+def ctrl_c() -> Iterator[SimpleNamespace]:
     """Count the first Ctrl-C instead of raising; only the main thread can, others leave it to their caller."""
     interrupt = SimpleNamespace(pressed=False)
 

@@ -1,0 +1,155 @@
+"""Pictures of what the models look like, and of what their parameters do.
+
+From Python::
+
+    from mi_brdfs.gallery import gallery
+    gallery(["ward", "walter"], "pictures")      # pictures/index.html, overview.png, ward.png, walter.png
+
+It needs ``pip install 'mi_brdfs[gallery]'``.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import os
+import re
+from collections.abc import Callable, Iterable
+from itertools import islice
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+
+try:
+    import mitsuba_oidn
+    from PIL import Image
+except ImportError:
+    raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
+
+from ..model import Model
+from ..preview import preview_scene
+from ..registry import all_models, find_model
+from ..render import ctrl_c, display_image, write
+from .html import Section, page
+from .sheet import Row, sheet
+from .sweeps import SWEEPS, shown
+
+SIZE, SPP = 192, 16
+PER_ROW = 7
+
+
+def gallery(
+    types: Iterable[str] = (),
+    folder: str | os.PathLike = "gallery",
+    spp: int = SPP,
+    size: int = SIZE,
+    on_picture: Callable[[str, int, int], None] = lambda type, done, total: None,
+) -> Path:
+    """Render models in the preview scene, each with sweeps of its main parameters, and write an HTML page that shows
+    them, with an overview and a contact sheet of each model. Ctrl-C ends it with what is finished, and is raised.
+
+    Args:
+        types: the models, by type or alias; all of them if there are none.
+        folder: where ``index.html``, ``overview.png`` and ``TYPE.png`` go; it is made if it does not exist.
+        spp: samples per pixel, rounded up to a power of 4; the pictures are denoised.
+        size: width and height of a picture, in pixels.
+        on_picture: called as ``on_picture(type, done, total)`` after each picture.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        ValueError: if there is no such model, with the closest name there is.
+        OSError: if the folder cannot be made or written to.
+    """
+    models = list(dict.fromkeys(map(find_model, types))) or all_models()
+    entries = [Entry(model) for model in models]
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    done, total = 0, sum(len(entry.bsdfs) for entry in entries)
+    try:
+        for entry in entries:
+            for bsdf in entry.bsdfs:
+                with ctrl_c() as interrupt:  # Mitsuba cannot be interrupted in the middle
+                    image = picture(bsdf, size, spp)
+                if interrupt.pressed:
+                    raise KeyboardInterrupt
+                entry.pictures.append(image)
+                done += 1
+                on_picture(entry.type, done, total)
+            entry.write(folder)
+    finally:
+        begun = [entry for entry in entries if entry.pictures]
+        if begun:
+            begun[-1].write(folder)
+            _save(overview([(entry.model, entry.pictures[0]) for entry in begun]), folder / "overview.png")
+            text = page([entry.section() for entry in begun], f"{power_of_4(spp)} samples per pixel, denoised")
+            (folder / "index.html").write_text(text, encoding="utf-8")
+    return folder / "index.html"
+
+
+def picture(bsdf: dict, size: int = SIZE, spp: int = SPP, seed: int = 0) -> Image.Image:
+    """A material in the preview scene, denoised and tone-mapped; a square of ``size`` pixels."""
+    scene = preview_scene(bsdf)
+    # The denoiser expects pixels that do not share samples, and this sampler takes powers of 4.
+    scene["sensor"]["film"] |= {"width": size, "height": size, "rfilter": {"type": "box"}}
+    scene["sensor"]["sampler"] = {"type": "ldsampler", "sample_count": power_of_4(spp)}
+    image = np.array(mi.render(mi.load_dict(scene), seed=seed))
+    return Image.fromarray(np.array(display_image(mi.Bitmap(mitsuba_oidn.denoise(image, hdr=True)))))
+
+
+def power_of_4(spp: int) -> int:
+    """The next one that is not smaller, and at least 4, as the sampler asks."""
+    return 4 ** max(((spp - 1).bit_length() + 1) // 2, 1)
+
+
+def example(model: type[Model]) -> dict:
+    """The plugin dict that a manual page has as its example."""
+    return ast.literal_eval(inspect.cleandoc(model.__doc__).rpartition("\n\n")[2])
+
+
+def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
+    """Models with their names and years."""
+    rows = []
+    for first in range(0, len(portraits), PER_ROW):
+        some = portraits[first : first + PER_ROW]
+        rows.append(Row("", [image for _, image in some], [f"{model.plugins[0]}\n{year(model)}" for model, _ in some]))
+    return sheet(rows)
+
+
+def year(model: type[Model]) -> str:
+    """When a model was published: the first year on its manual page."""
+    return re.search(r"\b(1[789]|20)\d\d\b", model.__doc__)[0]
+
+
+class Entry:
+    """A model with the plugin dicts to be shown, the example and then the sweeps, and pictures of the first of them."""
+
+    def __init__(self, model: type[Model]):
+        self.model, self.type = model, model.plugins[0]
+        self.sweeps = SWEEPS[self.type]
+        self.bsdfs = [example(model), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
+        self.pictures: list[Image.Image] = []
+
+    def rows(self) -> list[Row]:
+        """A row for each sweep, as far as there are pictures."""
+        pictures = iter(self.pictures[1:])
+        rows = []
+        for sweep in self.sweeps:
+            some = list(islice(pictures, len(sweep.values)))
+            rows.append(Row(sweep.heading(self.type), some, [shown(value) for value in sweep.values[: len(some)]]))
+        return [row for row in rows if row.pictures]
+
+    def write(self, folder: Path) -> None:
+        """Write the contact sheet, if there is something on it."""
+        if rows := self.rows():
+            _save(sheet(rows), folder / f"{self.type}.png")
+
+    def section(self) -> Section:
+        rows = [(row.heading, row.captions) for row in self.rows()]
+        return Section(self.model, year(self.model), self.bsdfs[0], rows)
+
+
+def _save(image: Image.Image, path: Path) -> None:
+    write(mi.Bitmap(np.array(image)), path)

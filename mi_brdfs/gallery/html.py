@@ -1,0 +1,88 @@
+"""The gallery as a page of HTML beside its pictures."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import NamedTuple
+
+import mitsuba as mi
+
+from .. import __version__
+from ..model import Model
+
+STYLE = """
+:root { color-scheme: light; --ink: #222; --faint: #666; --line: #ccc }
+body { margin: 0 auto; padding: 1rem; max-width: 68rem; font: 1rem/1.45 system-ui, sans-serif; color: var(--ink);
+  background: #fff }
+h2 { margin: 3rem 0 0.5rem; border-top: 1px solid var(--line); padding-top: 1rem }
+h2 span, footer { color: var(--faint); font-weight: normal }
+a { color: inherit }
+nav { line-height: 1.9 }
+nav a { margin-right: 0.8rem; white-space: nowrap }
+img { max-width: 100%; height: auto }
+pre { overflow-x: auto; padding: 0.6rem 0.8rem; background: #f5f5f5; font-size: 0.85rem }
+"""
+
+
+class Section(NamedTuple):
+    """A model on the page."""
+
+    model: type[Model]
+    year: str
+    example: dict
+    rows: list[tuple[str, list[str]]]
+    """Headings and captions of the contact sheet."""
+
+
+def page(sections: list[Section], quality: str) -> str:
+    """The page, as text; ``quality`` says how the pictures were made."""
+    links = "\n".join(f'<a href="#{name}">{name}</a>' for name in (section.model.plugins[0] for section in sections))
+    parts = "\n".join(map(_section, sections))
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>BRDF gallery</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<header>
+<h1>What BRDFs look like</h1>
+<p>The models of mi_brdfs in one scene: a soft key light from the left, a rim light from behind on
+the right, and a dim sky. The tangent dp_du runs around the body.</p>
+<img src="overview.png" alt="An example of each model: {", ".join(section.model.plugins[0] for section in sections)}">
+<nav>
+{links}
+</nav>
+</header>
+<main>
+{parts}
+</main>
+<footer><p>mi_brdfs {escape(__version__)}, Mitsuba {escape(mi.__version__)}, {escape(mi.variant())}:
+{escape(quality)}</p></footer>
+</body>
+</html>
+"""
+
+
+def _section(section: Section) -> str:
+    name, *aliases = section.model.plugins
+    also = f", also <code>{'</code>, <code>'.join(aliases)}</code>" if aliases else ""
+    alt = "; ".join(f"{heading}: {', '.join(captions)}" for heading, captions in section.rows)
+    image = f'<a href="{name}.png"><img src="{name}.png" alt="{escape(alt)}" loading="lazy"></a>' if alt else ""
+    return f"""<section id="{name}">
+<h2>{name} <span>{section.year}{also}</span></h2>
+<p>{_code(section.model.summary())}</p>
+{image}
+<p>The picture in the overview is</p>
+<pre>{escape(str(section.example))}</pre>
+<details><summary>Reference</summary>
+<pre>{escape(section.model.manual())}</pre>
+</details>
+</section>"""
+
+
+def _code(text: str) -> str:
+    """HTML of a text that has reStructuredText's marks of code."""
+    return "".join(f"<code>{escape(p)}</code>" if k % 2 else escape(p) for k, p in enumerate(text.split("``")))

@@ -1,0 +1,118 @@
+"""What the words of the command line ask for: ``mi-brdfs plot ward --param alpha=0.1,0.2,0.4``."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..parameters import listed
+from . import albedo, cartesian, hemisphere, polar, sphere
+
+KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo, sphere)}
+"""The functions by the name that ``--kind`` takes."""
+PICTURES, PAGES = (".png", ".svg", ".pdf", ".jpg"), (".html",)
+DPI = 200
+
+
+def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | dict]:
+    """The BSDFs that words and ``--param`` options stand for: each word, as a plugin dict for each of the values of a
+    swept parameter.
+
+    Raises:
+        ValueError: for an option that is malformed or fits no word.
+    """
+    values: dict[str, list[Any]] = {}
+    for option in parameters:
+        name, _, given = option.partition("=")
+        if not name or not given or "" in given.split(","):
+            raise ValueError(f"--param {option}: write name=value, or name=a,b,c to draw each of several values")
+        if name in values:
+            raise ValueError(f"--param {name} is given twice; write {name}=a,b,c to draw each of several values")
+        values[name] = [_value(text) for text in given.split(",")]
+    sweeps = [name for name, choices in values.items() if len(choices) > 1]
+    if len(sweeps) > 1:
+        raise ValueError(f"--param: {' and '.join(sweeps)} have several values each; only one parameter may")
+    if not values:
+        return list(targets)
+    for word in targets:
+        if word.startswith("<") or word.endswith(".xml"):
+            raise ValueError(
+                f"--param sets parameters of plugins that are given by type; those of {word} are in its XML"
+            )
+    dicts: list[str | dict] = []
+    for word in targets:
+        fixed = {"type": word} | {name: choices[0] for name, choices in values.items()}
+        dicts += [fixed | {name: choice} for name in sweeps for choice in values[name]] or [fixed]
+    return dicts
+
+
+def options_of(kind: str, angles: str | None, azimuth: float | None, scale: str | None) -> dict[str, Any]:
+    """The arguments that a kind of figure gets from the options that were given.
+
+    Raises:
+        ValueError: for one that it does not take.
+    """
+    try:
+        numbers = None if angles is None else [float(text) for text in angles.split(",")]
+    except ValueError:
+        raise ValueError(f"--angles {angles}: write degrees, as 10,40,70") from None
+    options: dict[str, Any] = {"angles": numbers, "azimuth": azimuth, "scale": scale}
+    taken = inspect.signature(KINDS[kind]).parameters
+    if numbers and "angle" in taken:
+        if len(numbers) > 1:
+            raise ValueError(f"--angles {angles}: {kind} shows one angle of incidence")
+        options["angle"], options["angles"] = numbers[0], None
+    options = {name: value for name, value in options.items() if value is not None}
+    for name in options:
+        if name not in taken:
+            raise ValueError(f"--{name} says nothing about {kind}")
+    return options
+
+
+def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
+    """The file to write, by default one here that is named after what it shows.
+
+    Raises:
+        ValueError: if this kind of figure cannot be written in the format of the name.
+    """
+    suffixes = PAGES if kind == "sphere" else PICTURES
+    if path is None:
+        words = ["bsdf" if word.startswith("<") else Path(word).stem for word in dict.fromkeys(targets)]
+        return Path(re.sub(r"[^\w-]+", "_", "-".join([*words, kind]))[-100:] + suffixes[0])
+    if path.suffix.lower() not in suffixes:
+        raise ValueError(f"{path}: {kind} is written as {listed(suffixes)}")
+    return path
+
+
+def write(figure, path: Path) -> None:
+    """Write a figure; one of Plotly as a page that needs no network."""
+    if path.suffix.lower() in PAGES:
+        figure.write_html(path, include_plotlyjs=True)
+    else:
+        figure.savefig(path, dpi=DPI)
+
+
+def _value(text: str) -> Any:
+    """A number, true or false, a colour as #rrggbb (sRGB) or r;g;b (linear), or else a word."""
+    if text in ("true", "false"):
+        return text == "true"
+    for number in (int, float):
+        try:
+            return number(text)
+        except ValueError:
+            continue
+    if re.fullmatch("#[0-9a-fA-F]{6}", text):
+        encoded = [int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+        return _rgb([c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded])
+    try:
+        colour = [float(part) for part in text.split(";")]
+    except ValueError:
+        return text
+    return _rgb(colour) if len(colour) == 3 else text
+
+
+def _rgb(colour: list[float]) -> dict[str, Any]:
+    return {"type": "rgb", "value": colour}

@@ -1,0 +1,120 @@
+"""The BSDFs that a figure is asked for, and what it calls them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import mitsuba as mi
+
+from ..parameters import brief
+from ..validation.runner import name_of
+from ..validation.subject import Subject
+from ..validation.targets import find_targets
+
+SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
+
+
+class Named(NamedTuple):
+    """A BSDF and its name in the legend."""
+
+    label: str
+    subject: Subject
+
+
+def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
+    """The BSDFs loaded, with the labels given or found.
+
+    Raises:
+        ValueError: if there are none, one is no BSDF, or the active variant cannot evaluate arrays of directions.
+    """
+    variant = mi.variant() or ""
+    if variant.startswith("scalar") or "polarized" in variant or not variant:
+        raise ValueError(
+            f"plots need a vectorized and unpolarized variant, not {variant or 'none'}: call "
+            'mi.set_variant("llvm_ad_rgb") first'
+        )
+    if not bsdfs:
+        raise ValueError('there is no BSDF to plot; give one, as {"type": "ward"}')
+    own = _labels_of_dicts(bsdfs)
+    found = [pair for given in bsdfs for pair in _loaded(given, own)]
+    if labels is not None:
+        if len(labels) != len(found):
+            raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
+        found = [(label, bsdf) for label, (_, bsdf) in zip(labels, found, strict=True)]
+    # Legends leave out what begins with an underscore.
+    return [Named(label.lstrip("_"), Subject(bsdf, ())) for label, bsdf in found]
+
+
+def check_angles(angles: Sequence[float]) -> None:
+    """Raise a ValueError unless these are angles of incidence, in degrees."""
+    if not len(angles):
+        raise ValueError("there is no angle of incidence; give one or more, in degrees")
+    for angle in angles:
+        if not 0 <= angle < 90:
+            raise ValueError(f"an angle of incidence must be in [0, 90) degrees, not {angle:g}")
+
+
+def scales_of(scale: str) -> tuple[str, ...]:
+    """The scales that are drawn: linear, log, or both."""
+    if scale not in SCALES:
+        raise ValueError(f"there is no scale {scale!r}; there are {', '.join(SCALES)}")
+    return SCALES[scale]
+
+
+def with_smooth_part(found: list[Named]) -> list[Named]:
+    """The same, if each has more than delta functions, and with a label that says so if it has them, too."""
+    for it in found:
+        if not it.subject.components:
+            raise ValueError(f"{it.label} reflects and transmits in single directions only: there is no lobe to draw")
+    return [it._replace(label=f"{it.label} without its delta lobe") if it.subject.deltas else it for it in found]
+
+
+def quantity(name: str) -> str:
+    """The label of what is plotted, which says what becomes of colours."""
+    return name + (", luminance" if mi.is_rgb else ", mean of the spectrum" if mi.is_spectral else "")
+
+
+def _loaded(given, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
+    if isinstance(given, str):
+        for target in find_targets(given):
+            bsdf = target.load()
+            yield target.name, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+        return
+    bsdf = mi.load_dict(given) if isinstance(given, dict) else given
+    if not isinstance(bsdf, mi.BSDF):
+        word = given.get("type") if isinstance(given, dict) else type(given).__name__
+        raise ValueError(f"{word} is not a BSDF of {mi.variant()}")
+    yield labels.get(id(given)) or name_of(bsdf), bsdf
+
+
+def _labels_of_dicts(bsdfs) -> dict[int, str]:
+    """A label for each dict, by its identity: the type, and the parameters that the others of this type do not share.
+    The only one of its type shows them all."""
+    told = [
+        (given, {name: _shown(value) for name, value in given.items() if name != "type"})
+        for given in bsdfs
+        if isinstance(given, dict)
+    ]
+    labels = {}
+    for given, values in told:
+        others = [theirs for other, theirs in told if other is not given and other.get("type") == given.get("type")]
+        own = {n: v for n, v in values.items() if not others or any(theirs.get(n) != v for theirs in others)}
+        labels[id(given)] = " ".join([str(given.get("type")), *(f"{name}={value}" for name, value in own.items())])
+    return labels
+
+
+def _shown(value) -> str:
+    """A parameter's value in a label."""
+    if isinstance(value, dict):
+        value = value.get("value", value.get("type"))
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return f"{value:.4g}"
+    if isinstance(value, str):
+        return brief(value)
+    try:
+        return ";".join(f"{number:.3g}" for number in value)
+    except TypeError:
+        return type(value).__name__

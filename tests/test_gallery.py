@@ -1,0 +1,251 @@
+"""The gallery: its sweeps, what it writes, and the pictures in the documentation."""
+
+import html
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from PIL import Image
+from support import is_scalar
+
+import mi_brdfs
+from mi_brdfs.gallery import Entry, Row, example, gallery, page, picture, power_of_4, sheet, year
+from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, rgb, shown
+from mi_brdfs.registry import all_models, find_model
+from mi_brdfs.render import display_image, render
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
+
+import reference_page as docs
+
+NAMES = [model.plugins[0] for model in all_models()]
+
+# --- Sweeps and sheets ----------------------------------------------------------------------------------------------
+
+
+def test_every_model_has_sweeps():
+    assert list(SWEEPS) == NAMES
+    for name, sweeps in SWEEPS.items():
+        parameters = [sweep.parameter for sweep in sweeps]
+        assert parameters and len(set(parameters)) == len(parameters), name
+        assert all(2 <= len(set(sweep.values)) == len(sweep.values) <= 5 for sweep in sweeps), name
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", SWEEPS)
+def test_sweeps_load(name):
+    """Their parameters are declared, and the values in the declared ranges."""
+    for sweep in SWEEPS[name]:
+        for bsdf in sweep.bsdfs(name):
+            mi.load_dict(bsdf)
+
+
+def test_a_sweep():
+    two = Sweep("cx, cy", (-1.0, 0.5), {"exponent": 20, "diffuse_reflectance": rgb(0.1, 0.25, 0.4)})
+    assert two.bsdfs("lafortune")[1] == {
+        "type": "lafortune", "cx": 0.5, "cy": 0.5, "exponent": 20,
+        "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.25, 0.4]},
+    }  # fmt: skip
+    assert two.heading("lafortune") == "lafortune: cx, cy, with exponent = 20, diffuse_reflectance = (0.1, 0.25, 0.4)"
+    assert Sweep("b", (1, 2), {}).heading("low") == "low: b"
+    assert [shown(value) for value in (0.0, 0.0625, 100000, "ggx", True)] == ["0", "0.0625", "100000", "ggx", "true"]
+
+
+def test_years():
+    years = {name: year(find_model(name)) for name in ("lambert", "microfacet", "toon", "ward", "eon")}
+    assert years == {"lambert": "1760", "microfacet": "1967", "toon": "2000", "ward": "1992", "eon": "2025"}
+
+
+def test_powers_of_4():
+    assert [power_of_4(spp) for spp in (1, 2, 4, 5, 16, 17, 64, 65)] == [4, 4, 4, 16, 16, 64, 64, 256]
+
+
+def test_labels_cover_no_picture_and_are_not_cut():
+    red = Image.new("RGB", (20, 20), (255, 0, 0))
+    rows = [
+        Row("a heading that is much wider than the picture below it", [red], ["1"]),
+        Row("", [red, red], ["smith-correlated", "2\nsecond"]),
+    ]
+    image = np.array(sheet(rows))
+    assert (image == (255, 0, 0)).all(axis=-1).sum() == 3 * 20 * 20
+    ink = (image < 128).all(axis=-1)
+    assert ink.sum() > 200
+    assert not any(edge.any() for edge in (ink[:4], ink[-4:], ink[:, :4], ink[:, -4:]))
+
+
+# --- What is rendered and written -----------------------------------------------------------------------------------
+
+
+def blocks(image) -> np.ndarray:
+    """The means of 8 x 8 pixels, from 0 to 1 on the scale of the display."""
+    values = np.array(image, np.float64) / 255
+    height, width = (size - size % 8 for size in values.shape[:2])
+    return values[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).mean(axis=(1, 3))
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_picture_shows_the_preview_scene():
+    """Denoising, and the sampler that is quieter, leave it as it is."""
+    scene = mi_brdfs.preview_scene({"type": "ward"})
+    scene["sensor"]["film"] |= {"width": 48, "height": 48}
+    expected = display_image(render(mi.load_dict(scene), 256).bitmap)
+    made = picture({"type": "ward"}, 48, 64)
+    assert made.size == (48, 48)
+    np.testing.assert_allclose(blocks(made), blocks(expected), atol=0.03)
+
+
+def test_pictures_in_every_variant(variant):
+    made = np.array(picture({"type": "ward"}, 16, 4 if is_scalar() else 16))
+    assert made.shape == (16, 16, 3) and 40 < made.mean() < 160
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_what_is_finished_is_kept(tmp_path):
+    def press_ctrl_c(type, done, total):
+        reported.append((type, done, total))
+        if done == 8:
+            raise KeyboardInterrupt
+
+    reported = []
+    with pytest.raises(KeyboardInterrupt):
+        gallery(["lambert", "eon", "wrap"], tmp_path / "made" / "here", 1, 16, press_ctrl_c)
+    assert reported == [*(("lambert", k, 23) for k in range(1, 7)), ("eon", 7, 23), ("eon", 8, 23)]
+    files = {path.name: path for path in (tmp_path / "made" / "here").iterdir()}
+    assert set(files) == {"index.html", "overview.png", "lambert.png", "eon.png"}
+    text = files["index.html"].read_text()
+    assert 'alt="eon: roughness, with reflectance = (0.6, 0.35, 0.2): 0"' in text and 'id="wrap"' not in text
+
+
+def start(*arguments, **options):
+    command = [sys.executable, "-m", "mi_brdfs.cli", "gallery", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def run(*arguments, **options):
+    process = start(*arguments, **options)
+    out, err = process.communicate(timeout=180)
+    return process.returncode, out, err
+
+
+def test_the_command_writes_a_page_and_its_pictures(tmp_path):
+    status, out, err = run("eon", "lambert", "--size", 16, "--spp", 1, "-o", "pictures", cwd=tmp_path)
+    assert status == 0, err
+    assert out == f"{Path('pictures', 'index.html')}\n"
+    assert re.fullmatch(r"12 pictures in \d+ s, \w+_rgb\.\n", err)
+    folder = tmp_path / "pictures"
+    assert sorted(path.name for path in folder.iterdir()) == ["eon.png", "index.html", "lambert.png", "overview.png"]
+
+    text = (folder / "index.html").read_text(encoding="utf-8")
+    assert 'alt="eon: roughness, with reflectance = (0.6, 0.35, 0.2): 0, 0.25, 0.5, 0.75, 1"' in text
+    links = set(re.findall(r'(?:src|href)="([^"]+)"', text))
+    assert links == {"overview.png", "eon.png", "lambert.png", "#eon", "#lambert"}
+    assert all(f'id="{link[1:]}"' in text for link in links if link.startswith("#"))
+    for name in "eon", "lambert":
+        width, height = mi.Bitmap(str(folder / f"{name}.png")).size()
+        assert width > 5 * 16 and height > 2 * 16
+
+
+def test_the_page_has_all_about_a_model():
+    text = html.unescape(page([Entry(find_model("disney")).section()], "64 samples"))
+    assert find_model("disney").summary() in text and "<code>disney</code>" in text and "2012" in text
+    assert find_model("disney").manual() in text and str(example(find_model("disney"))) in text
+    assert "64 samples" in text
+
+
+def test_ctrl_c_keeps_what_is_finished(tmp_path):
+    process = start(
+        "lambert", "burley", "--size", 32, "--variant", "llvm_ad_rgb", cwd=tmp_path,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    folder = tmp_path / "gallery"
+    while not (folder / "lambert.png").exists() and process.poll() is None:
+        time.sleep(0.05)
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    finished = re.search(r"Interrupted; it has (\d+) of 57 pictures\.\n\Z", err)
+    assert finished and 6 <= int(finished[1]) < 57
+    assert out == f"{Path('gallery', 'index.html')}\n"
+    assert {"index.html", "overview.png", "lambert.png"} <= {path.name for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize(
+    "arguments, status, text",
+    [
+        (["wrad"], 2, "There is no model 'wrad'; did you mean "),
+        (["ward", "-o", "taken"], 1, "cannot write to the folder taken: "),
+        (["ward", "--variant", "llvm"], 1, "there is no variant llvm"),
+    ],
+)
+def test_an_error_is_one_line(tmp_path, arguments, status, text):
+    (tmp_path / "taken").touch()
+    done, out, err = run(*arguments, cwd=tmp_path)
+    assert done == status and out == ""
+    assert err.startswith(f"mi-brdfs: {text}") and err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+@pytest.mark.parametrize("package", ["PIL", "mitsuba_oidn"])
+def test_a_missing_package(tmp_path, package):
+    (tmp_path / f"{package}.py").write_text(f"raise ModuleNotFoundError('No module named {package}')")
+    status, out, err = run("ward", cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    assert status == 1 and out == ""
+    assert err.startswith("mi-brdfs: ") and "pip install 'mi_brdfs[gallery]'" in err and err.count("\n") == 1
+
+
+# --- The pictures in the documentation ------------------------------------------------------------------------------
+
+STALE = "looks different; if that is meant, run python docs/reference_page.py"
+QUICK = ("blinnphong", "ward")
+THUMBNAILS = [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in NAMES]
+
+
+def difference(name: str, bsdf: dict) -> float:
+    """How far a material is from a thumbnail: the mean square of the difference, over what the noise makes of it as
+    two renderings with other seeds and a quarter of the samples tell. About 1 if the thumbnail shows the material."""
+    committed = blocks(Image.open(docs.THUMBNAILS / f"{name}.png"))
+    first, second = (blocks(picture(bsdf, docs.SIZE, docs.SAMPLES // 4, seed)) for seed in (1, 2))
+    variance = np.square(first - second).mean() / 2
+    return np.square((first + second) / 2 - committed).mean() / (0.75 * variance)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", THUMBNAILS)
+def test_thumbnails_show_the_models(name):
+    assert difference(name, example(find_model(name))) < 4, f"{name} {STALE} {name}"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_thumbnails_tell_lobes_and_models_apart():
+    assert difference("ward", example(find_model("ward")) | {"specular_reflectance": 0.24}) > 8
+    assert difference("walter", {"type": "cooktorrance", "material": "Au", "alpha": 0.2}) > 8
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+def test_strips_show_the_main_sweeps(model):
+    name = model.plugins[0]
+    committed = blocks(Image.open(docs.STRIPS / f"{name}.jpg"))
+    now = blocks(docs.strip(model, 4))
+    assert now.shape == committed.shape and np.sqrt(np.square(now - committed).mean()) < 0.02, f"{STALE} {name}"
+
+
+def test_the_picture_in_the_readme_has_all_thumbnails():
+    committed, now = blocks(Image.open(docs.GALLERY)), blocks(docs.all_thumbnails())
+    assert committed.shape == now.shape and abs(committed - now).max() < 0.02, f"{STALE} all"
+
+
+def test_pictures_are_small_and_of_each_model():
+    for folder, suffix in (docs.THUMBNAILS, ".png"), (docs.STRIPS, ".jpg"):
+        sizes = {path.stem: path.stat().st_size for path in folder.iterdir() if path.suffix == suffix}
+        assert set(sizes) == set(NAMES) and max(sizes.values()) < 50_000
+    assert docs.GALLERY.stat().st_size < 700_000

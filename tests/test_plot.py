@@ -1,0 +1,476 @@
+"""The plots of lobes: what is drawn is what closed forms say, legends name it, and the command writes it."""
+
+import re
+import subprocess
+import sys
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from matplotlib import pyplot, rcParams
+from support import call, context, direction
+from typer.testing import CliRunner
+
+import mi_brdfs
+from mi_brdfs import plot
+from mi_brdfs.cli import app
+from mi_brdfs.plot import command, lobes
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
+MIRROR = {"type": "walter", "alpha": 0.01}
+PHONG = {"type": "phong", "exponent": 2000, "diffuse_reflectance": 0, "specular_reflectance": 0.4}
+SHEET = {"type": "wrap", "domain": "sphere", "reflectance": 0.6}
+COLOURED = {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
+LUMINANCE = 0.2126 * 0.2 + 0.7152 * 0.5 + 0.0722 * 0.8
+
+
+def curves(figure, panel=0):
+    """The curves of a panel, by label: x and y."""
+    return {line.get_label(): line.get_data() for line in figure.axes[panel].lines if line.get_label()[0] != "_"}
+
+
+def curve(figure, panel=0):
+    (only,) = curves(figure, panel).values()
+    return only
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def near(got, expected, of_peak):
+    """Equal to a part of the largest."""
+    np.testing.assert_allclose(got, expected, rtol=0, atol=of_peak * np.max(expected))
+
+
+# --- What is drawn --------------------------------------------------------------------------------------------------
+
+
+def test_lamberts_polar_lobe_is_a_circle():
+    """Of the diameter ρ/π, on the surface, for light from everywhere."""
+    figure = plot.polar({"type": "lambert", "reflectance": 0.8}, angles=(0, 50, 85), scale="linear")
+    assert len(curves(figure)) == 3
+    for x, y in curves(figure).values():
+        near(np.hypot(x, y - 0.4 / np.pi), np.full(len(x), 0.4 / np.pi), 1e-5)
+        assert x.min() < -0.39 / np.pi and x.max() > 0.39 / np.pi and y.max() > 0.79 / np.pi
+
+
+def test_the_log_radius_is_as_its_rings_say():
+    """A ring 10^k lies where the curve is 10^k, and rings are as far apart as decades."""
+    figure = plot.polar({"type": "lambert", "reflectance": 0.8}, angles=(30,), scale="log")
+    x, y = curve(figure)
+    theta, radius = np.degrees(np.arctan2(x, y)), np.hypot(x, y)
+    rings = {int(found[1]): text.get_position()[0] for text in figure.axes[0].texts
+             if (found := re.fullmatch(r"\$10\^\{(-?\d+)\}\$", text.get_text()))}  # fmt: skip
+    assert len(rings) > 1
+    for power, at in rings.items():
+        expected = np.log10(0.8 / np.pi * np.cos(np.radians(theta))) - power + at
+        seen = radius > 0
+        np.testing.assert_allclose(radius[seen], expected[seen], atol=1e-4)
+
+
+def test_the_signed_angle_is_positive_at_the_mirror_direction():
+    theta, value = curve(plot.cartesian(PHONG, angles=(40,), scale="linear"))
+    cos = np.maximum(np.cos(np.radians(theta - 40)), 0)
+    near(value, 0.4 * 2002 / (2 * np.pi) * cos**2000 * np.cos(np.radians(theta)), 1e-3)
+    assert theta[np.argmax(value)] == pytest.approx(40, abs=0.1)
+    x, y = curve(plot.polar(PHONG, angles=(40,), scale="linear"))
+    tip = np.argmax(np.hypot(x, y))
+    assert np.degrees(np.arctan2(x[tip], y[tip])) == pytest.approx(40, abs=0.1)
+
+
+def ggx(theta, theta_i, alpha):
+    """f cosθ_o in the plane of incidence of a perfect reflector with GGX facets and Smith's separate shadowing."""
+    theta, theta_i = np.radians(theta), np.radians(theta_i)
+    h = (theta - theta_i) / 2  # the angle of the half vector: wi is at -theta_i
+    d = alpha**2 / (np.pi * (np.sin(h) ** 2 + alpha**2 * np.cos(h) ** 2) ** 2)
+    g = [2 / (1 + np.sqrt(1 + (alpha * np.tan(t)) ** 2)) for t in (theta, theta_i)]
+    return d * g[0] * g[1] / (4 * np.cos(theta_i))
+
+
+@pytest.mark.parametrize("theta_i", [0, 33.3, 80])
+@pytest.mark.parametrize("alpha", [1e-3, 1e-2, 0.3])
+def test_no_lobe_is_too_narrow(alpha, theta_i):
+    figure = plot.cartesian({"type": "walter", "alpha": alpha}, angles=(theta_i,))
+    everywhere = np.concatenate([np.linspace(-89, 89, 1000), theta_i + np.linspace(-5, 5, 100_001)])
+    peak = ggx(everywhere[abs(everywhere) < 89], theta_i, alpha).max()
+    for panel in (0, 1):
+        theta, value = curve(figure, panel)
+        assert value.max() == pytest.approx(peak, rel=0.01)
+        asked = np.random.default_rng(1).uniform(-85, 85, 1000)
+        asked = np.where(np.arange(1000) % 2, asked, theta_i + asked * alpha)
+        asked = asked[abs(asked) < 85]
+        expected = ggx(asked, theta_i, alpha)
+        near(np.interp(asked, theta, value), expected, 0.01)
+        error = abs(np.interp(asked, theta, value) / expected - 1)
+        assert error[expected > 1e-6 * peak].max() < 0.05
+
+
+@pytest.mark.parametrize("bsdf", ["toon", {"type": "ward", "alpha_u": 0.02, "alpha_v": 0.3}, "roughplastic"])
+def test_any_bsdf_is_drawn_as_it_evaluates(bsdf):
+    """Also turned about the normal."""
+    theta, value = curve(plot.cartesian(bsdf, angles=(50,), azimuth=25, scale="linear"))
+    asked = np.linspace(-88, 88, 777)
+    wo = np.array([direction(-each, 25) for each in asked])
+    loaded = mi.load_dict({"type": bsdf} if isinstance(bsdf, str) else bsdf)
+    (expected,) = call(loaded.eval, context(), np.tile(direction(50, 25), (777, 1)), wo)
+    near(np.interp(asked, theta, value), expected[:, 0], 0.01)
+
+
+def test_below_the_surface_only_what_transmits():
+    theta, value = curve(plot.cartesian(SHEET, angles=(40,), scale="linear"))
+    assert theta[0] == -180 and theta[-1] == 180
+    near(value, 0.6 * 3 / (4 * np.pi) * ((np.cos(np.radians(theta)) + 1) / 2) ** 2, 1e-3)
+    _, y = curve(plot.polar(SHEET, angles=(40,), scale="linear"))
+    assert y.min() < -0.003
+    theta, _ = curve(plot.cartesian("lambert", angles=(40,)))
+    assert theta[0] > -90 and theta[-1] < 90
+    for bsdf, depth in (SHEET, 1), ("lambert", 0.125):
+        bottom, top = plot.polar(bsdf, angles=(40,)).axes[0].get_ylim()
+        assert -bottom / top == pytest.approx(depth)
+    assert len(plot.hemisphere(SHEET, resolution=8).axes) == 2 * 3 + 1
+
+
+def test_a_refracted_lobe_lies_where_snell_says():
+    """On the far side of the normal, at 180° - θ_t; and it is found there, though nothing hints at it elsewhere."""
+    glass = {"type": "roughdielectric", "distribution": "beckmann", "alpha": 1e-4, "int_ior": 1.5}
+    theta, value = curve(plot.cartesian(glass, angles=(50,), scale="linear"))
+    refracted = np.degrees(np.arcsin(np.sin(np.radians(50)) / 1.5))
+    assert theta[np.argmax(value)] == pytest.approx(180 - refracted, abs=0.1)
+    assert (value[abs(theta - 180 + refracted) > 1] < 0.02 * value.max()).all()
+
+
+def test_both_scales_show_the_same():
+    figure = plot.cartesian(MIRROR, angles=(20, 60))
+    assert [ax.get_yscale() for ax in figure.axes] == ["linear", "log"]
+    for label, (theta, value) in curves(figure).items():
+        np.testing.assert_array_equal(curves(figure, 1)[label], (theta, value))
+    polar = plot.polar(MIRROR)
+    assert [re.search("linear|log", ax.get_xlabel())[0] for ax in polar.axes] == ["linear", "log"]
+
+
+def test_albedo():
+    drawn = curves(plot.albedo(
+        {"type": "lambert", "reflectance": 0.3}, SHEET, COLOURED, {"type": "conductor", "material": "none"},
+        "dielectric", labels=["flat", "both sides", "coloured", "mirror", "glass"],
+    ))  # fmt: skip
+    expected = {"flat": 0.3, "both sides": 0.6, "coloured": LUMINANCE, "mirror": 1, "glass": 1}
+    assert list(drawn) == list(expected)
+    for name, (theta, value) in drawn.items():
+        assert theta[0] == 0 and theta[-1] > 89
+        np.testing.assert_allclose(value, expected[name], rtol=1e-3)
+
+
+def test_luminance_is_drawn_and_said():
+    figure = plot.cartesian(COLOURED, angles=(0,), scale="linear")
+    assert curve(figure)[1].max() == pytest.approx(LUMINANCE / np.pi, rel=1e-3)
+    assert "luminance" in figure.axes[0].get_ylabel() and r"\cos" in figure.axes[0].get_ylabel()
+
+
+def test_spectra_are_drawn_by_their_mean():
+    with mi.variant_context("llvm_ad_spectral"):
+        figure = plot.cartesian({"type": "lambert", "reflectance": 0.5}, angles=(0,), scale="linear")
+    assert curve(figure)[1].max() == pytest.approx(0.5 / np.pi, rel=1e-3)
+    assert "mean of the spectrum" in figure.axes[0].get_ylabel()
+
+
+# --- Maps -----------------------------------------------------------------------------------------------------------
+
+
+def maps(figure):
+    return [np.array(ax.images[0].get_array()) for ax in figure.axes if ax.images]
+
+
+def disc(n):
+    """The coordinates of the pixels, and the solid angle of each."""
+    x, y = np.meshgrid((np.arange(n) + 0.5) * 2 / n - 1, (np.arange(n) + 0.5) * 2 / n - 1)
+    r = np.hypot(x, y)
+    return x, y, r, np.where(r < 1, np.sin(r * np.pi / 2) * np.pi / 2 / r * (2 / n) ** 2, 0)
+
+
+def test_a_map_has_the_angle_as_its_radius():
+    (picture,) = maps(plot.hemisphere({"type": "lambert", "reflectance": 0.8}, angles=(30,), resolution=100))
+    _, _, r, _ = disc(100)
+    seen = r < 0.97
+    near(picture[seen], 0.8 / np.pi * np.cos(r * np.pi / 2)[seen], 2e-3)
+
+
+@pytest.mark.parametrize("alpha", [1e-3, 0.02, 0.2])
+def test_a_map_holds_the_whole_lobe(alpha):
+    """Also one that is narrower than a pixel, and at any azimuth in the same place."""
+    bsdf = {"type": "walter", "alpha": alpha}
+    for azimuth in (0, 70):
+        (picture,) = maps(plot.hemisphere(bsdf, angles=(40,), azimuth=azimuth, resolution=90))
+        x, y, _, solid_angle = disc(90)
+        brightest = np.unravel_index(np.argmax(picture), picture.shape)
+        assert np.hypot(x[brightest] - 40 / 90, y[brightest]) < 0.04
+        assert (picture * solid_angle).sum() == pytest.approx(np.interp(40, *curve(plot.albedo(bsdf))), rel=0.05)
+
+
+def test_a_map_is_seen_from_above():
+    """An anisotropic lobe, out of the plane of incidence, is where its axis is; and what is drawn is looked for where
+    it is shown."""
+    bsdf = {"type": "lafortune", "cx": -1, "cy": -0.2, "exponent": 400, "diffuse_reflectance": 0}
+    (picture,) = maps(plot.hemisphere(bsdf, angles=(50,), azimuth=45, resolution=90))
+    wo = direction(50, 45) * [-1, -0.2, 1]
+    azimuth = np.degrees(np.arctan2(wo[1], wo[0])) - 45 + 180  # counter-clockwise from the right
+    x, y, _, _ = disc(90)
+    brightest = np.unravel_index(np.argmax(picture), picture.shape)
+    assert np.degrees(np.arctan2(y[brightest], x[brightest])) == pytest.approx((azimuth + 180) % 360 - 180, abs=4)
+    shown = np.random.default_rng(1).uniform(-0.7, 0.7, (100, 2))
+    np.testing.assert_allclose(lobes.to_disc(lobes.from_disc(shown, 45), 45), shown, atol=1e-6)
+
+
+# --- The body -------------------------------------------------------------------------------------------------------
+
+
+def points(trace):
+    return np.stack([np.array(trace[axis], float) for axis in "xyz"], axis=-1)
+
+
+def test_the_body_of_a_lobe():
+    figure = plot.sphere({"type": "lambert", "reflectance": 0.8}, angle=30, scale="linear", resolution=20, samples=50)
+    surface, drawn, wi, mirror, _ = figure.data
+    for trace in surface, drawn:
+        x = points(trace).reshape(-1, 3)
+        near(np.linalg.norm(x - [0, 0, 0.4 / np.pi], axis=1), np.full(len(x), 0.4 / np.pi), 0.02)
+    assert len(drawn.x) == 50
+    for trace, expected in (wi, direction(30)), (mirror, direction(30, 180)):
+        end = points(trace)[1]
+        np.testing.assert_allclose(end / np.linalg.norm(end), expected, atol=1e-6)
+    assert figure.layout.scene.aspectmode == "data"
+
+
+@pytest.mark.parametrize("azimuth", [0, 130])
+def test_the_body_of_a_narrow_lobe(azimuth):
+    surface, drawn, *_ = plot.sphere(MIRROR, azimuth=azimuth, scale="linear").data
+    x = points(surface).reshape(-1, 3)
+    tip = x[np.argmax(np.linalg.norm(x, axis=1))]
+    assert np.linalg.norm(tip) == pytest.approx(ggx(45.0, 45, 0.01), rel=0.01)
+    np.testing.assert_allclose(tip / np.linalg.norm(tip), direction(45, azimuth + 180), atol=0.01)
+    assert np.linalg.norm(points(drawn), axis=1).max() > 0.5 * np.linalg.norm(tip)
+
+
+def test_the_scales_of_a_body_are_behind_buttons():
+    figure = plot.sphere("lambert", SHEET, resolution=8, samples=8)
+    linear, log = figure.layout.updatemenus[0].buttons
+    assert [linear.label, log.label] == ["linear", "log"]
+    visible = tuple(trace.visible for trace in figure.data)
+    assert visible == linear.args[1] == tuple(not each for each in log.args[1])
+    names = [trace.name for trace in figure.data if trace.type == "surface" and trace.visible]
+    assert names == ["lambert", "wrap domain=sphere reflectance=0.6", "wrap domain=sphere reflectance=0.6"]
+    top, log_top = (max(points(figure.data[k])[..., 2].max() for k in (start, start + 2))
+                    for start in (0, len(figure.data) // 2))  # fmt: skip
+    assert top == pytest.approx(0.5 / np.pi, rel=1e-3) and log_top > 2  # two decades, at least
+
+
+def test_the_page_needs_no_network(tmp_path):
+    command.write(plot.sphere("lambert", resolution=8, samples=8), tmp_path / "a.html")
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert "Plotly.newPlot" in page and len(page) > 1e6
+    assert not re.search(r"<script[^>]*\ssrc=|<link|@import", page.partition("Plotly.newPlot")[0][:2000])
+    assert not re.search(r"<script[^>]*\ssrc=\W?http", page)
+
+
+# --- Several BSDFs --------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_is_named_by_what_differs():
+    sweep = [{"type": "ward", "alpha": alpha, "variant": "ward-duer"} for alpha in (0.1, 0.25)]
+    figure = plot.polar(*sweep, "roughconductor", angles=(45,))
+    assert legend(figure)[:3] == ["ward alpha=0.1", "ward alpha=0.25", "roughconductor"]
+    assert list(curves(figure)) == legend(figure)[:3]
+    looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines if line.get_label()[0] != "_"}
+    assert len(looks) == 3
+    first, second, _ = (np.hypot(*xy).max() for xy in curves(figure).values())
+    assert first > 3 * second
+
+
+def test_a_parameter_is_named_if_any_other_bsdf_differs_in_it():
+    both = [{"type": "phong", "exponent": 9, "specular_reflectance": value} for value in (0.1, 0.2)]
+    other = {"type": "phong", "exponent": 20, "specular_reflectance": 0.2}
+    assert legend(plot.albedo(*both, other)) == [
+        f"phong exponent={n} specular_reflectance={value}" for n, value in ((9, 0.1), (9, 0.2), (20, 0.2))
+    ]
+
+
+def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
+    figure = plot.cartesian("lambert", "phong", angles=(10, 60))
+    assert len(figure.axes) == 4 and list(curves(figure, 2)) == ["lambert", "phong"]
+    assert ["10°" in ax.get_title() for ax in figure.axes] == [True, True, False, False]
+    figure = plot.cartesian({"type": "phong", "exponent": 7}, angles=(10, 60))
+    assert len(figure.axes) == 2 and figure.get_suptitle() == "phong exponent=7"
+    assert ["10°" in label for label in curves(figure)] == [True, False]
+
+
+def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):
+    loaded = mi.load_dict({"type": "ward", "id": "brushed"})
+    (tmp_path / "two.xml").write_text(
+        '<scene version="3.0.0"><shape type="sphere"><bsdf type="lambert" id="wall"/></shape>'
+        '<shape type="sphere"><bsdf type="toon" id="fun"/></shape></scene>'
+    )
+    figure = plot.albedo(loaded, str(tmp_path / "two.xml"), '<bsdf type="lambert" id="text"/>', COLOURED)
+    assert legend(figure) == ["brushed", "two.xml: wall", "two.xml: fun", "text", "lambert reflectance=0.2;0.5;0.8"]
+    assert legend(plot.albedo(loaded, labels=["mine"])) == ["mine"]
+
+
+def test_what_is_left_out_is_said():
+    assert plot.polar("plastic").get_suptitle() == "plastic without its delta lobe"
+
+
+# --- Any model, any kind --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", mi_brdfs.list_models())
+def test_every_model_in_every_kind(name):
+    for figure in plot.polar(name, angles=(50,)), plot.cartesian(name, angles=(50,)), plot.albedo(name):
+        for panel in range(len(figure.axes)):
+            x, y = curve(figure, panel)
+            assert np.isfinite(x).all() and np.isfinite(y).all() and y.max() > 0
+    (picture,) = maps(plot.hemisphere(name, angles=(50,), resolution=12))
+    assert np.isfinite(picture).all() and picture.max() > 0
+    body = points(plot.sphere(name, resolution=6, samples=9).data[0])
+    assert np.isfinite(body).all() and body.max() > 0
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", command.KINDS)
+def test_what_is_black_is_drawn_too(kind):
+    figure = command.KINDS[kind]({"type": "lambert", "reflectance": 0})
+    if kind != "sphere":
+        figure._repr_png_()
+
+
+def test_figures_are_nobody_elses():
+    """pyplot knows none of them, its settings stay, and a notebook can show them."""
+    before = dict(rcParams)
+    figure = plot.polar("lambert")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert pyplot.get_fignums() == [] and dict(rcParams) == before
+
+
+# --- Errors ---------------------------------------------------------------------------------------------------------
+
+ERRORS = {
+    "nothing": (lambda: plot.polar(), "no BSDF to plot"),
+    "no BSDF": (lambda: plot.polar({"type": "sphere"}), "sphere is not a BSDF of llvm_ad_rgb"),
+    "not one": (lambda: plot.albedo(3), "int is not a BSDF"),
+    "mirror": (lambda: plot.hemisphere("conductor"), "conductor .*single directions"),
+    "angle": (lambda: plot.cartesian("ward", angles=(90,)), r"in \[0, 90\) degrees, not 90"),
+    "no angle": (lambda: plot.hemisphere("ward", angles=()), "no angle"),
+    "scale": (lambda: plot.sphere("ward", scale="logarithmic"), "no scale 'logarithmic'; there are linear, log, both"),
+    "labels": (lambda: plot.albedo("ward", "phong", labels=["ward"]), "2 BSDFs, but 1 labels"),
+    "unknown": (lambda: plot.albedo("wrad"), "wrad"),
+    "parameter": (lambda: plot.albedo({"type": "ward", "alhpa": 1}), "did you mean alpha"),
+}
+
+
+@pytest.mark.parametrize("wrong, text", ERRORS.values(), ids=ERRORS)
+def test_errors(wrong, text):
+    with pytest.raises((ValueError, RuntimeError), match=text):
+        wrong()
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_mono_polarized"])
+def test_a_variant_that_does_not_do(variant):
+    with mi.variant_context(variant), pytest.raises(ValueError, match=f"vectorized and unpolarized.*{variant}"):
+        plot.polar("lambert")
+
+
+# --- The command ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["plot", *map(str, arguments)])
+
+
+def test_values_of_parameters():
+    assert command.asked_for(["ward", "phong"], ["a=1,0.5", "b=true", "c=word"]) == [
+        {"type": name, "a": a, "b": True, "c": "word"} for name in ("ward", "phong") for a in (1, 0.5)
+    ]
+    (coloured, linear) = command.asked_for(["lambert"], ["reflectance=#ff8000,0.1;0.2;0.3"])
+    assert coloured["reflectance"] == {"type": "rgb", "value": pytest.approx([1, 0.2158605, 0])}
+    assert linear["reflectance"] == {"type": "rgb", "value": [0.1, 0.2, 0.3]}
+    assert command.asked_for(["<bsdf/>", "a.xml"], []) == ["<bsdf/>", "a.xml"]
+
+
+def test_the_command_in_a_process_of_its_own(folder):
+    words = ["plot", "ward", "--param", "alpha=0.1,0.4", "--param", "variant=ward-duer", "--scale", "log"]
+    done = subprocess.run([sys.executable, "-m", "mi_brdfs.cli", *words], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ward-polar.png\n", "")
+    width, height = mi.Bitmap(str(folder / "ward-polar.png")).size()
+    assert width > 800 and height > 800
+    assert [file.name for file in folder.iterdir()] == ["ward-polar.png"]
+
+
+def test_the_command_passes_on_what_it_is_told(folder, monkeypatch):
+    def kind(*bsdfs, angles=(), azimuth=0, scale="both"):
+        told.append((bsdfs, list(angles), azimuth, scale))
+        return plot.albedo("lambert")
+
+    told = []
+    monkeypatch.setitem(command.KINDS, "polar", kind)
+    done = run("ward", "lambert", "--angles", "10,60.5", "--azimuth", 30, "--scale", "log", "-o", "a.svg")
+    assert done.exit_code == 0 and done.stdout == "a.svg\n"
+    assert told == [(("ward", "lambert"), [10, 60.5], 30, "log")]
+    assert "<svg" in (folder / "a.svg").read_text()
+
+
+def test_each_kind_has_its_file(folder):
+    assert run("lambert", "--kind", "albedo").stdout == "lambert-albedo.png\n"
+    assert run("lambert", "toon", "--kind", "sphere", "--angles", "20").stdout == "lambert-toon-sphere.html\n"
+    assert run('<bsdf type="lambert"/>', "--kind", "cartesian", "-o", "b.pdf").stdout == "b.pdf\n"
+    assert {file.name for file in folder.iterdir()} == {"lambert-albedo.png", "lambert-toon-sphere.html", "b.pdf"}
+    assert pyplot.get_fignums() == []
+
+
+WRONG = {
+    "kind": (["ward", "--kind", "radar"], 2, "radar: there is no such kind; there are polar, cartesian, hemisphere"),
+    "plugin": (["wrad"], 2, "wrad"),
+    "not a BSDF": (["perspective"], 2, "perspective is not a BSDF"),
+    "parameter": (["ward", "--param", "alhpa=0.1"], 2, "ward: unknown parameter alhpa; did you mean alpha"),
+    "its value": (["ward", "--param", "alpha=0.1,7"], 2, "ward: alpha = 7 is not allowed"),
+    "malformed": (["ward", "--param", "alpha"], 2, "--param alpha: write name=value"),
+    "empty": (["ward", "--param", "alpha=0.1,,"], 2, "write name=value"),
+    "twice": (["ward", "--param", "alpha=0.1", "--param", "alpha=0.2"], 2, "alpha is given twice"),
+    "two sweeps": (["ward", "--param", "a=1,2", "--param", "b=1,2"], 2, "a and b have several values each"),
+    "of XML": (['<bsdf type="ward"/>', "--param", "alpha=0.1"], 2, "in its XML"),
+    "no file": (["gone.xml"], 2, "gone.xml: no such file"),
+    "bad XML": (["<bsdf"], 2, "parsing failed"),
+    "mirror": (["conductor"], 2, "no lobe to draw"),
+    "angles": (["ward", "--angles", "ten"], 2, "--angles ten: write degrees"),
+    "angle": (["ward", "--angles", "95"], 2, "degrees, not 95"),
+    "one angle": (["ward", "--kind", "sphere", "--angles", "1,2"], 2, "sphere shows one angle"),
+    "scale": (["ward", "--scale", "cubic"], 2, "no scale 'cubic'"),
+    "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale says nothing about albedo"),
+    "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),
+    "page": (["ward", "--kind", "sphere", "-o", "ward.png"], 2, "ward.png: sphere is written as .html"),
+    "folder": (["ward", "-o", "gone/ward.png"], 2, "there is no folder gone"),
+    "unwritable": (["ward", "-o", "taken.png"], 1, "cannot write taken.png: Is a directory"),
+    "variant": (["ward", "--variant", "scalar_rgb"], 2, "vectorized and unpolarized"),
+}
+
+
+@pytest.mark.parametrize("arguments, status, text", WRONG.values(), ids=WRONG)
+def test_an_error_is_one_sentence(folder, arguments, status, text):
+    (folder / "taken.png").mkdir()
+    done = run(*arguments)
+    assert done.exit_code == status and done.stdout == ""
+    assert text in done.stderr and done.stderr.startswith("mi-brdfs: ") and done.stderr.count("\n") == 1
+    assert [file.name for file in folder.iterdir()] == ["taken.png"]
+
+
+@pytest.mark.parametrize("library, kind", [("matplotlib", "polar"), ("plotly", "sphere")])
+def test_a_missing_library_is_named(folder, library, kind):
+    code = f"import sys; sys.modules['{library}'] = None; from mi_brdfs.cli import main; main()"
+    words = [sys.executable, "-c", code, "plot", "ward", "--kind", kind]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1 and done.stdout == ""
+    assert re.fullmatch(rf"mi-brdfs: .*{library}: pip install 'mi_brdfs\[plot\]'\n", done.stderr, re.IGNORECASE)
