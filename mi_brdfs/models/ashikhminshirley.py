@@ -38,7 +38,8 @@ class AshikhminShirley(Model):
         <float name="exponent_v" value="400"/>
     </bsdf>
 
-    {"type": "ashikhminshirley", "diffuse_reflectance": {"type": "rgb", "value": [0.3, 0.1, 0.35]}, "exponent_u": 20, "exponent_v": 400}
+    {"type": "ashikhminshirley", "diffuse_reflectance": {"type": "rgb", "value": [0.3, 0.1, 0.35]},
+     "exponent_u": 20, "exponent_v": 400}
     """
 
     diffuse_reflectance = Reflectance(0.5, "colour Rd of the diffuse lobe")

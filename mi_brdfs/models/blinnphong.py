@@ -44,7 +44,8 @@ class BlinnPhong(Model):
         <string name="normalization" value="ndf"/>
     </bsdf>
 
-    {"type": "blinnphong", "diffuse_reflectance": {"type": "rgb", "value": [0.15, 0.3, 0.05]}, "exponent": 80, "normalization": "ndf"}
+    {"type": "blinnphong", "diffuse_reflectance": {"type": "rgb", "value": [0.15, 0.3, 0.05]},
+     "exponent": 80, "normalization": "ndf"}
     """
 
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
