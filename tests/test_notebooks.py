@@ -2,22 +2,144 @@
 
 import json
 
-import mitsuba as mi
+import numpy as np
 import pytest
+
+from notebooks import NOTEBOOKS, code_cells, read_notebook, run_notebook
+
+# --- What they say --------------------------------------------------------------------------------------------------
+
+
+def first_light(names):
+    recovered = {key.split(".")[2]: value.numpy().ravel() for key, value in names["recovered"].items()}
+    assert names["losses"][-1] < 0.5 * names["losses"][0]  # what remains is the noise of 16 samples
+    assert recovered["specular_reflectance"] == pytest.approx([0.8, 0.5, 0.35], abs=0.08)
+    assert recovered["alpha_u"] == pytest.approx(0.08, abs=0.02)
+    assert recovered["alpha_v"] == pytest.approx(0.3, abs=0.04)
+    assert recovered["diffuse_reflectance"] == pytest.approx(0.05, abs=0.02)
+
+
+def is_my_sampler_right(names):
+    reports = names["reports"]
+    assert names["walter"].passed and names["roughconductor"].passed and names["facets"].passed
+    assert failed_checks(reports["no_jacobian"]) == failed_checks(reports["loses_samples"]) == {"pdf", "chi2"}
+    assert failed_checks(reports["wrong_weight"]) == {"weight"}
+
+    albedo = {report.name: albedos(report) for report in [*reports.values(), names["walter"]]}
+    assert albedo["facets"] == pytest.approx(albedo["walter"], rel=0.01)
+    kept = {name: {angle: albedo[name][angle] / albedo["facets"][angle] for angle in (0, 70)} for name in reports}
+    assert kept["no_jacobian"][0] == pytest.approx(0.25, abs=0.03)
+    for name in ("loses_samples", "wrong_weight"):
+        assert 0.94 < kept[name][0] < 0.965 and 0.84 < kept[name][70] < 0.885
+
+    middle, rim = np.s_[40:56, 40:56], np.s_[40:56, 84:88]
+    balls = {name: np.array(picture) for name, picture in names["balls"].items()}
+    dimmer = {n: [1 - ball[part].mean() / balls["facets"][part].mean() for part in (middle, rim)]
+              for n, ball in balls.items()}  # fmt: skip
+    assert dimmer["wrong_weight"] == pytest.approx([0.035, 0.035], abs=0.02)
+    assert dimmer["loses_samples"] == pytest.approx([0.01, 0.1], abs=0.02)
+
+    assert (names["eta"]["walter"] > names["eta"]["roughconductor"]).all()
+    assert (names["eta"]["roughconductor"][3:] > names["eta"]["facets"][3:] + 0.03).all()
+    drawn = names["facets"].of("pdf")[0].data["80°"]
+    assert drawn["drawn"] == pytest.approx(drawn["integral"], abs=0.003) and drawn["drawn"] < 0.7
+
+
+def recover_a_material(names):
+    excess = {model: error / names["noise"] for model, error in names["errors"].items()}
+    assert excess["walter"] < 1.1
+    assert min(excess[model] for model in ("phong", "ward", "burley")) > 2
+    # The last steps are 0.04 · 0.97^59 = 0.007 long.
+    found = {model: {name: trace[-1] for name, trace in fit[2].items()} for model, fit in names["fits"].items()}
+    for name, hidden in names["hidden"].items():
+        assert found["walter"][name] == pytest.approx(hidden, abs=0.02), name
+    for model in ("phong", "ward"):
+        assert found[model]["diffuse_reflectance"][0] > 0.15
+    difference = {model: np.array(fit[0] - names["target"]) for model, fit in names["fits"].items()}
+    assert difference["phong"][28:36, 57:60].mean() < -0.1  # the reflection of the light from behind
+    assert difference["ward"][18:26, 18:26].mean() < -0.02  # the middle of the highlight
+    red, _, blue = difference["burley"][32:56, 24:40].mean(axis=(0, 1))
+    assert red > 0.01 and blue < -0.01
+
+
+def write_your_own_brdf(names):
+    report = names["report"]
+    assert {finding.verdict for finding in report.findings} == {"pass", "info"}
+    assert min(efficiencies(report)) > 0.98
+    assert names["cosine"].passed
+    assert efficiencies(names["cosine"])[-1] == pytest.approx(0.84, abs=0.01)
+    assert failed_checks(names["slip"]) == {"chi2", "albedo"}
+    assert albedos(names["slip"])[89.9] > 3 * 0.148
+    assert names["refusal"].endswith("lommelseeliger: scattering = 1.5 is not allowed; it must be a number, rgb or "
+                                     "spectrum within [0, 1] or a texture.")  # fmt: skip
+
+    # w/2 ∫ ν/(μ+ν) dν by the midpoint rule.
+    nu = (np.arange(100_000) + 0.5) / 100_000
+    for theta, albedo in albedos(report).items():
+        assert albedo == pytest.approx(0.15 * np.mean(nu / (np.cos(np.radians(theta)) + nu)), rel=2e-3)
+
+    moons = {key: np.array(picture)[..., 0] for key, picture in names["moons"].items()}
+    full = moons["lommelseeliger", 0]
+    assert full[64, 12:116] == pytest.approx(0.5, rel=1e-3)
+    assert moons["lambert", 0][64, 12] < 0.6 * moons["lambert", 0][64, 64]
+    assert moons["lommelseeliger", 70][64].argmax() > 115
+
+
+def failed_checks(report):
+    return {finding.check for finding in report.failures}
+
+
+def albedos(report):
+    found = report.of("albedo")[0].data
+    return {theta: found[f"{theta:g}°"]["albedo"] for theta in (0, 30, 60, 70, 80, 89.9)}
+
+
+def efficiencies(report):
+    return list(report.of("efficiency")[0].data.values())
+
+
+def coming_from_mitsuba_06(names):
+    assert names["difference"] < 1e-4  # of the same scene with the names of Mitsuba 3
+
+
+def anatomy_of_a_microfacet_brdf(names):
+    """The white furnace: Blinn's D without the 4, whose integral at normal incidence is 4 (n + 2^(-n/2))/(n+4)."""
+    picture = names["picture"]
+    assert picture[72:88, 72:88].mean() == pytest.approx(4 * (20 + 2**-10) / 24, rel=0.01)
+    np.testing.assert_allclose(picture[[0, 0, -1, -1], [0, -1, 0, -1]], 1, rtol=1e-5)
+
+
+SAYS = {
+    say.__name__: say
+    for say in (
+        first_light,
+        is_my_sampler_right,
+        recover_a_material,
+        write_your_own_brdf,
+        coming_from_mitsuba_06,
+        anatomy_of_a_microfacet_brdf,
+    )
+}
+
+# --- Tests ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
-def test_first_light(pytestconfig):
-    notebook = json.loads((pytestconfig.rootpath / "notebooks" / "first_light.ipynb").read_text(encoding="utf-8"))
-    cells = {}
-    with mi.variant_context("llvm_ad_rgb"):
-        for cell in notebook["cells"]:
-            if cell["cell_type"] == "code":
-                assert not cell["outputs"]
-                exec("".join(cell["source"]), cells)
-        recovered = {key.split(".")[2]: value.numpy().ravel() for key, value in cells["recovered"].items()}
-        assert cells["losses"][-1] < 0.5 * cells["losses"][0]  # what remains is the noise of 16 samples
-        assert recovered["specular_reflectance"] == pytest.approx([0.8, 0.5, 0.35], abs=0.08)
-        assert recovered["alpha_u"] == pytest.approx(0.08, abs=0.02)
-        assert recovered["alpha_v"] == pytest.approx(0.3, abs=0.04)
-        assert recovered["diffuse_reflectance"] == pytest.approx(0.05, abs=0.02)
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook(path):
+    names = run_notebook(path)
+    if path.stem in SAYS:
+        SAYS[path.stem](names)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_committed_form(path):
+    """Sources are reviewable as text, without outputs, and plain Python."""
+    text, notebook = path.read_text(encoding="utf-8"), read_notebook(path)
+    assert text == json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
+    assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
+    for cell in notebook["cells"]:
+        assert "".join(cell["source"]).splitlines(keepends=True) == cell["source"]
+    for cell in code_cells(notebook):
+        assert not cell["outputs"] and cell["execution_count"] is None
+        compile("".join(cell["source"]), cell["id"], "exec")
