@@ -19,10 +19,10 @@ class Toon(Model):
         S(c; t, s) = 3x² - 2x³,    x = min(max((c - t + s)/2s, 0), 1)
 
     with S the step of a cosine c from 0 at t-s to 1 at t+s, and r the mirror direction. A point is lit fully where its
-    normal is within acos td of the light, by the fraction b beyond that, and shows a highlight where the mirror
-    direction is within acos ts of it. The bands are the paper's, which looks them up in a texture of cosθ_o; the
-    formula is this plugin's. It stands for the whole response to a light, cosine included. ``normalization`` chooses
-    the scale:
+    normal is within acos td of the light, by the fraction b from there to 90°, where it turns away, and shows a
+    highlight where the mirror direction is within acos ts of it. Large lamps blur the edges: use points, or the sun.
+    The bands are the paper's, which looks them up in a texture of cosθ_o; the formula is this plugin's. It stands for
+    the whole response to a light, cosine included. ``normalization`` chooses the scale:
 
     * energy: Z is 2π times the integral of the band over the cosines from 0 to 1. The albedo of the diffuse lobe is ρd.
       That of the specular lobe is ρs as long as the horizon does not clip the highlight, and falls to about half of
