@@ -18,7 +18,8 @@ from PIL import Image
 from mi_brdfs.gallery import example, overview, picture
 from mi_brdfs.gallery.sheet import Row, sheet
 from mi_brdfs.gallery.sweeps import SWEEPS, shown
-from mi_brdfs.model import Energy, Model
+from mi_brdfs.integrators.shading import Shading
+from mi_brdfs.model import Energy, Model, Plugin
 from mi_brdfs.registry import all_models
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
@@ -50,7 +51,7 @@ value is limited to the range where it is evaluated. Pictures show the examples,
 def reference() -> str:
     """The text of the plugin reference."""
     models = all_models()
-    parts = [INTRODUCTION, _overview(models), *map(_page, models), CHAPTER.read_text(encoding="utf-8")]
+    parts = [INTRODUCTION, _overview(models), *map(_model, models), _integrator(), CHAPTER.read_text(encoding="utf-8")]
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
 
@@ -103,23 +104,31 @@ def _overview(models: list[type[Model]]) -> str:
     return _table([[""] * PICTURES_PER_LINE, *lines])
 
 
-def _page(model: type[Model]) -> str:
-    name, aliases = model.plugins[0], model.plugins[1:]
-    text, _, examples = inspect.cleandoc(model.__doc__).partition("\n\nExample\n-------\n")
+def _model(model: type[Model]) -> str:
+    return _page(model, _picture(model), _strip(model), _table(model.energy.rows()), Energy.NOTE)
+
+
+def _integrator() -> str:
+    picture = "![shading](../../docs/scenes/shading/phong.jpg)"
+    return _page(Shading, f"{picture}\n\nAbove shaded, below path-traced: one of the [scenes](../../scenes/shading).")
+
+
+def _page(plugin: type[Plugin], picture: str, strip: str = "", *more: str) -> str:
+    name, aliases = plugin.plugins[0], plugin.plugins[1:]
+    text, _, examples = inspect.cleandoc(plugin.__doc__).partition("\n\nExample\n-------\n")
     xml, _, dictionary = examples.partition("\n\n")
     text = _code(text)
     return "\n\n".join(
         [
             f"## {name}",
             *([f"Also as {', '.join(f'`{alias}`' for alias in aliases)}."] if aliases else []),
-            _picture(model),
+            picture,
             text,
             f"```xml\n{xml}\n```",
             f"```python\n{dictionary}\n```",
-            _strip(model),
-            _table(model.parameter_rows()),
-            _table(model.energy.rows()),
-            Energy.NOTE,
+            *([strip] if strip else []),
+            _table(plugin.parameter_rows()),
+            *more,
         ]
     )
 

@@ -30,7 +30,8 @@ INTRODUCTION = """\
 
 Each picture is what the command beside it renders, made smaller. `-Dspp=64`, `-Dwidth=640`, `-Dheight=360` and
 `-Dmax_depth=4` change the defaults at the top of a scene; `legacy_06` has none. What is where is told from left to
-right and from top to bottom. `textures/make_textures.py` makes the textures.
+right and from top to bottom. `textures/make_textures.py` makes the textures. [shading](shading/README.md) has scenes
+that are shaded as in the textbooks, beside what path tracing makes of them.
 """
 
 

@@ -139,6 +139,15 @@ class ModelBSDF:
         albedo = sum(lobe.albedo(normal) for lobe in lobes if not lobe.transmits)
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 
+    def mirror_reflectance(self, si, active=True):
+        """What the lobes reflect of the direction that mirrors si.wi, as if they were mirrors: at most 1."""
+        evaluated = self._mixture(mi.BSDFContext(), si, active)
+        if evaluated is None:
+            return mi.UnpolarizedSpectrum(0)
+        valid, mixture, _, _ = evaluated
+        reflectance = sum(lobe.mirror_reflectance(mixture.wi) for lobe in mixture.lobes)
+        return select(valid, clamp(mi.UnpolarizedSpectrum(reflectance), 0, 1), mi.UnpolarizedSpectrum(0))
+
     def has_attribute(self, name, active=True):
         return mi.Bool(name in self.textures)
 
@@ -161,12 +170,7 @@ class ModelBSDF:
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
     def to_string(self):
-        words = {name: value for name, value in vars(self.model).items() if isinstance(value, (str, bool))}
-        for slot in self.model.slots.values():
-            words |= slot.words
-        lines = [f"  {name} = {value}" for name, value in words.items()]
-        lines += [f"  {name} = {texture}" for name, texture in self.textures.items()]
-        return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
+        return self.model.described()
 
 
 class Turn:

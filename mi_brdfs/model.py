@@ -1,4 +1,4 @@
-"""The contract of a model: declared parameters, and the lobes that they make."""
+"""The contract of a plugin, its declared parameters; and that of a model, with the lobes that they make."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ is 0; what is not named takes all values in its range."""
         return rows
 
 
-class Model:
-    """A BRDF model. A subclass is its paper in code: its docstring is the manual page, its class attributes declare
-    the parameters (:mod:`mi_brdfs.parameters`), and :meth:`lobes` says what they mean.
+class Plugin:
+    """What a plugin is by its declarations. A subclass's docstring is its manual page, and its class attributes declare
+    the parameters (:mod:`mi_brdfs.parameters`).
 
     An instance belongs to one plugin instance. It holds the parameters that are textures as ``slots``, by declared
     name, with all their ``textures`` by property name; choices are attributes under their declared names.
@@ -48,9 +48,6 @@ class Model:
 
     plugins: ClassVar[tuple[str, ...]] = ()
     """The plugin's name in scenes, and its aliases; by default the class name in lower case."""
-
-    energy: ClassVar[Energy]
-    """How much light the model reflects at most."""
 
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)
@@ -77,19 +74,18 @@ class Model:
         members = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
         return [value for value in members.values() if isinstance(value, Parameter)]
 
-    def lobes(self, p) -> tuple[Lobe, ...]:
-        """The lobes of the model at a surface point, where ``p`` holds the values of the declared parameters. Their
-        number and kinds depend on nothing but the model's choices."""
-        raise NotImplementedError
-
     def evaluate(self, si, active) -> SimpleNamespace:
         """The values of the parameters that are textures, at a surface interaction."""
         return SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in self.slots.items()})
 
-    def placeholders(self) -> SimpleNamespace:
-        """Stand-ins for these values, to learn of which lobes the model consists."""
-        declared = [parameter for parameter in self.declared() if parameter.name in self.slots]
-        return SimpleNamespace(**{p.name: p.placeholder(self.slots[p.name]) for p in declared})
+    def described(self) -> str:
+        """The class and the parameters, as Mitsuba's plugins show themselves."""
+        words = {it.name: getattr(self, it.name) for it in self.declared() if it.name not in self.slots}
+        for slot in self.slots.values():
+            words |= slot.words
+        lines = [f"  {name} = {value}" for name, value in words.items()]
+        lines += [f"  {name} = {texture}" for name, texture in self.textures.items()]
+        return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 
     @classmethod
     def summary(cls) -> str:
@@ -104,19 +100,33 @@ class Model:
 
     @classmethod
     def manual(cls) -> str:
-        """The manual page: the docstring, the table of parameters, and that of the largest albedos."""
-        return "\n".join(
-            [
-                inspect.cleandoc(cls.__doc__),
-                "",
-                *_section("Parameters", [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]),
-                "",
-                *_section("Largest albedo", [list(row) for row in cls.energy.rows()]),
-                "",
-                Energy.NOTE,
-                "",
-            ]
-        )
+        """The manual page: the docstring and the table of parameters."""
+        rows = [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]
+        return "\n".join([inspect.cleandoc(cls.__doc__), "", *_section("Parameters", rows), ""])
+
+
+class Model(Plugin):
+    """A BRDF model. A subclass is its paper in code: its docstring cites and gives the formula, its class attributes
+    declare the parameters, and :meth:`lobes` says what they mean."""
+
+    energy: ClassVar[Energy]
+    """How much light the model reflects at most."""
+
+    def lobes(self, p) -> tuple[Lobe, ...]:
+        """The lobes of the model at a surface point, where ``p`` holds the values of the declared parameters. Their
+        number and kinds depend on nothing but the model's choices."""
+        raise NotImplementedError
+
+    def placeholders(self) -> SimpleNamespace:
+        """Stand-ins for these values, to learn of which lobes the model consists."""
+        declared = [parameter for parameter in self.declared() if parameter.name in self.slots]
+        return SimpleNamespace(**{p.name: p.placeholder(self.slots[p.name]) for p in declared})
+
+    @classmethod
+    def manual(cls) -> str:
+        """The manual page, with the table of the largest albedos."""
+        rows = [list(row) for row in cls.energy.rows()]
+        return "\n".join([super().manual(), *_section("Largest albedo", rows), "", Energy.NOTE, ""])
 
 
 def _section(title: str, table: list[list[str]]) -> list[str]:

@@ -10,7 +10,9 @@ import mitsuba as mi
 
 from . import llvm, models
 from .bsdf import bsdf_class
-from .model import Model
+from .integrator import integrator_class
+from .integrators.shading import Shading
+from .model import Model, Plugin
 
 
 def _discover() -> dict[str, type[Model]]:
@@ -25,11 +27,12 @@ def _discover() -> dict[str, type[Model]]:
 
 
 MODELS = _discover()
+INTEGRATORS: dict[str, type[Plugin]] = {name: Shading for name in Shading.plugins}
 _registered: set[str] = set()
 
 
 def list_models() -> list[str]:
-    """The names of all plugins, in alphabetical order, each followed by its aliases."""
+    """The names of all BSDF plugins, in alphabetical order, each followed by its aliases."""
     return list(MODELS)
 
 
@@ -44,10 +47,7 @@ def find_model(name: str) -> type[Model]:
     Raises:
         ValueError: if there is none, with the closest name there is.
     """
-    if name not in MODELS:
-        closest = difflib.get_close_matches(str(name), MODELS, n=1, cutoff=0.0)[0]
-        raise ValueError(f"There is no model {name!r}; did you mean {closest!r}?")
-    return MODELS[name]
+    return _find(name, MODELS)
 
 
 def info(name: str) -> str:
@@ -56,7 +56,14 @@ def info(name: str) -> str:
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
     """
-    return find_model(name).manual()
+    return _find(name, MODELS | INTEGRATORS).manual()
+
+
+def _find(name: str, plugins: dict):
+    if name not in plugins:
+        closest = difflib.get_close_matches(str(name), plugins, n=1, cutoff=0.0)[0]
+        raise ValueError(f"There is no model {name!r}; did you mean {closest!r}?")
+    return plugins[name]
 
 
 def install():
@@ -75,4 +82,6 @@ def _on_variant(old: str | None, new: str | None):
         module = importlib.import_module(f"mitsuba.{variant}")
         for name, model in MODELS.items():
             module.register_bsdf(name, bsdf_class(model, module.BSDF))
+        for name, physics in INTEGRATORS.items():
+            module.register_integrator(name, integrator_class(physics, module.SamplingIntegrator))
         _registered.add(variant)

@@ -34,3 +34,8 @@ class Lobe:
         """A direction ``wo`` for three uniform variates ``u`` and ``v = (v.x, v.y)``. It may lie beyond the horizon,
         where the lobe is zero."""
         raise NotImplementedError
+
+    def mirror_reflectance(self, wi):
+        """The lobe's colour times its Fresnel reflectance at the direction that mirrors ``wi``, whatever its width and
+        scale: what it would reflect of there as a mirror. Diffuse lobes reflect nothing so."""
+        return 0

@@ -13,11 +13,11 @@ from .lobe import Lobe
 
 class MicrofacetLobe(Lobe):
     """f = ρ·F(cosθ_d)·D(h)·G / (4 cosθ_i cosθ_o), for any distribution, shadowing and Fresnel term of
-    :mod:`mi_brdfs.microfacet`, drawn by one of its samplers.
+    :mod:`mi_brdfs.microfacet`, drawn by one of its samplers. ρ is a ``colour`` times a ``scale``.
     """
 
-    def __init__(self, reflectance, distribution, shadowing, fresnel, sampler):
-        self.reflectance, self.distribution = reflectance, distribution
+    def __init__(self, colour, distribution, shadowing, fresnel, sampler, scale=1):
+        self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel, self.sampler = shadowing, fresnel, sampler
 
     def albedo(self, wi):
@@ -30,6 +30,9 @@ class MicrofacetLobe(Lobe):
 
     def sample(self, wi, u, v):
         return self.sampler.sample(self, wi, u, v)
+
+    def mirror_reflectance(self, wi):
+        return self.colour * self.fresnel(wi.z)
 
     def _facets(self, facet):
         """f cosθ_o for ρ = F = 1."""

@@ -53,6 +53,11 @@ class MirrorLobe(Lobe):
         """The scale for ``wi``."""
         return self.scale
 
+    def mirror_reflectance(self, wi):
+        log_a, _, inside = self.frame(wi).cosine(mi.Vector3f(-wi.x, -wi.y, wi.z))
+        relative = dr.select(inside, dr.exp(self.exponent * log_a), 0) * self.peak(wi) / self.scale
+        return self.reflectance * relative
+
 
 class PowerLobe(MirrorLobe):
     r"""f = ρ·scale·max(0, A)ⁿ, sampled nearly in proportion to f cosθ.

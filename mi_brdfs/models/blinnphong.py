@@ -73,10 +73,10 @@ class BlinnPhong(Model):
             "none": lambda: 1,
             "original": lambda: dr.inv_pi,
         }[self.normalization]()
-        # ρs scale cosⁿθ_h in terms of D, of which G has the rest
-        reflectance = p.specular_reflectance * (4 * dr.two_pi / (n + 2) * scale)
+        scale = 4 * dr.two_pi / (n + 2) * scale  # in terms of D, of which G has the rest
         lobe, shadowing = (BlinnResponseLobe, cosine) if self.normalization == "original" else (BlinnLobe, implicit)
-        return LambertLobe(p.diffuse_reflectance), lobe(reflectance, Blinn(n), shadowing, Unit(), LeaningPair(4))
+        specular = lobe(p.specular_reflectance, Blinn(n), shadowing, Unit(), LeaningPair(4), scale)
+        return LambertLobe(p.diffuse_reflectance), specular
 
 
 class BlinnLobe(MicrofacetLobe):

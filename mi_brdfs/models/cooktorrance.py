@@ -64,5 +64,5 @@ class CookTorrance(Model):
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1
-        specular = MicrofacetLobe(p.specular_reflectance * scale, distribution, vcavity, p.fresnel, Pair())
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, vcavity, p.fresnel, Pair(), scale)
         return over_diffuse(p.diffuse_reflectance, specular)

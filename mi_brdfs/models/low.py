@@ -93,6 +93,9 @@ class SmoothLobe(Lobe):
     def albedo(self, wi):
         return self.reflectance * (self.fresnel(wi.z) * self.law.norm * dr.pi)
 
+    def mirror_reflectance(self, wi):
+        return self.reflectance * self.fresnel(wi.z)
+
     def _mass(self, wi, x, y):
         """The power law's mass on the way from -wi_xy in the direction (x, y) to the edge of the disc."""
         along = x * wi.x + y * wi.y

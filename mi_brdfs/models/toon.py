@@ -72,7 +72,7 @@ class Toon(Model):
         mass = dark + (1 - dark) * lit.mass
         return (
             BandsLobe(self._albedo(p.diffuse_reflectance, mass), lit, dark, mass),
-            HighlightLobe(self._albedo(p.specular_reflectance, highlight.mass), highlight),
+            HighlightLobe(p.specular_reflectance, self._albedo(1, highlight.mass), highlight),
         )
 
     def _albedo(self, reflectance, mass):
@@ -150,8 +150,12 @@ class HighlightLobe(Lobe):
 
     reciprocal = False
 
-    def __init__(self, reflected, step):
-        self.reflected, self.step, self.mass = reflected, step, dr.maximum(step.mass, EMPTY)
+    def __init__(self, colour, scale, step):
+        self.colour, self.reflected, self.step = colour, colour * scale, step
+        self.mass = dr.maximum(step.mass, EMPTY)
+
+    def mirror_reflectance(self, wi):
+        return self.colour
 
     def _frame(self, wi):
         return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))

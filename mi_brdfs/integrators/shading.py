@@ -1,0 +1,235 @@
+"""Local illumination, as the shading formulas of the textbooks mean it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import clamp, select
+from ..model import Plugin
+from ..parameters import Choice, Colour, ColourSlot, Flag, ParameterError, listed
+
+
+@dataclass
+class RadianceSlot(ColourSlot):
+    dark: bool = False
+    """Whether it is a literal zero."""
+
+
+class Radiance(Colour):
+    """A colour of light."""
+
+    def bind(self, given):
+        texture = given.colour(self.name, self.default, self.limits)
+        textured = self.name in given and isinstance(given.props[self.name], mi.Texture)
+        dark = not textured and not texture.max() > 0
+        if not dark:  # in spectral variants, black is no emission spectrum
+            texture = given.props.get_emissive_texture(self.name)
+        return RadianceSlot({self.name: texture}, self.limits, dark)
+
+
+class Shading(Plugin):
+    """Local illumination: the textbooks' shading of a scene, where ``path`` traces light.
+
+    B. T. Phong, Illumination for computer generated pictures, Communications of the ACM 18(6), 1975,
+    doi:10.1145/360825.360839, for the sum; E. Reinhard, M. Stark, P. Shirley and J. Ferwerda, Photographic tone
+    reproduction for digital images, SIGGRAPH 2002, doi:10.1145/566570.566575, for ``tonemap``.
+
+        I = k_a I_a + Σ V π f cosθ_o L + ρ_m L_env(r),    summed over the lights
+
+    of what is seen first along a ray: nothing is reflected twice. f is the BRDF of the surface, ours or built-in; L is
+    the light's irradiance at normal incidence, the intensity over the squared distance for a point, and V whether it
+    reaches the surface. Lights that are seen show themselves.
+
+    * π belongs to the light: a light of L = 1 straight above makes Lambert's surface as bright as its albedo. So the
+      formulas that were never BRDFs come out as printed: ``original`` of ``phong`` and ``blinnphong``, ``none`` of
+      ``minnaert``, ``toon`` and ``wrap`` (whose light from behind wants ``domain`` = sphere, and no shadows). It
+      belongs to every light, so that what they do is π times what ``path`` makes of direct light; with ``pi_folded``
+      = false it is the same.
+    * k_a is the diffuse reflectance, π f of the diffuse lobes seen and lit along the normal: the scale ρ or ρd of the
+      formulas above. Built-in BSDFs answer by their own ``eval_diffuse_reflectance``.
+    * ``environment_reflection`` looks up the environment in the mirror direction r, whatever stands in between. ρ_m is
+      the specular colour times the Fresnel reflectance at r. The environment then lights only the diffuse lobes: the
+      look-up stands for what the others reflect of it. Built-in BSDFs have no ρ_m, nor have ours within them but for
+      ``twosided``: they get no reflection, and a warning tells which.
+    * At the end, ``tonemap`` = reinhard makes x/(1+x) of each channel of a pixel, and ``clamp`` cuts off what is
+      above 1: nothing, then.
+
+    Rays go through the centres of the pixels. So where all lights are points, spots or directional, or area lights that
+    shine from their centre (of a rectangle, disk or sphere), a picture in rgb or mono is the same for any seed and
+    number of samples; for smooth edges render larger and scale down. Of other area lights and of environments, each
+    sample draws one point, and spectral variants draw wavelengths; a pixel is the mean, finished at the end. Within
+    ``aov`` the rays are that integrator's, and each sample is finished.
+
+    Differentiable in the parameters of BSDFs and lights and in ``ambient``, by ``mi.render``; not in what moves edges.
+    Surfaces are opaque: nothing is seen through ``null``, ``mask`` and ``dielectric``.
+
+    Example
+    -------
+    <integrator type="shading">
+        <rgb name="ambient" value="0.1, 0.1, 0.12"/>
+        <boolean name="shadows" value="false"/>
+    </integrator>
+
+    {"type": "shading", "ambient": {"type": "rgb", "value": [0.1, 0.1, 0.12]}, "shadows": False}
+    """
+
+    ambient = Radiance(0, (0, float("inf")), "ambient light I_a, as a surface of k_a = 1 reflects it")
+    pi_folded = Flag(True, "whether π belongs to the light")
+    shadows = Flag(True, "whether surfaces shadow each other, and themselves")
+    area_lights = Choice(("sample", "centre"), "whether area lights shine from a random point or from their centre")
+    environment_reflection = Flag(False, "whether the environment is mirrored")
+    clamp = Flag(True, "whether values above 1 are cut off")
+    tonemap = Choice(("none", "reinhard"), "what becomes of a pixel before the clamp")
+
+    def __init__(self, props):
+        super().__init__(props)
+        self.warned = False
+
+    def shade(self, scene, sampler, ray, active):
+        """``(radiance, seen)`` along a ray: the formula above, and whether the ray meets anything."""
+        self._check(scene)
+        si = scene.ray_intersect(ray, active)
+        hit = select(si.is_valid(), active, False)
+        emitter = si.emitter(scene, active)
+        colour = mi.UnpolarizedSpectrum(0)
+        if emitter is not None:
+            colour += mi.unpolarized_spectrum(emitter.eval(si, active))
+        if hit is not False:
+            colour += select(hit, self._reflected(scene, sampler, si, hit), mi.UnpolarizedSpectrum(0))
+        return colour, hit if scene.environment() is None else active
+
+    def finish(self, colour):
+        """What becomes of a pixel at the end."""
+        if self.tonemap == "reinhard":
+            colour = colour / (1 + colour)
+        return clamp(colour, 0, 1) if self.clamp else colour
+
+    def _check(self, scene):
+        """Raise if there is nothing to shade with, and warn once of what is not mirrored."""
+        if not scene.emitters() and self.slots["ambient"].dark:
+            raise ParameterError("shading: the scene has no light; add an emitter to it, or give ambient.")
+        if self.environment_reflection and scene.environment() is None:
+            raise ParameterError("shading: environment_reflection needs an environment; add an envmap or constant.")
+        if self.environment_reflection and not self.warned:
+            self.warned = True
+            bsdfs = [shape.bsdf() for shape in scene.shapes()]
+            shiny = int(mi.BSDFFlags.GlossyReflection) | int(mi.BSDFFlags.DeltaReflection)
+            dull = {it.class_name() for it in bsdfs if int(it.flags()) & shiny and not mirrors(it)}
+            if dull:
+                warnings.warn(
+                    f"shading: {listed(sorted(dull), 'and')} cannot tell a mirror reflectance, so that "
+                    "environment_reflection leaves what is made of it without.",
+                    stacklevel=2,
+                )
+
+    def _reflected(self, scene, sampler, si, hit):
+        bsdf = si.bsdf()
+        colour = self.evaluate(si, hit).ambient * of_each(diffuse_reflectance, bsdf, si, hit)
+        mirrored = mi.Bool(False)
+        if self.environment_reflection:
+            reflectance, mirrored = of_each(mirror_reflectance, bsdf, si, hit)
+            towards = dr.zeros(mi.SurfaceInteraction3f)
+            towards.wi = -si.to_world(mi.reflect(si.wi))
+            towards.time, towards.wavelengths = si.time, si.wavelengths
+            colour += reflectance * mi.unpolarized_spectrum(scene.environment().eval(towards, hit))
+        for light in scene.emitters():
+            ds, irradiance = light.sample_direction(si, self._place(light, sampler), hit)
+            lit = select(ds.pdf > 0, hit, False)
+            if self.shadows:
+                # Nothing lies beyond these; and where they are is unknown if Mitsuba lost the scene's bounds, as it
+                # does when it merges rectangles.
+                infinite = mi.has_flag(light.flags(), mi.EmitterFlags.Infinite)
+                way = si.spawn_ray(ds.d) if infinite else si.spawn_ray_to(ds.p)
+                lit = select(scene.ray_test(way, lit), False, lit)
+            wo = si.to_local(ds.d)
+            value = bsdf.eval(mi.BSDFContext(), si, wo, lit)
+            if self.environment_reflection and light.is_environment():
+                value = dr.select(mirrored, bsdf.eval(only_diffuse(), si, wo, lit), value)
+            value = mi.unpolarized_spectrum(value) * mi.unpolarized_spectrum(irradiance)
+            colour += select(lit, value * (dr.pi if self.pi_folded else 1), mi.UnpolarizedSpectrum(0))
+        return colour
+
+    def _place(self, light, sampler) -> mi.Point2f:
+        """The sample by which a light is asked for its direction."""
+        flags = mi.EmitterFlags
+        if mi.has_flag(light.flags(), flags.DeltaPosition) or mi.has_flag(light.flags(), flags.DeltaDirection):
+            return mi.Point2f(0.5)
+        if self.area_lights == "centre" and not light.is_environment():
+            shape = light.get_shape().class_name()
+            if shape not in CENTRES:
+                raise ParameterError(
+                    f'shading: area_lights = "centre" knows {listed(list(CENTRES), "and")}, but a light is a {shape}; '
+                    'replace it, or take area_lights = "sample".'
+                )
+            return mi.Point2f(*CENTRES[shape])
+        return sampler.next_2d()
+
+
+CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
+"""The sample that stands for the centre of a shape; a sphere samples the cone about it that it fills."""
+
+
+# --- What surfaces tell ---------------------------------------------------------------------------------------------
+
+
+def of_each(function, bsdf, si, active):
+    """``function(bsdf, si, active)``, where vectorized variants have many BSDFs at once."""
+    return function(bsdf, si, active) if isinstance(bsdf, mi.BSDF) else dr.dispatch(bsdf, function, si, active)
+
+
+def diffuse_reflectance(bsdf, si, active):
+    """k_a. Ours, also within ``twosided``, are asked for their diffuse lobes, as what they answer to
+    ``eval_diffuse_reflectance`` has the others in it."""
+    if not mirrors(bsdf):
+        return mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
+    normal = mi.Vector3f(0, 0, dr.select(si.wi.z > 0, 1, -1))
+    upright = mi.SurfaceInteraction3f(si)
+    upright.wi = normal
+    return dr.pi * mi.unpolarized_spectrum(bsdf.eval(only_diffuse(), upright, normal, active))
+
+
+def mirror_reflectance(bsdf, si, active):
+    """``(ρ_m, known)``: zero for a BSDF that does not know its own."""
+    total = mi.UnpolarizedSpectrum(0)
+    inner = mirrors(bsdf)
+    if not inner:
+        return total, mi.Bool(False)
+    seen = mi.SurfaceInteraction3f(si)
+    for side, it in zip((1, -1), inner, strict=False):
+        seen.wi = mi.Vector3f(si.wi.x, si.wi.y, side * si.wi.z)
+        total += it.mirror_reflectance(seen, active)
+    return total, mi.Bool(True)
+
+
+def mirrors(bsdf) -> list:
+    """The BSDFs of ours that make up a BSDF, front side first: itself, or those within ``twosided``."""
+    inner = [bsdf]
+    if bsdf.class_name() == "TwoSidedBRDF":
+        found = collector()
+        bsdf.traverse(found)
+        inner = found.objects
+    return inner if all(hasattr(it, "mirror_reflectance") for it in inner) else []
+
+
+def only_diffuse():
+    ctx = mi.BSDFContext()
+    ctx.type_mask = mi.BSDFFlags.DiffuseReflection
+    return ctx
+
+
+def collector():
+    """A callback that lists the objects within another, ``objects``."""
+
+    class Collector(mi.TraversalCallback):
+        def __init__(self):
+            mi.TraversalCallback.__init__(self)
+            self.objects = []
+
+        def put(self, name, value, flags, cpptype=None):
+            self.objects.append(value)
+
+    return Collector()
