@@ -116,10 +116,11 @@ def median_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
 
 def deviations(pictures: np.ndarray) -> np.ndarray:
     """How far the picture of each seed is from the mean of the seeds: the squared difference of a pixel over its mean
-    squared, averaged over the pixels that are not black. The mean over the seeds is the relative variance. Shape
-    (2, seeds), for pictures of shape (2, seeds, pixels)."""
+    squared, averaged over the pixels that are brighter than a thousandth of the picture: one in a shadow may be black
+    but for a seed or two. The mean over the seeds is the relative variance. Shape (2, seeds), for pictures of shape
+    (2, seeds, pixels)."""
     mean, seeds = pictures.mean(axis=1, keepdims=True), pictures.shape[1]
-    lit = mean > 0
+    lit = mean > 1e-3 * mean.mean(axis=2, keepdims=True)
     relative = np.where(lit, pictures / np.where(lit, mean, 1) - 1, 0) ** 2
     return relative.sum(axis=2) / np.maximum(lit.sum(axis=2), 1) * seeds / (seeds - 1)
 
