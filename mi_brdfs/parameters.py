@@ -92,19 +92,19 @@ class Given:
     def colour(self, name: str, default: float, limits: Range) -> mi.Texture:
         """The texture of a reflectance or another spectral parameter."""
         allowed = f"a number, rgb or spectrum within {_interval(limits)} or a texture"
-        if name in self:
-            value = self.props[name]
-            if not isinstance(value, mi.Texture):
-                kind = self.props.type(name)
-                if kind == mi.Properties.Type.Spectrum:
-                    values = value.values
-                elif kind == mi.Properties.Type.Color:
-                    values = list(value)
-                else:
-                    values = [value]
-                self._check(name, value, values, limits, allowed)
+        if name in self and (values := self.numbers(name)) is not None:
+            self._check(name, self.props[name], values, limits, allowed)
         bounded = limits[1] <= 1
         return (self.props.get_texture if bounded else self.props.get_unbounded_texture)(name, default)
+
+    def numbers(self, name: str) -> list | None:
+        """What a colour was given as, or none of a texture."""
+        value, kind = self.props[name], self.props.type(name)
+        if isinstance(value, mi.Texture):
+            return None
+        if kind == mi.Properties.Type.Spectrum:
+            return list(value.values)
+        return list(value) if kind == mi.Properties.Type.Color else [value]
 
     def _check(self, name: str, value, numbers, limits: Range, allowed: str):
         for number in numbers:

@@ -24,8 +24,9 @@ class Radiance(Colour):
 
     def bind(self, given):
         texture = given.colour(self.name, self.default, self.limits)
-        textured = self.name in given and isinstance(given.props[self.name], mi.Texture)
-        dark = not textured and not texture.max() > 0
+        # Not from the texture: evaluating it may wait for a thread that loads a BSDF, and waits for Python.
+        values = given.numbers(self.name) if self.name in given else [self.default]
+        dark = values is not None and not any(values)
         if not dark:  # in spectral variants, black is no emission spectrum
             texture = given.props.get_emissive_texture(self.name)
         return RadianceSlot({self.name: texture}, self.limits, dark)
