@@ -82,7 +82,7 @@ class Beckmann(Distribution):
         return 1 - complement, complement
 
     def inverse_cdf(self, c, complement, g):
-        return -dr.log(dr.maximum(complement, 1e-37)) / g
+        return -log_complement(complement) / g
 
 
 class GGX(Distribution):
@@ -119,7 +119,7 @@ class Blinn(Isotropic):
         return cosine_power_cdf(tan2, self.exponent + 2)
 
     def inverse_cdf(self, c, complement, g):
-        return inverse_cosine_power_cdf(c, complement, self.exponent + 2)
+        return inverse_cosine_power_cdf(complement, self.exponent + 2)
 
 
 class AshikhminShirley(Distribution):
@@ -151,7 +151,7 @@ class AshikhminShirley(Distribution):
         return cosine_power_cdf(tan2, g)
 
     def inverse_cdf(self, c, complement, g):
-        return inverse_cosine_power_cdf(c, complement, g)
+        return inverse_cosine_power_cdf(complement, g)
 
 
 class PowerLaw:
@@ -292,7 +292,7 @@ class BentLaw:
         return dr.select(above, mass, 1 - mass), dr.select(above, 1 - mass, mass)
 
     def inverse_cdf(self, c, complement):
-        """``(m, s)``"""
+        """The s of a ``cdf`` value."""
         above = c < 0.5
         mass = dr.select(above, c, complement)
         y = mass * dr.select(self.rises, dr.select(above, self.norm_above, self.norm), self.norm)
@@ -300,7 +300,7 @@ class BentLaw:
         exponential = log1p_ratio(sign * self.kappa * y)
         rational = expm1_ratio(sign * self.k * y) * dr.select(above, 1 + self.k, 1)
         value = y * dr.select(self.rises, exponential, rational)
-        return dr.select(above, value, 1 - value), dr.select(above, 1 - value, value)
+        return dr.select(above, 1 - value, value)
 
 
 class HemiEPD(Isotropic):
@@ -350,7 +350,7 @@ class HemiEPD(Isotropic):
         return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
 
     def inverse_cdf(self, c, complement, g):
-        return inverse_cosine_power_cdf(*self.law.inverse_cdf(c, complement), self.gamma + 2)
+        return inverse_cosine_power_cdf(self.law.inverse_cdf(c, complement), self.gamma + 2)
 
 
 class Steps:
@@ -465,8 +465,8 @@ def cosine_power_cdf(tan2, power):
     return 1 - complement, complement
 
 
-def inverse_cosine_power_cdf(c, complement, power):
-    """The tan²θ of a ``cosine_power_cdf`` value."""
+def inverse_cosine_power_cdf(complement, power):
+    """The tan²θ of the complement of a ``cosine_power_cdf`` value."""
     return dr.minimum(expm1(log_complement(complement) * (-2 / power)), 1e30)
 
 
