@@ -2,7 +2,7 @@
 
 ``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
 dict scenes. :func:`list_models` names them, :func:`info` is the manual page of one, :func:`preview_scene` a scene to
-look at one in.
+look at one in. :func:`ranges` and :func:`project` keep optimised parameters where models have a meaning.
 """
 
 import re
@@ -24,8 +24,9 @@ if _version > _TESTED:
     warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
 
 from .preview import preview_scene  # noqa: E402
+from .ranges import project, ranges  # noqa: E402
 from .registry import info, install, list_models  # noqa: E402
 
 install()
 
-__all__ = ["__version__", "info", "list_models", "preview_scene"]
+__all__ = ["__version__", "info", "list_models", "preview_scene", "project", "ranges"]

@@ -8,6 +8,7 @@ import mitsuba as mi
 from .lobes import Mixture
 from .math import clamp, select
 from .model import Model
+from .parameters import evaluate_colour
 
 
 def bsdf_class(model: type[Model], base: type) -> type:
@@ -152,7 +153,8 @@ class ModelBSDF:
         return mi.Bool(name in self.textures)
 
     def eval_attribute(self, name, si, active=True):
-        return self._attribute(name).eval(si, active)
+        self._attribute(name)
+        return evaluate_colour(self.textures, name, si, active)
 
     def eval_attribute_1(self, name, si, active=True):
         return self._attribute(name).eval_1(si, active)

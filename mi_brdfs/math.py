@@ -25,11 +25,36 @@ def select(mask, a, b):
 
 
 def clamp(x, low: float, high: float):
-    """x limited to [low, high]. Unlike ``dr.clip``, the derivative at the limits is one: a parameter that starts at
-    its limit can be optimised away from it."""
-    if not dr.is_diff_v(x):
-        return dr.minimum(dr.maximum(x, float(low)), float(high))
-    return dr.select(x < low, low, dr.select(x > high, high, x))
+    """x limited to [low, high]. Unlike that of ``dr.clip``, its derivative keeps an optimised parameter from being
+    stuck: at a limit it is one, and a gradient descent from beyond a limit is led back.
+
+    Backward derivatives beyond a limit pass if a step against them leads back, and vanish if it leads further out.
+    Forward ones, which do not know where a loss falls, are those at the limit.
+    """
+    if dr.is_diff_v(x) and dr.grad_enabled(x):
+        return dr.custom(_Clamp, dr.maximum(x, -dr.inf), float(low), float(high))
+    return _limited(x, low, high)
+
+
+def _limited(x, low, high):
+    return dr.minimum(dr.maximum(x, float(low)), float(high))
+
+
+class _Clamp(dr.CustomOp):
+    def eval(self, x, low, high):
+        self.below, self.above = x < low, x > high
+        return _limited(x, low, high)
+
+    def forward(self):
+        self.set_grad_out(self.grad_in("x"))
+
+    def backward(self):
+        grad = self.grad_out()
+        outward = (self.below & (grad > 0)) | (self.above & (grad < 0))
+        self.set_grad_in("x", dr.select(outward, 0, grad))
+
+    def name(self):
+        return "clamp"
 
 
 def log1p(x):

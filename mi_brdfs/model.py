@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
-from .parameters import Given, Parameter, Row, Slot, textures_of
+from .parameters import Given, Parameter, Row, Slot, ranges_of, textures_of
 
 
 class Energy(NamedTuple):
@@ -43,7 +43,8 @@ class Plugin:
     the parameters (:mod:`mi_brdfs.parameters`).
 
     An instance belongs to one plugin instance. It holds the parameters that are textures as ``slots``, by declared
-    name, with all their ``textures`` by property name; choices are attributes under their declared names.
+    name, with all their ``textures`` and ``ranges`` by property name; choices are attributes under their declared
+    names.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -64,7 +65,7 @@ class Plugin:
                 self.slots[parameter.name] = bound
             else:
                 setattr(self, parameter.name, bound)
-        self.textures = textures_of(self.slots.values())
+        self.textures, self.ranges = textures_of(self.slots.values()), ranges_of(self.slots.values())
         for name in props.keys():
             props.mark_queried(name)
 

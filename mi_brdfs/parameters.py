@@ -18,6 +18,7 @@ from __future__ import annotations
 import copy
 import difflib
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -96,6 +97,24 @@ class Given:
             self._check(name, self.props[name], values, limits, allowed)
         bounded = limits[1] <= 1
         return (self.props.get_texture if bounded else self.props.get_unbounded_texture)(name, default)
+
+    def scaled_colour(self, name: str, default: float, limits: Range) -> dict[str, mi.Texture]:
+        """The texture of a colour and, where that holds at most 1, another of what it is to be multiplied by: spectral
+        variants upsample an rgb colour to a reflectance, which Mitsuba clips."""
+        texture = self.colour(name, default, limits)
+        if not mi.is_spectral or limits[1] <= 1 or name not in self:
+            return {name: texture}
+        if texture.class_name().startswith("BitmapTexture") and mi.traverse(texture)["data"].shape[2] == 3:
+            warnings.warn(
+                f"{self.plugin}: {name} is a bitmap of colours, of which Mitsuba's spectral variants clip to 1 what is "
+                "larger; give a bitmap of one channel if it has such values.",
+                stacklevel=2,
+            )
+        values = self.numbers(name)
+        if self.props.type(name) != mi.Properties.Type.Color or max(values) <= 1:
+            return {name: texture}
+        scale = 2 * max(values)  # as for light: spectra of reflectances below a half are smooth
+        return {name: _colour_of([value / scale for value in values]), _scale_of(name): _constant(scale)}
 
     def numbers(self, name: str) -> list | None:
         """What a colour was given as, or none of a texture."""
@@ -204,6 +223,11 @@ class Slot:
     words: ClassVar[dict[str, str]] = {}
     """The choices among these parameters."""
 
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """What the values of its textures are limited to, by property name."""
+        return {}
+
     def evaluate(self, si, active):
         raise NotImplementedError
 
@@ -228,6 +252,10 @@ class NumberSlot(Slot):
     def anisotropic(self) -> bool:
         return len(self.textures) == 2
 
+    @property
+    def ranges(self) -> dict[str, Range]:
+        return dict.fromkeys(self.textures, self.limits)
+
     def evaluate(self, si, active):
         values = [clamp(texture.eval_1(si, active), *self.limits) for texture in self.textures.values()]
         if self.scale != 1:
@@ -241,8 +269,12 @@ class NumberSlot(Slot):
 class ColourSlot(Slot):
     limits: Range = (0, 1)
 
+    @property
+    def ranges(self) -> dict[str, Range]:
+        return {next(iter(self.textures)): self.limits}
+
     def evaluate(self, si, active):
-        return clamp(next(iter(self.textures.values())).eval(si, active), *self.limits)
+        return clamp(evaluate_colour(self.textures, next(iter(self.textures)), si, active), *self.limits)
 
 
 @dataclass
@@ -251,19 +283,23 @@ class FresnelSlot(Slot):
 
     kind: str = "none"
 
+    @property
+    def ranges(self) -> dict[str, Range]:
+        return {name: FresnelSet.RANGES[name] for name in FresnelSet.SETS[self.kind]}
+
     def evaluate(self, si, active):
-        def value(name, limits):
-            return clamp(self.textures[name].eval(si, active), *limits)
+        def colour(name):
+            return clamp(evaluate_colour(self.textures, name, si, active), *FresnelSet.RANGES[name])
+
+        def number(name):
+            return clamp(self.textures[name].eval_1(si, active), *FresnelSet.RANGES[name])
 
         if self.kind == "conductor":
-            return Conductor(value("eta", FresnelSet.INDEX), value("k", FresnelSet.EXTINCTION))
+            return Conductor(colour("eta"), colour("k"))
         if self.kind == "schlick":
-            return Schlick(value("f0", (0, 1)))
+            return Schlick(colour("f0"))
         if self.kind == "dielectric":
-            interior, exterior = (
-                clamp(self.textures[name].eval_1(si, active), *FresnelSet.INDEX) for name in ("int_ior", "ext_ior")
-            )
-            return Dielectric(interior / exterior)
+            return Dielectric(number("int_ior") / number("ext_ior"))
         return Unit()
 
 
@@ -276,6 +312,10 @@ class LobesSlot(Slot):
     @property
     def anisotropic(self) -> bool:
         return any(slot.anisotropic for lobe in self.lobes for slot in lobe.values())
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        return ranges_of(slot for lobe in self.lobes for slot in lobe.values())
 
     def evaluate(self, si, active):
         return [
@@ -295,6 +335,10 @@ class OneOfSlot(Slot):
     @property
     def anisotropic(self) -> bool:
         return any(slot.anisotropic for slot in self.own.values() if isinstance(slot, Slot))
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        return ranges_of(slot for slot in self.own.values() if isinstance(slot, Slot))
 
     @property
     def words(self) -> dict[str, str]:
@@ -319,6 +363,22 @@ class RotationSlot(Slot):
 def textures_of(slots: Iterable[Slot]) -> dict[str, Any]:
     """The textures of several slots together, by property name."""
     return {name: texture for slot in slots for name, texture in slot.textures.items()}
+
+
+def ranges_of(slots: Iterable[Slot]) -> dict[str, Range]:
+    """What the textures of several slots are limited to, by property name."""
+    return {name: limits for slot in slots for name, limits in slot.ranges.items()}
+
+
+def evaluate_colour(textures: dict[str, Any], name: str, si, active):
+    """The colour of a property, whether its texture has a scale beside it or not."""
+    colour, scale = textures[name].eval(si, active), textures.get(_scale_of(name))
+    return colour if scale is None else colour * scale.eval_1(si, active)
+
+
+def _scale_of(name: str) -> str:
+    """The name under which the scale of a colour appears beside it."""
+    return f"{name}_scale"
 
 
 # --- Declarations ---------------------------------------------------------------------------------------------------
@@ -454,7 +514,7 @@ class Colour(Parameter):
         (name,) = self.names
         if self.default is None and name not in given:
             return AbsentSlot()
-        return ColourSlot({name: given.colour(name, self.default or 0, self.limits)}, self.limits)
+        return ColourSlot(given.scaled_colour(name, self.default or 0, self.limits), self.limits)
 
     def placeholder(self, slot):
         return None if isinstance(slot, AbsentSlot) else mi.UnpolarizedSpectrum(self.default or 0)
@@ -593,7 +653,9 @@ class FresnelSet(Parameter):
     over ext_ior), or none (F = 1)."""
 
     INDEX, EXTINCTION = (0.01, 100), (0, 100)
+    RANGES: ClassVar = {"eta": INDEX, "k": EXTINCTION, "f0": (0, 1), "int_ior": INDEX, "ext_ior": INDEX}
     SETS: ClassVar = {
+        "none": (),
         "conductor": ("eta", "k"),
         "material": ("material",),
         "schlick": ("f0",),
@@ -619,9 +681,8 @@ class FresnelSet(Parameter):
             for name, other in (("eta", "k"), ("k", "eta")):
                 if other not in given:
                     raise given.error(name, f"needs {other} beside it")
-            return FresnelSlot(
-                {"eta": given.colour("eta", 0, self.INDEX), "k": given.colour("k", 0, self.EXTINCTION)}, "conductor"
-            )
+            textures = (given.scaled_colour(name, 0, self.RANGES[name]) for name in ("eta", "k"))
+            return FresnelSlot({key: texture for each in textures for key, texture in each.items()}, "conductor")
         if "material" in chosen:
             return self._material(given)
         if "schlick" in chosen:
@@ -707,7 +768,10 @@ def _measured(path: Path) -> mi.Texture:
         return mi.load_dict(
             {"type": "irregular"} | {name: ", ".join(map(repr, numbers)) for name, numbers in listed.items()}
         )
-    colour = mi.spectrum_list_to_srgb(wavelengths, values, bounded=False, d65=False)
+    return _colour_of(mi.spectrum_list_to_srgb(wavelengths, values, bounded=False, d65=False))
+
+
+def _colour_of(rgb) -> mi.Texture:
     props = mi.Properties()
-    props["value"] = mi.ScalarColor3d(colour)
+    props["value"] = mi.ScalarColor3d(rgb)
     return props.get_unbounded_texture("value")

@@ -1,0 +1,84 @@
+"""The ranges of traversed parameters, for whoever optimises them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, MutableMapping
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from .parameters import Range
+
+VALUES = ("value", "values", "data")
+"""The names under which Mitsuba's textures show their values."""
+
+
+def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
+    """The ``(low, high)`` that the parameters of one of our BSDFs are limited to, by their keys in ``mi.traverse(bsdf)``.
+
+    A value beyond is evaluated as the nearer limit; ``high`` may be infinite. In spectral variants, what was given as
+    rgb is left out: Mitsuba shows the coefficients of a spectrum there, which have no range.
+
+    Raises:
+        ValueError: for a BSDF that is not one of ours.
+    """
+    if not _is_ours(bsdf):
+        raise ValueError(f"{bsdf.class_name()} declares no ranges: it is not a BSDF of mi_brdfs.")
+    return dict(_ranges(mi.traverse(bsdf)))
+
+
+def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | None = None) -> None:
+    """Put the parameters of all our BSDFs in a scene into their ranges, each at the nearest value there.
+
+    In an optimisation, call it after each step, with the optimizer, whose variables are put there, too::
+
+        optimizer.step()
+        params.update(optimizer)
+        mi_brdfs.project(params, optimizer)
+
+    Args:
+        params: what ``mi.traverse`` returned for a scene, a shape or a BSDF.
+        optimizer: an optimizer such as ``mi.ad.Adam``, with variables named like the parameters. With it, only these
+            are projected.
+    """
+    source = params if optimizer is None else optimizer
+    inside = {key: _projected(source[key], limits) for key, limits in _ranges(params) if key in source}
+    if optimizer is not None:
+        for key, value in inside.items():
+            optimizer[key] = value
+    params.update(inside)
+
+
+def _ranges(params) -> Iterator[tuple[str, Range]]:
+    """``(key, range)`` of the traversed parameters of our BSDFs."""
+    for key in params.keys():
+        node = params.properties[key][2]
+        *path, word = key.split(".")
+        if word not in VALUES or _holds_coefficients(node, params[key]):
+            continue
+        # A key is the path from the root, so that as many words lie below the BSDF as there are nodes.
+        levels = 0
+        while node is not None and not _is_ours(node):
+            node, levels = params.hierarchy[node][0], levels + 1
+        if node is not None and levels and path[-levels] in node.model.ranges:
+            yield key, node.model.ranges[path[-levels]]
+
+
+def _is_ours(node) -> bool:
+    return isinstance(node, mi.BSDF) and hasattr(node, "model")
+
+
+def _holds_coefficients(node, value) -> bool:
+    """Whether a texture holds the coefficients of spectra in place of rgb colours."""
+    kind = node.class_name()
+    upsampled = kind == "SRGBReflectanceSpectrum" or kind.startswith("BitmapTexture") and value.shape[-1] == 3
+    return mi.is_spectral and upsampled
+
+
+def _projected(value, limits: Range):
+    low, high = limits
+    inside = dr.minimum(dr.maximum(dr.detach(value), low), high)
+    if dr.grad_enabled(value):
+        dr.enable_grad(inside)
+    return inside
