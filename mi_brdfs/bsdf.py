@@ -38,7 +38,7 @@ class ModelBSDF:
         common = flags.FrontSide
         if any(texture.is_spatially_varying() for texture in self.textures.values()):
             common |= flags.SpatiallyVarying
-        self.kinds, components = [], []
+        self.kinds, self.transmits, components = [], [], []
         for lobe in self.model.lobes(self.model.placeholders()):
             if lobe.transmits:
                 kind = flags.GlossyTransmission if lobe.glossy else flags.DiffuseTransmission
@@ -50,6 +50,7 @@ class ModelBSDF:
             if not lobe.reciprocal:
                 component |= flags.NonSymmetric
             self.kinds.append(kind)
+            self.transmits.append(lobe.transmits)
             components.append(int(component))
         self.m_components = components
         self.m_flags = 0
@@ -61,24 +62,33 @@ class ModelBSDF:
     def _mixture(self, ctx, si, active):
         """``(valid, mixture, components, frame)``: the lobes that the context enables, seen from si.wi."""
         components = [k for k, kind in enumerate(self.kinds) if ctx.is_enabled(kind, k)]
-        valid = select(si.wi.z > 0, active, False)
-        if not components or valid is False:
+        if not components:
+            return None
+        from_light = ctx.mode == mi.TransportMode.Importance
+        transmits = [from_light and self.transmits[k] for k in components]
+        # The viewer is in front; so is wi, unless it leads to a light that shines through.
+        front = si.wi.z != 0 if any(transmits) else si.wi.z > 0
+        valid = select(si.wi.z < 0 if all(transmits) else front, active, False)
+        if valid is False:
             return None
         p = self.model.evaluate(si, valid)
-        frame = Turn(getattr(p, "rotation", None))
-        # Lanes that do not count get a direction that does not harm: else their NaNs would enter derivatives.
+        frame = LobeFrame(getattr(p, "rotation", None), select(si.wi.z < 0, valid, False) if any(transmits) else None)
+        # Replace wi in inactive lanes by a harmless direction: a NaN would enter the derivatives.
         wi = frame.to_local(select(valid, si.wi, mi.Vector3f(0, 0, 1)))
         lobes = self.model.lobes(p)
-        return valid, Mixture([lobes[k] for k in components], wi), components, frame
+        lobes = [lobes[k].adjoint() if from_light else lobes[k] for k in components]
+        return valid, Mixture(lobes, wi, frame.mirrored), components, frame
 
     @staticmethod
     def _eval_pdf(valid, mixture, frame, wo):
-        value, pdf = mi.UnpolarizedSpectrum(0), mi.Float(0)
+        value, pdf, z = mi.UnpolarizedSpectrum(0), mi.Float(0), frame.mirror(wo).z
         for transmitted in sorted({lobe.transmits for lobe in mixture.lobes}):
-            here = select(wo.z < 0 if transmitted else wo.z > 0, valid, False)
+            here = select(z < 0 if transmitted else z > 0, valid, False)
+            if frame.mirrored is not None:
+                here = select(frame.mirrored, here, False) if transmitted else select(frame.mirrored, False, here)
             if here is False:
                 continue
-            harmless = mi.Vector3f(0, 0, -1 if transmitted else 1)
+            harmless = frame.mirror(mi.Vector3f(0, 0, -1 if transmitted else 1))
             side = mixture.eval_pdf(frame.to_local(select(here, wo, harmless)), transmitted)
             value, pdf = value + select(here, side[0], 0), pdf + select(here, side[1], 0)
         return value, pdf
@@ -175,19 +185,27 @@ class ModelBSDF:
         return self.model.described()
 
 
-class Turn:
-    """A turn of the tangent frame about the normal, by an angle given as (cosine, sine), or none."""
+class LobeFrame:
+    """The frame in which lobes are evaluated: the local one, turned about the normal by an angle given as (cosine,
+    sine), or None; and mirrored at the surface in the lanes where wi comes from behind, or None if there are none."""
 
-    def __init__(self, cos_sin):
-        self.cos_sin = cos_sin
+    def __init__(self, cos_sin, mirrored=None):
+        self.cos_sin, self.mirrored = cos_sin, mirrored
+
+    def mirror(self, w):
+        if self.mirrored is None:
+            return w
+        return mi.Vector3f(w.x, w.y, select(self.mirrored, -w.z, w.z))
 
     def to_local(self, w):
+        w = self.mirror(w)
         if self.cos_sin is None:
             return w
         cos, sin = self.cos_sin
         return mi.Vector3f(cos * w.x + sin * w.y, cos * w.y - sin * w.x, w.z)
 
     def to_world(self, w):
+        w = self.mirror(w)
         if self.cos_sin is None:
             return w
         cos, sin = self.cos_sin

@@ -15,7 +15,7 @@ VALUES = ("value", "values", "data")
 
 
 def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
-    """The ``(low, high)`` that the parameters of one of our BSDFs are limited to, by their keys in ``mi.traverse(bsdf)``.
+    """The ``(low, high)`` that the parameters of one of our BSDFs are limited to, by key in ``mi.traverse(bsdf)``.
 
     A value beyond is evaluated as the nearer limit; ``high`` may be infinite. In spectral variants, what was given as
     rgb is left out: Mitsuba shows the coefficients of a spectrum there, which have no range.
@@ -72,7 +72,7 @@ def _is_ours(node) -> bool:
 def _holds_coefficients(node, value) -> bool:
     """Whether a texture holds the coefficients of spectra in place of rgb colours."""
     kind = node.class_name()
-    upsampled = kind == "SRGBReflectanceSpectrum" or kind.startswith("BitmapTexture") and value.shape[-1] == 3
+    upsampled = kind == "SRGBReflectanceSpectrum" or (kind.startswith("BitmapTexture") and value.shape[-1] == 3)
     return mi.is_spectral and upsampled
 
 

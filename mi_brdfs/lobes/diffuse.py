@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import choose, normalize_or, safe_sqrt
-from .lobe import Lobe
+from .lobe import AdjointLobe, Lobe
 
 
 class LambertLobe(Lobe):
@@ -47,6 +47,9 @@ class ZonalLobe(Lobe):
         """The cosine below which the fraction ``u`` of p lies."""
         raise NotImplementedError
 
+    def adjoint(self):
+        return self if self.reciprocal else AdjointZonalLobe(self)
+
     def eval_pdf(self, wi, wo):
         pdf = self.density(wo.z) * dr.inv_two_pi
         return self.albedo(wi) * pdf, pdf
@@ -56,6 +59,25 @@ class ZonalLobe(Lobe):
         sin = safe_sqrt(1 - cos * cos)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         return mi.Vector3f(sin * cos_phi, sin * sin_phi, cos)
+
+
+class AdjointZonalLobe(AdjointLobe):
+    """f(wo, wi) |cosθ_o| = albedo(wo)·p(cosθ_i)/(2π cosθ_i) cosθ_o, cosine-sampled."""
+
+    def _radiance(self, wi):
+        """What a lobe of an albedo of 1 makes of light from ``wi``, times π."""
+        return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, 1e-20)
+
+    def albedo(self, wi):
+        return self.lobe.albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)
+
+    def eval_pdf(self, wi, wo):
+        viewer = self._mirrored(wo)
+        pdf = viewer.z * dr.inv_pi
+        return self.lobe.albedo(viewer) * (self._radiance(wi) * pdf), pdf
+
+    def sample(self, wi, u, v):
+        return self._mirrored(mi.warp.square_to_cosine_hemisphere(v))
 
 
 class RoughDiffuseLobe(Lobe):

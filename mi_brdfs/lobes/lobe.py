@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import drjit as dr
+import mitsuba as mi
+
 
 class Lobe:
     """One additive part of a BRDF, holding its parameters evaluated at a surface point.
@@ -35,7 +38,38 @@ class Lobe:
         where the lobe is zero."""
         raise NotImplementedError
 
+    def adjoint(self) -> Lobe:
+        """The lobe for light that is traced from its source (``TransportMode.Importance``), where ``wi`` leads to the
+        light and ``wo`` to the viewer: its value is f(wo, wi) |cosθ_o|. Of a lobe that transmits, both are mirrored at
+        the surface: wi.z > 0 and wo.z < 0, as ever.
+
+        This one is sampled like the lobe itself; override it where that misses directions."""
+        return self if self.reciprocal else AdjointLobe(self)
+
     def mirror_reflectance(self, wi):
         """The lobe's colour times its Fresnel reflectance at the direction that mirrors ``wi``, whatever its width and
         scale: what it would reflect of there as a mirror. Diffuse lobes reflect nothing so."""
         return 0
+
+
+class AdjointLobe(Lobe):
+    """f(wo, wi) of a lobe that is not reciprocal, sampled like the lobe."""
+
+    reciprocal = False
+
+    def __init__(self, lobe: Lobe):
+        self.lobe, self.glossy, self.transmits = lobe, lobe.glossy, lobe.transmits
+
+    def albedo(self, wi):
+        return self.lobe.albedo(wi)
+
+    def eval_pdf(self, wi, wo):
+        value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))
+        _, pdf = self.lobe.eval_pdf(wi, wo)
+        return value * (abs(wo.z) / dr.maximum(wi.z, 1e-20)), pdf
+
+    def sample(self, wi, u, v):
+        return self.lobe.sample(wi, u, v)
+
+    def _mirrored(self, w):
+        return mi.Vector3f(w.x, w.y, -w.z) if self.transmits else w

@@ -5,22 +5,30 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import ONE_MINUS_EPSILON, clamp, luminance
+from ..math import ONE_MINUS_EPSILON, clamp, luminance, select
 
 
 class Mixture:
-    """Several lobes sampled as one: lobe k with probability ∝ the luminance of its albedo at ``wi``."""
+    """Several lobes sampled as one: lobe k with probability ∝ the luminance of its albedo at ``wi``.
 
-    def __init__(self, lobes, wi):
+    In lanes that are ``mirrored`` (a mask, or None) light comes from behind: there only lobes that transmit count,
+    and elsewhere only the others."""
+
+    def __init__(self, lobes, wi, mirrored=None):
         self.lobes, self.wi = lobes, wi
         if len(lobes) == 1:
             self.probabilities = [mi.Float(1)]
             return
-        energies = [luminance(lobe.albedo(wi)) for lobe in lobes]
+        counts = [1.0] * len(lobes)
+        if mirrored is not None:
+            counts = [select(mirrored, 1.0, 0.0) if it.transmits else select(mirrored, 0.0, 1.0) for it in lobes]
+        energies = [count * luminance(lobe.albedo(wi)) for count, lobe in zip(counts, lobes, strict=True)]
         total = sum(energies)
         black = total <= 0
-        scale = dr.rcp(dr.select(black, 1, total))
-        self.probabilities = [dr.select(black, 1 / len(lobes), energy * scale) for energy in energies]
+        scale = dr.rcp(dr.select(black, sum(counts), total))
+        self.probabilities = [
+            dr.select(black, count, energy) * scale for count, energy in zip(counts, energies, strict=True)
+        ]
 
     def eval_pdf(self, wo, transmitted):
         """``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
