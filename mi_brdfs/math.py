@@ -57,6 +57,14 @@ class _Clamp(dr.CustomOp):
         return "clamp"
 
 
+def square(x):
+    """x² of a parameter from 0 on. Its derivative at exactly 0, which is 0, is replaced by that at 0.03: else an
+    optimisation that a step too long has led to that limit would stay there."""
+    if dr.is_diff_v(x) and dr.grad_enabled(x):
+        return dr.replace_grad(dr.square(x), 2 * dr.select(x == 0, 0.03, dr.detach(x)) * x)
+    return dr.square(x)
+
+
 def log1p(x):
     """log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
     small = abs(x) < 0.5

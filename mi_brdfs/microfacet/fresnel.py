@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import drjit as dr
 
-from ..math import luminance, safe_sqrt
+from ..math import luminance, safe_sqrt, square
 
 
 class Unit:
@@ -63,7 +63,7 @@ class Conductor:
         cos2 = cos * cos
         sin2 = 1 - cos2
         # a + ib = sqrt((η - ik)² - sin²θ)
-        eta2, k2 = self.eta * self.eta, self.k * self.k
+        eta2, k2 = self.eta * self.eta, square(self.k)
         real = eta2 - k2 - sin2
         modulus = safe_sqrt(real * real + 4 * eta2 * k2)
         a = safe_sqrt(0.5 * (modulus + real))

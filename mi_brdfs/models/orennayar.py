@@ -3,7 +3,7 @@ import math
 import drjit as dr
 
 from ..lobes.diffuse import RoughDiffuseLobe
-from ..math import clamp, safe_sqrt
+from ..math import clamp, safe_sqrt, square
 from ..model import Energy, Model
 from ..parameters import Choice, Flag, Number, Reflectance, Spelling
 
@@ -98,7 +98,7 @@ class QualitativeLobe(RoughDiffuseLobe):
     RETRO = 0.7  # of B/C1; this and that of the full form were chosen by measurement
 
     def __init__(self, reflectance, sigma):
-        self.sigma2 = sigma * sigma
+        self.sigma2 = square(sigma)
         self.c1 = 1 - 0.5 * self.sigma2 / (self.sigma2 + 0.33)
         self.b = 0.45 * self.sigma2 / (self.sigma2 + 0.09)
         super().__init__(reflectance, self.RETRO * self.b / self.c1)

@@ -1,0 +1,197 @@
+"""Optimisation from random starts, with steps that overshoot: parameters end within their ranges."""
+
+import zlib
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from fuzzing import Quantity, ways
+from support import hemisphere, interaction
+
+import mi_brdfs
+from mi_brdfs.registry import all_models
+
+SIDE = 10
+STARTS, PAIRS = SIDE * SIDE, 12
+LARGEST = 1e3
+"""Ranges that go on beyond are searched up to here: wider ones hold lobes that 12 pairs of directions do not meet."""
+
+
+class Problem:
+    """Find the parameters of a BSDF again from its values for some pairs of directions, from many starts at once: each
+    parameter is a bitmap, of which each pixel belongs to one start."""
+
+    unit = 1e-3
+
+    def __init__(self, given, quantities):
+        self.rng = np.random.default_rng(zlib.crc32(" ".join(quantity.name for quantity in quantities).encode()))
+        self.quantities = quantities
+        bitmaps = {name: self._bitmap(np.zeros((SIDE, SIDE, 1))) for name in self.limits()}
+        self.bsdf = mi.load_dict(given | bitmaps)
+        self.params = mi.traverse(self.bsdf)
+        self.keys = {name: f"{name}.data" for name in bitmaps}
+        v, u = np.mgrid[0:SIDE, 0:SIDE]
+        uv = np.stack([u.ravel(), v.ravel()], axis=-1) / SIDE + 0.5 / SIDE
+        wi = np.tile(hemisphere(PAIRS, 1, 0.2), (STARTS, 1))
+        near = wi * [-1, -1, 1] + np.random.default_rng(2).normal(0, 0.15, wi.shape)
+        near[:, 2] = np.maximum(near[:, 2], 0.1)
+        self.si = interaction(wi)
+        self.si.uv = mi.Point2f(np.repeat(uv, PAIRS, axis=0).T.astype(np.float32))
+        self.wo = mi.Vector3f((near / np.linalg.norm(near, axis=1, keepdims=True)).T.astype(np.float32))
+        self.set({name: self.draw(limits) for name, limits in self.limits().items()})
+        self.target = dr.detach(self.values())
+        self.starts = {name: self.draw(limits) for name, limits in self.limits().items()}
+
+    def limits(self):
+        return {q.name: (max(q.limits[0], -LARGEST), min(q.limits[1], LARGEST)) for q in self.quantities}
+
+    @staticmethod
+    def _bitmap(data):
+        bitmap = mi.Bitmap(np.float32(data), mi.Bitmap.PixelFormat.Y)
+        return {"type": "bitmap", "bitmap": bitmap, "filter_type": "nearest", "raw": True, "format": "variant"}
+
+    def draw(self, limits):
+        """Values between the limits, of all magnitudes if these are far apart."""
+        low, high = limits
+        if low >= 0 and high > 10:
+            return np.exp(self.rng.uniform(np.log(max(low, 0.5)), np.log(high), STARTS))
+        return self.rng.uniform(low, high, STARTS)
+
+    def set(self, values):
+        for name, drawn in values.items():
+            self.params[self.keys[name]] = mi.TensorXf(
+                np.broadcast_to(np.float32(drawn), STARTS).reshape(SIDE, SIDE, 1).copy()
+            )
+        self.params.update()
+
+    def values(self):
+        return mi.luminance(self.bsdf.eval(mi.BSDFContext(), self.si, self.wo, True))
+
+    def losses(self):
+        """The loss of each start: of values up to the unit, and of logarithms beyond it."""
+        difference = dr.asinh(self.values() / self.unit) - dr.asinh(self.target / self.unit)
+        return dr.block_sum(dr.square(difference), PAIRS)
+
+    def backward(self, key, settings, sign):
+        """The derivative of ``sign`` times the sum of a start's values with respect to its parameter."""
+        self.set(settings)
+        dr.enable_grad(self.params[key])
+        self.params.update()
+        dr.backward(sign * dr.sum(self.values()))
+        gradient = np.array(dr.grad(self.params[key]).array)
+        dr.disable_grad(self.params[key])
+        return gradient
+
+    def forward(self, key, settings):
+        """The derivative of each of a start's values with respect to its parameter."""
+        self.set(settings)
+        dr.enable_grad(self.params[key])
+        self.params.update()
+        values = self.values()
+        dr.set_grad(self.params[key], 1)
+        dr.enqueue(dr.ADMode.Forward, self.params[key])
+        dr.traverse(dr.ADMode.Forward)
+        gradient = np.array(dr.grad(values)).reshape(STARTS, PAIRS)
+        dr.disable_grad(self.params[key])
+        return gradient
+
+    def optimise(self, steps, project=True, first=0.4):
+        """The losses in the beginning and at the end, and where the parameters end, by name."""
+        self.set(self.starts)
+        before = np.array(self.losses())
+        optimizer = mi.ad.Adam(lr=1)
+        for key in self.keys.values():
+            optimizer[key] = self.params[key]
+        for step in range(steps):
+            decay = first * 0.5 ** (6 * step / steps)
+            rates = {self.keys[n]: decay * min(high - low, 50) for n, (low, high) in self.limits().items()}
+            optimizer.set_learning_rate(rates)
+            self.params.update(optimizer)
+            dr.backward(dr.sum(self.losses()))
+            optimizer.step()
+            self.params.update(optimizer)
+            if project:
+                mi_brdfs.project(self.params, optimizer)
+        return before, np.array(self.losses()), {n: np.array(self.params[k]).ravel() for n, k in self.keys.items()}
+
+
+def problems(model):
+    """One for each way to give the parameters of a model."""
+    for options in ways(model.declared()):
+        given = {"type": model.plugins[0], **options.words}
+        try:
+            yield str(options), Problem(given, options.quantities)
+        except RuntimeError as error:  # words that do not go together
+            assert "is not known for distribution" in str(error)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+def test_adam_ends_within_the_ranges(model):
+    """From a hundred starts each; and it gets nearer to the values that it is to find."""
+    for name, problem in problems(model):
+        before, after, ends = problem.optimise(40)
+        for quantity in problem.quantities:
+            low, high = np.float32(quantity.limits)
+            assert ((ends[quantity.name] >= low) & (ends[quantity.name] <= high)).all(), (name, quantity.name)
+        assert np.isfinite(after).all(), name
+        assert np.median(after) < 0.5 * np.median(before), name
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+def test_derivatives_beyond_the_ranges_lead_back(model):
+    """Each value that a descent inwards lowers has the derivative that it has at the limit, and the others none; and
+    forward derivatives are those at the limit."""
+    led = 0
+    for name, problem in problems(model):
+        drawn = {n: problem.draw(limits) for n, limits in problem.limits().items()}
+        for key, (low, high) in mi_brdfs.ranges(problem.bsdf).items():
+            if key not in problem.keys.values():
+                continue  # a default
+            parameter = key.partition(".")[0]
+            for limit, inward in ((low, 1), (high, -1)):
+                if not np.isfinite(limit):
+                    continue
+                at, beyond = drawn | {parameter: limit}, drawn | {parameter: limit - inward * (0.3 + 1e-3 * abs(limit))}
+                slope = problem.forward(key, at)
+                noise = 1e-6 + 1e-5 * abs(slope).max()
+                np.testing.assert_allclose(problem.forward(key, beyond), slope, rtol=1e-4, atol=noise, err_msg=name)
+                for sign in (1, -1):
+                    expected = np.where(sign * slope * inward < 0, sign * slope, 0).sum(axis=1)
+                    got = problem.backward(key, beyond, sign)
+                    np.testing.assert_allclose(got, expected, rtol=1e-3, atol=PAIRS * noise, err_msg=name)
+                    led += np.count_nonzero(got)
+    assert led > STARTS / 2
+
+
+CONDUCTOR = {"eta": (0.1, 4), "k": (0, 6), "specular_reflectance": (0, 1)}
+COUNTERPARTS = {
+    "lambert": ({"type": "lambert"}, {"type": "diffuse"}, {"reflectance": (0, 1)}),
+    "walter": ({"type": "walter"}, {"type": "roughconductor", "distribution": "ggx"}, {"alpha": (0, 1), **CONDUCTOR}),
+    "walter anisotropic": (
+        {"type": "walter"},
+        {"type": "roughconductor", "distribution": "ggx"},
+        {"alpha_u": (0, 1), "alpha_v": (0, 1), **CONDUCTOR},
+    ),
+    "microfacet": ({"type": "microfacet"}, {"type": "roughconductor"}, {"alpha": (0, 1), **CONDUCTOR}),
+}
+"""Ours, the built-in that is the same, and where their parameters are searched."""
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", COUNTERPARTS)
+def test_starts_end_no_worse_than_with_the_built_in(name):
+    """The same values to find, from the same starts, by the same steps; the built-in's parameters are not projected.
+    The deciles of the losses are compared: after the first step beyond a limit, the ways of a start part."""
+    plugin, builtin, limits = COUNTERPARTS[name]
+    quantities = [Quantity(name, limit, 0) for name, limit in limits.items()]
+    losses = []
+    for given in (plugin, builtin):
+        problem = Problem(given, quantities)
+        problem.unit = dr.repeat(dr.block_sum(problem.target, PAIRS) / PAIRS, PAIRS)
+        _, after, _ = problem.optimise(80, project=given is plugin)
+        losses.append(np.nan_to_num(after, nan=np.inf))
+    ours, theirs = (np.quantile(of, np.arange(0.1, 1, 0.1)) for of in losses)
+    assert (ours <= theirs).all()
