@@ -117,14 +117,14 @@ class ModelBSDF:
         evaluated = self._mixture(ctx, si, active)
         if evaluated is None:
             return dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
-        return self._sample(*evaluated, sample1, sample2)
+        return self._sample(*evaluated, _as(mi.Float, sample1), _as(mi.Point2f, sample2))
 
     def eval_pdf(self, ctx, si, wo, active=True):
         evaluated = self._mixture(ctx, si, active)
         if evaluated is None:
             return mi.Spectrum(0), mi.Float(0)
         valid, mixture, _, frame = evaluated
-        value, pdf = self._eval_pdf(valid, mixture, frame, wo)
+        value, pdf = self._eval_pdf(valid, mixture, frame, _as(mi.Vector3f, wo))
         return mi.depolarizer(value), pdf
 
     def eval(self, ctx, si, wo, active=True):
@@ -138,8 +138,9 @@ class ModelBSDF:
         if evaluated is None:
             return mi.Spectrum(0), mi.Float(0), dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
         valid, mixture, _, frame = evaluated
-        value, pdf = self._eval_pdf(valid, mixture, frame, wo)
-        return mi.depolarizer(value), pdf, *self._sample(*evaluated, sample1, sample2)
+        value, pdf = self._eval_pdf(valid, mixture, frame, _as(mi.Vector3f, wo))
+        sampled = self._sample(*evaluated, _as(mi.Float, sample1), _as(mi.Point2f, sample2))
+        return mi.depolarizer(value), pdf, *sampled
 
     # --- What else Mitsuba asks -------------------------------------------------------------------------------------
 
@@ -163,19 +164,26 @@ class ModelBSDF:
         return mi.Bool(name in self.textures)
 
     def eval_attribute(self, name, si, active=True):
-        self._attribute(name)
+        if name not in self.textures:
+            return self._without_attribute(name, mi.UnpolarizedSpectrum)
         return evaluate_colour(self.textures, name, si, active)
 
     def eval_attribute_1(self, name, si, active=True):
-        return self._attribute(name).eval_1(si, active)
+        if name not in self.textures:
+            return self._without_attribute(name, mi.Float)
+        return self.textures[name].eval_1(si, active)
 
     def eval_attribute_3(self, name, si, active=True):
-        return self._attribute(name).eval_3(si, active)
-
-    def _attribute(self, name):
         if name not in self.textures:
-            raise ValueError(f"{self.model.plugins[0]}: no attribute {name}; there are {', '.join(self.textures)}.")
-        return self.textures[name]
+            return self._without_attribute(name, mi.Color3f)
+        return self.textures[name].eval_3(si, active)
+
+    def _without_attribute(self, name, kind):
+        """Zero, or in scalar variants an error, as of Mitsuba's own BSDFs."""
+        if mi.variant().startswith("scalar"):
+            known = ", ".join(self.textures)
+            raise RuntimeError(f"{self.model.plugins[0]}: Invalid attribute requested {name}; there are {known}.")
+        return kind(0)
 
     def traverse(self, callback):
         for name, texture in self.textures.items():
@@ -183,6 +191,11 @@ class ModelBSDF:
 
     def to_string(self):
         return self.model.described()
+
+
+def _as(kind, value):
+    """A value as the type that a method takes: a list, a tuple or a NumPy array, too, as Mitsuba's bindings do."""
+    return value if isinstance(value, kind) else kind(value)
 
 
 class LobeFrame:
