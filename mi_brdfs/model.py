@@ -110,8 +110,8 @@ class Model(Plugin):
     """A BRDF model. A subclass is its paper in code: its docstring cites and gives the formula, its class attributes
     declare the parameters, and :meth:`lobes` says what they mean."""
 
-    energy: ClassVar[Energy]
-    """How much light the model reflects at most."""
+    energy: ClassVar[Energy | None] = None
+    """How much light the model reflects at most; None if that was not measured."""
 
     def lobes(self, p) -> tuple[Lobe, ...]:
         """The lobes of the model at a surface point, where ``p`` holds the values of the declared parameters. Their
@@ -126,6 +126,8 @@ class Model(Plugin):
     @classmethod
     def manual(cls) -> str:
         """The manual page, with the table of the largest albedos."""
+        if cls.energy is None:
+            return "\n".join([super().manual(), *_heading("Largest albedo"), "Not measured.", ""])
         rows = [list(row) for row in cls.energy.rows()]
         return "\n".join([super().manual(), *_section("Largest albedo", rows), "", Energy.NOTE, ""])
 
@@ -134,7 +136,11 @@ def _section(title: str, table: list[list[str]]) -> list[str]:
     """A table under a heading, with its columns aligned."""
     widths = [max(len(row[column]) for row in table) for column in range(len(table[0]) - 1)]
     rows = ("  ".join([*map(str.ljust, row, widths), row[-1]]).rstrip() for row in table)
-    return [title, "-" * len(title), *rows]
+    return [*_heading(title), *rows]
+
+
+def _heading(title: str) -> list[str]:
+    return [title, "-" * len(title)]
 
 
 def _shortened(words: str) -> str:

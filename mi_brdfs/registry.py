@@ -1,10 +1,17 @@
-"""From names to models: which plugins there are, and how they get into each variant."""
+"""From names to models: which plugins there are, whoever wrote them, and how they get into each variant."""
 
 from __future__ import annotations
 
 import difflib
+import functools
 import importlib
+import importlib.metadata
 import pkgutil
+import re
+import warnings
+from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
 
 import mitsuba as mi
 
@@ -14,31 +21,117 @@ from .integrator import integrator_class
 from .integrators.shading import Shading
 from .model import Model, Plugin
 
+ENTRY_POINTS = "mi_brdfs.models"
+"""The group of entry points by which installed packages bring models."""
 
-def _discover() -> dict[str, type[Model]]:
-    """The models of the files in ``mi_brdfs/models``, by plugin name and alias."""
-    found = []
-    for module_info in pkgutil.iter_modules(models.__path__):
-        module = importlib.import_module(f"{models.__name__}.{module_info.name}")
-        for value in vars(module).values():
-            if isinstance(value, type) and issubclass(value, Model) and value.__module__ == module.__name__:
-                found.append(value)
-    return {name: model for model in sorted(found, key=lambda model: model.plugins) for name in model.plugins}
+AnyModel = TypeVar("AnyModel", bound=type[Model])
 
-
-MODELS = _discover()
+MODELS: dict[str, type[Model]] = {}
 INTEGRATORS: dict[str, type[Plugin]] = {name: Shading for name in Shading.plugins}
-_registered: set[str] = set()
+_variants: dict[str, dict[str, type[Plugin]]] = {}
+"""What is registered, by variant and name."""
+
+
+# --- Which models there are -----------------------------------------------------------------------------------------
+
+
+def register(model: AnyModel, *, replace: bool = False) -> AnyModel:
+    """Make a model of your own known by its names, ``model.plugins``, in every variant, present and future, and to all
+    commands and functions that take a name. Also a decorator::
+
+        @mi_brdfs.register
+        class Schlick94(mi_brdfs.Model):
+            ...
+
+    Registering an edited class again, as in a notebook, replaces its former self. BSDFs that were loaded before remain
+    what they were.
+
+    Args:
+        model: a subclass of :class:`mi_brdfs.Model`.
+        replace: take a name that belongs to Mitsuba or to another model.
+
+    Returns:
+        The model.
+
+    Raises:
+        TypeError: if it is not a subclass of ``mi_brdfs.Model``.
+        ValueError: if a name is taken or cannot be one, or the model has no docstring.
+    """
+    if not (isinstance(model, type) and issubclass(model, Model)):
+        raise TypeError(f"register takes a subclass of mi_brdfs.Model, which {model!r} is not.")
+    if not (model.__doc__ or "").strip():
+        raise ValueError(f"{model.__name__} has no docstring: write its manual page there, the first line a summary.")
+    for name in model.plugins:
+        if not re.fullmatch(r"[A-Za-z]\w*", name):
+            raise ValueError(f"{model.__name__}: {name!r} cannot be a plugin name; take letters, digits and _.")
+        owner = _owner(name, model)
+        if owner and not replace:
+            raise ValueError(
+                f'{model.__name__}: the name "{name}" belongs to {owner}; '
+                'choose another one by plugins = ("…",), or register with replace=True.'
+            )
+    for name in [name for name, other in MODELS.items() if _same(other, model)]:
+        del MODELS[name]
+    MODELS.update(dict.fromkeys(model.plugins, model))
+    for variant in _variants:
+        _register_in(variant)
+    return model
+
+
+def _owner(name: str, model: type[Model]) -> str | None:
+    """Whose a name is, if not the model's own."""
+    if name in MODELS:
+        other = MODELS[name]
+        return None if _same(other, model) else f"{other.__module__}.{other.__qualname__}"
+    return "Mitsuba" if name in _builtins() else "mi_brdfs" if name in INTEGRATORS else None
+
+
+def _same(one: type[Model], other: type[Model]) -> bool:
+    """Whether both are the same class, perhaps of different times."""
+    return (one.__module__, one.__qualname__) == (other.__module__, other.__qualname__)
+
+
+def models_in(module: ModuleType) -> list[type[Model]]:
+    """The models that a module defines, in the order of their names."""
+    found = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, Model) and value.__module__ == module.__name__
+    ]
+    return sorted(found, key=lambda model: model.plugins)
+
+
+def _take_in_own():
+    """The models of the files in ``mi_brdfs/models``."""
+    for file in pkgutil.iter_modules(models.__path__):
+        for model in models_in(importlib.import_module(f"{models.__name__}.{file.name}")):
+            MODELS.update(dict.fromkeys(model.plugins, model))
+
+
+_take_in_own()
+
+
+def register_installed():
+    """Register what installed packages bring by entry points: a model each, or a module with models. One that fails is
+    left out with a warning."""
+    for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
+        try:
+            brought = entry.load()
+            for model in models_in(brought) if isinstance(brought, ModuleType) else [brought]:
+                register(model)
+        except Exception as error:
+            package = f" of {entry.dist.name}" if entry.dist else ""
+            warnings.warn(f"The model {entry.name}{package} is left out: {type(error).__name__}: {error}", stacklevel=2)
 
 
 def list_models() -> list[str]:
     """The names of all BSDF plugins, in alphabetical order, each followed by its aliases."""
-    return list(MODELS)
+    return [name for model in all_models() for name in model.plugins if MODELS[name] is model]
 
 
 def all_models() -> list[type[Model]]:
     """The models in the same order, each once."""
-    return list(dict.fromkeys(MODELS.values()))
+    return sorted(set(MODELS.values()), key=lambda model: model.plugins)
 
 
 def find_model(name: str) -> type[Model]:
@@ -66,11 +159,19 @@ def _find(name: str, plugins: dict):
     return plugins[name]
 
 
+# --- How they get into variants -------------------------------------------------------------------------------------
+
+
 def install():
     """Register the plugins in the active variant, if there is one, and in every variant that becomes active."""
-    mi.detail.add_variant_callback(_on_variant)
+    _follow_variants()
     if mi.variant() is not None:
         _on_variant(None, mi.variant())
+
+
+@functools.cache  # Mitsuba may import a package of plugins anew after each change of variant
+def _follow_variants():
+    mi.detail.add_variant_callback(_on_variant)
 
 
 def _on_variant(old: str | None, new: str | None):
@@ -78,10 +179,38 @@ def _on_variant(old: str | None, new: str | None):
         return
     llvm.warn_if_unsafe(new)
     # Mitsuba asks scalar_rgb what kind of plugin a name stands for, whatever the active variant.
-    for variant in {new, "scalar_rgb"} - _registered:
-        module = importlib.import_module(f"mitsuba.{variant}")
-        for name, model in MODELS.items():
-            module.register_bsdf(name, bsdf_class(model, module.BSDF))
-        for name, physics in INTEGRATORS.items():
-            module.register_integrator(name, integrator_class(physics, module.SamplingIntegrator))
-        _registered.add(variant)
+    for variant in {new, "scalar_rgb"}:
+        _register_in(variant)
+
+
+def _register_in(variant: str):
+    """Register in a variant what is not registered there as it is now."""
+    module = importlib.import_module(f"mitsuba.{variant}")
+    known = _variants.setdefault(variant, {})
+    for name, plugin in (MODELS | INTEGRATORS).items():
+        if known.get(name) is plugin:
+            continue
+        if issubclass(plugin, Model):
+            if name not in known and variant == mi.variant() and _is_foreign(name):
+                warnings.warn(f'mi_brdfs replaces the BSDF "{name}" that another package registered.', stacklevel=2)
+            module.register_bsdf(name, bsdf_class(plugin, module.BSDF))
+        else:
+            module.register_integrator(name, integrator_class(plugin, module.SamplingIntegrator))
+        known[name] = plugin
+
+
+@functools.cache
+def _builtins() -> frozenset[str]:
+    """The names of the plugins that are part of Mitsuba."""
+    return frozenset(path.stem for path in (Path(mi.__file__).parent / "plugins").iterdir())
+
+
+def _is_foreign(name: str) -> bool:
+    """Whether the active variant has a plugin of a name that is not ours, and not part of Mitsuba."""
+    if name in _builtins():
+        return False
+    try:
+        mi.PluginManager.instance().create_object(mi.Properties(name))
+    except Exception as error:  # of the plugin manager, or of a plugin that wants parameters
+        return "not found" not in str(error)
+    return True

@@ -1,0 +1,167 @@
+"""Models from other people's code: ``register``, and entry points of installed packages."""
+
+import importlib.metadata
+import subprocess
+import sys
+import textwrap
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import call, direction, hemisphere
+
+import mi_brdfs
+from mi_brdfs import registry
+from mi_brdfs.lobes import LambertLobe
+from mi_brdfs.models.eon import EON
+from mi_brdfs.parameters import Reflectance
+
+
+@pytest.fixture(autouse=True)
+def as_before():
+    """Mitsuba cannot forget a plugin, but names here go back to whom they belonged to."""
+    models = dict(registry.MODELS)
+    yield
+    registry.MODELS.clear()
+    registry.MODELS.update(models)
+
+
+def matte(brightness, **members):
+    """A model that reflects its colour times a brightness."""
+
+    class Matte(mi_brdfs.Model):
+        """A matte surface."""
+
+        colour = Reflectance(0.5, "colour")
+
+        def lobes(self, p):
+            return (LambertLobe(brightness * p.colour),)
+
+    for name, value in members.items():
+        setattr(Matte, name, value)
+    return Matte
+
+
+def brightness(plugin):
+    bsdf = mi.load_dict({"type": plugin})
+    return call(bsdf.eval, mi.BSDFContext(), direction(20), hemisphere(1, 1))[0][0, 0] * np.pi / hemisphere(1, 1)[0, 2]
+
+
+def test_a_model_is_known_in_every_variant(variant):
+    """Whether the variant was active before or not; and to whatever takes a name."""
+    model = mi_brdfs.register(matte(0.5))
+    assert model.plugins == ("matte",)
+    assert brightness("matte") == pytest.approx(0.25)
+    with mi.variant_context("llvm_ad_mono"):
+        assert brightness("matte") == pytest.approx(0.25)
+    assert mi_brdfs.list_models().index("matte") == mi_brdfs.list_models().index("metallicroughness") - 1
+    page = mi_brdfs.info("matte")
+    assert page.startswith("A matte surface.") and "Not measured." in page and "colour" in page
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_an_edited_model_takes_its_own_place():
+    """As when the cell of a notebook runs again; aliases that it no longer has are no longer listed."""
+    mi_brdfs.register(matte(0.5, plugins=("matte", "dull")))
+    mi_brdfs.register(matte(0.8))
+    assert brightness("matte") == pytest.approx(0.4)
+    assert "dull" not in mi_brdfs.list_models()
+    with mi.variant_context("llvm_ad_mono"):
+        assert brightness("matte") == pytest.approx(0.4)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "name, owner", [("ward", "mi_brdfs.models.ward.Ward"), ("diffuse", "Mitsuba"), ("shading", "mi_brdfs")]
+)
+def test_names_of_others_are_refused(name, owner):
+    with pytest.raises(ValueError, match=f'Matte: the name "{name}" belongs to {owner}; choose another one'):
+        mi_brdfs.register(matte(0.5, plugins=(name,)))
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_name_can_be_taken_explicitly():
+    mi_brdfs.register(matte(0.5, plugins=("eon",)), replace=True)
+    assert brightness("eon") == pytest.approx(0.25)
+    mi_brdfs.register(EON, replace=True)
+    assert brightness("eon") != pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    "model, error, message",
+    [
+        (int, TypeError, "register takes a subclass of mi_brdfs.Model, which <class 'int'> is not."),
+        (matte(1, __doc__=None), ValueError, "Matte has no docstring: write its manual page there"),
+        (matte(1, plugins=("my matte",)), ValueError, "Matte: 'my matte' cannot be a plugin name; take letters"),
+    ],
+)
+def test_what_is_no_model_is_refused(model, error, message):
+    with pytest.raises(error, match=message):
+        mi_brdfs.register(model)
+
+
+def fresh(code):
+    """What a fresh Python prints to stdout and stderr."""
+    command = [sys.executable, "-c", textwrap.dedent(code)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
+
+
+def test_a_plugin_of_somebody_else_is_replaced_with_a_warning():
+    out, err = fresh(
+        """
+        import mitsuba as mi
+        mi.set_variant("scalar_rgb")
+        class Other(mi.BSDF):
+            def __init__(self, props):
+                mi.BSDF.__init__(self, props)
+        mi.register_bsdf("microfacet", Other)
+        import mi_brdfs
+        print(type(mi.load_dict({"type": "microfacet"})).__name__)
+        """
+    )
+    assert out == "Microfacet\n"
+    assert err.count("UserWarning") == 1 and 'replaces the BSDF "microfacet" that another package' in err
+
+
+def test_a_reload_changes_nothing():
+    """Mitsuba may import a package of plugins anew after each change of variant."""
+    out, err = fresh(
+        """
+        import importlib
+        import mitsuba as mi
+        mi.set_variant("scalar_rgb")
+        import mi_brdfs
+        before = mi.load_dict({"type": "ward"})
+        importlib.reload(mi_brdfs)
+        mi.set_variant("scalar_spectral")
+        importlib.reload(mi_brdfs)
+        mi.set_variant("scalar_rgb")
+        print(type(mi.load_dict({"type": "ward"})) is type(before), len(mi_brdfs.list_models()))
+        """
+    )
+    assert out.split()[0] == "True" and err == ""
+
+
+class EntryPoint:
+    """An entry point that loads what it is given."""
+
+    dist = None
+
+    def __init__(self, name, brought):
+        self.name, self.brought = name, brought
+
+    def load(self):
+        if isinstance(self.brought, Exception):
+            raise self.brought
+        return self.brought
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_entry_points_bring_models_and_failures_stay_alone(monkeypatch):
+    entries = [EntryPoint("broken", ImportError("No module named 'nowhere'")), EntryPoint("matte", matte(0.3))]
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: entries)
+    with pytest.warns(UserWarning, match="The model broken is left out: ImportError: No module named 'nowhere'"):
+        registry.register_installed()
+    assert brightness("matte") == pytest.approx(0.15)
