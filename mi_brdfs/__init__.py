@@ -24,10 +24,11 @@ if _version > _TESTED:
     warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
 
 from . import lobes, microfacet, parameters  # noqa: E402
+from .guests import register_installed  # noqa: E402
 from .model import Energy, Model  # noqa: E402
 from .preview import preview_scene  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
-from .registry import info, install, list_models, register, register_installed  # noqa: E402
+from .registry import info, install, list_models, register  # noqa: E402
 
 install()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import functools
 import importlib
-import importlib.metadata
 import pkgutil
 import re
 import warnings
@@ -20,9 +19,6 @@ from .bsdf import bsdf_class
 from .integrator import integrator_class
 from .integrators.shading import Shading
 from .model import Model, Plugin
-
-ENTRY_POINTS = "mi_brdfs.models"
-"""The group of entry points by which installed packages bring models."""
 
 AnyModel = TypeVar("AnyModel", bound=type[Model])
 
@@ -109,19 +105,6 @@ def _take_in_own():
 
 
 _take_in_own()
-
-
-def register_installed():
-    """Register what installed packages bring by entry points: a model each, or a module with models. One that fails is
-    left out with a warning."""
-    for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
-        try:
-            brought = entry.load()
-            for model in models_in(brought) if isinstance(brought, ModuleType) else [brought]:
-                register(model)
-        except Exception as error:
-            package = f" of {entry.dist.name}" if entry.dist else ""
-            warnings.warn(f"The model {entry.name}{package} is left out: {type(error).__name__}: {error}", stacklevel=2)
 
 
 def list_models() -> list[str]:

@@ -11,7 +11,7 @@ import pytest
 from support import call, direction, hemisphere
 
 import mi_brdfs
-from mi_brdfs import registry
+from mi_brdfs import guests, registry
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.models.eon import EON
 from mi_brdfs.parameters import Reflectance
@@ -163,5 +163,79 @@ def test_entry_points_bring_models_and_failures_stay_alone(monkeypatch):
     entries = [EntryPoint("broken", ImportError("No module named 'nowhere'")), EntryPoint("matte", matte(0.3))]
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: entries)
     with pytest.warns(UserWarning, match="The model broken is left out: ImportError: No module named 'nowhere'"):
-        registry.register_installed()
+        guests.register_installed()
     assert brightness("matte") == pytest.approx(0.15)
+
+
+GUEST = """
+import mi_brdfs
+from mi_brdfs.lobes import LambertLobe
+from mi_brdfs.parameters import Choice, Number, Reflectance
+
+
+class Chalk(mi_brdfs.Model):
+    \"\"\"Chalk, which somebody else has written.\"\"\"
+
+    reflectance = Reflectance(0.5, "albedo")
+    dust = Number(0.5, (0, 1), "dust")
+    mood = Choice(("bright", "dim"), "mood")
+
+    def lobes(self, p):
+        return (Lobe(p.reflectance * (1 if self.mood == "bright" else 0.5)),)
+
+
+class Lobe(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return FAULT * value, pdf
+"""
+
+
+@pytest.fixture
+def guest(tmp_path):
+    """A file with a model that is right, and one with a model that is not reciprocal."""
+    for name, factor in (("chalk", "1"), ("faulty", "(0.5 + wi.z)")):
+        (tmp_path / f"{name}.py").write_text(GUEST.replace("FAULT", factor))
+    return tmp_path
+
+
+def command(folder, *arguments):
+    words = [sys.executable, "-m", "mi_brdfs.cli", *map(str, arguments)]
+    return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=180)
+
+
+def test_commands_take_in_a_file(guest):
+    """Each of them, without a line of the project about the model."""
+    option = "--import", "chalk.py"
+    assert "Chalk, which somebody else has written." in command(guest, "list", *option).stdout
+    page = command(guest, "info", "chalk", *option).stdout
+    assert "reflectance" in page and "Not measured." in page
+    assert command(guest, "plot", "chalk", *option, "-o", "lobes.png").returncode == 0
+    assert command(guest, "gallery", "chalk", *option, "-o", "pictures", "--size", 32, "--spp", 4).returncode == 0
+    assert {"index.html", "overview.png", "chalk.png"} <= {file.name for file in (guest / "pictures").iterdir()}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
+    right = command(guest, "check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
+    assert right.returncode == 0, right.stderr
+    wrong = command(guest, "check", "chalk", "--import", "faulty.py", "--only", "reciprocity", "-j", jobs)
+    assert wrong.returncode == 1 and "chalk: reciprocity: whole: f from" in wrong.stdout
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        (None, "--import guest.py: no such file"),
+        ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model"),
+        ("\n1 / 0", "--import guest.py: line 2: ZeroDivisionError: division by zero"),
+        ("def f(:", "--import guest.py: line 1: invalid syntax"),
+        (GUEST.replace("Chalk(", "Ward("), 'the name "ward" belongs to mi_brdfs.models.ward.Ward'),
+    ],
+)
+def test_wrong_files_are_told_in_a_sentence(tmp_path, text, message):
+    if text is not None:
+        (tmp_path / "guest.py").write_text(text)
+    done = command(tmp_path, "list", "--import", "guest.py")
+    assert done.returncode == 2 and done.stdout == ""
+    assert message in done.stderr and done.stderr.count("\n") == 1

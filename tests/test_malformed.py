@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from support import call, direction
 from test_resources import scene_of
 
-from mi_brdfs.cli import one_line
+from mi_brdfs.cli.errors import one_line
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
 from mi_brdfs.registry import all_models

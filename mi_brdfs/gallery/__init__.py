@@ -33,7 +33,7 @@ from ..registry import all_models, find_model
 from ..render import ctrl_c, display_image, write
 from .html import Section, page
 from .sheet import Row, sheet
-from .sweeps import SWEEPS, shown
+from .sweeps import shown, sweeps_of
 
 SIZE, SPP = 192, 16
 PER_ROW = 7
@@ -105,8 +105,9 @@ def power_of_4(spp: int) -> int:
 
 
 def example(model: type[Model]) -> dict:
-    """The plugin dict that a manual page has as its example."""
-    return ast.literal_eval(inspect.cleandoc(model.__doc__).rpartition("\n\n")[2])
+    """The plugin dict that a manual page has as its example, at its end, or else the defaults."""
+    last = inspect.cleandoc(model.__doc__).rpartition("\n\n")[2]
+    return ast.literal_eval(last) if last.startswith("{") else {"type": model.plugins[0]}
 
 
 def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
@@ -119,8 +120,9 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
 
 
 def year(model: type[Model]) -> str:
-    """When a model was published: the first year on its manual page."""
-    return re.search(r"\b(1[789]|20)\d\d\b", model.__doc__)[0]
+    """When a model was published: the first year on its manual page, if there is one."""
+    found = re.search(r"\b(1[789]|20)\d\d\b", model.__doc__)
+    return found[0] if found else ""
 
 
 class Entry:
@@ -128,7 +130,7 @@ class Entry:
 
     def __init__(self, model: type[Model]):
         self.model, self.type = model, model.plugins[0]
-        self.sweeps = SWEEPS[self.type]
+        self.sweeps = sweeps_of(model)
         self.bsdfs = [example(model), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
         self.pictures: list[Image.Image] = []
 

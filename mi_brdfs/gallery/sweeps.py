@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..model import Model
+from ..parameters import Choice, Number
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -156,3 +159,24 @@ SWEEPS: dict[str, list[Sweep]] = {
         sweep("exponent", 0.5, 1.0, 2.0, 4.0, 8.0, reflectance=CLAY),
     ],
 }
+
+
+def sweeps_of(model: type[Model]) -> list[Sweep]:
+    """The sweeps that show a model: those above, or of a model that is not among them, each number over its range (or
+    about its default, if the range is wide) and each choice."""
+    if model.plugins[0] in SWEEPS:
+        return SWEEPS[model.plugins[0]]
+    sweeps = []
+    for parameter in model.declared():
+        if isinstance(parameter, Number) and parameter.default is not None:
+            sweeps.append(Sweep(parameter.name, tuple(_values(parameter)), {}))
+        elif isinstance(parameter, Choice):
+            sweeps.append(Sweep(parameter.name, parameter.choices, {}))
+    return sweeps
+
+
+def _values(number: Number) -> list[float]:
+    low, high = number.limits
+    if high - low <= 10:
+        return [low + (high - low) * k / 4 for k in range(5)]
+    return [min(max(number.default * 3.0**k, low), high) for k in range(-2, 3)]

@@ -1,0 +1,64 @@
+"""The command line as a whole, and what all of its commands have in common."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from .. import guests
+from .terminal import Exit, fail
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+imported: list[str] = []
+"""What was given as --import, for processes that a command starts."""
+
+
+def main() -> None:
+    """The entry point of the command ``mi-brdfs``."""
+    app()
+
+
+@app.callback()
+def _describe() -> None:
+    """Classical BRDFs for Mitsuba 3: what there is, what works here, and rendering scenes that use them."""
+
+
+def _import(names: list[str] | None) -> None:
+    for name in names or []:
+        try:
+            guests.import_models(name)
+        except (ImportError, ValueError) as error:
+            fail(f"--import {name}: {error}", Exit.USAGE)
+        imported.append(name)
+
+
+Imports = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--import",
+        metavar="FILE.py|MODULE",
+        help="Take in the models that this file or module defines; may be repeated.",
+    ),
+]
+
+
+def command(name: str | None = None) -> Callable:
+    """Add a function to the commands, with the option --import."""
+
+    def add(function: Callable) -> Callable:
+        @functools.wraps(function)
+        def importing(*args, imports: Imports = None, **kwargs):
+            _import(imports)
+            return function(*args, **kwargs)
+
+        signature = inspect.signature(function, eval_str=True)
+        option = inspect.Parameter("imports", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Imports)
+        importing.__signature__ = signature.replace(parameters=[*signature.parameters.values(), option])
+        importing.__annotations__ = {**inspect.get_annotations(function, eval_str=True), "imports": Imports}
+        return app.command(name)(importing)
+
+    return add

@@ -1,0 +1,51 @@
+"""``mi-brdfs bench``"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from .app import command
+from .interrupts import interruptible
+from .options import check_folder, check_names, write_json
+from .terminal import err, out, print_table, stdout_to_stderr
+from .variants import set_tracing_variant
+
+
+@command()
+def bench(
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="SECTION", help="Measure this alone; may be repeated.")
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file, too.")
+    ] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+    ] = None,
+) -> None:
+    """Measure efficiency, time and noise beside Mitsuba's BSDFs, some ten minutes on a machine that is not busy."""
+    from ..bench import SECTIONS
+    from ..bench import bench as measure
+
+    check_names(only, SECTIONS, "section")
+    check_folder("--json", json_file)
+    chosen = set_tracing_variant(variant)
+    start = time.perf_counter()
+    columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
+    with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("")
+        with interruptible():
+            results = measure(only or None, lambda section, done, of: progress.update(
+                task, description=section, completed=done, total=of))  # fmt: skip
+    write_json(json_file, results.to_dict())
+    for table in results.tables():
+        print_table(table)
+        out.print()
+    for sentence in results.missed:
+        out.print(sentence)
+    err.print(f"Measured in {time.perf_counter() - start:.0f} s, {chosen}; {len(results.missed)} targets are missed.")

@@ -1,0 +1,32 @@
+"""Exceptions as one line each."""
+
+from __future__ import annotations
+
+import re
+
+
+def one_line(error: BaseException) -> str:
+    """Reduce an exception of Mitsuba to its cause, in one line, with the place in the scene file if it is known."""
+    while error.__cause__:  # render-time errors keep their cause there
+        error = error.__cause__
+    text = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)) or type(error).__name__
+    place = None
+    for match in re.finditer(r"(?:At|[Ww]hile loading) (.+?) \(line (\d+), col \d+\): ", text):
+        place, rest = match, text[match.end() :]
+    broken = re.search(r'Parsing of XML file "(.+)" failed: (.+) \(line (\d+), col \d+\)', text)
+    unused = re.findall(r"^ +- \$([^=]+)=", text, re.MULTILINE) if "unused parameters" in text else []
+    if broken:
+        return f"{broken[1]}: line {broken[3]}: {broken[2]}"
+    if unused:
+        return f"-D {', '.join(unused)}: the scene has no <default> parameter of this name"
+    sentence = _last_of_traceback(rest if place else text)
+    return f"{place[1]}: line {place[2]}: {sentence}" if place else sentence
+
+
+def _last_of_traceback(text: str) -> str:
+    """The exception's message if ``text`` holds a Python traceback, else ``text``, in one line."""
+    _, traceback, tail = text.partition("Traceback (most recent call last):")
+    if traceback:
+        text = re.split(r"^[\w.]+(?:Error|Exception|Warning): ", tail, flags=re.MULTILINE)[-1]
+    # Nothing that a scene file says may command the terminal.
+    return "".join(character for character in " ".join(text.split()) if character.isprintable())

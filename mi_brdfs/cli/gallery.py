@@ -1,0 +1,69 @@
+"""``mi-brdfs gallery``"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from .app import command
+from .errors import one_line
+from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .variants import set_variant
+
+
+@command()
+def gallery(
+    types: Annotated[
+        list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases that `list` shows. Default: all.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="It is made if it does not exist.")
+    ] = Path("gallery"),
+    spp: Annotated[
+        int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; pictures are denoised.")
+    ] = 16,
+    size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 192,
+    variant: Annotated[
+        str | None,
+        typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
+    ] = None,
+) -> None:
+    """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps what is
+    finished."""
+    try:
+        from ..gallery import gallery as render_gallery
+    except ImportError as error:
+        fail(str(error))
+    chosen = set_variant(variant)
+    start, finished, total = time.perf_counter(), 0, 0
+    columns = [TextColumn("Rendering {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
+    columns += [TextColumn("pictures,"), TimeRemainingColumn(), TextColumn("left")]
+    with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("", total=None)
+
+        def advance(type: str, done: int, of: int) -> None:
+            nonlocal finished, total
+            finished, total = done, of
+            progress.update(task, description=type, completed=done, total=of)
+
+        try:
+            render_gallery(types or (), output, spp, size, advance)
+        except ValueError as error:
+            fail(one_line(error), Exit.USAGE)
+        except OSError as error:
+            fail(f"cannot write to the folder {output}: {error.strerror}")
+        except RuntimeError as error:
+            fail(one_line(error))
+        except KeyboardInterrupt:
+            pass
+    if finished:
+        out.print(str(output / "index.html"))
+    if not finished or finished < total:
+        kept = f"it has {finished} of {total} pictures" if finished else "nothing is finished, nothing was written"
+        err.print(f"Interrupted; {kept}.")
+        raise typer.Exit(Exit.INTERRUPTED)
+    err.print(f"{total} pictures in {time.perf_counter() - start:.0f} s, {chosen}.")

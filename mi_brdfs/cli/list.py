@@ -1,0 +1,18 @@
+"""``mi-brdfs list``"""
+
+from __future__ import annotations
+
+from rich.table import Table
+
+from ..registry import all_models
+from .app import command
+from .terminal import print_table
+
+
+@command("list")
+def list_() -> None:
+    """List the BRDFs: type, aliases, summary."""
+    table = Table("type", "aliases", "summary", box=None, pad_edge=False)
+    for model in all_models():
+        table.add_row(model.plugins[0], " ".join(model.plugins[1:]), model.summary())
+    print_table(table)

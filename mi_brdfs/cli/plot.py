@@ -1,0 +1,80 @@
+"""``mi-brdfs plot``"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import command
+from .errors import one_line
+from .interrupts import interruptible
+from .options import check_folder
+from .terminal import Exit, fail, out, stdout_to_stderr
+from .variants import set_tracing_variant
+
+
+@command()
+def plot(
+    targets: Annotated[
+        list[str],
+        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins, of the pack or not; files with a scene or BSDF."),
+    ],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--param",
+            metavar="name=value",
+            help="Set a parameter of each TYPE, to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws "
+            "each of the values.",
+        ),
+    ] = None,
+    kind: Annotated[
+        str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere, albedo or sphere.")
+    ] = "polar",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A .png, .svg, .pdf or .jpg; of sphere .html.")
+    ] = None,
+    angles: Annotated[
+        str | None, typer.Option(metavar="DEGREES", help="Of incidence. Default: 10,40,70; of sphere 45.")
+    ] = None,
+    azimuth: Annotated[
+        float | None, typer.Option(metavar="DEGREES", help="Of incidence, from dp_du. Default: 0.")
+    ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(metavar="SCALE", help="linear, log or both, of polar, cartesian, sphere. Default: both."),
+    ] = None,
+    variant: Annotated[
+        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+    ] = None,
+) -> None:
+    """Draw the lobes of BSDFs, one or several to compare: in the plane of incidence (polar, cartesian), over the
+    hemisphere, their albedos, or as bodies to turn in a browser (sphere)."""
+    try:
+        from ..plot import command as asked
+    except ImportError as error:
+        fail(str(error))
+    if kind not in asked.KINDS:
+        fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
+    try:
+        bsdfs = asked.asked_for(targets, parameters or [])
+        options = asked.options_of(kind, angles, azimuth, scale)
+        file = asked.output_file(output, kind, targets)
+    except ValueError as error:
+        fail(str(error), Exit.USAGE)
+    check_folder("-o", output)
+    set_tracing_variant(variant)
+    with stdout_to_stderr(), interruptible():
+        try:
+            figure = asked.KINDS[kind](*bsdfs, **options)
+        except ImportError as error:
+            fail(str(error))
+        except (ValueError, RuntimeError) as error:  # Mitsuba's are of both kinds
+            fail(one_line(error), Exit.USAGE)
+        try:
+            asked.write(figure, file)
+        except OSError as error:
+            fail(f"cannot write {file}: {error.strerror}")
+    out.print(str(file))

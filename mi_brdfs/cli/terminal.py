@@ -1,0 +1,52 @@
+"""What is said, and where: results go to stdout, errors and progress to stderr."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from typing import NoReturn
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+out = Console(markup=False, highlight=False, soft_wrap=True)
+err = Console(markup=False, highlight=False, soft_wrap=True, stderr=True)
+
+
+class Exit(IntEnum):
+    """Exit statuses other than 0."""
+
+    ERROR = 1
+    USAGE = 2
+    INTERRUPTED = 130
+
+
+def print_table(table: Table) -> None:
+    """One line a row where another program reads it."""
+    console = Console(markup=False, highlight=False, width=None if out.is_terminal else 400)
+    console.print(table)
+
+
+def fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:
+    err.print(f"mi-brdfs: {text}")
+    raise typer.Exit(status)
+
+
+@contextmanager
+def stdout_to_stderr() -> Iterator[None]:
+    """Send to stderr what Mitsuba prints to stdout, its warnings.
+
+    At the level of the operating system: its log may speak inside a signal handler, where no Python may run.
+    """
+    sys.stdout.flush()
+    stdout = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        os.dup2(stdout, 1)
+        os.close(stdout)

@@ -1,0 +1,47 @@
+"""The variant that a command works in."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+
+from .. import llvm
+from .terminal import Exit, err, fail
+
+
+def set_variant(wanted: str | None) -> str:
+    """Activate the variant asked for, or the fastest that works."""
+    if wanted:
+        _refuse(wanted)
+        try:
+            mi.set_variant(wanted)
+        except ImportError:
+            fail(f"{wanted} does not work on this machine; `mi-brdfs doctor` says why")
+        return wanted
+    for name in ("cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb"):
+        if name not in mi.variants():
+            continue
+        if name.startswith("llvm") and (text := llvm.problem()):
+            err.print(f"mi-brdfs: using scalar_rgb, which is slow: {text}")
+            continue
+        try:
+            mi.set_variant(name)
+            return name
+        except ImportError:
+            continue
+    mi.set_variant("scalar_rgb")
+    return "scalar_rgb"
+
+
+def set_tracing_variant(wanted: str | None) -> str:
+    """The same, of those that check and bench work in."""
+    chosen = set_variant(wanted)
+    if chosen.startswith("scalar") or "polarized" in chosen:
+        fail(f"this needs a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if wanted else Exit.ERROR)
+    return chosen
+
+
+def _refuse(variant: str) -> None:
+    if variant not in mi.variants():
+        fail(f"there is no variant {variant}; this Mitsuba has {', '.join(mi.variants())}")
+    if variant.startswith("llvm") and (text := llvm.problem()):
+        fail(text)
