@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from .lobes import Mixture
+from .lobes import Lobe, Mixture
 from .math import clamp, select
 from .model import Model
 from .parameters import evaluate_colour
@@ -38,8 +38,9 @@ class ModelBSDF:
         common = flags.FrontSide
         if any(texture.is_spatially_varying() for texture in self.textures.values()):
             common |= flags.SpatiallyVarying
+        self.lobe_kinds = None
         self.kinds, self.transmits, components = [], [], []
-        for lobe in self.model.lobes(self.model.placeholders()):
+        for lobe in self._lobes(self.model.placeholders()):
             if lobe.transmits:
                 kind = flags.GlossyTransmission if lobe.glossy else flags.DiffuseTransmission
             else:
@@ -59,6 +60,21 @@ class ModelBSDF:
 
     # --- Evaluation and sampling ------------------------------------------------------------------------------------
 
+    def _lobes(self, p):
+        """The lobes of the model, which must be of the kinds that the components were made for."""
+        name, lobes = type(self.model).__name__, self.model.lobes(p)
+        if isinstance(lobes, Lobe) or not all(isinstance(lobe, Lobe) for lobe in lobes):
+            raise TypeError(f"{name}.lobes returns {lobes!r}; it must return a tuple of lobes.")
+        kinds = [(lobe.glossy, lobe.transmits, lobe.reciprocal) for lobe in lobes]
+        if self.lobe_kinds is None:
+            self.lobe_kinds = kinds
+        if kinds != self.lobe_kinds:
+            raise TypeError(
+                f"{name}.lobes returns {len(kinds)} lobes where it returned {len(self.lobe_kinds)}, or others; their "
+                "number and kinds may depend on choices and on what was given, but not on values."
+            )
+        return lobes
+
     def _mixture(self, ctx, si, active):
         """``(valid, mixture, components, frame)``: the lobes that the context enables, seen from si.wi."""
         components = [k for k, kind in enumerate(self.kinds) if ctx.is_enabled(kind, k)]
@@ -75,7 +91,7 @@ class ModelBSDF:
         frame = LobeFrame(getattr(p, "rotation", None), select(si.wi.z < 0, valid, False) if any(transmits) else None)
         # Replace wi in inactive lanes by a harmless direction: a NaN would enter the derivatives.
         wi = frame.to_local(select(valid, si.wi, mi.Vector3f(0, 0, 1)))
-        lobes = self.model.lobes(p)
+        lobes = self._lobes(p)
         lobes = [lobes[k].adjoint() if from_light else lobes[k] for k in components]
         return valid, Mixture(lobes, wi, frame.mirrored), components, frame
 
@@ -147,7 +163,7 @@ class ModelBSDF:
     def eval_diffuse_reflectance(self, si, active=True):
         """The albedo at normal incidence: the diffuse colour and the specular lobes' together."""
         normal = mi.Vector3f(0, 0, 1)
-        lobes = self.model.lobes(self.model.evaluate(si, active))
+        lobes = self._lobes(self.model.evaluate(si, active))
         albedo = sum(lobe.albedo(normal) for lobe in lobes if not lobe.transmits)
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 

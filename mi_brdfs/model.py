@@ -53,6 +53,12 @@ class Plugin:
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)
         cls.plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
+        if isinstance(cls.plugins, str):
+            raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
+        for parameter in cls.declared():
+            for name in {parameter.name, *parameter.names}:
+                if hasattr(Model, name) or name in ("slots", "textures", "ranges"):
+                    raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, as every model has that.")
 
     def __init__(self, props: mi.Properties):
         given = Given(self.plugins[0], props)
@@ -116,7 +122,7 @@ class Model(Plugin):
     def lobes(self, p) -> tuple[Lobe, ...]:
         """The lobes of the model at a surface point, where ``p`` holds the values of the declared parameters. Their
         number and kinds depend on nothing but the model's choices."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define lobes.")
 
     def placeholders(self) -> SimpleNamespace:
         """Stand-ins for these values, to learn of which lobes the model consists."""

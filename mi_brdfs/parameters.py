@@ -68,11 +68,13 @@ class Given:
         for name in self.props.keys():
             if name in known:
                 continue
-            if name.startswith("_arg_"):
+            if name.startswith("_arg_") and shown:
                 raise ParameterError(
                     f"{self.plugin}: {_kind(self.props[name])} is nested without a name; "
                     f"give it the name of the parameter it is meant for, {listed(shown)}."
                 )
+            if not known:
+                raise ParameterError(f"{self.plugin}: unknown parameter {brief(name)}; it has no parameters.")
             closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
             raise ParameterError(
                 f"{self.plugin}: unknown parameter {brief(name)}; did you mean {closest}? Known are {', '.join(shown)}."
@@ -305,21 +307,22 @@ class FresnelSlot(Slot):
 
 @dataclass
 class LobesSlot(Slot):
-    """The parameters of several lobes, as slots by declared name for each; evaluated, a list of their values."""
+    """The parameters of several lobes, as slots (or words) by declared name for each; evaluated, a list of their
+    values."""
 
-    lobes: list[dict[str, Slot]] = field(default_factory=list)
+    lobes: list[dict[str, Slot | str | bool]] = field(default_factory=list)
 
     @property
     def anisotropic(self) -> bool:
-        return any(slot.anisotropic for lobe in self.lobes for slot in lobe.values())
+        return any(slot.anisotropic for lobe in self.lobes for slot in slots_among(lobe.values()))
 
     @property
     def ranges(self) -> dict[str, Range]:
-        return ranges_of(slot for lobe in self.lobes for slot in lobe.values())
+        return ranges_of(slot for lobe in self.lobes for slot in slots_among(lobe.values()))
 
     def evaluate(self, si, active):
         return [
-            SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in lobe.items()}) for lobe in self.lobes
+            SimpleNamespace(**{name: _evaluated(own, si, active) for name, own in lobe.items()}) for lobe in self.lobes
         ]
 
 
@@ -330,22 +333,22 @@ class OneOfSlot(Slot):
 
     name: str = ""
     choice: str = ""
-    own: dict[str, Slot | str] = field(default_factory=dict)
+    own: dict[str, Slot | str | bool] = field(default_factory=dict)
 
     @property
     def anisotropic(self) -> bool:
-        return any(slot.anisotropic for slot in self.own.values() if isinstance(slot, Slot))
+        return any(slot.anisotropic for slot in slots_among(self.own.values()))
 
     @property
     def ranges(self) -> dict[str, Range]:
-        return ranges_of(slot for slot in self.own.values() if isinstance(slot, Slot))
+        return ranges_of(slots_among(self.own.values()))
 
     @property
     def words(self) -> dict[str, str]:
         return {self.name: self.choice} | {name: word for name, word in self.own.items() if isinstance(word, str)}
 
     def evaluate(self, si, active):
-        values = {n: own.evaluate(si, active) if isinstance(own, Slot) else own for n, own in self.own.items()}
+        values = {name: _evaluated(own, si, active) for name, own in self.own.items()}
         return SimpleNamespace(choice=self.choice, **values)
 
 
@@ -363,6 +366,19 @@ class RotationSlot(Slot):
 def textures_of(slots: Iterable[Slot]) -> dict[str, Any]:
     """The textures of several slots together, by property name."""
     return {name: texture for slot in slots for name, texture in slot.textures.items()}
+
+
+def slots_among(bound: Iterable[Slot | str | bool]) -> list[Slot]:
+    """The slots among what parameters were bound to: choices are words."""
+    return [it for it in bound if isinstance(it, Slot)]
+
+
+def _evaluated(bound: Slot | str | bool, si, active):
+    return bound.evaluate(si, active) if isinstance(bound, Slot) else bound
+
+
+def _placeholder(parameter: Parameter, bound: Slot | str | bool):
+    return parameter.placeholder(bound) if isinstance(bound, Slot) else bound
 
 
 def ranges_of(slots: Iterable[Slot]) -> dict[str, Range]:
@@ -465,7 +481,7 @@ class Number(Parameter):
         return self.spelling.name + self.number
 
     def bind(self, given: Given) -> Slot:
-        if self.default is None and self.name not in given:
+        if self.default is None and not any(name in given for name in self.names):
             return AbsentSlot()
         if self.spelling and self.other in given:
             if self.names[0] in given:
@@ -538,10 +554,10 @@ class Choice(Parameter):
         self.choices = choices
 
     def bind(self, given: Given) -> str:
-        return given.choice(self.name, self.choices)
+        return given.choice(self.name + self.number, self.choices)
 
     def rows(self) -> list[Row]:
-        return [Row(self.name, "string", self.choices[0], " | ".join(self.choices), self.text)]
+        return [Row(self.name + self.number, "string", self.choices[0], " | ".join(self.choices), self.text)]
 
 
 class OneOf(Parameter):
@@ -569,11 +585,11 @@ class OneOf(Parameter):
                 has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
                 raise given.error(name, f'does not belong to {self.name} = "{choice}", which {has} of its own')
         own = {name: parameter.bind(given) for name, parameter in declared.items()}
-        return OneOfSlot(textures_of(s for s in own.values() if isinstance(s, Slot)), self.name, choice, own)
+        return OneOfSlot(textures_of(slots_among(own.values())), self.name, choice, own)
 
     def placeholder(self, slot):
         declared = self.words[slot.choice]
-        values = {n: declared[n].placeholder(own) if isinstance(own, Slot) else own for n, own in slot.own.items()}
+        values = {name: _placeholder(declared[name], own) for name, own in slot.own.items()}
         return SimpleNamespace(choice=slot.choice, **values)
 
     def rows(self) -> list[Row]:
@@ -622,11 +638,11 @@ class PerLobe(Parameter):
                 problem = f"leaves a gap; number the lobes from 1, so that this one is {expected[1:]}"
                 raise given.error(first[number], problem)
         lobes = [{p.name: p.bind(given) for p in self._lobe(number)} for number in numbers]
-        return LobesSlot(textures_of(slot for lobe in lobes for slot in lobe.values()), lobes)
+        return LobesSlot(textures_of(slot for lobe in lobes for slot in slots_among(lobe.values())), lobes)
 
     def placeholder(self, slot):
         return [
-            SimpleNamespace(**{name: p.placeholder(lobe[name]) for name, p in self.declared.items()})
+            SimpleNamespace(**{name: _placeholder(p, lobe[name]) for name, p in self.declared.items()})
             for lobe in slot.lobes
         ]
 
@@ -642,10 +658,10 @@ class Flag(Parameter):
         self.default = default
 
     def bind(self, given: Given) -> bool:
-        return given.flag(self.name, self.default)
+        return given.flag(self.name + self.number, self.default)
 
     def rows(self) -> list[Row]:
-        return [Row(self.name, "boolean", str(self.default).lower(), "true | false", self.text)]
+        return [Row(self.name + self.number, "boolean", str(self.default).lower(), "true | false", self.text)]
 
 
 class FresnelSet(Parameter):

@@ -27,16 +27,16 @@ class Lobe:
     def albedo(self, wi):
         """An estimate of ∫ f |cosθ_o| dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
         exact; but where the lobe reflects anything it must be positive."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define albedo.")
 
     def eval_pdf(self, wi, wo):
         """``(value, pdf)``: f |cosθ_o|, and the density of ``wo`` in :meth:`sample`."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define eval_pdf.")
 
     def sample(self, wi, u, v):
         """A direction ``wo`` for three uniform variates ``u`` and ``v = (v.x, v.y)``. It may lie beyond the horizon,
         where the lobe is zero."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define sample.")
 
     def adjoint(self) -> Lobe:
         """The lobe for light that is traced from its source (``TransportMode.Importance``), where ``wi`` leads to the

@@ -1,0 +1,123 @@
+"""Slips that somebody makes who writes a model: each is told in one sentence, or works."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import call, direction
+
+import mi_brdfs
+from mi_brdfs import registry
+from mi_brdfs.lobes import LambertLobe, Lobe
+from mi_brdfs.parameters import Choice, Flag, Number, PerLobe, Reflectance
+
+
+@pytest.fixture(autouse=True)
+def as_before(llvm_rgb):
+    models = dict(registry.MODELS)
+    yield
+    registry.MODELS.clear()
+    registry.MODELS.update(models)
+
+
+def model(lobes, **declared):
+    """A registered model of these lobes, a function of the model and its values."""
+    members = {"__doc__": "A model with a slip.", "lobes": lobes, **declared}
+    return mi_brdfs.register(type("Slip", (mi_brdfs.Model,), members))
+
+
+def matte(self, p):
+    return (LambertLobe(p.reflectance),)
+
+
+def radiance(**given):
+    bsdf = mi.load_dict({"type": "slip", **given})
+    return call(bsdf.eval, mi.BSDFContext(), direction(30), np.float32([direction(0)]))[0][0, 0] * np.pi
+
+
+def told(**given):
+    """The last line of the error that loading raises."""
+    with pytest.raises(RuntimeError) as caught:
+        mi.load_dict({"type": "slip", **given})
+    return str(caught.value).strip().splitlines()[-1]
+
+
+def test_a_pair_without_a_default():
+    """Given as NAME_u and NAME_v it is there, as it is when given once."""
+
+    def lobes(self, p):
+        return (LambertLobe(0.0 if p.alpha is None else p.alpha[0] + p.alpha[1]),)
+
+    model(lobes, alpha=Number(None, (0, 1), "roughness", anisotropic=True))
+    assert radiance() == 0
+    assert radiance(alpha_u=0.1, alpha_v=0.2) == pytest.approx(0.3)
+    assert radiance(alpha=0.2) == pytest.approx(0.4)
+
+
+def test_a_choice_of_each_lobe():
+    """Numbered like everything else of a lobe, and a flag, too."""
+
+    def lobes(self, p):
+        return tuple(
+            LambertLobe(it.scale * (1 if it.shade == "full" else 0.5) * (0 if it.off else 1)) for it in p.parts
+        )
+
+    parts = PerLobe(
+        3,
+        scale=Reflectance(0.1, "scale"),
+        shade=Choice(("full", "half"), "shade of lobe i"),
+        off=Flag(False, "whether lobe i is off"),
+    )
+    model(lobes, parts=parts)
+    assert radiance() == pytest.approx(0.1)
+    assert radiance(shade="half") == pytest.approx(0.05)
+    assert radiance(shade_1="half", scale_2=0.3) == pytest.approx(0.35)
+    assert radiance(scale_1=0.2, scale_2=0.3, off_2=True) == pytest.approx(0.2)
+    assert 'slip: shade_2 = "dim" is unknown; it must be one of "full" or "half"' in told(shade_2="dim", scale_1=0.1)
+
+
+def test_a_model_without_parameters():
+    model(lambda self, p: (LambertLobe(0.25),))
+    assert radiance() == pytest.approx(0.25)
+    assert told(alpha=0.1).endswith("slip: unknown parameter alpha; it has no parameters.")
+    assert "parameter" in mi_brdfs.info("slip")
+    assert mi_brdfs.ranges(mi.load_dict({"type": "slip"})) == {}
+
+
+@pytest.mark.parametrize(
+    "lobes, message",
+    [
+        (lambda self, p: LambertLobe(p.reflectance), "Slip.lobes returns <mi_brdfs.lobes.diffuse.LambertLobe object"),
+        (lambda self, p: (p.reflectance,), "it must return a tuple of lobes."),
+    ],
+)
+def test_lobes_are_a_tuple(lobes, message):
+    model(lobes, reflectance=Reflectance(0.5, "albedo"))
+    assert message in told()
+
+
+def test_the_lobes_depend_on_no_values():
+    """Here on whether there is a surface point already."""
+    counts = iter([2, 1, 1, 1])
+    model(lambda self, p: (LambertLobe(p.reflectance),) * next(counts), reflectance=Reflectance(0.5, "albedo"))
+    with pytest.raises(TypeError, match=r"Slip.lobes returns 1 lobes where it returned 2, or others; their number and"):
+        radiance()
+
+
+def test_a_lobe_without_an_albedo_is_named():
+    class Half(Lobe):
+        pass
+
+    model(lambda self, p: (Half(), Half()))
+    with pytest.raises(NotImplementedError, match="Half does not define albedo."):
+        radiance()
+
+
+@pytest.mark.parametrize("name", ["lobes", "evaluate", "slots", "textures", "energy", "plugins"])
+def test_a_parameter_is_not_called_like_what_models_have(name):
+    with pytest.raises(TypeError, match=f"Slip: a parameter cannot be called {name}, as every model has that."):
+        model(**({"lobes": matte} | {name: Number(1, (0, 1), "number")}))
+
+
+def test_plugins_are_a_tuple():
+    with pytest.raises(TypeError, match=r'Slip: plugins is a tuple of names; write plugins = \("slip",\).'):
+        model(matte, plugins="slip")
