@@ -77,7 +77,7 @@ class Toon(Model):
 
     def _albedo(self, reflectance, mass):
         """The albedo of a band whose integral over the cosines is ``mass``."""
-        return reflectance * (2 * mass if self.normalization == "none" else dr.select(mass > EMPTY, 1, 0))
+        return reflectance * (2 * mass if self.normalization == "none" else dr.select(mass > EMPTY, 1.0, 0.0))
 
 
 EMPTY = 1e-12
