@@ -231,12 +231,9 @@ def may_pass(scene) -> bool:
 
 def bsdfs_of(scene) -> list:
     """The BSDFs of a scene's shapes, those within shape groups included."""
-    groups = [it for it in children(scene) if isinstance(it, mi.Shape) and it.class_name() == "ShapeGroup"]
-    shapes = [it for it in scene.shapes() if it.class_name() != "Instance"]
-    return [
-        shape.bsdf()
-        for shape in [*shapes, *(it for group in groups for it in children(group) if isinstance(it, mi.Shape))]
-    ]
+    shapes = [it for it in children(scene) if isinstance(it, mi.Shape)]
+    grouped = [it for shape in shapes for it in children(shape) if isinstance(it, mi.Shape)]
+    return [shape.bsdf() for shape in [*scene.shapes(), *grouped]]
 
 
 # --- What surfaces tell ---------------------------------------------------------------------------------------------
