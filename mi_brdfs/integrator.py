@@ -61,42 +61,88 @@ class CentredIntegrator:
         """The sums over the samples of each pixel: red, green, blue and opacity, before the finish.
 
         What this returns for different seeds may be added. The memory that it takes does not depend on ``spp``, except
-        where derivatives are recorded.
+        where derivatives of it are recorded; those of ``mi.render`` are not, over several passes.
         """
         film, sampler = sensor.film(), self._sampler(sensor, spp)
         if mi.has_flag(film.flags(), mi.FilmFlags.Special):
             raise ValueError(
                 f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; take an hdrfilm."
             )
-        pixel, spp = pixels(film), sampler.sample_count()
         if mi.variant().startswith("scalar"):
-            totals = []
+            totals, pixel = [], pixels(film)
             for index, corner in enumerate(pixel):
                 sampler.seed(seed * len(pixel) + index)
                 total = [0.0] * 4
-                for _ in range(spp):
+                for _ in range(sampler.sample_count()):
                     total = [a + b for a, b in zip(total, self._look(scene, sensor, sampler, corner), strict=True)]
                     sampler.advance()
                 totals.append(total)
             return np.array(totals)
 
-        # The samples of a pass divide all samples, as samplers that stratify over all passes demand.
+        total = mi.Vector4f(0)
+        for index, passed in enumerate(self._passes(scene, sensor, sampler, seed)):
+            total += passed
+            if index:
+                dr.eval(total)
+        return total
+
+    def _passes(self, scene, sensor, sampler, seed):
+        """The sums of the samples of each pass, of bounded memory, in vectorized variants."""
+        pixel, spp, at_once = pixels(sensor.film()), sampler.sample_count(), samples_at_once(sensor.film(), sampler)
         count = dr.width(pixel)
-        at_once = next(k for k in range(min(spp, max(LANES // count, 1)), 0, -1) if spp % k == 0)
         sampler.set_samples_per_wavefront(at_once)
         sampler.seed(seed, count * at_once)
-        corner, total = dr.repeat(pixel, at_once), mi.Vector4f(0)
+        corner = dr.repeat(pixel, at_once)
         for _ in range(spp // at_once):
             samples = self._look(scene, sensor, sampler, corner)
             if at_once > 1:
                 dr.eval(samples)  # together: each sum evaluates what it adds, by itself
-            total += mi.Vector4f([added(value, count, at_once) for value in samples])
+            passed = mi.Vector4f([added(value, count, at_once) for value in samples])
+            del samples
             if at_once < spp:
                 sampler.advance()
                 sampler.schedule_state()
-                dr.eval(total)
+                dr.eval(passed)
+            yield passed
+            if at_once < spp:
                 dr.sync_thread()  # or else all passes would take their memory before the first gives it back
-        return total
+
+    def render_backward(self, scene, params, grad_in, sensor=0, seed=0, spp=0):
+        """As Mitsuba's own, but pass by pass, by the derivative of the finish at the mean of all."""
+        if isinstance(sensor, int):
+            sensor = scene.sensors()[sensor]
+        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        if samples_at_once(film, sampler) == sampler.sample_count():
+            return mi.SamplingIntegrator.render_backward(self, scene, params, grad_in, sensor, seed, spp)
+        with dr.suspend_grad():
+            sums = self.sums(scene, sensor, seed, spp)
+        dr.enable_grad(sums)
+        self.put(film, sums, sampler.sample_count())
+        dr.backward_from(film.develop() * grad_in)
+        adjoint = dr.grad(sums)
+        with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):  # recorded loops cannot be differentiated
+            for passed in self._passes(scene, sensor, sampler, seed):
+                dr.backward_from(dr.dot(passed, adjoint))
+                dr.eval()
+
+    def render_forward(self, scene, params, sensor=0, seed=0, spp=0):
+        """As Mitsuba's own, but pass by pass."""
+        if isinstance(sensor, int):
+            sensor = scene.sensors()[sensor]
+        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        if samples_at_once(film, sampler) == sampler.sample_count():
+            return mi.SamplingIntegrator.render_forward(self, scene, params, sensor, seed, spp)
+        sums, tangent = mi.Vector4f(0), mi.Vector4f(0)
+        with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):
+            for passed in self._passes(scene, sensor, sampler, seed):
+                # The passes to come need the gradients of the parameters, too.
+                tangent += dr.forward_to(passed, flags=dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
+                sums += dr.detach(passed)
+                dr.eval(sums, tangent)
+        dr.enable_grad(sums)
+        dr.set_grad(sums, tangent)
+        self.put(film, sums, sampler.sample_count())
+        return dr.forward_to(film.develop())
 
     def put(self, film, sums, count):
         """Fill a film with the finished means of its pixels, each with the weight of the ``count`` samples of which
@@ -162,6 +208,13 @@ def pixels(film):
         return [mi.Point2f(x, y) + first for y in range(height) for x in range(width)]
     index = dr.arange(mi.UInt32, width * height)
     return mi.Point2f(mi.Point2u(index % width, index // width)) + first
+
+
+def samples_at_once(film, sampler) -> int:
+    """How many samples of each pixel are drawn at once: a divisor of all, as samplers that stratify over all passes
+    demand."""
+    spp, most = sampler.sample_count(), max(LANES // dr.width(pixels(film)), 1)
+    return next(count for count in range(min(spp, most), 0, -1) if spp % count == 0)
 
 
 def added(value, count: int, size: int):
