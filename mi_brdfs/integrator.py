@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from .model import Plugin
 
@@ -24,7 +25,10 @@ class CentredIntegrator:
     """An integrator that looks through the centres of the pixels, so that nothing is random but what its physics draws.
 
     The physics has two methods. ``shade(scene, sampler, ray, active)`` returns the unpolarized radiance along a ray,
-    and whether something was seen; ``finish(colour)`` is what becomes of the mean of a pixel's samples.
+    and its opacity; ``finish(colour)`` is what becomes of the mean of a pixel's samples.
+
+    A picture is made in two steps, so that any number of passes may add up before the finish: :meth:`sums` and
+    :meth:`put`.
     """
 
     physics_class: type[Plugin]
@@ -36,44 +40,14 @@ class CentredIntegrator:
 
     def sample(self, scene, sampler, ray, medium=None, active=True):
         """What other integrators, such as ``aov``, see along a ray: each of their samples is finished."""
-        radiance, seen = self.physics.shade(scene, sampler, ray, active)
-        return mi.depolarizer(self.physics.finish(radiance)), seen, []
+        radiance, opacity = self.physics.shade(scene, sampler, ray, active)
+        return mi.depolarizer(self.physics.finish(radiance)), opacity > 0, []
 
     def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
-        film, sampler = sensor.film(), sensor.sampler().clone()
-        if mi.has_flag(film.flags(), mi.FilmFlags.Special):
-            raise ValueError(
-                f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; take an hdrfilm."
-            )
-        if spp:
-            sampler.set_sample_count(spp)
-        spp = sampler.sample_count()
-        border = film.rfilter().border_size() if film.sample_border() else 0
-        width, height = (int(size) + 2 * border for size in film.crop_size())
-        corner = mi.ScalarVector2i(film.crop_offset()) - border
-        film.prepare([])
-        block = film.create_block()
-
-        if mi.variant().startswith("scalar"):
-            for index in range(width * height):
-                pixel = mi.Point2f(index % width, index // width) + corner
-                sampler.seed(seed * width * height + index)
-                total = [0.0] * 4
-                for _ in range(spp):
-                    total = [a + b for a, b in zip(total, self._look(scene, sensor, sampler, pixel), strict=True)]
-                    sampler.advance()
-                self._put(block, film, pixel, total, spp)
-        else:
-            sampler.set_samples_per_wavefront(spp)
-            sampler.seed(seed, width * height * spp)
-            index = dr.arange(mi.UInt32, width * height)
-            pixel = mi.Point2f(mi.Point2u(index % width, index // width)) + corner
-            samples = self._look(scene, sensor, sampler, dr.repeat(pixel, spp))
-            self._put(block, film, pixel, [dr.block_sum(value, spp) for value in samples], spp)
-
-        film.put_block(block)
+        film, count = sensor.film(), self._sampler(sensor, spp).sample_count()
+        self.put(film, self.sums(scene, sensor, seed, spp), count)
         if not develop:
             film.schedule_storage()
             return mi.TensorXf()
@@ -83,33 +57,135 @@ class CentredIntegrator:
             dr.sync_thread()
         return image
 
-    def _look(self, scene, sensor, sampler, pixel):
-        """The red, green and blue of a sample, and its opacity, through the centre of a pixel, given by its corner."""
+    def sums(self, scene, sensor, seed=0, spp=0):
+        """The sums over the samples of each pixel: red, green, blue and opacity, before the finish.
+
+        What this returns for different seeds may be added. The memory that it takes does not depend on ``spp``, except
+        where derivatives of it are recorded; those of ``mi.render`` are not, over several passes.
+        """
+        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        if mi.has_flag(film.flags(), mi.FilmFlags.Special):
+            raise ValueError(
+                f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; take an hdrfilm."
+            )
+        if mi.variant().startswith("scalar"):
+            totals, pixel = [], pixels(film)
+            for index, corner in enumerate(pixel):
+                sampler.seed(seed * len(pixel) + index)
+                total = [0.0] * 4
+                for _ in range(sampler.sample_count()):
+                    total = [a + b for a, b in zip(total, self._look(scene, sensor, sampler, corner), strict=True)]
+                    sampler.advance()
+                totals.append(total)
+            return np.array(totals)
+
+        total = mi.Vector4f(0)
+        for index, passed in enumerate(self._passes(scene, sensor, sampler, seed)):
+            total += passed
+            if index:
+                dr.eval(total)
+        return total
+
+    def _passes(self, scene, sensor, sampler, seed):
+        """The sums of the samples of each pass, of bounded memory, in vectorized variants."""
+        pixel, spp, at_once = pixels(sensor.film()), sampler.sample_count(), samples_at_once(sensor.film(), sampler)
+        count = dr.width(pixel)
+        sampler.set_samples_per_wavefront(at_once)
+        sampler.seed(seed, count * at_once)
+        corner = dr.repeat(pixel, at_once)
+        for _ in range(spp // at_once):
+            samples = self._look(scene, sensor, sampler, corner)
+            if at_once > 1:
+                dr.eval(samples)  # together: each sum evaluates what it adds, by itself
+            passed = mi.Vector4f([added(value, count, at_once) for value in samples])
+            del samples
+            if at_once < spp:
+                sampler.advance()
+                sampler.schedule_state()
+                dr.eval(passed)
+            yield passed
+            if at_once < spp:
+                dr.sync_thread()  # or else all passes would take their memory before the first gives it back
+
+    def render_backward(self, scene, params, grad_in, sensor=0, seed=0, spp=0):
+        """As Mitsuba's own, but pass by pass, by the derivative of the finish at the mean of all."""
+        if isinstance(sensor, int):
+            sensor = scene.sensors()[sensor]
+        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        if samples_at_once(film, sampler) == sampler.sample_count():
+            return mi.SamplingIntegrator.render_backward(self, scene, params, grad_in, sensor, seed, spp)
+        with dr.suspend_grad():
+            sums = self.sums(scene, sensor, seed, spp)
+        dr.enable_grad(sums)
+        self.put(film, sums, sampler.sample_count())
+        dr.backward_from(film.develop() * grad_in)
+        adjoint = dr.grad(sums)
+        with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):  # recorded loops cannot be differentiated
+            for passed in self._passes(scene, sensor, sampler, seed):
+                dr.backward_from(dr.dot(passed, adjoint))
+                dr.eval()
+
+    def render_forward(self, scene, params, sensor=0, seed=0, spp=0):
+        """As Mitsuba's own, but pass by pass."""
+        if isinstance(sensor, int):
+            sensor = scene.sensors()[sensor]
+        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        if samples_at_once(film, sampler) == sampler.sample_count():
+            return mi.SamplingIntegrator.render_forward(self, scene, params, sensor, seed, spp)
+        sums, tangent = mi.Vector4f(0), mi.Vector4f(0)
+        with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):
+            for passed in self._passes(scene, sensor, sampler, seed):
+                # The passes to come need the gradients of the parameters, too.
+                tangent += dr.forward_to(passed, flags=dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
+                sums += dr.detach(passed)
+                dr.eval(sums, tangent)
+        dr.enable_grad(sums)
+        dr.set_grad(sums, tangent)
+        self.put(film, sums, sampler.sample_count())
+        return dr.forward_to(film.develop())
+
+    def put(self, film, sums, count):
+        """Fill a film with the finished means of its pixels, each with the weight of the ``count`` samples of which
+        ``sums`` are the sums."""
+        film.prepare([])
+        block, has_alpha = film.create_block(), mi.has_flag(film.flags(), mi.FilmFlags.Alpha)
+        # A box filter takes the corner, as Mitsuba's own integrators do.
+        centre = 0 if film.rfilter().is_box_filter() else 0.5
+        scalar = mi.variant().startswith("scalar")
+        for corner, total in zip(pixels(film), sums, strict=True) if scalar else [(pixels(film), sums)]:
+            *colour, opacity = (mi.Float(value) for value in total)
+            colour = self.physics.finish(mi.Color3f(colour) / count) * count
+            block.put(corner + centre, [*colour, *([opacity] if has_alpha else []), mi.Float(count)])
+        film.put_block(block)
+
+    @staticmethod
+    def _sampler(sensor, spp):
+        """A sampler of one's own, for ``spp`` samples per pixel or the scene's number."""
+        sampler = sensor.sampler().clone()
+        if spp:
+            sampler.set_sample_count(spp)
+        return sampler
+
+    def _look(self, scene, sensor, sampler, corner):
+        """The red, green and blue of a sample, and its opacity, through the centre of a pixel."""
         film, time = sensor.film(), sensor.shutter_open()
         if sensor.shutter_open_time() > 0:
             time += sampler.next_1d() * sensor.shutter_open_time()
+        # The film of a sensor that is a surface has no pixels to look through the centre of, but spreads over it.
+        inside = 0.5 if sensor.get_shape() is None else sampler.next_2d()
         ray, weight = sensor.sample_ray_differential(
             time=time,
             sample1=sampler.next_1d() if mi.is_spectral else 0,
-            sample2=(pixel + 0.5 - film.crop_offset()) / mi.ScalarVector2f(film.crop_size()),
+            sample2=(corner + inside - film.crop_offset()) / mi.ScalarVector2f(film.crop_size()),
             sample3=sampler.next_2d() if sensor.needs_aperture_sample() else mi.Point2f(0.5),
         )
-        radiance, seen = self.physics.shade(scene, sampler, ray, mi.Bool(True))
+        radiance, opacity = self.physics.shade(scene, sampler, ray, mi.Bool(True))
         colour = mi.unpolarized_spectrum(weight) * radiance
         if mi.is_spectral:
             colour = mi.spectrum_to_srgb(colour, ray.wavelengths)
         elif mi.is_monochromatic:
             colour = mi.Color3f(colour[0])
-        return [*colour, dr.select(seen, mi.Float(1), mi.Float(0))]
-
-    def _put(self, block, film, pixel, total, spp):
-        """Add the finished mean to a block, with the weight of its samples, of which ``total`` is the sum."""
-        *colour, alpha = total
-        colour = self.physics.finish(mi.Color3f(colour) / spp) * spp
-        channels = [*colour, alpha, spp] if mi.has_flag(film.flags(), mi.FilmFlags.Alpha) else [*colour, spp]
-        # A box filter takes the corner, as Mitsuba's own integrators do.
-        position = pixel if film.rfilter().is_box_filter() else pixel + 0.5
-        block.put(position, [mi.Float(value) for value in channels])
+        return [*colour, opacity]
 
     def traverse(self, callback):
         for name, texture in self.textures.items():
@@ -117,3 +193,30 @@ class CentredIntegrator:
 
     def to_string(self):
         return self.physics.described()
+
+
+LANES = 1 << 22
+"""The most samples that are drawn at once, unless the film has more pixels: fixed, as what is drawn depends on it."""
+
+
+def pixels(film):
+    """The corners of a film's pixels, with the border that its filter may want sampled: a list in scalar variants."""
+    border = film.rfilter().border_size() if film.sample_border() else 0
+    width, height = (int(size) + 2 * border for size in film.crop_size())
+    first = mi.ScalarVector2i(film.crop_offset()) - border
+    if mi.variant().startswith("scalar"):
+        return [mi.Point2f(x, y) + first for y in range(height) for x in range(width)]
+    index = dr.arange(mi.UInt32, width * height)
+    return mi.Point2f(mi.Point2u(index % width, index // width)) + first
+
+
+def samples_at_once(film, sampler) -> int:
+    """How many samples of each pixel are drawn at once: a divisor of all, as samplers that stratify over all passes
+    demand."""
+    spp, most = sampler.sample_count(), max(LANES // dr.width(pixels(film)), 1)
+    return next(count for count in range(min(spp, most), 0, -1) if spp % count == 0)
+
+
+def added(value, count: int, size: int):
+    """The sums of ``count`` blocks of a value, each of a size; of one that is the same in all lanes, too."""
+    return dr.block_sum(value, size) if dr.width(value) == count * size else dr.repeat(value * size, count)

@@ -51,11 +51,13 @@ def render(
     """Render ``scene`` in passes of about a second and combine them without bias.
 
     What is summed over the passes is the film's raw data, numerators and filter weights apart; one division at the
-    end develops it. (A mean of developed passes would be biased: each is a ratio of two random sums.)
+    end develops it. (A mean of developed passes would be biased: each is a ratio of two random sums.) An integrator
+    that makes something of the mean of a pixel's samples, as ``shading`` does, has methods ``sums`` and ``put`` like
+    those of :class:`FilmPasses`: its passes add up before that.
 
     ``spp`` defaults to the scene's own number. ``on_pass(done, total)`` is called after each pass. The first Ctrl-C
-    lets the running pass end (scalar variants drop it) and returns what is there (``picture.spp < picture.total``). A
-    second one, or one before anything is there, raises KeyboardInterrupt.
+    lets the running pass end (scalar variants may drop it) and returns what is there
+    (``picture.spp < picture.total``). A second one, or one before anything is there, raises KeyboardInterrupt.
 
     The result depends on scene, variant, ``spp``, ``seed`` and, in LLVM variants, the number of threads, but never on
     timing: the size of a pass follows from the size of the image, and pass ``k`` uses a seed computed from ``seed``
@@ -63,20 +65,20 @@ def render(
     """
     camera = scene.sensors()[sensor]
     film, sampler, integrator = camera.film(), camera.sampler(), scene.integrator()
-    # A particle tracer's film holds a finished estimate per pass, with weight 0: it is to be averaged.
-    averaged = isinstance(integrator, mi.AdjointIntegrator)
-    scalar = mi.variant().startswith("scalar")
+    source = integrator if hasattr(integrator, "sums") else FilmPasses(integrator)
+    # Mitsuba's own handler cuts a pass of a scalar variant short.
+    cut_short = mi.variant().startswith("scalar") and isinstance(source, FilmPasses)
     own_count = sampler.sample_count()
     try:
-        passes = _pass_sizes(sampler, spp or own_count, _samples_per_pass() // _pixel_count(film, averaged))
+        particles = isinstance(integrator, mi.AdjointIntegrator)
+        passes = _pass_sizes(sampler, spp or own_count, _samples_per_pass() // _pixel_count(film, particles))
         total, done, raw = sum(passes), 0, 0
         with ctrl_c() as interrupt:
             for index, count in enumerate(passes):
-                integrator.render(scene, camera, seed=_pass_seed(seed, index), spp=count, evaluate=False)
-                passed = film.develop(raw=True)
-                if interrupt.pressed and scalar:  # Mitsuba's own handler has cut this pass short
+                passed = source.sums(scene, camera, seed=_pass_seed(seed, index), spp=count)
+                if interrupt.pressed and cut_short:
                     break
-                raw += passed * (count if averaged else 1)
+                raw += passed
                 dr.eval(raw)
                 dr.sync_thread()
                 done += count
@@ -87,8 +89,27 @@ def render(
         sampler.set_sample_count(own_count)
     if not done:
         raise KeyboardInterrupt
-    _fill(film, raw / done if averaged else raw)
+    source.put(film, raw, done)
     return Picture(film.develop(), film.bitmap(), done, total)
+
+
+class FilmPasses:
+    """Mitsuba's integrators, of whose passes the film's raw data add up."""
+
+    def __init__(self, integrator: mi.Integrator):
+        self.integrator = integrator
+        # A particle tracer's film holds a finished estimate per pass, with weight 0: it is to be averaged.
+        self.averaged = isinstance(integrator, mi.AdjointIntegrator)
+
+    def sums(self, scene: mi.Scene, sensor: mi.Sensor, seed: int, spp: int) -> mi.TensorXf:
+        """What the film holds after a pass, to be added to that of others."""
+        self.integrator.render(scene, sensor, seed=seed, spp=spp, evaluate=False)
+        return sensor.film().develop(raw=True) * (spp if self.averaged else 1)
+
+    def put(self, film: mi.Film, sums: mi.TensorXf, count: int) -> None:
+        """Fill a film with what ``count`` samples per pixel add up to."""
+        film.clear()
+        film.put_block(mi.ImageBlock(sums / count if self.averaged else sums, film.crop_offset(), border=False))
 
 
 def tonemap(image: np.ndarray) -> np.ndarray:
@@ -169,11 +190,6 @@ def _pass_seed(seed: int, index: int) -> int:
     The golden ratio keeps the sequences of different ``seed`` far from each other.
     """
     return (seed * 0x9E3779B1 + index) % (1 << 32)
-
-
-def _fill(film: mi.Film, raw: mi.TensorXf) -> None:
-    film.clear()
-    film.put_block(mi.ImageBlock(raw, film.crop_offset(), border=False))
 
 
 @contextmanager

@@ -59,14 +59,18 @@ class Shading(Plugin):
     * At the end, ``tonemap`` = reinhard makes x/(1+x) of each channel of a pixel, and ``clamp`` cuts off what is
       above 1: nothing, then.
 
-    Rays go through the centres of the pixels. So where all lights are points, spots or directional, or area lights that
-    shine from their centre (of a rectangle, disk or sphere), a picture in rgb or mono is the same for any seed and
-    number of samples; for smooth edges render larger and scale down. Of other area lights and of environments, each
-    sample draws one point, and spectral variants draw wavelengths; a pixel is the mean, finished at the end. Within
-    ``aov`` the rays are that integrator's, and each sample is finished.
+    Rays go through the centres of the pixels, except that those of an ``irradiancemeter`` spread over it. So where all
+    lights are points, spots or directional, or area lights that shine from their centre (of a rectangle, disk or
+    sphere), a picture in rgb or mono is the same for any seed and number of samples; for smooth edges render larger and
+    scale down. Of other area lights and of environments, each sample draws one point, and spectral variants draw
+    wavelengths. What is finished at the end is the mean of all samples of a pixel, however many passes draw them.
+    Within ``aov`` the rays are that integrator's, and each sample is finished.
+
+    Light passes straight through surfaces as far as their BSDFs let it (``null``, ``mask``, ``thindielectric``, and
+    ``blendbsdf`` of them): what is behind is seen, and their shadows are lighter by as much. ``dielectric`` is opaque.
+    Participating media are left out: behind a boundary that is ``null``, space is empty.
 
     Differentiable in the parameters of BSDFs and lights and in ``ambient``, by ``mi.render``; not in what moves edges.
-    Surfaces are opaque: nothing is seen through ``null``, ``mask`` and ``dielectric``.
 
     Example
     -------
@@ -91,17 +95,23 @@ class Shading(Plugin):
         self.warned = False
 
     def shade(self, scene, sampler, ray, active):
-        """``(radiance, seen)`` along a ray: the formula above, and whether the ray meets anything."""
+        """``(radiance, opacity)`` along a ray: the formula above for what is seen first and for what is seen through
+        it, and how much it all hides of what is behind. An environment leaves nothing behind."""
         self._check(scene)
-        si = scene.ray_intersect(ray, active)
-        hit = select(si.is_valid(), active, False)
-        emitter = si.emitter(scene, active)
-        colour = mi.UnpolarizedSpectrum(0)
-        if emitter is not None:
-            colour += mi.unpolarized_spectrum(emitter.eval(si, active))
-        if hit is not False:
-            colour += select(hit, self._reflected(scene, sampler, si, hit), mi.UnpolarizedSpectrum(0))
-        return colour, hit if scene.environment() is None else active
+        spectrum, veils = mi.UnpolarizedSpectrum, may_pass(scene)
+
+        def layer(sampler, ray, radiance, through, active):
+            si = scene.ray_intersect(ray, active)
+            hit = select(si.is_valid(), active, False)
+            here = self._seen(scene, sampler, si, hit, active, veils)
+            radiance = spectrum(radiance + select(active, through * here, 0))
+            passed = null_transmission(si, hit) if veils else spectrum(0)
+            through = spectrum(select(hit, through * passed, through))
+            return sampler, si.spawn_ray(ray.d), radiance, through, select(dr.any(through > 0), hit, False)
+
+        state = (sampler, mi.Ray3f(ray), spectrum(0), spectrum(1), mi.Bool(active))
+        _, _, radiance, through, _ = dr.while_loop(state, lambda *state: state[-1], layer) if veils else layer(*state)
+        return radiance, mi.Float(1) if scene.environment() is not None else 1 - dr.max(through)
 
     def finish(self, colour):
         """What becomes of a pixel at the end."""
@@ -117,9 +127,8 @@ class Shading(Plugin):
             raise ParameterError("shading: environment_reflection needs an environment; add an envmap or constant.")
         if self.environment_reflection and not self.warned:
             self.warned = True
-            bsdfs = [shape.bsdf() for shape in scene.shapes()]
             shiny = int(mi.BSDFFlags.GlossyReflection) | int(mi.BSDFFlags.DeltaReflection)
-            dull = {it.class_name() for it in bsdfs if int(it.flags()) & shiny and not mirrors(it)}
+            dull = {it.class_name() for it in bsdfs_of(scene) if int(it.flags()) & shiny and not mirrors(it)}
             if dull:
                 warnings.warn(
                     f"shading: {listed(sorted(dull), 'and')} cannot tell a mirror reflectance, so that "
@@ -127,7 +136,17 @@ class Shading(Plugin):
                     stacklevel=2,
                 )
 
-    def _reflected(self, scene, sampler, si, hit):
+    def _seen(self, scene, sampler, si, hit, active, veils):
+        """The radiance of an intersection, or of the environment: what shines there, and what is reflected."""
+        colour = mi.UnpolarizedSpectrum(0)
+        emitter = si.emitter(scene, active)
+        if emitter is not None:
+            colour += mi.unpolarized_spectrum(emitter.eval(si, active))
+        if hit is not False and scene.shape_types():  # else there is no BSDF to ask
+            colour += select(hit, self._reflected(scene, sampler, si, hit, veils), 0)
+        return colour
+
+    def _reflected(self, scene, sampler, si, hit, veils):
         bsdf = si.bsdf()
         colour = self.evaluate(si, hit).ambient * of_each(diffuse_reflectance, bsdf, si, hit)
         mirrored = mi.Bool(False)
@@ -139,18 +158,17 @@ class Shading(Plugin):
             colour += reflectance * mi.unpolarized_spectrum(scene.environment().eval(towards, hit))
         for light in scene.emitters():
             ds, irradiance = light.sample_direction(si, self._place(light, sampler), hit)
-            lit = select(ds.pdf > 0, hit, False)
-            if self.shadows:
-                # Nothing lies beyond these; and where they are is unknown if Mitsuba lost the scene's bounds, as it
-                # does when it merges rectangles.
-                infinite = mi.has_flag(light.flags(), mi.EmitterFlags.Infinite)
-                way = si.spawn_ray(ds.d) if infinite else si.spawn_ray_to(ds.p)
-                lit = select(scene.ray_test(way, lit), False, lit)
+            irradiance, lit = mi.unpolarized_spectrum(irradiance), select(ds.pdf > 0, hit, False)
+            if self.shadows and veils:
+                through = straight_through(scene, si, ds, light, lit)
+                irradiance, lit = irradiance * through, select(dr.any(through > 0), lit, False)
+            elif self.shadows:
+                lit = select(scene.ray_test(ray_to(light, si, ds), lit), False, lit)
             wo = si.to_local(ds.d)
             value = bsdf.eval(mi.BSDFContext(), si, wo, lit)
             if self.environment_reflection and light.is_environment():
                 value = dr.select(mirrored, bsdf.eval(only_diffuse(), si, wo, lit), value)
-            value = mi.unpolarized_spectrum(value) * mi.unpolarized_spectrum(irradiance)
+            value = mi.unpolarized_spectrum(value) * irradiance
             colour += select(lit, value * (dr.pi if self.pi_folded else 1), mi.UnpolarizedSpectrum(0))
         return colour
 
@@ -174,6 +192,50 @@ CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
 """The sample that stands for the centre of a shape; a sphere samples the cone about it that it fills."""
 
 
+# --- What is in between ---------------------------------------------------------------------------------------------
+
+
+def ray_to(light, si, ds):
+    """The ray from a surface to a light, sampled as ``ds``."""
+    # Nothing lies beyond these; and where they are is unknown if Mitsuba lost the scene's bounds, as it does when it
+    # merges rectangles.
+    infinite = mi.has_flag(light.flags(), mi.EmitterFlags.Infinite)
+    return si.spawn_ray(ds.d) if infinite else si.spawn_ray_to(ds.p)
+
+
+def straight_through(scene, si, ds, light, active):
+    """How much of a light the surfaces between it and ``si`` let straight through."""
+
+    def step(ray, through, active):
+        met = scene.ray_intersect(ray, active)
+        active = select(met.is_valid(), active, False)
+        through = mi.UnpolarizedSpectrum(select(active, through * null_transmission(met, active), through))
+        return ray_to(light, met, ds), through, select(dr.any(through > 0), active, False)
+
+    state = (ray_to(light, si, ds), mi.UnpolarizedSpectrum(1), mi.Bool(active))
+    return dr.while_loop(state, lambda *state: state[-1], step)[1]
+
+
+def null_transmission(si, active):
+    if active is False:  # there may be no BSDF
+        return mi.UnpolarizedSpectrum(0)
+    return mi.unpolarized_spectrum(si.bsdf().eval_null_transmission(si, active))
+
+
+def may_pass(scene) -> bool:
+    """Whether light may pass straight through some surface; scalar variants, which can ask each, always look."""
+    if mi.variant().startswith("scalar"):
+        return True
+    return any(mi.has_flag(it.flags(), mi.BSDFFlags.Null) for it in bsdfs_of(scene))
+
+
+def bsdfs_of(scene) -> list:
+    """The BSDFs of a scene's shapes, those within shape groups included."""
+    shapes = [it for it in children(scene) if isinstance(it, mi.Shape)]
+    grouped = [it for shape in shapes for it in children(shape) if isinstance(it, mi.Shape)]
+    return [shape.bsdf() for shape in [*scene.shapes(), *grouped]]
+
+
 # --- What surfaces tell ---------------------------------------------------------------------------------------------
 
 
@@ -186,7 +248,10 @@ def diffuse_reflectance(bsdf, si, active):
     """k_a. Ours, also within ``twosided``, are asked for their diffuse lobes, as what they answer to
     ``eval_diffuse_reflectance`` has the others in it."""
     if not mirrors(bsdf):
-        return mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
+        k_a = mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
+        if bsdf.class_name() == "MaskBSDF":  # answers as if nothing were masked
+            k_a *= 1 - mi.unpolarized_spectrum(bsdf.eval_null_transmission(si, active))
+        return k_a
     normal = mi.Vector3f(0, 0, dr.select(si.wi.z > 0, 1, -1))
     upright = mi.SurfaceInteraction3f(si)
     upright.wi = normal
@@ -203,16 +268,14 @@ def mirror_reflectance(bsdf, si, active):
     for side, it in zip((1, -1), inner, strict=False):
         seen.wi = mi.Vector3f(si.wi.x, si.wi.y, side * si.wi.z)
         total += it.mirror_reflectance(seen, active)
-    return total, mi.Bool(True)
+    return mi.UnpolarizedSpectrum(total), mi.Bool(True)
 
 
 def mirrors(bsdf) -> list:
     """The BSDFs of ours that make up a BSDF, front side first: itself, or those within ``twosided``."""
     inner = [bsdf]
     if bsdf.class_name() == "TwoSidedBRDF":
-        found = collector()
-        bsdf.traverse(found)
-        inner = found.objects
+        inner = children(bsdf)
     return inner if all(hasattr(it, "mirror_reflectance") for it in inner) else []
 
 
@@ -222,8 +285,8 @@ def only_diffuse():
     return ctx
 
 
-def collector():
-    """A callback that lists the objects within another, ``objects``."""
+def children(parent) -> list:
+    """The objects within another."""
 
     class Collector(mi.TraversalCallback):
         def __init__(self):
@@ -231,6 +294,9 @@ def collector():
             self.objects = []
 
         def put(self, name, value, flags, cpptype=None):
-            self.objects.append(value)
+            if isinstance(value, mi.Object):
+                self.objects.append(value)
 
-    return Collector()
+    found = Collector()
+    parent.traverse(found)
+    return found.objects
