@@ -108,7 +108,7 @@ def test_a_lobe_without_an_albedo_is_named():
         pass
 
     model(lambda self, p: (Half(), Half()))
-    with pytest.raises(NotImplementedError, match="Half does not define albedo."):
+    with pytest.raises(NotImplementedError, match="Half does not define albedo"):
         radiance()
 
 

@@ -1,6 +1,7 @@
 """Models from other people's code: ``register``, and entry points of installed packages."""
 
 import importlib.metadata
+import re
 import subprocess
 import sys
 import textwrap
@@ -239,3 +240,27 @@ def test_wrong_files_are_told_in_a_sentence(tmp_path, text, message):
     done = command(tmp_path, "list", "--import", "guest.py")
     assert done.returncode == 2 and done.stdout == ""
     assert message in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_the_page_on_extending_works(pytestconfig, tmp_path):
+    """Its model has a manual page, and passes checks."""
+    page = (pytestconfig.rootpath / "docs" / "extending.md").read_text(encoding="utf-8")
+    code = re.search(r"```python\n(.*?)```", page, re.S)[1].replace(
+        "import mi_brdfs\n", "import mi_brdfs\nimport mitsuba as mi\n", 1
+    )
+    (tmp_path / "lommel.py").write_text(code, encoding="utf-8")
+    done = command(
+        tmp_path,
+        "check",
+        "lommel",
+        "--import",
+        "lommel.py",
+        "--only",
+        "chi2",
+        "--only",
+        "weight",
+        "--only",
+        "reciprocity",
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Lommel and Seeliger" in command(tmp_path, "info", "lommel", "--import", "lommel.py").stdout
