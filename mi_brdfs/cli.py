@@ -340,7 +340,8 @@ def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs
 
 
 def _start_job(variant: str) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as it is for a shell's job in the background
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
     mi.set_variant(variant)
 
 
