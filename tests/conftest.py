@@ -1,3 +1,5 @@
+import signal
+
 import mitsuba as mi
 import pytest
 
@@ -21,3 +23,12 @@ def variant(request):
     """Each kind of variant in turn; the one that users have most by default."""
     with mi.variant_context(request.param):
         yield request.param
+
+
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C interrupts this process and those that it starts, even if a shell started the tests in the background and
+    had them ignore it."""
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, previous)

@@ -215,7 +215,6 @@ def interrupted(folder, *arguments, running, times=1):
     process = subprocess.Popen(
         command("render", "scenes/box.xml", "--spp", 10**6, *arguments),
         cwd=folder, stdout=subprocess.PIPE, stderr=its_end, text=True, env={**os.environ, "TERM": "xterm"},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     os.close(its_end)
     shown = ""
@@ -233,6 +232,7 @@ def interrupted(folder, *arguments, running, times=1):
     return process.returncode, out, shown
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
 def test_ctrl_c_keeps_what_is_finished(folder, variant):
     if variant.startswith("llvm") and llvm.version() is None:
@@ -246,6 +246,7 @@ def test_ctrl_c_keeps_what_is_finished(folder, variant):
     assert exr[0, 0] == pytest.approx(1, rel=0.01)  # the constant emitter, so sums and weights belong together
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_a_second_ctrl_c_aborts_at_once(folder):
     if llvm.version() is None:
         pytest.skip("no LLVM here")

@@ -159,11 +159,9 @@ def test_the_page_has_all_about_a_model():
     assert "64 samples" in text
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
-    process = start(
-        "lambert", "burley", "--size", 32, "--variant", "llvm_ad_rgb", cwd=tmp_path,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
+    process = start("lambert", "burley", "--size", 32, "--variant", "llvm_ad_rgb", cwd=tmp_path)
     folder = tmp_path / "gallery"
     while not (folder / "lambert.png").exists() and process.poll() is None:
         time.sleep(0.05)

@@ -164,12 +164,14 @@ def test_the_scene_is_left_as_it_was(variant):
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_the_first_ctrl_c_keeps_what_is_finished(variant):
     picture = render(scene(), spp=16, on_pass=lambda done, total: os.kill(os.getpid(), signal.SIGINT))
     assert (picture.spp, picture.total) == (4, 16)
     assert np.array(picture.image).mean() > 0.01
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_the_second_ctrl_c_raises(variant):
     def twice(done, total):
         for _ in range(2):

@@ -1,6 +1,8 @@
 """The checker passes what is right, and says what is wrong."""
 
 import json
+import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -220,6 +222,7 @@ def test_command_in_several_processes(tmp_path):
     assert page.count("<section") == 3 and page.count("<image") >= 9
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_ends_the_command_at_once(jobs):
     """Also if only the first of its processes receives the signal."""
@@ -229,6 +232,22 @@ def test_ctrl_c_ends_the_command_at_once(jobs):
     process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=10)
     assert (process.returncode, stdout, stderr) == (130, "", "Interrupted; nothing was written.\n")
+
+
+def test_a_job_in_the_background_ignores_ctrl_c():
+    """Of a shell, which has it ignore the signal: it is meant for what runs in the foreground."""
+    command = [sys.executable, "-m", "mi_brdfs.cli", "check", "lambert", "diffuse", "--only", "pdf", "-j", "2"]
+    background = ["sh", "-c", f"trap '' INT; echo; exec {shlex.join(command)}"]
+    process = subprocess.Popen(
+        background, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    process.stdout.readline()
+    while process.poll() is None:
+        os.killpg(process.pid, signal.SIGINT)
+        time.sleep(0.1)
+    stdout, stderr = process.communicate()
+    assert process.returncode == 0, stderr
+    assert stdout.split() == ["type", "pdf", "lambert", "pass", "diffuse", "pass"]
 
 
 def test_command_on_xml(tmp_path):
