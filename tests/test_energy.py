@@ -24,10 +24,10 @@ def configuration(value):
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model, given, stated", CONFIGURATIONS, ids=configuration)
 def test_largest_albedo(model, given, stated):
-    """No setting of all numbers, and no direction of view, is brighter than the page states, and one nearly as bright.
-    The integral of the reference says the same of it."""
+    """No setting of all numbers, and no direction of view, is brighter than the page states, and one is nearly as
+    bright. The integral of the reference says the same of it. The search is a quick one."""
     found = brightest(model, given)
-    assert not fault(stated, found.albedo, found.noise), found
+    assert not fault(stated, found.albedo, found.noise, slack=0.05), found
     for reference in REFERENCES:
         if reference.model == PLUGINS[model] and reference.given == given:
             assert reference.albedo(found.numbers, 16) == pytest.approx(found.albedo, rel=2e-3), found
