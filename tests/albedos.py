@@ -169,14 +169,14 @@ class Search:
             texture.value = None  # what lives on is part of other kernels
         return found
 
-    def brightest(self, climbs=16, steps=32, rounds=16, log2_counts=(9, 11)) -> Setting:
+    def brightest(self, climbs=16, steps=32, rounds=12, log2_counts=(9, 11)) -> Setting:
         """The brightest of several climbs from the brightest of points all over the cube. A climb tries steps in a box
         that shrinks from round to round: along some of the axes, as the others may be at their best, and in every other
         climb to what any of the climbs has found there. Cube and boxes stretch over the ends of the ranges, where most
         maxima lie. Each round has other variates, so that nothing stays at the top by their noise."""
         rng = np.random.default_rng(1)
         coarse, fine = log2_counts
-        points = (1.2 * qmc.Sobol(len(self.axes), seed=1).random_base2(12) - 0.1).clip(0, 1)
+        points = (1.2 * qmc.Sobol(len(self.axes), seed=1).random_base2(11) - 0.1).clip(0, 1)
         best = points[np.argsort(self.albedos(points, coarse))[-climbs:]]
         climb = np.arange(climbs)[:, None]
         for k in range(rounds):

@@ -30,7 +30,8 @@ def test_largest_albedo(model, given, stated):
     assert not fault(stated, found.albedo, found.noise, slack=0.05), found
     for reference in REFERENCES:
         if reference.model == PLUGINS[model] and reference.given == given:
-            assert reference.albedo(found.numbers, 16) == pytest.approx(found.albedo, rel=2e-3), found
+            tolerance = 2e-3 * found.albedo + 3 * found.noise
+            assert reference.albedo(found.numbers, 18) == pytest.approx(found.albedo, abs=tolerance), found
 
 
 def test_references_are_configurations():

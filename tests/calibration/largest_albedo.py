@@ -55,7 +55,7 @@ def main():
         if arguments.models and name not in arguments.models:
             continue
         for given, stated in model.energy.largest:
-            found = brightest(model, given, climbs=32, steps=64, log2_counts=(10, 12))
+            found = brightest(model, given, climbs=32, steps=64, rounds=20, log2_counts=(10, 12))
             verdicts.append(judged(stated, found.albedo, found.noise))
             print(f"{name} {given}: {verdicts[-1]}; found {found}", flush=True)
             for reference in REFERENCES if arguments.independent else []:
