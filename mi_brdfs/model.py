@@ -14,8 +14,9 @@ from .parameters import Given, Parameter, Row, Slot, ranges_of, textures_of
 
 
 class Energy(NamedTuple):
-    """The largest directional albedos of a model, at angles up to 89.9° and for lobes as wide as those of α = 0.003 or
-    an exponent of 30 000, at least: narrower ones are mirrors to float32."""
+    """The largest directional albedos of a model, at angles up to 89.9°, rounded up
+    (``tests/calibration/largest_albedo.py``). Rounding to float32 may exceed them by 1e-4, and by 2 % at 89.9° where
+    narrow lobes have steep flanks (``epd`` with α < 0.003)."""
 
     default: float
     """With the default parameters."""

@@ -49,6 +49,22 @@ def context(component=None, mask=None):
     return ctx
 
 
+def per_lane() -> mi.Texture:
+    """A texture whose ``value``, a float or a colour, may differ from lane to lane."""
+
+    class Lanes(mi.Texture):
+        def __init__(self):
+            super().__init__(mi.Properties())
+
+        def eval(self, si, active=True):
+            return self.value
+
+        def eval_1(self, si, active=True):
+            return self.value
+
+    return Lanes()
+
+
 def is_scalar() -> bool:
     return mi.variant().startswith("scalar")
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fuzzing import examples, ways
 from hypothesis import strategies as st
-from support import context, interaction, numbers
+from support import context, interaction, numbers, per_lane
 
 from mi_brdfs.registry import all_models
 
@@ -194,19 +194,9 @@ class Subject:
     """A plugin with some options, whose quantities differ from lane to lane. A range without an end has ``largest``."""
 
     def __init__(self, model, options, largest, lanes=LANES):
-        class Lanes(mi.Texture):
-            def __init__(self):
-                super().__init__(mi.Properties())
-
-            def eval(self, si, active=True):
-                return self.value
-
-            def eval_1(self, si, active=True):
-                return self.value
-
         self.given = {"type": model.plugins[0], **options.words}
         self.quantities, self.largest, self.lanes = options.quantities, largest, lanes
-        self.textures = {quantity.name: Lanes() for quantity in self.quantities}
+        self.textures = {quantity.name: per_lane() for quantity in self.quantities}
         self.bsdf = mi.load_dict(self.given | self.textures)
 
     def fill(self, settings, incident, reflected, seed):

@@ -21,7 +21,7 @@ class BlinnPhong(Model):
 
     * energy: K = (n+2)(n+4) / (8π (2^(-n/2) + n)). The albedo of the lobe is ρs at normal incidence and falls towards
       grazing; so ρd + ρs <= 1 conserves energy.
-    * approximate: K = (n+8)/(8π), the approximation common in games. The albedo exceeds ρs by up to 7.5 % (n = 10).
+    * approximate: K = (n+8)/(8π), the approximation common in games. The albedo exceeds ρs by up to 7.5 % (n = 9).
     * ndf: K = (n+2)/(2π), which normalises the power as a distribution of facets. It stands in published fits of
       measured materials. The albedo is 2.9 ρs (n = 10) to 3.85 ρs (n = 100) at normal incidence.
     * none: K = 1. Gains energy for small n: the albedo is 8π/((n+2)(n+4)) (2^(-n/2) + n) ρs at normal incidence.
@@ -57,9 +57,9 @@ class BlinnPhong(Model):
         0.7,
         [
             ({"normalization": "energy"}, 1),
-            ({"normalization": "approximate"}, 1.075),
+            ({"normalization": "approximate"}, 1.08),
             ({"normalization": "ndf"}, 4),
-            ({"normalization": "none"}, 3.14),
+            ({"normalization": "none"}, dr.pi),
             ({"normalization": "original"}, 2),
         ],
     )

@@ -26,8 +26,8 @@ class Brady(Model):
 
     Of the paper, the formula was checked against public code only; its model B is not part of this plugin.
 
-    Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: towards grazing the albedo falls like cosθ_i, and F
-    raises it less than that. One-sided.
+    Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: for F = 1 the albedo is ρs at most, and that of narrow
+    lobes falls like cosθ_i towards grazing. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
     (mi_brdfs.microfacet.sampling.LeaningPair); no sample falls below the horizon.

@@ -58,9 +58,10 @@ class Burley(Model):
     sheen, and specular lobe for spec_tint = 1 or metallic = 1; otherwise it has the exact Fresnel reflectance in place
     of F(f0). Its clear coat is 4 cosθ_i cosθ_o times this one.
 
-    Reciprocal. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the defaults, 1.60 for roughness = 1,
-    and 1.82 for a smooth surface with everything switched on, all of them beyond 80°; with metallic = 1 it stays
-    below 1, and below 1.05 with a clear coat. One-sided.
+    Reciprocal. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the defaults, 1.60 for roughness = 1 and,
+    with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv for roughness = 0.17 and
+    anisotropic = 1, all of them beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a clear coat.
+    One-sided.
 
     Sampling: the base lobe by cosine with a few uniform directions, the sheen by a density of its own, the clear
     coat by a half vector or its mirror image and the specular lobe by one of two visible normals, chosen by what they
@@ -92,7 +93,7 @@ class Burley(Model):
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
     rotation = Rotation()
 
-    energy = Energy(0.687, [({"metallic": 1.0, "clearcoat": 0.0}, 1), ({}, 1.82)])
+    energy = Energy(0.688, [({"metallic": 1.0, "clearcoat": 0.0}, 1), ({}, 1.89)])
 
     def lobes(self, p):
         brightness = luminance(p.base_color)

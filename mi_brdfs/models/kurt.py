@@ -21,9 +21,9 @@ class Kurt(Model):
     single lobe drops the number. As a microfacet model each is Beckmann's with the shadowing term
     G = (cosθ_i cosθ_o)^(1-κ)/(wi·h).
 
-    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1. For κ = 0.25 the albedo (F = 1) exceeds 1 beyond 89.9°
-    for α <= 0.3, and beyond 88° for α = 1. For κ = 0.5 it diverges at grazing: α = 0.1 reaches 1.05 at 88° and 3.7 at
-    89.9°.
+    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1. Else the albedo diverges at grazing: for κ = 0.25 and
+    F = 1 it exceeds 1 from 89.9° on for α = 0.3, and from 88° on for α = 1; for κ = 0.5 and α = 0.1 it is 1.05 at 88°
+    and 3.7 at 89.9°.
     That D's cosine power is 4 was not checked against the paper. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
@@ -50,7 +50,7 @@ class Kurt(Model):
     )
     rotation = Rotation()
 
-    energy = Energy(0.809, [({"kurt_exponent": 0.0}, 1), ({"kurt_exponent": 0.25}, 3.08), ({}, 16.5)])
+    energy = Energy(0.81, [({"kurt_exponent": 0.0}, 1), ({"kurt_exponent": 0.25}, 3.19), ({}, 16.6)])
 
     def lobes(self, p):
         glossy = [

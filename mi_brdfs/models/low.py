@@ -62,9 +62,9 @@ class Low(Model):
     energy = Energy(
         0.069,
         [
-            ({"variant": "microfacet", "normalization": "fit"}, 3.62),
+            ({"variant": "microfacet", "normalization": "fit"}, 3.63),
             ({"variant": "microfacet", "normalization": "paper"}, 11.4),
-            ({"variant": "microfacet", "normalization": "unit"}, 0.961),
+            ({"variant": "microfacet", "normalization": "unit"}, 0.995),
             ({"variant": "smooth"}, 3.02),
         ],
     )

@@ -25,13 +25,13 @@ class Nishino(Model):
       if none of them is given.
     * dsbrdf: f = ρd/π + ρs D/4. The paper has the BRDF itself distributed like that, without F and G, in a sum of such
       lobes whose κ and γ are curves over the angle between wi and h, one for each colour channel. This is one lobe with
-      constant κ and γ; the factor 1/4 makes its albedo about ρs at normal incidence.
+      constant κ and γ; the factor 1/4 makes the albedo of a narrow one about ρs at normal incidence.
 
     C was derived here, for every κ and γ. The paper's own notation was not at hand: it is cited from public code, and
     from memory.
 
-    Reciprocal. Energy-conserving for ``microfacet`` with ρd + ρs <= 1. For ``dsbrdf`` the albedo falls like cosθ_i
-    towards grazing. One-sided.
+    Reciprocal. Energy-conserving for ``microfacet`` with ρd + ρs <= 1. For ``dsbrdf`` the albedo falls towards
+    grazing, for narrow lobes like cos²θ_i. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
     (mi_brdfs.microfacet.sampling.Pair and LeaningPair); no sample falls below the horizon.

@@ -26,7 +26,7 @@ class OrenNayar(Model):
     σ may be given as ``alpha`` = √2 σ, the roughness of a Beckmann distribution, instead. σ = 0 is Lambert's model.
 
     Reciprocal. Not energy-conserving, by little: for ρ = 1 the albedo at grazing reaches 1.015 (qualitative, σ = 0.2)
-    and 1.051 (full, σ = 0.3). Rough surfaces lose light: at normal incidence it is 0.56 and 0.72 for σ = π/2. ``eon``
+    and 1.050 (full, σ = 0.3). Rough surfaces lose light: at normal incidence it is 0.56 and 0.72 for σ = π/2. ``eon``
     does neither.
 
     The constants are those that other implementations agree on; they could not be compared with the paper. One-sided.
@@ -50,7 +50,7 @@ class OrenNayar(Model):
                    spelling=Spelling("alpha", (0, 2.2), math.sqrt(0.5), "√2 σ, as a Beckmann roughness"))  # fmt: skip
     model = Choice(("qualitative", "full"), "which fit of the paper")
 
-    energy = Energy(0.497, [({"model": "qualitative"}, 1.015), ({"model": "full"}, 1.05)])
+    energy = Energy(0.498, [({"model": "qualitative"}, 1.02), ({"model": "full"}, 1.05)])
 
     def lobes(self, p):
         lobe = FullLobe if self.model == "full" else QualitativeLobe
@@ -65,7 +65,7 @@ class RoughDiffuse(Model):
     The same as ``orennayar``, whose page has the formulas, for σ = α/√2: in its full form or, with
     ``use_fast_approx``, the qualitative one.
 
-    Reciprocal. Not energy-conserving, by little: for ρ = 1 the albedo at grazing reaches 1.051 (α = 0.42), or 1.015
+    Reciprocal. Not energy-conserving, by little: for ρ = 1 the albedo at grazing reaches 1.050 (α = 0.42), or 1.015
     (α = 0.28) with ``use_fast_approx``. One-sided.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions
@@ -85,7 +85,7 @@ class RoughDiffuse(Model):
     alpha = Number(0.2, (0, 2.2), "roughness α of the surface, as of a Beckmann distribution")
     use_fast_approx = Flag(False, "leave out interreflection, and simplify the rest")
 
-    energy = Energy(0.507, [({"use_fast_approx": False}, 1.05), ({"use_fast_approx": True}, 1.015)])
+    energy = Energy(0.508, [({"use_fast_approx": False}, 1.05), ({"use_fast_approx": True}, 1.02)])
 
     def lobes(self, p):
         lobe = QualitativeLobe if self.use_fast_approx else FullLobe

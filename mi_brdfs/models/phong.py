@@ -20,7 +20,7 @@ class Phong(Model):
       like cosθ; so ρd + ρs <= 1 conserves energy.
     * none: ρs max(0, r·wo)ⁿ. Its albedo is 2π ρs/(n+2) at normal incidence: it gains energy for n < 4.28.
     * original: f cosθ_o = ρs max(0, r·wo)ⁿ/π, the formula of 1975, where the term is the whole response to a light
-      and π belongs to the light. As a BRDF it is neither reciprocal nor bounded at grazing; its albedo stays below
+      and π belongs to the light. As a BRDF it is neither reciprocal nor bounded at grazing; its albedo is at most
       2ρs/(n+1).
 
     Reciprocal, but for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. Same as ``phong`` of
@@ -44,7 +44,7 @@ class Phong(Model):
     normalization = Choice(("energy", "none", "original"), "scale of the specular lobe")
 
     energy = Energy(
-        0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, 3.14), ({"normalization": "original"}, 2)]
+        0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, dr.pi), ({"normalization": "original"}, 2)]
     )
 
     def lobes(self, p):

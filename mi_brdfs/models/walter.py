@@ -47,7 +47,7 @@ class Walter(Model):
     shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")
     rotation = Rotation()
 
-    energy = Energy(0.988, [({}, 1)])
+    energy = Energy(0.989, [({}, 1)])
 
     def lobes(self, p):
         specular = DimmedLobe(

@@ -24,9 +24,10 @@ class Ward(Model):
 
     * balanced (2010): S = 1/(4 (wi·h)² h_z⁴). Conserves energy: the albedo of the lobe stays below ρs.
     * ward (1992, equation 5a): S = 1/(4 √(cosθ_i cosθ_o)). Loses energy up to about 85°, and then diverges like
-      cosθ_i^(-1/2): for α = 0.3 the albedo is 1.04 ρs at 89.9°.
-    * ward-duer (2006): S = 1/(4 cosθ_i cosθ_o). About as bright as balanced up to 80°, to 18 %; at 89° the
-      albedo is 2.1 ρs (α = 0.1) to 5.1 ρs (α = 0.5).
+      cosθ_i^(-1/2): at 89.9° the albedo is 1.04 ρs for α = 0.3, and 2.35 ρs in the plane of αu = 1 as αv → 0.
+    * ward-duer (2006): S = 1/(4 cosθ_i cosθ_o). Up to 80° the albedo is within 30 % of that of balanced: at most 28 %
+      below it (α = 1), and above it at 80° by 18 % (α = 0.35), or by 30 % for two roughnesses. At 89° it is 2.1 ρs
+      (α = 0.1) to 5.1 ρs (α = 0.5).
     * approximate (1992, equation 5b): S as ward, with exp(-2 ((h_x/αu)² + (h_y/αv)²)/(1+h_z)). Much wider than 5a for
       all but small roughness: 1.1 times (α = 0.1), 5.2 times (α = 0.5) its value at tanθ_h = 2α.
 
@@ -60,9 +61,9 @@ class Ward(Model):
         0.698,
         [
             ({"variant": "balanced"}, 1),
-            ({"variant": "ward"}, 2.2),
-            ({"variant": "ward-duer"}, 62.7),
-            ({"variant": "approximate"}, 4.23),
+            ({"variant": "ward"}, 2.36),
+            ({"variant": "ward-duer"}, 65.7),
+            ({"variant": "approximate"}, 4.53),
         ],
     )
 
