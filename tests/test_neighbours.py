@@ -3,6 +3,9 @@
 import mitsuba as mi
 import numpy as np
 import pytest
+from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
+
+import mi_brdfs
 
 
 def picture(bsdf, folder):
@@ -44,3 +47,42 @@ def test_attributes_of_meshes_are_parameters(plugin, numbers, colours, tmp_path)
     actual, expected, default = (picture({"type": plugin} | given, tmp_path) for given in (of_mesh, uniform, {}))
     np.testing.assert_allclose(actual, expected, atol=1e-5)
     assert abs(default - expected).max() > 0.01
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_mitsubas_own_chi2_test_passes():
+    """With its own adapter and grid, for every plugin with its defaults."""
+    angles = (20, 60)
+    for name in mi_brdfs.list_models():
+        for theta in angles:
+            wi = [float(np.sin(np.radians(theta))), 0.0, float(np.cos(np.radians(theta)))]
+            sample, pdf = BSDFAdapter(name, {"type": name}, wi=wi)
+            test = ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, ires=16, seed=theta)
+            assert test.run(test_count=len(angles) * len(mi_brdfs.list_models()), quiet=True), f"{name} at {theta}°"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_an_instance_looks_like_the_shape():
+    """Turned, so that an anisotropic highlight turns with it."""
+    T = mi.ScalarTransform4f
+    turn, ball = T().rotate([1, 0, 0], 70), {"type": "sphere", "bsdf": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.4}}
+    common = {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "lamp": {"type": "point", "position": [2, 4, 6], "intensity": 200.0},
+        "sensor": {
+            "type": "perspective",
+            "fov": 25,
+            "to_world": T().look_at([3, 2, 5], [0, 0, 0], [0, 0, 1]),
+            "film": {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}},
+        },
+    }
+    plain = mi.load_dict(common | {"ball": ball | {"to_world": turn}})
+    group = {"type": "shapegroup", "ball": ball}
+    instanced = mi.load_dict(
+        common
+        | {"group": group, "one": {"type": "instance", "to_world": turn, "group": {"type": "ref", "id": "group"}}}
+    )
+    one, other = (np.array(mi.render(scene, spp=64, seed=3)) for scene in (plain, instanced))
+    assert one.max() > 3 * one.mean() > 0
+    np.testing.assert_allclose(one, other, rtol=0.02, atol=0.02)
