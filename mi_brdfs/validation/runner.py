@@ -9,7 +9,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from . import components, contract, derivatives, sampling, textures, values
+from . import components, contract, derivatives, sampling, spectral, textures, values
 from .energy import energy_limits
 from .outcome import Findings, told
 from .report import Finding, Report
@@ -37,6 +37,7 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         contract.active,
         contract.mode,
         contract.reflectance,
+        spectral.spectral,
     )
 }
 """The checks by name, in the order in which they run; the docstring of each says what it checks and how strictly."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import erfc, sqrt
 
@@ -15,7 +15,7 @@ from .subject import STEEPEST, Incident, Samples, angles_of, brightness, directi
 
 COUNT = 1 << 18
 """Samples for a direction that was asked for."""
-CELLS = 1024
+CELLS, GROUPS = 1024, 64
 PILOT = 1 / 4
 """Samples that the cells are made by, for each that is counted."""
 RANDOM = 16
@@ -57,7 +57,14 @@ class Trial:
 
     @cached_property
     def test(self) -> ChiSquare:
-        return chi_square(self.counts, self.expected)
+        """The graver of two tests: of the cells, which see what is wrong in few of them, and of groups of neighbours,
+        which see what is slightly wrong in many."""
+        fine = chi_square(self.counts, self.expected)
+        share = np.cumsum(self.expected) / max(self.expected.sum(), 1e-30)
+        groups = np.minimum(share * GROUPS, GROUPS - 1).astype(int)
+        counts, expected = (np.bincount(groups, each, GROUPS) for each in (self.counts, self.expected))
+        graver = min(fine, chi_square(counts, expected), key=lambda test: test.p_value)
+        return replace(graver, p_value=min(2 * graver.p_value, 1), worst=fine.worst)
 
     @property
     def is_suspect(self) -> bool:
@@ -152,7 +159,7 @@ def significance(run) -> float:
 
 def chi2(run) -> Findings:
     """The directions drawn are distributed as ``pdf`` says: Pearson's test of the counts in cells that adapt to the
-    lobe. Together with ``pdf`` below it sees whatever is wrong with one of the two."""
+    lobe, and in larger ones. Together with ``pdf`` below it sees whatever is wrong with one of the two."""
     level = significance(run)
     for part in run.subject.parts:
         outcome, smallest = Outcome("chi2", part.name), 1.0
