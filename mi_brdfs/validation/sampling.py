@@ -16,7 +16,7 @@ from .subject import STEEPEST, Incident, Samples, angles_of, brightness, directi
 COUNT = 1 << 18
 """Samples for a direction that was asked for."""
 CELLS, GROUPS = 1024, 64
-PILOT = 1 / 4
+PILOT = 1 / 8
 """Samples that the cells are made by, for each that is counted."""
 RANDOM = 16
 """Directions at random beside those."""

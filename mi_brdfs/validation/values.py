@@ -251,7 +251,7 @@ def continuity(run) -> Findings:
                         )
             for phi in (0, 77):
                 heights = [on_side(direction(90 - np.degrees(STEP) * times, phi), side) for times in OCTAVES]
-                for word, values in _both_ways(run, part, heights, on_side(hemisphere(2000, 23), side)):
+                for word, values in _both_ways(run, part, heights, on_side(hemisphere(1000, 23), side)):
                     _check_octaves(outcome, word, np.nan_to_num(values))
         yield outcome.finding(
             f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
