@@ -25,6 +25,7 @@ from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.models.phong import Phong
 from mi_brdfs.models.walter import Walter
 from mi_brdfs.models.ward import Ward
+from mi_brdfs.parameters import Colour
 
 # --- Diffuse lobes --------------------------------------------------------------------------------------------------
 
@@ -342,6 +343,24 @@ class FixedPoint(Lambert):
 
     def evaluate(self, si, active):
         return super().evaluate(dr.zeros(mi.SurfaceInteraction3f), active)
+
+
+class ClippedSpectrum(Lambert):
+    """Limits colours to 1 where they are spectra."""
+
+    reflectance = Colour(0.5, (0, 10), "a colour without a limit to speak of")
+
+    def evaluate(self, si, active):
+        p = super().evaluate(si, active)
+        return SimpleNamespace(reflectance=dr.minimum(p.reflectance, 1) if mi.is_spectral else p.reflectance)
+
+
+class BrighterSpectrum(Lambert):
+    """Scales spectra by two hundredths too much."""
+
+    def evaluate(self, si, active):
+        p = super().evaluate(si, active)
+        return SimpleNamespace(reflectance=p.reflectance * (1.02 if mi.is_spectral else 1))
 
 
 class TexturePoint(Lambert):
@@ -807,6 +826,8 @@ MUTANTS = [
     mutant("inactive lanes sampled", "active", Lambert, SamplesInactive),
     mutant("active lanes dropped", "active", Lambert, AllOrNone),
     mutant("derivatives of inactive lanes", "active", Lambert, LeaksDerivative),
+    mutant("colours clipped in spectral variants", "spectral", ClippedSpectrum),
+    mutant("brighter in spectral variants", "spectral", BrighterSpectrum),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), IgnoresMode),
     mutant("cosines in light tracing", "mode", Lambert, CosinesInLightTracing),
     mutant("twice the reflectance", "reflectance", Ward, DoubleReflectance),
