@@ -60,7 +60,8 @@ class Trial:
         """The graver of two tests: of the cells, which see what is wrong in few of them, and of groups of neighbours,
         which see what is slightly wrong in many."""
         fine = chi_square(self.counts, self.expected)
-        share = np.cumsum(self.expected) / max(self.expected.sum(), 1e-30)
+        share = np.cumsum(np.fmin(self.expected, self.count))  # a density may be infinite
+        share = share / max(share[-1], 1e-30)
         groups = np.minimum(share * GROUPS, GROUPS - 1).astype(int)
         counts, expected = (np.bincount(groups, each, GROUPS) for each in (self.counts, self.expected))
         graver = min(fine, chi_square(counts, expected), key=lambda test: test.p_value)
