@@ -345,6 +345,26 @@ class FixedPoint(Lambert):
         return super().evaluate(dr.zeros(mi.SurfaceInteraction3f), active)
 
 
+class Stuck(Lambert):
+    """Limits its parameter by a function without a derivative beyond."""
+
+    def evaluate(self, si, active):
+        return SimpleNamespace(reflectance=dr.clip(self.textures["reflectance"].eval(si, active), 0, 1))
+
+
+class Unlimited(Lambert):
+    def evaluate(self, si, active):
+        return SimpleNamespace(reflectance=self.textures["reflectance"].eval(si, active))
+
+
+class Outwards(Lambert):
+    """Derivatives beyond a limit are those at it, also where they lead further out."""
+
+    def evaluate(self, si, active):
+        value = self.textures["reflectance"].eval(si, active)
+        return SimpleNamespace(reflectance=dr.replace_grad(dr.clip(value, 0, 1), value))
+
+
 class ClippedSpectrum(Lambert):
     """Limits colours to 1 where they are spectra."""
 
@@ -826,6 +846,9 @@ MUTANTS = [
     mutant("inactive lanes sampled", "active", Lambert, SamplesInactive),
     mutant("active lanes dropped", "active", Lambert, AllOrNone),
     mutant("derivatives of inactive lanes", "active", Lambert, LeaksDerivative),
+    mutant("stuck beyond a limit", "gradients", Stuck),
+    mutant("evaluated beyond a limit", "gradients", Unlimited),
+    mutant("led out of its range", "gradients", Outwards),
     mutant("colours clipped in spectral variants", "spectral", ClippedSpectrum),
     mutant("brighter in spectral variants", "spectral", BrighterSpectrum),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), IgnoresMode),

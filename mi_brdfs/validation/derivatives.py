@@ -9,7 +9,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .outcome import Findings, Outcome
+from ..ranges import ranges
+from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .subject import angles_of, direction, hemisphere, interaction, numbers, on_side, random, variates_of, vectors
 
@@ -68,6 +69,10 @@ def gradients(run) -> Findings:
     step use (``prb`` calls ``eval`` again): the direction, or else the weight. For plugins of ours, which detach the
     direction and its density, it is that of eval over pdf.
 
+    A parameter of a plugin of ours that an optimiser took beyond its range is evaluated at the limit, and led back:
+    where a derivative inside the limit is not zero, the reverse derivative of the sum of the values or that of its
+    negative is not, and a step against it leads to the limit.
+
     And the derivatives of ``eval`` and ``pdf`` for the directions are finite."""
     subject, part = run.subject, run.subject.whole
     yield _directional(run)
@@ -82,7 +87,7 @@ def gradients(run) -> Findings:
         wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (12, 14))
         scale = np.full(COUNT, 2 * np.pi)
     wi, scale = np.ascontiguousarray(wi), scale[:, None]
-    edges = _edges(part)
+    edges, limits = _edges(part), ranges(subject.bsdf) if hasattr(subject.bsdf, "model") else {}
 
     def values():
         return subject.eval(part, wi, wo)
@@ -104,6 +109,9 @@ def gradients(run) -> Findings:
                 if not np.isfinite(found).all():
                     outcome.fault(f"{1 - np.isfinite(found).mean():.1%} {name} are not finite", np.inf)
             size = float(np.mean(abs(np.array(original, np.float64))))
+            for limit, beyond, inside in _beyond(limits.get(key)):
+                _check_way_back(outcome, subject, params, key, (limit, beyond, inside), wi, wo)
+            set_value(params, key, original)
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
             for shift, part_of in ((0, 1), (0, 0.1), (0, 0.01), (10 * step, 1), (-10 * step, 1)):
@@ -187,6 +195,62 @@ def _check_weight(outcome, subject, params, key, wi, u, expected):
             f"the derivatives of sample's weight average {abs(found).mean():.3g} in size, but those of eval over pdf "
             f"{size:.3g}, and differ by {error / size:.0%}",
             error / size,
+        )
+
+
+def _beyond(limits):
+    """``(limit, beyond, inside)`` for each finite end of a range: values of a parameter."""
+    if limits is None:
+        return
+    low, high = limits
+    width = min(high - low, 1)
+    for limit, outwards in ((low, -1), (high, 1)):
+        if np.isfinite(limit):
+            step = outwards * max(0.1 * width, 1e-3 * abs(limit))
+            yield limit, limit + step, limit - 0.1 * step
+
+
+def _check_way_back(outcome, subject, params, key, values, wi, wo):
+    """Whether an optimiser returns from a value beyond a limit."""
+    limit, beyond, inside = values
+    kind, part, few = type(_value(params, key)), subject.whole, slice(0, 500)
+    wi, wo = np.ascontiguousarray(wi[few]), np.ascontiguousarray(wo[few])
+
+    def backward(value, signs):
+        """The value there, and the derivatives of its sum with some signs."""
+        set_value(params, key, dr.full(kind, value, dr.width(params[key])))
+        attach(params, key)
+        result = subject.bsdf.eval(part.context, interaction(wi), vectors(wo), True)
+        found = []
+        for sign in signs:
+            if dr.grad_enabled(result):
+                dr.set_grad(params[key], 0)
+                dr.set_grad(result, sign)
+                dr.enqueue(dr.ADMode.Backward, result)
+                dr.traverse(dr.ADMode.Backward, flags=dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
+            found.append(np.array(dr.grad(params[key]), np.float64).ravel())
+        dr.disable_grad(params[key])
+        return numbers(dr.detach(result), len(wi)), found
+
+    value, ways = backward(beyond, (1, -1))
+    set_value(params, key, dr.full(kind, limit, dr.width(params[key])))
+    error = relative(value, subject.eval(part, wi, wo)).max(initial=0)
+    if error > 10 * subject.rounding(part):
+        outcome.fault(f"at {beyond:g}, beyond its limit of {limit:g}, eval is not that at the limit", error)
+    outwards = max((float((found * np.sign(limit - beyond)).max()) for found in ways), default=0.0)
+    if outwards > 0:
+        outcome.fault(
+            f"at {beyond:g}, beyond its limit of {limit:g}, a step against its derivative leads away", outwards
+        )
+    if any(found.any() for found in ways):
+        return
+    # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump.
+    near, nearer = (abs(backward(limit + share * (inside - limit), (1,))[1][0]).sum() for share in (0.1, 0.01))
+    if max(0.3 * near, 1e-6 * len(wi)) < nearer < 3 * near:
+        outcome.fault(
+            f"at {beyond:g}, beyond its limit of {limit:g}, no derivative leads back: those of the sum of eval and of "
+            f"its negative are 0, but just inside the limit it is {nearer:.3g}",
+            np.inf,
         )
 
 
