@@ -114,7 +114,12 @@ def gradients(run) -> Findings:
             set_value(params, key, original)
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
-            for shift, part_of in ((0, 1), (0, 0.1), (0, 0.01), (10 * step, 1), (-10 * step, 1)):
+            candidates = [(0, 1), (0, 0.1), (0, 0.01), (10 * step, 1), (-10 * step, 1)]
+            # At the end of a range, the derivative that leads an optimiser inwards need not be that of the values.
+            lowest, highest = limits.get(key, (-np.inf, np.inf))
+            least, most = (float(extreme(np.array(original))) for extreme in (np.min, np.max))
+            inner = [each for each in candidates if lowest < least + each[0] and most + each[0] < highest]
+            for shift, part_of in inner or candidates:
                 set_value(params, key, original + shift)
                 if shift:
                     # At an index of refraction of 1, no reflection turns into total reflection: look beside it.
