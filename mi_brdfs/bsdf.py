@@ -46,7 +46,7 @@ class ModelBSDF:
             else:
                 kind = flags.GlossyReflection if lobe.glossy else flags.DiffuseReflection
             component = kind | common
-            if lobe.glossy and any(slot.anisotropic for slot in slots):
+            if lobe.glossy and (lobe.anisotropic or any(slot.anisotropic for slot in slots)):
                 component |= flags.Anisotropic
             if not lobe.reciprocal:
                 component |= flags.NonSymmetric

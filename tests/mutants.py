@@ -7,6 +7,7 @@ Each mutant is a plugin of its own, ``mutant_NAME``, made of a model or lobe of 
 from __future__ import annotations
 
 import importlib
+import math
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mi_brdfs import bsdf as adapter
-from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, PowerLobe, over_diffuse
+from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, Mixture, PowerLobe, over_diffuse
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
 from mi_brdfs.microfacet.fresnel import Unit
@@ -24,6 +25,7 @@ from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.models.phong import Phong
 from mi_brdfs.models.walter import Walter
 from mi_brdfs.models.ward import Ward
+from mi_brdfs.parameters import Colour
 
 # --- Diffuse lobes --------------------------------------------------------------------------------------------------
 
@@ -111,6 +113,10 @@ class OneWay(LambertLobe):
         return value * (0.5 + 0.5 * wo.z), pdf
 
 
+class OneWayAndSaysSo(OneWay):
+    reciprocal = False
+
+
 class Detached(LambertLobe):
     def eval_pdf(self, wi, wo):
         value, pdf = super().eval_pdf(wi, wo)
@@ -123,6 +129,78 @@ class RootOfSquare(LambertLobe):
     def eval_pdf(self, wi, wo):
         value, pdf = super().eval_pdf(wi, wo)
         return value * (1 + 0.01 * dr.sqrt(dr.square(self.reflectance - 0.5))), pdf
+
+
+# --- Faults at some directions only ---------------------------------------------------------------------------------
+
+
+def changed(lobe, value=None, density=None):
+    """A lobe with a factor on its value or its density, of wi and wo."""
+
+    class Mutant(lobe):
+        def eval_pdf(self, wi, wo):
+            f, pdf = super().eval_pdf(wi, wo)
+            return f * value(wi, wo) if value else f, pdf * density(wi, wo) if density else pdf
+
+    return Mutant
+
+
+def where(condition, factor=1.05, otherwise=1.0):
+    return lambda wi, wo: dr.select(condition(wi, wo), mi.Float(factor), otherwise)
+
+
+def between(low, high):
+    """Whether a direction is within some angles to the normal, in degrees."""
+    return lambda w: (w.z < math.cos(math.radians(low))) & (w.z > math.cos(math.radians(high)))
+
+
+def third_quadrant(w):
+    return (w.x < 0) & (w.y < 0)
+
+
+def first_quadrant(w):
+    return (w.x > 0) & (w.y > 0)
+
+
+def blue(wi, wo):
+    return mi.Color3f(1, 1, 1.2)
+
+
+class LostAtFortyFive(LambertLobe):
+    def sample(self, wi, u, v):
+        wo = super().sample(wi, u, v)
+        return dr.select((v.y < 0.02) & between(40, 50)(wi), -wo, wo)
+
+
+class NotANumberStraightBack(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        d2 = dr.squared_norm(wi - wo)
+        return value * (d2 / d2), pdf
+
+
+class DoubleDerivative(LambertLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return 2 * value - dr.detach(value), pdf
+
+
+class RootAtNormal(LambertLobe):
+    """sinθ as √(1 - cos²θ), of which the derivative is infinite at normal incidence."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (
+            1 + 0.01 * dr.sqrt(dr.maximum(1 - wi.z * wi.z, 0)) * dr.sqrt(dr.maximum(1 - wo.z * wo.z, 0))
+        ), pdf
+
+
+class UndirectedDensity(LambertLobe):
+    """The same in the density alone."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value, pdf * dr.sqrt(dr.maximum(1 - wi.z * wi.z, 0)) / dr.sqrt(dr.maximum(1 - wi.z * wi.z, 0))
 
 
 # --- Glossy lobes ---------------------------------------------------------------------------------------------------
@@ -167,6 +245,30 @@ class SwappedDensity(MicrofacetLobe):
         d = self.distribution
         swapped = MicrofacetLobe(1, type(d)(d.alpha_v, d.alpha_u), self.shadowing, self.fresnel, self.sampler)
         return value, swapped.eval_pdf(wi, wo)[1]
+
+
+class SwappedBeyond(SwappedDensity):
+    """They do for light from a quarter of the azimuths."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = MicrofacetLobe.eval_pdf(self, wi, wo)
+        return value, dr.select(third_quadrant(wi), super().eval_pdf(wi, wo)[1], pdf)
+
+
+class HalfVectorIfAnisotropic(MicrofacetLobe):
+    """The Jacobian 1/(4 cosθ_d) is missing in the branch of different alphas."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        d = self.distribution
+        return value, pdf * dr.select(d.alpha_u == d.alpha_v, 1, 4 * Facet.between(wi, wo).cos_d)
+
+
+class TurnedByADegree(PowerLobe):
+    def sample(self, wi, u, v):
+        wo = super().sample(wi, u, v)
+        sin, cos = dr.sincos(mi.Float(math.radians(1)))
+        return mi.Vector3f(cos * wo.x - sin * wo.y, cos * wo.y + sin * wo.x, wo.z)
 
 
 class LostHalf(MicrofacetLobe):
@@ -243,6 +345,70 @@ class FixedPoint(Lambert):
         return super().evaluate(dr.zeros(mi.SurfaceInteraction3f), active)
 
 
+class Stuck(Lambert):
+    """Limits its parameter by a function without a derivative beyond."""
+
+    def evaluate(self, si, active):
+        return SimpleNamespace(reflectance=dr.clip(self.textures["reflectance"].eval(si, active), 0, 1))
+
+
+class Unlimited(Lambert):
+    def evaluate(self, si, active):
+        return SimpleNamespace(reflectance=self.textures["reflectance"].eval(si, active))
+
+
+class Outwards(Lambert):
+    """Derivatives beyond a limit are those at it, also where they lead further out."""
+
+    def evaluate(self, si, active):
+        value = self.textures["reflectance"].eval(si, active)
+        return SimpleNamespace(reflectance=dr.replace_grad(dr.clip(value, 0, 1), value))
+
+
+class ClippedSpectrum(Lambert):
+    """Limits colours to 1 where they are spectra."""
+
+    reflectance = Colour(0.5, (0, 10), "a colour without a limit to speak of")
+
+    def evaluate(self, si, active):
+        p = super().evaluate(si, active)
+        return SimpleNamespace(reflectance=dr.minimum(p.reflectance, 1) if mi.is_spectral else p.reflectance)
+
+
+class BrighterSpectrum(Lambert):
+    """Scales spectra by two hundredths too much."""
+
+    def evaluate(self, si, active):
+        p = super().evaluate(si, active)
+        return SimpleNamespace(reflectance=p.reflectance * (1.02 if mi.is_spectral else 1))
+
+
+class TexturePoint(Lambert):
+    """Looks its texture up elsewhere."""
+
+    def evaluate(self, si, active):
+        moved = mi.SurfaceInteraction3f(si)
+        moved.uv = self.moved(si.uv)
+        return super().evaluate(moved, active)
+
+
+class IgnoresV(TexturePoint):
+    def moved(self, uv):
+        return mi.Point2f(uv.x, 0.5)
+
+
+class ExchangesUV(TexturePoint):
+    def moved(self, uv):
+        return mi.Point2f(uv.y, uv.x)
+
+
+class HalfATexel(TexturePoint):
+    """Of a bitmap of three columns."""
+
+    def moved(self, uv):
+        return mi.Point2f(uv.x + 0.5 / 3, uv.y)
+
+
 # --- Adapters -------------------------------------------------------------------------------------------------------
 
 
@@ -266,6 +432,13 @@ class CosineTwice(adapter.ModelBSDF):
 
     def eval(self, ctx, si, wo, active=True):
         return self.eval_pdf(ctx, si, wo, active)[0]
+
+
+class HalfFloats(adapter.ModelBSDF):
+    """eval returns eleven bits."""
+
+    def eval(self, ctx, si, wo, active=True):
+        return mi.Color3f([mi.Float(dr.llvm.ad.Float16(channel)) for channel in self.eval_pdf(ctx, si, wo, active)[0]])
 
 
 class PairDisagrees(adapter.ModelBSDF):
@@ -310,6 +483,182 @@ class ShinesThrough(adapter.ModelBSDF):
 
     def eval_pdf(self, ctx, si, wo, active=True):
         return adapter.ModelBSDF.eval_pdf(self, ctx, si, mi.Vector3f(wo.x, wo.y, abs(wo.z)), active)
+
+
+class SeenFromBehind(adapter.ModelBSDF):
+    """Turns light from behind to the front, though its flags deny that."""
+
+    @staticmethod
+    def _turned(si):
+        turned = mi.SurfaceInteraction3f(si)
+        turned.wi = mi.Vector3f(si.wi.x, si.wi.y, abs(si.wi.z))
+        return turned, dr.select(si.wi.z < 0, mi.Float(-1), 1)
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        turned, side = self._turned(si)
+        bs, weight = adapter.ModelBSDF.sample(self, ctx, turned, sample1, sample2, active)
+        bs.wo = mi.Vector3f(bs.wo.x, bs.wo.y, bs.wo.z * side)
+        return bs, weight
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        turned, side = self._turned(si)
+        return adapter.ModelBSDF.eval_pdf(self, ctx, turned, mi.Vector3f(wo.x, wo.y, wo.z * side), active)
+
+
+class Sampled(adapter.ModelBSDF):
+    """Changes what ``sample`` returns."""
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
+        return self.altered(bs, weight, si)
+
+
+class NoEta(Sampled):
+    def altered(self, bs, weight, si):
+        bs.eta = mi.Float(0)
+        return bs, weight
+
+
+class EtaOfGlass(Sampled):
+    def altered(self, bs, weight, si):
+        bs.eta = mi.Float(1.5)
+        return bs, weight
+
+
+class OtherComponentAtSome(Sampled):
+    def altered(self, bs, weight, si):
+        bs.sampled_component = dr.select(between(65, 75)(si.wi), 1 - bs.sampled_component, bs.sampled_component)
+        return bs, weight
+
+
+class WeightAtMostOne(Sampled):
+    def altered(self, bs, weight, si):
+        return bs, dr.minimum(weight, 1)
+
+
+class WeightOfOtherChannels(Sampled):
+    def altered(self, bs, weight, si):
+        return bs, mi.Color3f(weight.z, weight.x, weight.y)
+
+
+class DetachedWeight(Sampled):
+    def altered(self, bs, weight, si):
+        return bs, dr.detach(weight)
+
+
+class WeightOverAttachedDensity(Sampled):
+    def altered(self, bs, weight, si):
+        return bs, weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
+
+
+class SampleDensityAtGrazing(Sampled):
+    """The density that ``sample`` says is another where no angle is asked for."""
+
+    def altered(self, bs, weight, si):
+        bs.pdf = dr.select(between(82, 88)(si.wi), 1.02 * bs.pdf, bs.pdf)
+        return bs, weight
+
+
+class VariateUsedTwice(adapter.ModelBSDF):
+    """The lobe is chosen by a variate that also chooses the direction."""
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        return adapter.ModelBSDF.sample(self, ctx, si, sample2.x, sample2, active)
+
+
+class OtherSharesDrawn(adapter.ModelBSDF):
+    """Lobes are drawn alike, but the density has their shares."""
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        evaluated = self._mixture(ctx, si, active)
+        if evaluated is None:
+            return dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
+        valid, mixture, components, frame = evaluated
+        alike = Mixture(mixture.lobes, mixture.wi)
+        alike.probabilities = [mi.Float(1 / len(mixture.lobes)) for _ in mixture.lobes]
+        wo, index = alike.sample(sample1, sample2)
+        mixture.sample = lambda u, v: (wo, index)
+        return self._sample(valid, mixture, components, frame, sample1, sample2)
+
+
+class ShareForgottenInOne(adapter.ModelBSDF):
+    """The probability of the second lobe is left out of the density."""
+
+    @staticmethod
+    def _eval_pdf(valid, mixture, frame, wo):
+        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
+        if len(mixture.lobes) < 2:
+            return value, pdf
+        second = mixture.lobes[1].eval_pdf(mixture.wi, frame.to_local(wo))[1] * (1 - mixture.probabilities[1])
+        return value, pdf + dr.select(valid & (wo.z > 0), second, 0)
+
+
+class AllVariatesTwice(adapter.ModelBSDF):
+    """eval_pdf_sample draws with exchanged variates."""
+
+    def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
+        other = mi.Point2f(sample2.y, sample2.x)
+        return adapter.ModelBSDF.eval_pdf_sample(self, ctx, si, wo, sample1, other, active)
+
+
+class NeverInactive(adapter.ModelBSDF):
+    def eval_pdf(self, ctx, si, wo, active=True):
+        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, True)
+
+
+class SamplesInactive(adapter.ModelBSDF):
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        return adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, True)
+
+
+class AllOrNone(adapter.ModelBSDF):
+    """Switches all lanes off if one is."""
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, dr.all(mi.Bool(active)))
+
+
+class LeaksDerivative(adapter.ModelBSDF):
+    """Inactive lanes get no light, but parameters get their derivatives."""
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
+        every = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, True)[0]
+        return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
+
+
+class IgnoresMode(adapter.ModelBSDF):
+    """Reflects light from an emitter as light from the camera."""
+
+    def _mixture(self, ctx, si, active):
+        radiance = mi.BSDFContext()
+        radiance.component, radiance.type_mask = ctx.component, ctx.type_mask
+        return adapter.ModelBSDF._mixture(self, radiance, si, active)
+
+
+class CosinesInLightTracing(adapter.ModelBSDF):
+    """Corrects for shading normals that there are none of."""
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
+        if ctx.mode == mi.TransportMode.Importance:
+            value = value * abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3)
+        return value, pdf
+
+
+class DoubleReflectance(adapter.ModelBSDF):
+    def eval_diffuse_reflectance(self, si, active=True):
+        return 2 * adapter.ModelBSDF.eval_diffuse_reflectance(self, si, active)
+
+
+class ReflectanceOverPi(adapter.ModelBSDF):
+    def eval_diffuse_reflectance(self, si, active=True):
+        return adapter.ModelBSDF.eval_diffuse_reflectance(self, si, active) * dr.inv_pi
+
+
+class ReflectanceAtOnePoint(adapter.ModelBSDF):
+    def eval_diffuse_reflectance(self, si, active=True):
+        return adapter.ModelBSDF.eval_diffuse_reflectance(self, dr.zeros(mi.SurfaceInteraction3f), active)
 
 
 class SamplesBelow(adapter.ModelBSDF):
@@ -368,6 +717,8 @@ def mutant(name, caught_by, model, methods=adapter.ModelBSDF, **given):
     return Mutant(name, tuple(caught_by.split()), model, methods, tuple(given.items()))
 
 
+RED = {"type": "rgb", "value": (0.6, 0.3, 0.1)}
+
 MUTANTS = [
     mutant("pi forgotten in the denominator", "albedo", lambert(TimesPi)),
     mutant("pi twice in the denominator", "albedo", lambert(OverPi)),
@@ -409,4 +760,99 @@ MUTANTS = [
     mutant("gradient cut", "gradients", lambert(Detached)),
     mutant("gradient not a number", "gradients", lambert(RootOfSquare)),
     mutant("parameter baked in", "recompiles", BakedIn),
+    mutant(
+        "density off for a quarter of the azimuths",
+        "pdf",
+        lambert(changed(LambertLobe, density=where(lambda wi, wo: third_quadrant(wi)))),
+    ),
+    mutant(
+        "density off towards a quarter of the azimuths",
+        "chi2",
+        lambert(
+            changed(
+                LambertLobe,
+                density=lambda wi, wo: (
+                    dr.select(third_quadrant(wo), 1.04, mi.Float(1)) - dr.select(first_quadrant(wo), 0.04, mi.Float(0))
+                ),
+            )
+        ),
+    ),
+    mutant(
+        "density off from 40 to 50 degrees",
+        "pdf",
+        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(40, 50)(wi), 1.01))),
+    ),
+    mutant(
+        "density off towards 40 to 50 degrees",
+        "chi2",
+        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(40, 50)(wo)))),
+    ),
+    mutant(
+        "density off above 81 degrees",
+        "pdf",
+        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(81, 90)(wi), 1.01))),
+    ),
+    mutant(
+        "density off towards more than 81 degrees",
+        "pdf",
+        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(81, 90)(wo), 1.1))),
+    ),
+    mutant("samples lost from 40 to 50 degrees", "pdf", lambert(LostAtFortyFive)),
+    mutant(
+        "one way for a quarter of the azimuths",
+        "reciprocity",
+        lambert(changed(LambertLobe, value=where(lambda wi, wo: third_quadrant(wi), 1.02))),
+    ),
+    mutant("energy gained in blue", "albedo", lambert(changed(LambertLobe, value=blue)), reflectance=0.9),
+    mutant(
+        "energy gained at grazing",
+        "albedo",
+        lambert(changed(LambertLobe, value=lambda wi, wo: 1 + dr.power(1 - wi.z, 20))),
+        reflectance=0.7,
+    ),
+    mutant("not a number straight back", "finite", lambert(NotANumberStraightBack)),
+    mutant(
+        "cut a quarter of a degree above the horizon",
+        "continuity",
+        lambert(changed(LambertLobe, value=where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 5e-3, 1e-2))),
+    ),
+    mutant("seen from behind", "horizon", Lambert, SeenFromBehind),
+    mutant("eta of zero", "components", Lambert, NoEta),
+    mutant("eta of glass", "components", Ward, EtaOfGlass),
+    mutant("other component from 65 to 75 degrees", "components", Ward, OtherComponentAtSome),
+    mutant("weight at most one", "weight", Ward, WeightAtMostOne, variant="ward", specular_reflectance=1.0),
+    mutant("channels exchanged in the weight", "weight", Lambert, WeightOfOtherChannels, reflectance=RED),
+    mutant("density of sample off at grazing", "weight", Ward, SampleDensityAtGrazing),
+    mutant("half floats", "weight eval_pdf", Ward, HalfFloats),
+    mutant("variate used twice", "chi2", Phong, VariateUsedTwice, diffuse_reflectance=0.4, specular_reflectance=0.5),
+    mutant("lobes drawn by other shares", "chi2", Phong, OtherSharesDrawn),
+    mutant("probability omitted of one lobe", "pdf chi2", Phong, ShareForgottenInOne),
+    mutant("turned by a degree", "chi2", phong(TurnedByADegree), exponent=300.0),
+    mutant("alphas swapped for a quarter of the azimuths", "chi2", ward(SwappedBeyond), alpha_u=0.2, alpha_v=0.3),
+    mutant(
+        "density of the half vector if anisotropic", "pdf", walter(HalfVectorIfAnisotropic), alpha_u=0.3, alpha_v=0.31
+    ),
+    mutant("eval_pdf_sample exchanges variates", "eval_pdf", Ward, AllVariatesTwice),
+    mutant("v ignored", "textures", IgnoresV),
+    mutant("u and v exchanged", "textures", ExchangesUV),
+    mutant("half a texel off", "textures", HalfATexel),
+    mutant("reflectance at a fixed point", "textures", Lambert, ReflectanceAtOnePoint),
+    mutant("derivative twice as large", "gradients", lambert(DoubleDerivative)),
+    mutant("root at normal incidence", "gradients", lambert(RootAtNormal)),
+    mutant("root at normal incidence in the density", "gradients", lambert(UndirectedDensity)),
+    mutant("weight detached", "gradients", Lambert, DetachedWeight),
+    mutant("weight over an attached density", "gradients", Phong, WeightOverAttachedDensity),
+    mutant("inactive lanes evaluated", "active", Ward, NeverInactive),
+    mutant("inactive lanes sampled", "active", Lambert, SamplesInactive),
+    mutant("active lanes dropped", "active", Lambert, AllOrNone),
+    mutant("derivatives of inactive lanes", "active", Lambert, LeaksDerivative),
+    mutant("stuck beyond a limit", "gradients", Stuck),
+    mutant("evaluated beyond a limit", "gradients", Unlimited),
+    mutant("led out of its range", "gradients", Outwards),
+    mutant("colours clipped in spectral variants", "spectral", ClippedSpectrum),
+    mutant("brighter in spectral variants", "spectral", BrighterSpectrum),
+    mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), IgnoresMode),
+    mutant("cosines in light tracing", "mode", Lambert, CosinesInLightTracing),
+    mutant("twice the reflectance", "reflectance", Ward, DoubleReflectance),
+    mutant("reflectance over pi", "reflectance", Lambert, ReflectanceOverPi),
 ]

@@ -82,7 +82,9 @@ def test_rejected(plugin, given, message, variant):
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_nested_objects_without_a_name():
-    with pytest.raises(RuntimeError, match=r"ward: a texture is nested without a name; give it the name of the parameter"):
+    with pytest.raises(
+        RuntimeError, match=r"ward: a texture is nested without a name; give it the name of the parameter"
+    ):
         mi.load_string('<bsdf type="ward" version="3.0.0"><texture type="checkerboard"/></bsdf>')
     with pytest.raises(RuntimeError, match=r"lambert: a BSDF is nested without a name"):
         mi.load_string('<bsdf type="lambert" version="3.0.0"><bsdf type="diffuse"/></bsdf>')

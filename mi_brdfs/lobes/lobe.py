@@ -21,6 +21,10 @@ class Lobe:
     reciprocal = True
     """Whether f(wi, wo) = f(wo, wi)."""
 
+    anisotropic = False
+    """Whether f may change as both directions turn about the normal, even without parameters for the two tangent
+    directions or a rotation."""
+
     transmits = False
     """Whether the light comes from the other side of the surface."""
 

@@ -74,6 +74,8 @@ class Lafortune(Model):
 class LafortuneLobe(PowerLobe):
     """ρ·scale·max(0, (C∘wi)·wo / unit)ⁿ: a power of the cosine to the axis C∘wi, times one of its length."""
 
+    anisotropic = True  # Cx and Cy are apart, and may come to differ
+
     def __init__(self, reflectance, exponent, scale, c, unit):
         super().__init__(reflectance, exponent, scale)
         self.c, self.unit = c, unit

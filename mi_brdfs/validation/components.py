@@ -6,22 +6,23 @@ import mitsuba as mi
 import numpy as np
 
 from .outcome import Findings, Outcome
-from .subject import Part, context, direction, hemisphere, on_side, random
-from .values import angles_of
+from .subject import SCATTERED, Part, angles_of, context, direction, hemisphere, on_side, random
 
 COUNT = 4000
 
 
 def components(run) -> Findings:
     """The components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
-    ``sampled_type`` lie within what was asked for and drawn; and what a context excludes is black."""
+    ``sampled_type`` lie within what was asked for and drawn, ``eta`` is 1 for light that stays on its side, and what a
+    context excludes is black."""
     subject = run.subject
     for part in subject.parts:
         outcome = Outcome("components", part.name)
-        for incident in subject.incidents(part):
+        for incident in subject.views(part):
             _check_sampled(run, outcome, part, incident)
         if part.component is None:
             _check_sum(run, outcome)
+            _check_there_and_back(outcome, run, part)
         yield outcome.finding("Sums, sampled components and types are as asked for.")
     for part in subject.components:
         outcome = Outcome("components", f"{part.name} masked out")
@@ -51,13 +52,14 @@ def _check_sampled(run, outcome, part, incident):
                 f"for light from {incident.name} sampled_type is {kind[index == k][wrong][0]:#x} for component {k}, "
                 f"whose flags are {allowed[k]:#x}"
             )
+    _check_eta(outcome, incident, samples)
     if part.component is None and len(allowed) > 1:
         # A sample of a component must lie where that component can send one.
         for each in run.subject.components:
             drawn = np.flatnonzero(chosen)[index == each.component]
             if len(drawn):
                 wo = np.ascontiguousarray(samples.wo[drawn])
-                stray = (run.subject.pdf(each, incident.wi, wo) <= 0).mean()
+                stray = (run.subject.pdf(each, incident.at(drawn), wo) <= 0).mean()
                 if stray > 1e-3:
                     outcome.fault(
                         f"for light from {incident.name} {stray:.1%} of the samples said to be component "
@@ -67,13 +69,44 @@ def _check_sampled(run, outcome, part, incident):
                 _check_share(run, outcome, incident, each, samples, drawn)
 
 
+def _check_eta(outcome, incident, samples):
+    """Light that stays on its side stays in its medium."""
+    stays = samples.lit & (samples.wo[:, 2] * incident.wi[..., 2] > 0)
+    wrong = (stays & (samples.eta != 1)) | samples.lit & ~(np.isfinite(samples.eta) & (samples.eta > 0))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        needed = "it must be 1 as the light stays on its side" if stays[k] else "it must be above 0"
+        outcome.fault(
+            f"for light from {incident.of(k)} a sample towards {angles_of(samples.wo[k])} has the eta "
+            f"{samples.eta[k]:.4g}, but {needed}; {wrong.sum() / samples.lit.sum():.1%} of them are wrong",
+            np.inf,
+        )
+
+
+def _check_there_and_back(outcome, run, part):
+    """The relative index of refraction is the reciprocal of that of the other way."""
+    if len(part.sides) < 2 or not part.has(mi.BSDFFlags.Transmission):
+        return
+    found = []
+    for side in part.sides:
+        samples = run.subject.sample(part, on_side(direction(20, 10), side), random(COUNT, 6))
+        through = samples.lit & (samples.wo[:, 2] * side < 0)
+        found.append(float(np.median(samples.eta[through])) if through.any() else 1.0)
+    if not abs(found[0] * found[1] - 1) < 1e-3:
+        outcome.fault(
+            f"eta is {found[0]:.4g} for light that passes from the front, but {found[1]:.4g} for light from behind, "
+            "which must be its reciprocal",
+            np.inf,
+        )
+
+
 def _check_share(run, outcome, incident, each, samples, drawn):
     """Where only one component can be, its share of the samples must be that of its density in the mixture's."""
     others = [other for other in run.subject.components if other is not each]
     kept = samples.lit
-    wo = np.ascontiguousarray(samples.wo[kept])
-    own = run.subject.pdf(each, incident.wi, wo)
-    rest = sum(run.subject.pdf(other, incident.wi, wo) for other in others)
+    wi, wo = incident.at(kept), np.ascontiguousarray(samples.wo[kept])
+    own = run.subject.pdf(each, wi, wo)
+    rest = sum(run.subject.pdf(other, wi, wo) for other in others)
     alone = (own > 1e3 * rest) & (own > 0)
     if alone.sum() < 200:
         return
@@ -93,30 +126,34 @@ def _check_sum(run, outcome):
         flags |= int(subject.bsdf.flags(k))
     if int(subject.bsdf.flags()) != flags:
         outcome.fault(f"flags() is {int(subject.bsdf.flags()):#x}, but those of the components make {flags:#x}", np.inf)
-    for incident in subject.incidents(subject.whole):
-        wo = np.concatenate([hemisphere(COUNT, 1), run.samples(subject.whole, incident).wo[:COUNT]])
-        turned = on_side(wo, -1)
-        wo = np.concatenate([wo, turned]) if subject.whole.has(mi.BSDFFlags.Transmission) else wo
-        whole, density = subject.eval_pdf(subject.whole, incident.wi, wo)
-        values, pdfs = zip(*(subject.eval_pdf(part, incident.wi, wo) for part in subject.components), strict=True)
+    for incident in subject.views(subject.whole):
+        lanes = np.arange(0, SCATTERED, SCATTERED // COUNT)
+        wo = np.concatenate([on_side(hemisphere(len(lanes), 1), side) for side in (1, -1)])
+        wo = np.concatenate([wo, run.samples(subject.whole, incident).wo[lanes]])
+        lanes = np.tile(lanes, 3)
+        wi = incident.at(lanes)
+        whole, density = subject.eval_pdf(subject.whole, wi, wo)
+        values, pdfs = zip(*(subject.eval_pdf(part, wi, wo) for part in subject.components), strict=True)
         total = sum(values)
         scale = np.maximum(np.maximum(whole, total), 1e-6 * np.max(total) + 1e-12)
         error = np.nan_to_num(abs(whole - total) / scale).max(axis=1)
         if error.max() > tolerance:
             k = int(np.argmax(error))
             outcome.fault(
-                f"for light from {incident.name} eval is {whole[k].max():.4g} towards {angles_of(wo[k])}, but the "
-                f"components add up to {total[k].max():.4g}",
+                f"for light from {incident.of(lanes[k])} eval is {whole[k].max():.4g} towards {angles_of(wo[k])}, but "
+                f"the components add up to {total[k].max():.4g}",
                 error[k],
             )
         low, high = np.min(pdfs, axis=0), np.max(pdfs, axis=0)
+        if subject.deltas:
+            low = np.zeros_like(low)  # they take a share of the samples
         beyond = np.maximum(density - high, low - density) / np.maximum(np.maximum(density, high), 1e-9)
         beyond = np.nan_to_num(beyond)
         if beyond.max() > tolerance:
             k = int(np.argmax(beyond))
             outcome.fault(
-                f"for light from {incident.name} pdf is {density[k]:.4g} towards {angles_of(wo[k])}, but a mixture of "
-                f"the components' lies between {low[k]:.4g} and {high[k]:.4g}",
+                f"for light from {incident.of(lanes[k])} pdf is {density[k]:.4g} towards {angles_of(wo[k])}, but a "
+                f"mixture of the components' lies between {low[k]:.4g} and {high[k]:.4g}",
                 beyond[k],
             )
 

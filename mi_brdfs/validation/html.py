@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import __version__
 from .report import Finding, Report, Verdict
-from .sampling import COUNT, Trial
+from .sampling import Trial
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #222; --faint: #666; --line: #ccc; --paper: #fff; --bad: #b3261e;
@@ -186,12 +186,12 @@ def views(trial: Trial) -> Iterator[View]:
     """A window for each side to which more than a ten-thousandth goes. It holds 99 % of what is drawn and expected
     there, and where the two deviate most if they do."""
     cells, worst = trial.partition, trial.test.worst
-    x, y = flattened(cells.centres, cells.axis)
+    x, y = flattened(cells.centres, trial.axis)
     size = 180 * 2.0**-cells.level
-    weights = trial.counts + np.fmin(COUNT * abs(cells.integrals), COUNT)
+    weights = trial.counts + np.fmin(trial.count * abs(cells.integrals), trial.count)
     for side in (1, -1):
         here = weights * (cells.centres[:, 2] * side > 0)
-        if here.sum() < 1e-4 * COUNT:
+        if here.sum() < 1e-4 * trial.count:
             continue
         held = [*_ends(x, here, 0.005), *_ends(y, here, 0.005)]
         held += [worst] if trial.test.p_value < SURE and here[worst] else []
@@ -222,10 +222,10 @@ def rasters(trial: Trial, view: View) -> np.ndarray:
     )
     pictures = np.full((3, PIXELS, PIXELS), np.nan)
     pictures[:, inside] = np.array([
-        counts / COUNT / solid_angles,
+        counts / trial.count / solid_angles,
         integrals / solid_angles,
         (counts - expected) / np.sqrt(np.maximum(expected, 1)),
-    ])[:, merged[cells.cells(raised(x[inside], y[inside], view.side, cells.axis))]]  # fmt: skip
+    ])[:, merged[cells.cells(raised(x[inside], y[inside], view.side, trial.axis))]]  # fmt: skip
     return pictures
 
 

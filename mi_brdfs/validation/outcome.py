@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..parameters import brief
 from .report import Finding
 
 
@@ -40,6 +41,15 @@ class Outcome:
 
 
 Findings = Iterator[Finding]
+
+
+def told(error: Exception) -> str:
+    """An exception in a few words: its kind, and the first line of what it says. Mitsuba and Dr.Jit hide the cause of
+    an error in a plugin's Python code behind one of their own."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    line = next((line.strip() for line in str(error).splitlines() if line.strip()), "")
+    return type(error).__name__ + (f": {brief(line.rstrip('.'))}" if line else "")
 
 
 def relative(got: np.ndarray, expected: np.ndarray) -> np.ndarray:

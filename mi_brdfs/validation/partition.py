@@ -8,7 +8,7 @@ quadrature differs from that of its quarters; so no width of a lobe need be know
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from math import erfc, sqrt
 
@@ -27,7 +27,8 @@ class Partition:
     """Cells that cover the sphere, along a space-filling curve, with a density's integral over each."""
 
     axis: np.ndarray
-    """The azimuth of the plane of incidence, as a unit vector (cosφ, sinφ)."""
+    """The azimuth that longitudes are measured from, as a unit vector (cosφ, sinφ): that of the plane of incidence, as
+    a rule."""
     starts: np.ndarray
     level: np.ndarray
     x: np.ndarray
@@ -61,6 +62,12 @@ class Partition:
         return np.cumsum(np.diff(ancestors, prepend=-1) > 0) - 1
 
 
+def azimuth(w) -> np.ndarray:
+    """The azimuth of a direction, as a unit vector (cosφ, sinφ)."""
+    length = np.hypot(w[0], w[1])
+    return np.array([w[0], w[1]], np.float64) / length if length > 1e-4 else np.array([1.0, 0.0])
+
+
 def partition(pdf: Callable, pilot: np.ndarray, wi: np.ndarray, count: int, cells: int = 1024) -> Partition:
     """The partition for a density.
 
@@ -71,18 +78,42 @@ def partition(pdf: Callable, pilot: np.ndarray, wi: np.ndarray, count: int, cell
         count: how many samples will be tested: the integrals are precise to a part of their deviation.
         cells: no cell holds more than this part of the samples.
     """
-    length = np.hypot(wi[0], wi[1])
-    axis = np.array([wi[0], wi[1]], np.float64) / length if length > 1e-4 else np.array([1.0, 0.0])
+    (made,) = partitions(lambda _, wo: pdf(wo), [pilot], [wi], count, cells)
+    return made
+
+
+def partitions(pdf: Callable, pilots: list, wis: list, count: int, cells: int) -> list[Partition]:
+    """Those for a density of several directions of incidence: it is asked for one array of all directions at once, as
+    ``pdf(of, wo)``, where ``of`` has the index of the direction of incidence of each."""
+    growing = [_grow(pilot, wi, count, cells) for pilot, wi in zip(pilots, wis, strict=True)]
+    made: list = [None] * len(growing)
+    wanted = {k: next(one) for k, one in enumerate(growing)}
+    while wanted:
+        of = np.repeat(list(wanted), [len(wo) for wo in wanted.values()])
+        density = pdf(of, np.concatenate(list(wanted.values())))
+        ends = np.cumsum([len(wo) for wo in wanted.values()])
+        for (k, _), found in zip(list(wanted.items()), np.split(density, ends[:-1]), strict=True):
+            try:
+                wanted[k] = growing[k].send(found)
+            except StopIteration as stop:
+                made[k] = stop.value
+                del wanted[k]
+    return made
+
+
+def _grow(pilot, wi, count: int, cells: int) -> Generator[np.ndarray, np.ndarray, Partition]:
+    """A partition; yields the directions of which it needs the density."""
+    axis = azimuth(wi)
     points = _to_square(pilot, axis)
     side = 1 << FIRST_LEVEL
     x, y = (index.ravel() for index in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
-    integrals = _integrals(pdf, axis, x, y, FIRST_LEVEL)
+    integrals = yield from _integrals(axis, x, y, FIRST_LEVEL)
     done = []
     for level in range(FIRST_LEVEL, LAST_LEVEL + 1):
         held, points = _count(points, x, y, level)
         quarters = [(2 * x + i, 2 * y + j) for i in (0, 1) for j in (0, 1)]
         qx, qy = (np.stack(index, axis=1) for index in zip(*quarters, strict=True))
-        parts = _integrals(pdf, axis, qx.ravel(), qy.ravel(), level + 1).reshape(-1, 4)
+        parts = (yield from _integrals(axis, qx.ravel(), qy.ravel(), level + 1)).reshape(-1, 4)
         precise = parts.sum(axis=1)
         error = count * abs(precise - integrals)
         split = (held * cells > len(pilot)) | (error > 0.2 * np.sqrt(np.maximum(count * precise, 1)))
@@ -150,13 +181,13 @@ def _count(points, x, y, level):
     return held, points[inside]
 
 
-def _integrals(pdf, axis, x, y, level):
-    """The integrals of a density over cells."""
+def _integrals(axis, x, y, level):
+    """The integrals of a density over cells; yields the directions of which it needs the density."""
     size = 2.0**-level
     px = (x[:, None, None] + _NODES[:, None]) * size + np.zeros(NODES)
     py = (y[:, None, None] + _NODES[None, :]) * size + np.zeros((NODES, 1))
     w, jacobian = _to_sphere(np.stack([px.ravel(), py.ravel()], axis=-1), axis)
-    density = (pdf(w.astype(np.float32)) * jacobian).reshape(-1, NODES, NODES)
+    density = ((yield w.astype(np.float32)) * jacobian).reshape(-1, NODES, NODES)
     return np.einsum("kij,i,j->k", density, _WEIGHTS, _WEIGHTS) * size * size
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import mitsuba as mi
 
-from . import components, derivatives, sampling, textures, values
+from . import components, contract, derivatives, sampling, spectral, textures, values
 from .energy import energy_limits
-from .outcome import Findings
+from .outcome import Findings, told
 from .report import Finding, Report
-from .subject import Incident, Part, Samples, Subject, random
+from .subject import SCATTERED, Incident, Part, Samples, Subject, random
 
 CHECKS: dict[str, Callable[[Run], Findings]] = {
     check.__name__: check
@@ -34,6 +34,10 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         textures.textures,
         derivatives.gradients,
         derivatives.recompiles,
+        contract.active,
+        contract.mode,
+        contract.reflectance,
+        spectral.spectral,
     )
 }
 """The checks by name, in the order in which they run; the docstring of each says what it checks and how strictly."""
@@ -54,15 +58,16 @@ class Run:
     """Whether the whole is judged to conserve energy; None if its manual page says so or not."""
     given: dict | None
     """The dict that the BSDF was given as, if it was."""
-    trials: list | None = None
-    """Of the sampler, once they are made."""
+    trials: dict[str, tuple[list, list]] = field(default_factory=dict)
+    """Of the sampler, by the name of the part, once they are made: for the directions that were asked for, and for some
+    at random."""
     _samples: dict = field(default_factory=dict)
 
     def samples(self, part: Part, incident: Incident) -> Samples:
         """Samples for a direction of incidence, the same for every check."""
         key = part.name, incident.name
         if key not in self._samples:
-            self._samples[key] = self.subject.sample(part, incident.wi, random(1 << 15, 11))
+            self._samples[key] = self.subject.sample(part, incident.wi, random(SCATTERED, 11))
         return self._samples[key]
 
     @property
@@ -110,7 +115,7 @@ def check(
     with nullcontext() if _suits(mi.variant()) else mi.variant_context(VARIANT):
         subject = Subject(bsdf if loaded else mi.load_dict(bsdf), tuple(angles))
         name = name or (bsdf["type"] if not loaded else name_of(subject.bsdf))
-        tests = max(1, 2 * sum(len(subject.incidents(part)) for part in subject.parts))
+        tests = max(1, sampling.tests(subject))
         run = Run(subject, significance, tests, conserves, None if loaded else bsdf)
         findings = [
             Finding("components", f"component {k}", "skip", "A delta function, which cannot be evaluated or tested.")
@@ -118,9 +123,17 @@ def check(
         ]
         for word in wanted:
             if subject.parts:
-                findings += CHECKS[word](run)
+                findings += _found(word, run)
             on_progress()
-    return Report(name, findings, run.trials or [])
+        return Report(name, findings, sampling.shown(run))
+
+
+def _found(word: str, run: Run) -> Findings:
+    """The findings of a check; if it raises, that is another."""
+    try:
+        yield from CHECKS[word](run)
+    except Exception as error:
+        yield Finding(word, "whole", "fail", f"It could not be checked to the end, as it raised {told(error)}.")
 
 
 def name_of(bsdf: mi.BSDF) -> str:

@@ -12,12 +12,15 @@ import numpy as np
 
 AZIMUTH_STEP = 137.5
 """In degrees: each incident direction has an azimuth of its own, so that what is turned wrongly shows."""
+SCATTERED = 1 << 15
+STEEPEST = 88.5
+"""The angles of scattered directions end here, in degrees: nearer to grazing, float32 knows little of a cosine."""
 CENTRE = 0.4, 0.3
-"""The texture coordinates of what is looked at, but for textures."""
+"""The texture coordinates of what is looked at, except by the check of textures."""
 
 
 class Part(NamedTuple):
-    """The whole BSDF (but for what is a delta function) or one of its components."""
+    """The whole BSDF (of which delta functions are not evaluated) or one of its components."""
 
     name: str
     context: Any
@@ -31,10 +34,18 @@ class Part(NamedTuple):
 
 
 class Incident(NamedTuple):
-    """A direction of incidence, float32 and of length one to its precision."""
+    """A direction of incidence, float32 and of length one to its precision; or many, of shape (N, 3)."""
 
     name: str
     wi: np.ndarray
+
+    def at(self, lanes) -> np.ndarray:
+        """The directions of some lanes, shape (3,) if they have all the same."""
+        return self.wi if self.wi.ndim == 1 else np.ascontiguousarray(self.wi[lanes])
+
+    def of(self, lane: int) -> str:
+        """The direction of a lane in words."""
+        return self.name if self.wi.ndim == 1 else angles_of(self.wi[lane])
 
 
 class Samples(NamedTuple):
@@ -46,20 +57,23 @@ class Samples(NamedTuple):
     """The density that ``sample`` says."""
     component: np.ndarray
     kind: np.ndarray
+    eta: np.ndarray
     value: np.ndarray
     pdf: np.ndarray
+    smooth: np.ndarray
+    """Which of them are none of a delta function."""
 
     @property
     def lit(self) -> np.ndarray:
-        """Which of them carry light."""
-        return self.weight.any(axis=1)
+        """Which of them carry light, and not that of a delta function."""
+        return self.weight.any(axis=1) & self.smooth
 
     @property
     def drawn(self) -> np.ndarray:
         """Which of them carry light or may be black ones, drawn where f = 0. A sampler may also reject a direction by a
         weight of zero, and leave anything in the other fields: so a black sample must have f = 0 and the density that
         ``pdf`` says."""
-        black = ~self.value.any(axis=1) & (self.pdf > 0)
+        black = ~self.value.any(axis=1) & (self.pdf > 0) & self.smooth
         return self.lit | (black & (abs(self.density - self.pdf) < 0.01 * self.pdf))
 
 
@@ -90,11 +104,11 @@ class Subject:
 
     @cached_property
     def whole(self) -> Part:
+        """Seen from wherever one of its components is, also if that is a delta function."""
         flags = 0
         for part in self.components:
             flags |= part.flags
-        mask = int(mi.BSDFFlags.Smooth) if self.deltas else None
-        return Part("whole", context(mask=mask), None, flags, _sides(flags))
+        return Part("whole", context(), None, flags, _sides(int(self.bsdf.flags())))
 
     @cached_property
     def parts(self) -> list[Part]:
@@ -111,15 +125,27 @@ class Subject:
             for k, theta in enumerate(self.angles)
         ]
 
+    def views(self, part: Part) -> list[Incident]:
+        """The same, and directions all over the sides that it is seen from, which find what is wrong at some angles
+        or azimuths only."""
+        return [*self.incidents(part), Incident("all directions", scattered(SCATTERED, 41, part.sides))]
+
     # --- Calls ------------------------------------------------------------------------------------------------------
 
     def eval(self, part: Part, wi, wo, uv=CENTRE) -> np.ndarray:
         """f |cosθ_o|, shape (N, channels)."""
         return numbers(self.bsdf.eval(part.context, interaction(wi, uv), vectors(wo), True), len(wo))
 
-    def pdf(self, part: Part, wi, wo) -> np.ndarray:
+    def pdf(self, part: Part, wi, wo, uv=CENTRE) -> np.ndarray:
         """The density of ``wo``, shape (N,)."""
-        return numbers(self.bsdf.pdf(part.context, interaction(wi), vectors(wo), True), len(wo))[:, 0]
+        return numbers(self.bsdf.pdf(part.context, interaction(wi, uv), vectors(wo), True), len(wo))[:, 0]
+
+    def reflectance(self, wi, uv=CENTRE) -> np.ndarray:
+        """``eval_diffuse_reflectance``, shape (N, channels); black if it is not implemented."""
+        try:
+            return numbers(self.bsdf.eval_diffuse_reflectance(interaction(wi, uv), True), len(wi))
+        except RuntimeError:
+            return np.zeros((len(wi), 1))
 
     def eval_pdf(self, part: Part, wi, wo) -> tuple[np.ndarray, np.ndarray]:
         value, pdf = self.bsdf.eval_pdf(part.context, interaction(wi), vectors(wo), True)
@@ -127,22 +153,28 @@ class Subject:
 
     def eval_pdf_sample(self, part: Part, wi, wo, variates) -> tuple[np.ndarray, ...]:
         """``(value, pdf, wo, density, weight)``."""
-        u, v = _variates(variates)
+        u, v = variates_of(variates)
         value, pdf, bs, weight = self.bsdf.eval_pdf_sample(part.context, interaction(wi), vectors(wo), u, v, True)
         count = len(variates)
         value, pdf, sampled, density, weight = (numbers(x, count) for x in (value, pdf, bs.wo, bs.pdf, weight))
         return value, pdf[:, 0], sampled, density[:, 0], weight
 
     def sample(self, part: Part, wi, variates, uv=CENTRE) -> Samples:
-        si, (u, v), count = interaction(wi, uv), _variates(variates), len(variates)
+        si, (u, v), count = interaction(wi, uv), variates_of(variates), len(variates)
         bs, weight = self.bsdf.sample(part.context, si, u, v, True)
         drawn = bs.pdf > 0
         wo = dr.select(drawn, bs.wo, mi.Vector3f(0, 0, 1))
         value, pdf = self.bsdf.eval(part.context, si, wo, True), self.bsdf.pdf(part.context, si, wo, True)
-        fields = (wo, weight, bs.pdf, bs.sampled_component, bs.sampled_type, value, dr.select(drawn, pdf, 0))
+        kind, density = bs.sampled_type, dr.select(drawn, pdf, 0)
+        fields = (wo, weight, bs.pdf, bs.sampled_component, kind, bs.eta, value, density, self.is_smooth(bs))
         dr.eval(fields)
-        wo, weight, density, component, kind, value, pdf = (numbers(field, count) for field in fields)
-        return Samples(wo.astype(np.float32), weight, density[:, 0], component[:, 0], kind[:, 0], value, pdf[:, 0])
+        wo, weight, density, component, kind, eta, value, pdf, smooth = (numbers(field, count) for field in fields)
+        single = (x[:, 0] for x in (density, component, kind, eta))
+        return Samples(wo.astype(np.float32), weight, *single, value, pdf[:, 0], smooth[:, 0] > 0)
+
+    def is_smooth(self, bs):
+        """Whether a sample is none of a delta function."""
+        return (bs.sampled_type & int(mi.BSDFFlags.Smooth)) != 0 if self.deltas else mi.Bool(True)
 
     # --- The width of a part ----------------------------------------------------------------------------------------
 
@@ -199,14 +231,34 @@ def hemisphere(count: int, seed: int) -> np.ndarray:
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), z], axis=-1).astype(np.float32)
 
 
+def scattered(count: int, seed: int, sides: tuple[int, ...]) -> np.ndarray:
+    """Directions of which angles and azimuths, in degrees, fill their ranges evenly, on some sides in turn."""
+    jitter = np.random.default_rng(seed).random((2, count))
+    lane = np.arange(count)
+    theta = STEEPEST * (lane + jitter[0]) / count
+    # The golden ratio spreads the azimuths of any interval of angles.
+    phi = 2 * np.pi * ((lane * 0.6180339887498949 + 0.3 * jitter[1]) % 1)
+    sin = np.sin(np.radians(theta))
+    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), np.cos(np.radians(theta))], axis=-1).astype(np.float32)
+    w[:, 2] *= np.resize(sides, count)
+    return w
+
+
+def angles_of(w) -> str:
+    """A direction in words."""
+    theta = np.degrees(np.arctan2(np.hypot(w[0], w[1]), w[2]))
+    return f"θ = {theta:.4g}°, φ = {np.degrees(np.arctan2(w[1], w[0])):.4g}°"
+
+
 def interaction(wi, uv=CENTRE):
-    """A surface interaction for one direction of the local frame, or for an array of shape (N, 3)."""
+    """A surface interaction for one direction of the local frame, or for an array of shape (N, 3); ``uv`` is a pair or
+    an array of shape (N, 2)."""
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi = vectors(wi)
     si.n = mi.Normal3f(0, 0, 1)
     si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
     si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
-    si.uv = mi.Point2f(uv)
+    si.uv = mi.Point2f(uv) if np.ndim(uv) == 1 else mi.Point2f(np.ascontiguousarray(np.float32(uv).T))
     if mi.is_spectral:
         si.wavelengths = mi.UnpolarizedSpectrum(450, 520, 580, 640)
     return si
@@ -241,7 +293,8 @@ def context(component=None, mask=None):
     return result
 
 
-def _variates(variates):
+def variates_of(variates):
+    """Rows of three uniform variates as ``sample`` takes them."""
     u, v = mi.Float(variates[:, 0].copy()), mi.Point2f(np.ascontiguousarray(variates[:, 1:].T))
     return u, v
 

@@ -7,17 +7,20 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from .derivatives import restored, set_value
 from .outcome import Findings, Outcome, relative
 from .report import Finding
-from .subject import Subject, direction, hemisphere, numbers, on_side, random
+from .subject import Subject, hemisphere, interaction, numbers, on_side, random
 
 COUNT = 4000
 
 
 def textures(run) -> Findings:
-    """A parameter given as a texture acts as its value at the surface point does. All of them become bitmaps with a
-    texel for each, in which this one's value differs: there eval is what it is with these values everywhere, and
-    weights are eval/pdf, to float32's rounding. For this the BSDF must be given as a dict."""
+    """A parameter given as a texture acts as its value at the surface point does, wherever that is. All of them become
+    bitmaps, in each of which some columns have a pattern of the parameter's value and another one, where the others
+    have theirs only. At points all over them ``eval`` and ``eval_diffuse_reflectance`` are what they are with the
+    texel's value everywhere, and weights are eval/pdf, to float32's rounding. For this the BSDF must be given as a
+    dict."""
     subject, part = run.subject, run.subject.whole
     if run.given is None:
         yield Finding("textures", "whole", "skip", "To replace its parameters by textures, its dict is needed.")
@@ -25,7 +28,7 @@ def textures(run) -> Findings:
     params = mi.traverse(subject.bsdf)
     originals = {
         name: type(params[key])(params[key])
-        for key in params.keys()
+        for key in constants(params)
         for name, _, rest in [key.partition(".")]
         if rest == "value" and not isinstance(run.given.get(name), dict)
     }
@@ -38,41 +41,84 @@ def textures(run) -> Findings:
         yield Finding("textures", "whole", "skip", "It has no parameters that are constant textures.")
         return
     textured = Subject(mi.load_dict(given), subject.angles)
-    wi, variates = on_side(direction(35, 50), part.sides[0]), random(COUNT, 31)
-    for name in names:
-        outcome, key = Outcome("textures", name), f"{name}.value"
-        uv = (list(originals).index(name) + 1.5) / (len(originals) + 1), 0.5
-        samples = textured.sample(part, wi, variates, uv)
-        wo = np.where(np.arange(COUNT)[:, None] % 2, samples.wo, hemisphere(COUNT, 32)).astype(np.float32)
-        params[key] = changed[name]
-        params.update()
-        value, expected = textured.eval(part, wi, wo, uv), subject.eval(part, wi, wo, uv)
-        params[key] = originals[name]
-        params.update()
-        tolerance = 3 * subject.rounding(part)
-        for got, wanted, words in (
-            (value, expected, "eval is {:.4g} where its texel is {}, but {:.4g} if that is its value everywhere"),
-            (
-                samples.weight * samples.pdf[:, None],
-                samples.value * samples.lit[:, None],
-                "the weight times pdf is {:.4g} where its texel is {}, but eval {:.4g}",
-            ),
-        ):
-            error = relative(got, wanted)
+    uv, column = _points(len(originals))
+    wi, variates = on_side(hemisphere(len(uv), 30), part.sides[0]), random(len(uv), 31)
+    samples = textured.sample(part, wi, variates, uv)
+    wo = np.where(np.arange(len(uv))[:, None] % 2, samples.wo, on_side(hemisphere(len(uv), 32), part.sides[0]))
+    wo = wo.astype(np.float32)
+    found = _numbers(textured, part, wi, wo, uv)
+    usual = _numbers(subject, part, wi, wo, uv)
+    tolerance = 3 * subject.rounding(part)
+    for k, parameter in enumerate(originals):
+        if parameter in refused:
+            continue
+        original, other_value = originals[parameter], changed[parameter]
+        outcome, key, own = Outcome("textures", parameter), f"{parameter}.value", column == k
+        different = _is_changed(_bitmap(original, other_value, k, len(originals)), other_value, uv)
+        with restored(params, key):
+            set_value(params, key, other_value)
+            other = _numbers(subject, part, wi, wo, uv)
+        wanted = {word: np.where(different[:, None], other[word], usual[word]) for word in usual}
+        comparisons = [
+            (word, found[word], wanted[word], "{} is {:.4g} where its texel is {}, but {:.4g} if it is that everywhere")
+            for word in wanted
+        ]
+        lit = samples.lit[:, None]
+        reflected = samples.weight * samples.pdf[:, None] * lit
+        words = "{} is {:.4g} where its texel is {}, but eval {:.4g}"
+        comparisons.append(("the weight times pdf", reflected, samples.value * lit, words))
+        for name, got, expected, words in comparisons:
+            error = relative(got[own], expected[own])
             if error.max() > tolerance:
-                k = np.unravel_index(int(np.argmax(error)), error.shape)
-                texel = ", ".join(f"{number:.3g}" for number in numbers(changed[name], 1)[0])
-                outcome.fault(words.format(got[k], texel, wanted[k]), error.max())
+                lane, channel = np.unravel_index(int(np.argmax(error)), error.shape)
+                lane = np.flatnonzero(own)[lane]
+                value = numbers(other_value if different[lane] else original, 1)[0]
+                texel = (
+                    f"{', '.join(f'{number:.3g}' for number in value)} at uv = ({uv[lane, 0]:.3g}, {uv[lane, 1]:.3g})"
+                )
+                outcome.fault(words.format(name, got[lane, channel], texel, expected[lane, channel]), error.max())
         yield outcome.finding("As a texture it acts as its value at the point does.")
+
+
+def constants(params) -> list[str]:
+    """The keys of the values of textures that are the same everywhere."""
+    return [key for key in params.keys() if key.endswith(".value")]
+
+
+def _numbers(subject, part, wi, wo, uv) -> dict[str, np.ndarray]:
+    return {
+        "eval": subject.eval(part, wi, wo, uv),
+        "eval_diffuse_reflectance": subject.reflectance(wi, uv),
+    }
+
+
+PATTERN = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]], bool)
+"""In which texels of its columns a parameter differs: no turn, flip or shift of the square leaves it as it is."""
+
+
+def _points(count: int):
+    """``(uv, column)``: points in the texels of each parameter, at some distance from their edges."""
+    rows, width = PATTERN.shape
+    rng = np.random.default_rng(33)
+    texel = np.arange(max(COUNT, 200 * count)) % (count * width * rows)
+    inside = rng.uniform(0.02, 0.98, (2, len(texel)))
+    u = (texel % (count * width) + inside[0]) / (count * width)
+    v = (texel // (count * width) + inside[1]) / rows
+    return np.stack([u, v], axis=-1).astype(np.float32), texel % (count * width) // width
+
+
+def _is_changed(bitmap: dict[str, Any], changed, uv) -> np.ndarray:
+    """Where a bitmap has the changed value, in the opinion of Mitsuba's texture itself."""
+    texture, value = mi.load_dict(bitmap), numbers(changed, 1)[0]
+    si = interaction(np.float32([0, 0, 1]), uv)
+    texels = numbers(texture.eval_1(si) if len(value) == 1 else texture.eval_3(si), len(uv))
+    return (abs(texels - value) < 1e-5).all(axis=1)
 
 
 def _textured(given: dict[str, Any], originals: dict, changed: dict) -> tuple[dict[str, Any], list[str]]:
     """``(dict, refused)``: the BSDF with bitmaps for its parameters, but for those that it refuses: some take none, and
     of some pairs only one may be given."""
-    bitmaps = {
-        name: _bitmap([changed[name] if other == name else originals[name] for other in [None, *originals]])
-        for name in originals
-    }
+    bitmaps = {name: _bitmap(originals[name], changed[name], k, len(originals)) for k, name in enumerate(originals)}
     if _loads(given | bitmaps):
         return given | bitmaps, []
     refused = []
@@ -92,7 +138,11 @@ def _loads(given: dict[str, Any]) -> bool:
     return True
 
 
-def _bitmap(texels) -> dict[str, Any]:
-    """Texels side by side, without interpolation and conversion."""
-    data = np.stack([numbers(texel, 1)[0] for texel in texels])[None].astype(np.float32)
-    return {"type": "bitmap", "bitmap": mi.Bitmap(data), "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}
+def _bitmap(original, changed, k: int, count: int) -> dict[str, Any]:
+    """Texels without interpolation and conversion, in three columns for each of some parameters: the pattern in those
+    of parameter k."""
+    rows, width = PATTERN.shape
+    data = np.tile(numbers(original, 1)[0], (rows, width * count, 1))
+    data[:, width * k : width * (k + 1)][PATTERN] = numbers(changed, 1)[0]
+    bitmap = mi.Bitmap(data.astype(np.float32))
+    return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}

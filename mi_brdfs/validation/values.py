@@ -7,13 +7,7 @@ import numpy as np
 
 from .outcome import Findings, Outcome, relative
 from .report import Finding
-from .subject import Part, direction, hemisphere, on_side, random
-
-
-def angles_of(w) -> str:
-    """A direction in words."""
-    theta = np.degrees(np.arctan2(np.hypot(w[0], w[1]), w[2]))
-    return f"θ = {theta:.4g}°, φ = {np.degrees(np.arctan2(w[1], w[0])):.4g}°"
+from .subject import SCATTERED, Part, angles_of, direction, hemisphere, on_side, random
 
 
 def _pairs(part: Part) -> tuple[np.ndarray, np.ndarray]:
@@ -91,9 +85,9 @@ def horizon(run) -> Findings:
                         f"{angles_of(wo[where][k])}, {words} the horizon, where the flags allow nothing",
                         np.inf,
                     )
-            for incident in run.subject.incidents(part):
+            for incident in run.subject.views(part):
                 samples = run.samples(part, incident)
-                there = (samples.wo[:, 2] * incident.wi[2] > 0) == (words == "above")
+                there = (samples.wo[:, 2] * incident.wi[..., 2] > 0) == (words == "above")
                 lost = there & samples.lit
                 if lost.any():
                     outcome.fault(
@@ -101,13 +95,30 @@ def horizon(run) -> Findings:
                         f"a weight, where the flags allow nothing",
                         lost.sum(),
                     )
-        blind = [side for side in (1, -1) if side not in part.sides]
-        for side in blind:
-            unseen = np.ascontiguousarray(on_side(wi, side * np.sign(wi[0, 2])))[: len(wi) // 2]
-            value = run.subject.eval(part, unseen, wo[: len(unseen)])
-            if value.any():
-                outcome.fault("light from the side that the flags exclude is reflected")
+        for side in (1, -1):
+            if side not in run.subject.whole.sides:
+                _check_blind(run, outcome, part, side)
         yield outcome.finding("Nothing on the sides that the flags exclude.")
+
+
+def _check_blind(run, outcome, part: Part, side: int):
+    """Nothing may come of light from a side that the flags of all components exclude."""
+    wi, wo = (hemisphere(4000, seed) * np.float32([1, 1, side]) for seed in (2, 3))
+    wo[::2, 2] *= -1
+    samples = run.subject.sample(part, wi, random(4000, 4))
+    for name, values in (
+        ("eval", run.subject.eval(part, wi, wo).max(axis=1)),
+        ("pdf", run.subject.pdf(part, wi, wo)),
+        ("the weight of a sample", (samples.weight * samples.smooth[:, None]).max(axis=1)),
+    ):
+        if (values != 0).any():
+            k = int(np.argmax(values != 0))
+            towards = samples.wo[k] if "sample" in name else wo[k]
+            outcome.fault(
+                f"{name} is {values[k]:.4g} for light from {angles_of(wi[k])} towards {angles_of(towards)}, but its "
+                f"flags say that it cannot be seen from {'the front' if side > 0 else 'behind'}",
+                np.inf,
+            )
 
 
 def support(run) -> Findings:
@@ -115,18 +126,23 @@ def support(run) -> Findings:
     count."""
     for part in run.subject.parts:
         outcome, tried = Outcome("support", part.name), 0
-        for incident in run.subject.incidents(part):
-            wo = np.concatenate([hemisphere(8000, 3), run.samples(part, incident).wo[:8000]])
+        for incident in run.subject.views(part):
+            lanes = np.arange(SCATTERED) % 2 == 0
+            own = np.sign(incident.wi[..., 2:]) * np.float32([0, 0, 1]) + np.float32([1, 1, 0])
+            wo = [np.where(lanes[:, None], hemisphere(SCATTERED, 3) * own, run.samples(part, incident).wo)]
             if part.has(mi.BSDFFlags.Transmission):
-                wo = np.concatenate([wo, on_side(hemisphere(8000, 4), -1)])
-            value = np.nan_to_num(run.subject.eval(part, incident.wi, wo).max(axis=1))
-            pdf = run.subject.pdf(part, incident.wi, wo)
+                wo.append(on_side(wo[0], -1))
+            wo = np.concatenate(wo).astype(np.float32)
+            wi = incident.at(np.arange(len(wo)) % SCATTERED)
+            value = np.nan_to_num(run.subject.eval(part, wi, wo).max(axis=1))
+            pdf = run.subject.pdf(part, wi, wo)
             missed = (value > 1e-9 * value.max()) & ~(pdf > 0)
             tried += len(wo)
             if missed.any():
                 k = int(np.argmax(np.where(missed, value, 0)))
                 outcome.fault(
-                    f"for light from {incident.name} eval is {value[k]:.4g} towards {angles_of(wo[k])}, but pdf is 0: "
+                    f"for light from {incident.of(k % SCATTERED)} eval is {value[k]:.4g} towards {angles_of(wo[k])}, "
+                    "but pdf is 0: "
                     "this light is never sampled",
                     missed.sum(),
                 )
@@ -138,23 +154,24 @@ def eval_pdf(run) -> Findings:
     float32's rounding: some plugins compute a shared term differently."""
     for part in run.subject.parts:
         outcome, tolerance, worst = Outcome("eval_pdf", part.name), run.subject.rounding(part), 0.0
-        for incident in run.subject.incidents(part):
-            wi, u = incident.wi, random(4000, 6)
+        for incident in run.subject.views(part):
+            lanes = np.arange(0, SCATTERED, 8)
+            wi, u = incident.at(lanes), random(len(lanes), 6)
             samples = run.subject.sample(part, wi, u)
-            wo = np.where(np.arange(4000)[:, None] % 2, samples.wo, hemisphere(4000, 7)).astype(np.float32)
+            wo = np.where(np.arange(len(u))[:, None] % 2, samples.wo, hemisphere(len(u), 7)).astype(np.float32)
             value, density = run.subject.eval(part, wi, wo), run.subject.pdf(part, wi, wo)
             pair, triple = run.subject.eval_pdf(part, wi, wo), run.subject.eval_pdf_sample(part, wi, wo, u)
-            drawn = samples.drawn
+            drawn, every = np.flatnonzero(samples.drawn), np.arange(len(u))
             comparisons = [
-                ("eval_pdf", "eval", pair[0], value),
-                ("eval_pdf", "pdf", pair[1], density),
-                ("eval_pdf_sample", "eval", triple[0], value),
-                ("eval_pdf_sample", "pdf", triple[1], density),
-                ("eval_pdf_sample", "sample's density", triple[3][drawn], samples.density[drawn]),
-                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight),
-                ("eval_pdf_sample", "sample's direction", triple[2][drawn] + 2.0, samples.wo[drawn] + 2.0),
+                ("eval_pdf", "eval", pair[0], value, every),
+                ("eval_pdf", "pdf", pair[1], density, every),
+                ("eval_pdf_sample", "eval", triple[0], value, every),
+                ("eval_pdf_sample", "pdf", triple[1], density, every),
+                ("eval_pdf_sample", "sample's density", triple[3][drawn], samples.density[drawn], drawn),
+                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, every),
+                ("eval_pdf_sample", "sample's direction", triple[2][drawn] + 2.0, samples.wo[drawn] + 2.0, drawn),
             ]
-            for name, of, got, expected in comparisons:
+            for name, of, got, expected, which in comparisons:
                 error = relative(got, expected)
                 if not error.size:
                     continue
@@ -162,7 +179,8 @@ def eval_pdf(run) -> Findings:
                 if error.max() > tolerance:
                     k = np.unravel_index(int(np.argmax(error)), error.shape)
                     outcome.fault(
-                        f"for light from {incident.name} {name} gives {got[k]:.6g} where {of} is {expected[k]:.6g}",
+                        f"for light from {incident.of(lanes[which[k[0]]])} {name} gives {got[k]:.6g} where {of} is "
+                        f"{expected[k]:.6g}",
                         error.max(),
                     )
         yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
@@ -202,14 +220,16 @@ def reciprocity(run) -> Findings:
 
 STEP = 5e-4
 """The distance, in radians, over which ``continuity`` looks for jumps: the cosine of a smaller one is 1 in float32."""
+OCTAVES = 16, 8, 4, 2, 1, 0.5
+"""The heights above the horizon that it looks at, in such steps."""
 
 
 def continuity(run) -> Findings:
     """Values do not jump where formulas treat directions apart: at exactly normal incidence and reflection, and where
     azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides (or, of narrow
     lobes, a twentieth of their width), to float32's rounding and for all but one pair in a hundred; or it comes nearer
-    to that the smaller the angle is. And from 0.03° above the horizon to half of it, eval changes at most as a fifth
-    power does."""
+    to that the smaller the angle is. And as the height above the horizon halves, from 0.5° to 0.01°, eval does not
+    change by more than a fifth power does, unless it does so before and after, too."""
     for part in run.subject.parts:
         outcome, worst = Outcome("continuity", part.name), 0.0
         step = min(STEP, run.subject.spread(part) / 20)
@@ -230,18 +250,29 @@ def continuity(run) -> Findings:
                             typical,
                         )
             for phi in (0, 77):
-                heights = [on_side(direction(90 - np.degrees(STEP) / over, phi), side) for over in (1, 2)]
-                for word, values in _both_ways(run, part, heights, on_side(hemisphere(2000, 23), side)):
-                    values = np.nan_to_num(values)
-                    lit = values.max(axis=0) > 1e-9 * values.max()
-                    if not lit.any():
-                        continue
-                    ratio = values.max(axis=0)[lit] / np.maximum(values.min(axis=0)[lit], 1e-38)
-                    if np.quantile(ratio, 0.99) > 2**5:
-                        largest = ratio.max()
-                        outcome.fault(f"eval jumps by the factor {largest:.3g} for light {word} grazing", largest)
+                heights = [on_side(direction(90 - np.degrees(STEP) * times, phi), side) for times in OCTAVES]
+                for word, values in _both_ways(run, part, heights, on_side(hemisphere(1000, 23), side)):
+                    _check_octaves(outcome, word, np.nan_to_num(values))
         yield outcome.finding(
             f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
+        )
+
+
+def _check_octaves(outcome, word: str, values):
+    """Faults for values that change far more while the height above the horizon halves than while it halves before
+    and after: a power of the height changes alike."""
+    high, low = np.maximum(values[:-1], values[1:]), np.minimum(values[:-1], values[1:])
+    change = np.log(np.maximum(high, 1e-38) / np.maximum(low, 1e-38))
+    lit = high > 1e-2 * values.max()  # a soft edge may end between two heights
+    beside = np.pad(change, ((1, 1), (0, 0)))
+    jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
+    if (jump.sum(axis=1) > 0.01 * np.maximum(lit.sum(axis=1), 1)).any():
+        octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
+        upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
+        factor = np.exp(change[octave, k])
+        outcome.fault(
+            f"eval jumps by the factor {factor:.3g} for light {word} {upper:.3g}° to {lower:.3g}° above the horizon",
+            factor,
         )
 
 
