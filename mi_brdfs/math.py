@@ -87,11 +87,11 @@ def log1p_ratio(x):
     return dr.select(small, _log1p_series(near), dr.log(1 + far) / far)
 
 
-def expm1_ratio(x):
-    """(exp(x) - 1)/x, and its limit 1 at x = 0."""
+def expm1_ratio(x, shift=0, scale=1):
+    """(exp(x) - 1)/x, and its limit 1 at x = 0, times ``scale`` = exp(-``shift``)."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
-    return dr.select(small, _expm1_series(near), (dr.exp(far) - 1) / far)
+    return dr.select(small, _expm1_series(near) * scale, (dr.exp(far - shift) - scale) / far)
 
 
 def _log1p_series(x):
