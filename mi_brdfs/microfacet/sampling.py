@@ -125,7 +125,7 @@ def draw_tilted(tilt, u):
 def reflected(lobe, facet):
     """What a facet reflects, ``lobe.over_facets``, or next to nothing if that leads below the horizon. It is never
     zero: the derivative of a share in what a pair reflects divides by the square of that."""
-    valid = (facet.cos_d > 0) & (facet.cos_o > 0)
+    valid = (facet.cos_d > 1e-9) & (facet.cos_o > 0)
     # Elsewhere the formulas need not make sense: give them the mirror direction.
     normal = mi.Vector3f(0, 0, 1)
     safe = Facet(

@@ -189,7 +189,7 @@ class SheenLobe(Lobe):
         value = schlick_weight(safe_sqrt(0.5 * (1 - cos))) * wo.z
 
         shape_a, shape_b = self._shape(wi)
-        y = dr.minimum(0.5 * dr.squared_norm(wo - wi) / (1 + frame.sin), 1 - 1e-6)
+        y = dr.clip(0.5 * dr.squared_norm(wo - wi) / (1 + frame.sin), 1e-9, 1 - 1e-6)
         power = dr.power(y, shape_a - 1)
         density = shape_a * shape_b * power * dr.power(1 - power * y, shape_b - 1) / (1 + frame.sin)
 
