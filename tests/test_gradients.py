@@ -133,6 +133,31 @@ def test_parameters_at_their_limits_can_be_optimised():
         assert dr.grad(params["reflectance.value"]).numpy() == pytest.approx(1 / np.pi)
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "bsdf, key, theta",
+    [
+        ({"type": "burley", "metallic": 1, "roughness": 0.02}, "roughness", 30),
+        ({"type": "cooktorrance", "distribution": "blinn", "alpha": 1.5}, "alpha", 70),
+        ({"type": "lafortune", "normalization": "none", "exponent": 1000, "cz": 1.5}, "exponent", 0),
+        ({"type": "lafortune", "normalization": "none", "exponent": 1000, "cz": 1.5}, "cz", 0),
+    ],
+)
+def test_limits_within_models_can_be_left(bsdf, key, theta):
+    """A parameter may be within its range, but what a model makes of it be limited: the derivatives that lead back from
+    there remain."""
+    azimuth = 180 if bsdf["type"] == "burley" else 0  # the mirror direction, where a wider lobe is darker
+    bsdf = mi.load_dict(bsdf)
+    params = mi.traverse(bsdf)
+    key = f"{key}.value"
+    dr.enable_grad(params[key])
+    params.update()
+    wi, wo = direction(theta), direction(theta, azimuth)
+    dr.backward(bsdf.eval(mi.BSDFContext(), interaction(wi), mi.Vector3f(wo), True)[0])
+    derivative = dr.grad(params[key]).numpy().item()
+    assert np.isfinite(derivative) and derivative != 0
+
+
 # --- Derivatives of the BSDFs themselves ----------------------------------------------------------------------------
 
 

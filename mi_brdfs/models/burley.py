@@ -5,7 +5,7 @@ import mitsuba as mi
 
 from ..lobes import DimmedLobe, Lobe
 from ..lobes.mirror import AxisFrame
-from ..math import choose, luminance, safe_sqrt, square
+from ..math import choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
@@ -101,7 +101,7 @@ class Burley(Model):
         dielectric = 1 - p.metallic
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)
         alpha, aspect = square(p.roughness), dr.sqrt(1 - 0.9 * p.anisotropic)
-        alpha = dr.maximum(0.001, alpha / aspect), dr.maximum(0.001, alpha * aspect)
+        alpha = [clamp(along, 0.001, dr.inf) for along in (alpha / aspect, alpha * aspect)]
         lobes = [BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface)]
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
