@@ -117,8 +117,8 @@ class ModelBSDF:
             wo, index = mixture.sample(sample1, sample2)
             wo = frame.to_world(wo)
         value, pdf = self._eval_pdf(valid, mixture, frame, wo)
-        # Scalar variants have floats so small that float32, of which colours are, is 0 there.
-        drawn, density = pdf > 1e-37, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
+        # Drop what is hardly ever drawn: the derivatives of its weight would overflow.
+        drawn, density = pdf > 1e-15, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
         weight = value / select(drawn, density, 1)
 
         bs.wo, bs.pdf, bs.eta = wo, pdf, 1

@@ -3,6 +3,7 @@
 Narrow lobes live in the last bits of a cosine: (N·H)^n at n = 1e5, or a GGX peak at alpha = 1e-3, lose all their digits
 when computed from N·H itself. The functions below take what does keep its digits, such as sin²θ or |i - R|².
 They work on every variant's floats and spectra, and their derivatives are finite wherever their values are.
+Keep divisors above 1e-18: the derivative of a quotient divides by their square, which below that is no float32.
 """
 
 from __future__ import annotations
@@ -86,11 +87,11 @@ def log1p_ratio(x):
     return dr.select(small, _log1p_series(near), dr.log(1 + far) / far)
 
 
-def expm1_ratio(x):
-    """(exp(x) - 1)/x, and its limit 1 at x = 0."""
+def expm1_ratio(x, shift=0, scale=1):
+    """(exp(x) - 1)/x, and its limit 1 at x = 0, times ``scale`` = exp(-``shift``)."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
-    return dr.select(small, _expm1_series(near), (dr.exp(far) - 1) / far)
+    return dr.select(small, _expm1_series(near) * scale, (dr.exp(far - shift) - scale) / far)
 
 
 def _log1p_series(x):
@@ -118,10 +119,16 @@ def safe_sqrt(x):
     return dr.select(positive, dr.sqrt(dr.select(positive, x, 1)), 0)
 
 
+def sin_theta(w):
+    """sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least 1e-15, where its derivative
+    is 0."""
+    return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, 1e-30))
+
+
 def normalize_or(x, y, fallback: tuple[float, float]):
-    """The 2-vector (x, y) scaled to length one, or ``fallback`` where its length is zero."""
+    """The 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
     length2 = x * x + y * y
-    valid = length2 > 1e-30  # smaller ones may have lost a square to underflow
+    valid = length2 > 1e-24  # the derivative has length⁻³
     scale = dr.rsqrt(dr.select(valid, length2, 1))
     return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
 

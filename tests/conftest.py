@@ -8,6 +8,17 @@ import mi_brdfs  # noqa: F401
 mi.set_variant("scalar_rgb")  # variant_context needs one to return to
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--derivative-lanes", type=int, default=1 << 16, help="inputs for which fuzzing takes the derivatives of a BSDF"
+    )
+
+
+@pytest.fixture
+def derivative_lanes(request):
+    return request.config.getoption("derivative_lanes")
+
+
 @pytest.fixture
 def llvm_rgb():
     """The variant that most tests run in."""

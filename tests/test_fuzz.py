@@ -248,6 +248,29 @@ class Subject:
         dr.eval(found)
         return {part: {name: numbers(x) for name, x in answers.items()} for part, answers in found.items()}
 
+    def derivatives(self, mode):
+        """Those of all that the methods answer together, by name of the input; in forward mode for all of these at
+        once."""
+        self.enter()
+        si, wo = interaction(self.wi), mi.Vector3f(self.wo.T)
+        u, *v = self.u.T
+        inputs = {name: texture.value for name, texture in self.textures.items()} | {"wi": si.wi, "wo": wo}
+        dr.enable_grad(inputs)
+        value, pdf, sample, weight = self.bsdf.eval_pdf_sample(
+            context(), si, wo, mi.Float(u), mi.Point2f(np.array(v)), True
+        )
+        total = mi.luminance(value) + pdf + sample.pdf + mi.luminance(weight)
+        if mode == "reverse":
+            dr.backward(total)
+            derivatives = dr.grad(inputs)
+        else:
+            for x in inputs.values():
+                dr.set_grad(x, 1)
+            dr.forward_to(total)
+            derivatives = {"all inputs": dr.grad(total)}
+        dr.eval(derivatives)
+        return {name: numbers(derivative) for name, derivative in derivatives.items()}
+
     def reproduction(self, part, lane):
         """The call that shows a lane alone."""
         given = dict(self.given)
@@ -327,21 +350,28 @@ def test_values_of_a_scalar_variant(model, options):
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model, options", CASES)
-def test_derivatives(model, options):
-    """Finite, for every quantity."""
+def test_derivatives(model, options, derivative_lanes):
+    """Finite, for every quantity and both directions: those of the value and of the density, which the weights of
+    multiple importance sampling have in them, and those of a sample's weight and density."""
+    fuzz_derivatives(model, options, "reverse", derivative_lanes)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.plugins[0])
+def test_derivatives_forward(model, derivative_lanes):
+    """In forward mode other terms overflow."""
+    fuzz_derivatives(model, ways(model.declared())[0], "forward", derivative_lanes)
+
+
+def fuzz_derivatives(model, options, mode, count):
     subject = Subject(model, options, largest=1e3)
 
-    @examples(4, lanes(options))
+    @examples(-(-count // subject.lanes), lanes(options))
     def fuzz(drawn):
         subject.fill(*drawn)
-        subject.enter()
-        values = {name: texture.value for name, texture in subject.textures.items()}
-        dr.enable_grad(values)
-        dr.backward(subject.bsdf.eval(context(), interaction(subject.wi), mi.Vector3f(subject.wo.T), True))
-        derivatives = dr.grad(values)
-        dr.eval(derivatives)
-        for name, derivative in derivatives.items():
-            wrong = ~np.isfinite(numbers(derivative)).all(axis=1)
+        for name, derivative in subject.derivatives(mode).items():
+            wrong = ~np.isfinite(derivative).all(axis=1)
             assert not wrong.any(), f"the derivative for {name}: {subject.reproduction(None, np.argmax(wrong))}"
 
     fuzz()

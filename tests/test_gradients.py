@@ -4,8 +4,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import SMOOTH, mostly_slow
-from support import direction, interaction
+import reference
+from catalogue import ROWS, SMOOTH, mostly_slow
+from support import direction, hemisphere, interaction
 
 LINEAR = ("reflectance", "subsurface", "metallic", "specular.", "tint", "sheen", "clearcoat.")
 """Parts of the keys of parameters in which a picture is linear or quadratic: a central difference is exact."""
@@ -15,7 +16,10 @@ NOISY = ("burley", "kurt two lobes", "walter dielectric")
 differences noisy."""
 
 
-def scene_of(bsdf):
+PATHS = {"type": "prb", "max_depth": 3}
+
+
+def scene_of(bsdf, integrator):
     """A sphere under a point light, where a highlight has no noise, and a sky with a broad bright spot, where both the
     light and the BSDF are sampled."""
     v, u = np.mgrid[0:16, 0:32]
@@ -24,7 +28,7 @@ def scene_of(bsdf):
     return mi.load_dict(
         {
             "type": "scene",
-            "integrator": {"type": "prb", "max_depth": 3},
+            "integrator": integrator,
             "sensor": {
                 "type": "perspective",
                 "fov": 22,
@@ -51,8 +55,8 @@ def test_prb_agrees_with_finite_differences(name):
     """
     turned = {"rotation": SMOOTH[name]["rotation"] + 0.05} if "rotation" in SMOOTH[name] else {}
     spp = 1 << (14 if name in NOISY else 12)
-    weights = dr.square(mi.render(scene_of({**SMOOTH[name], **turned}), spp=spp, seed=99))
-    scene = scene_of(SMOOTH[name])
+    weights = dr.square(mi.render(scene_of({**SMOOTH[name], **turned}, PATHS), spp=spp, seed=99))
+    scene = scene_of(SMOOTH[name], PATHS)
     params = mi.traverse(scene)
 
     def loss(**seeds):
@@ -127,3 +131,204 @@ def test_parameters_at_their_limits_can_be_optimised():
         params.update()
         dr.backward(bsdf.eval(mi.BSDFContext(), interaction(direction(0)), mi.Vector3f(0, 0, 1), True)[0])
         assert dr.grad(params["reflectance.value"]).numpy() == pytest.approx(1 / np.pi)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "bsdf, key, theta",
+    [
+        ({"type": "burley", "metallic": 1, "roughness": 0.02}, "roughness", 30),
+        ({"type": "cooktorrance", "distribution": "blinn", "alpha": 1.5}, "alpha", 70),
+        ({"type": "lafortune", "normalization": "none", "exponent": 1000, "cz": 1.5}, "exponent", 0),
+        ({"type": "lafortune", "normalization": "none", "exponent": 1000, "cz": 1.5}, "cz", 0),
+    ],
+)
+def test_limits_within_models_can_be_left(bsdf, key, theta):
+    """A parameter may be within its range, but what a model makes of it be limited: the derivatives that lead back from
+    there remain."""
+    azimuth = 180 if bsdf["type"] == "burley" else 0  # the mirror direction, where a wider lobe is darker
+    bsdf = mi.load_dict(bsdf)
+    params = mi.traverse(bsdf)
+    key = f"{key}.value"
+    dr.enable_grad(params[key])
+    params.update()
+    wi, wo = direction(theta), direction(theta, azimuth)
+    dr.backward(bsdf.eval(mi.BSDFContext(), interaction(wi), mi.Vector3f(wo), True)[0])
+    derivative = dr.grad(params[key]).numpy().item()
+    assert np.isfinite(derivative) and derivative != 0
+
+
+# --- Derivatives of the BSDFs themselves ----------------------------------------------------------------------------
+
+
+def unit(w):
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)
+
+
+def pairs_of_directions(count=500):
+    """``(wi, wo, kinked)``: pairs at random, near and at the mirror direction, back where wi came from, and along and
+    near the normal; and where f may have a kink."""
+    rng = np.random.default_rng(1)
+
+    def near(w, spread):
+        close = unit(w + spread * rng.normal(size=w.shape))
+        close[:, 2] = abs(close[:, 2])
+        return close
+
+    wi, wo = np.float64(hemisphere(count, 2, 0.05)), np.float64(hemisphere(count, 3, 0.05))
+    normal, mirror = np.tile([0.0, 0.0, 1.0], (count, 1)), wi * [-1, -1, 1]
+    smooth = [(wi, wo), (wi, near(mirror, 0.05)), (normal, wo), (wi, normal), (near(normal, 1e-4), wo)]
+    kinked = [(wi, mirror), (wi, wi)]
+    wi, wo = (np.float32(np.concatenate(part)) for part in zip(*smooth, *kinked, strict=True))
+    return wi, wo, np.arange(len(wi)) >= len(smooth) * count
+
+
+FIRST_ROWS = {row.name.split()[0]: row for row in reversed(ROWS)}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("row", [*FIRST_ROWS.values(), *(row for row in ROWS if row.name == "orennayar full")], ids=str)
+def test_derivatives_for_the_directions_agree_with_the_reference(row):
+    """Those of eval along tangents of wi and wo, to 2 %, against differences of the float64 reference; at a kink, what
+    lies between those to the two sides will do."""
+    wi, wo, kinked = pairs_of_directions()
+    bsdf, rng = mi.load_dict(row.bsdf), np.random.default_rng(4)
+    si, towards = interaction(wi), mi.Vector3f(wo.T)
+    inputs = {"wi": si.wi, "wo": towards}
+    dr.enable_grad(inputs)
+    dr.backward(bsdf.eval(mi.BSDFContext(), si, towards, True)[0], flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
+    for name, w in (("wi", wi), ("wo", wo)):
+        w = np.float64(w)
+        tangent = rng.normal(size=w.shape)
+        tangent = unit(tangent - w * np.sum(tangent * w, axis=1, keepdims=True))
+        derivative = np.sum(dr.grad(inputs[name]).numpy().T * tangent, axis=1)
+
+        def value(shift, name=name, w=w, tangent=tangent):
+            moved = unit(w + shift[:, None] * tangent)
+            return row.reference(moved, wo) if name == "wi" else row.reference(wi, moved)
+
+        step = np.where(kinked, 1e-4, 2e-6)  # at a kink longer than the float32 directions are off it
+        here = value(0 * step)
+        above, below = (value(step) - here) / step, (here - value(-step)) / step
+        expected = np.clip(derivative, np.minimum(above, below), np.maximum(above, below))
+        scale = abs(expected) + 1e-3 * here + 1e-4 * abs(expected).max()
+        assert (abs(derivative - expected) < 0.02 * scale).all(), name
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("kappa", [-80.0, 0.0, 40.0, 55.0, 65.0, 80.0])
+def test_derivatives_of_a_high_peak(kappa):
+    """Of Nishino's distribution, of which the integral without its factor 1/C grows like exp(κ)."""
+    wi, wo, _ = pairs_of_directions()
+    bsdf = mi.load_dict({"type": "nishino", "gamma": 20.0, "kappa": kappa})
+    params = mi.traverse(bsdf)
+    dr.enable_grad(params["kappa.value"])
+    params.update()
+    value = bsdf.eval(mi.BSDFContext(), interaction(wi), mi.Vector3f(wo.T), True)[0]
+    dr.forward(params["kappa.value"])
+    step = 1e-3
+    expected = [
+        reference.nishino(wi, wo, 0, 1, k, 20, "microfacet", np.ones_like) for k in (kappa + step, kappa - step)
+    ]
+    expected = (expected[0] - expected[1]) / (2 * step)
+    np.testing.assert_allclose(dr.grad(value).numpy(), expected, rtol=1e-3, atol=1e-4 * abs(expected).max())
+
+
+# --- Scenes that had none -------------------------------------------------------------------------------------------
+
+
+def differences(params, key, entries, step, loss):
+    """Central differences of a loss for some entries of a parameter."""
+    original = np.array(params[key])
+    found = []
+    for entry in entries:
+        losses = []
+        for shift in (step, -step):
+            moved = original.copy()
+            moved.ravel()[entry] += shift
+            params[key] = type(params[key])(moved)
+            params.update()
+            losses.append(loss())
+        found.append((losses[0] - losses[1]) / (2 * step))
+    params[key] = type(params[key])(original)
+    params.update()
+    return found
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("bsdf", [{"type": "orennayar", "model": "full"}, {"type": "roughdiffuse", "alpha": 0.6}])
+def test_a_plane_seen_from_straight_above(bsdf):
+    """There wi is the normal: the gradients for a normal map and for the heights of the vertices, by a light that makes
+    no noise."""
+    bitmap = mi.Bitmap(np.tile(np.float32([0.5, 0.5, 1]), (2, 2, 1)))
+    normalmap = {"type": "bitmap", "raw": True, "filter_type": "nearest", "bitmap": bitmap}
+    props = mi.Properties()
+    props["bsdf"] = mi.load_dict({"type": "normalmap", "normalmap": normalmap, "nested": bsdf})
+    mesh = mi.Mesh("plane", 4, 2, has_vertex_texcoords=True, props=props)
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = [-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]
+    params["vertex_texcoords"] = [0, 0, 1, 0, 1, 1, 0, 1]
+    params["faces"] = [0, 1, 2, 0, 2, 3]
+    params.update()
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "direct"},
+            "sensor": {
+                "type": "orthographic",
+                "to_world": mi.ScalarTransform4f().look_at([0, 0, 3], [0, 0, 0], [0, 1, 0]),
+                "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}},
+            },
+            "plane": mesh,
+            "light": {"type": "point", "position": [0.3, 0.2, 2]},
+        }
+    )
+    params = mi.traverse(scene)
+    weights = np.random.default_rng(1).random((4, 4, 3), np.float32)
+
+    def picture(**seeds):
+        return mi.render(scene, params, spp=16, **seeds)
+
+    keys = {"plane.bsdf.normalmap.data": range(12), "plane.vertex_positions": range(2, 12, 3)}
+    for key in keys:
+        dr.enable_grad(params[key])
+    params.update()
+    dr.backward(dr.sum(picture(seed=2, seed_grad=1) * mi.TensorXf(weights), axis=None))
+    gradients = {key: np.array(dr.grad(params[key])).ravel()[entries] for key, entries in keys.items()}
+    for key in keys:
+        dr.disable_grad(params[key])
+    for key, entries in keys.items():
+        expected = differences(params, key, entries, 1e-3, lambda: np.sum(np.float64(picture(seed=1)) * weights))
+        np.testing.assert_allclose(gradients[key], expected, rtol=0.02, atol=0.01 * np.abs(expected).max(), err_msg=key)
+
+
+WITH_STEPS = {
+    "brady": SMOOTH["brady unit"],
+    "epd": {"type": "microfacet", "distribution": "epd", "shadowing": "vcavity", "alpha": 0.3, "gamma": 0.6},
+}
+"""Those whose density is one of steps."""
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("bsdf", WITH_STEPS.values(), ids=WITH_STEPS)
+def test_direct_agrees_with_finite_differences(bsdf):
+    """Its weights of multiple importance sampling have derivatives of the density in them."""
+    scene = scene_of(bsdf, {"type": "direct"})
+    params = mi.traverse(scene)
+
+    def loss(**seeds):
+        return dr.mean(dr.square(mi.render(scene, params, spp=1024, **seeds)), axis=None)
+
+    keys = [f"shape.bsdf.{name}.value" for name in ("exponent", "beta", "alpha", "gamma") if name in bsdf]
+    for key in keys:
+        dr.enable_grad(params[key])
+    params.update()
+    dr.backward(loss(seed=2, seed_grad=1))
+    gradients = {key: dr.grad(params[key]).numpy().item() for key in keys}
+    for key in keys:
+        dr.disable_grad(params[key])
+    for key in keys:
+        (expected,) = differences(
+            params, key, [0], 0.03 * params[key].numpy().item(), lambda: loss(seed=1).numpy().item()
+        )
+        assert gradients[key] == pytest.approx(expected, rel=0.05), key

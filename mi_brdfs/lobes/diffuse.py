@@ -66,7 +66,7 @@ class AdjointZonalLobe(AdjointLobe):
 
     def _radiance(self, wi):
         """What a lobe of an albedo of 1 makes of light from ``wi``, times π."""
-        return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, 1e-20)
+        return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, 1e-15)
 
     def albedo(self, wi):
         return self.lobe.albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)

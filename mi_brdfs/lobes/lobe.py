@@ -70,7 +70,7 @@ class AdjointLobe(Lobe):
     def eval_pdf(self, wi, wo):
         value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))
         _, pdf = self.lobe.eval_pdf(wi, wo)
-        return value * (abs(wo.z) / dr.maximum(wi.z, 1e-20)), pdf
+        return value * (abs(wo.z) / dr.maximum(wi.z, 1e-15)), pdf
 
     def sample(self, wi, u, v):
         return self.lobe.sample(wi, u, v)

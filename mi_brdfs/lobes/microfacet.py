@@ -25,8 +25,8 @@ class MicrofacetLobe(Lobe):
 
     def eval_pdf(self, wi, wo):
         facet = Facet.between(wi, wo)
-        value = self.reflectance * (self.fresnel(facet.cos_d) * self._facets(facet))
-        return value, self.sampler.pdf(self, facet)
+        facets = self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
+        return self.reflectance * (self.fresnel(facet.cos_d) * facets), self.sampler.pdf(self, facet)
 
     def sample(self, wi, u, v):
         return self.sampler.sample(self, wi, u, v)
@@ -34,16 +34,9 @@ class MicrofacetLobe(Lobe):
     def mirror_reflectance(self, wi):
         return self.colour * self.fresnel(wi.z)
 
-    def _facets(self, facet):
-        """f cosθ_o for ρ = F = 1."""
-        return self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
-
-    def response(self, facet):
-        """f cosθ_o for ρ = 1, as the one number that samplers go by."""
-        return self.fresnel.brightness(facet.cos_d) * self._facets(facet)
-
     def over_facets(self, facet):
-        """``response``·4cosθ_d/D, which with D/q makes the weight of a half vector of the density q."""
+        """f cosθ_o·4cosθ_d/D for ρ = 1, as the one number that samplers go by: with D/q it makes the weight of a half
+        vector of the density q."""
         return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet) * facet.cos_d / facet.cos_i
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, expm1, log1p, normalize_or, safe_sqrt
+from ..math import choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
 from .lobe import Lobe
 
 
@@ -18,7 +18,7 @@ class AxisFrame:
 
     def __init__(self, axis):
         self.axis = axis
-        self.sin = dr.sqrt(axis.x * axis.x + axis.y * axis.y)
+        self.sin = sin_theta(axis)
         x, y = normalize_or(axis.x, axis.y, (1, 0))
         self.up = mi.Vector3f(-axis.z * x, -axis.z * y, self.sin)
         self.side = mi.Vector3f(-y, x, 0)
@@ -78,7 +78,7 @@ class PowerLobe(MirrorLobe):
 
     def _share(self, frame):
         upright, tilted = self._masses(frame)
-        return upright / dr.maximum(upright + tilted, 1e-30)  # an axis straight below the surface has neither
+        return upright / dr.maximum(upright + tilted, 1e-15)  # an axis straight below the surface has neither
 
     def albedo(self, wi):
         # Exact where the axis lies along the normal or in the horizon.
@@ -93,12 +93,12 @@ class PowerLobe(MirrorLobe):
         sin = dr.sqrt(dr.maximum(versine * (2 - versine), 1e-30))
         cos_phi = dr.minimum(abs(dr.dot(wo - frame.axis, frame.up)) / sin, 1)
         upright = (n + 2) * (1 - versine)
-        tilted = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 0)) * cos_phi
+        tilted = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 1e-30)) * cos_phi
         share = self._share(frame)
         pair = power * dr.inv_pi * (share * upright + (1 - share) * tilted)
         return (
             self.reflectance * (self.peak(wi) * power * wo.z),
-            pair * wo.z / (wo.z + frame.mirrored_z(wo, versine)),
+            pair * wo.z / dr.maximum(wo.z + frame.mirrored_z(wo, versine), 1e-15),
         )
 
     def sample(self, wi, u, v):

@@ -24,7 +24,7 @@ class Mixture:
             counts = [select(mirrored, 1.0, 0.0) if it.transmits else select(mirrored, 0.0, 1.0) for it in lobes]
         energies = [count * luminance(lobe.albedo(wi)) for count, lobe in zip(counts, lobes, strict=True)]
         total = sum(energies)
-        black = total <= 0
+        black = total < 1e-9  # derivatives divide by its square
         scale = dr.rcp(dr.select(black, sum(counts), total))
         self.probabilities = [
             dr.select(black, count, energy) * scale for count, energy in zip(counts, energies, strict=True)

@@ -46,9 +46,9 @@ class Distribution:
         """D(h)."""
         raise NotImplementedError
 
-    def over_density(self, tan2, g):
-        """D(h)/q(h) on the line; by default q = D cosθ_h."""
-        return dr.sqrt(1 + tan2)
+    def density(self, facet, g):
+        """q(h); by default D cosθ_h."""
+        return self.eval(facet) * facet.cos_h
 
     def cdf(self, tan2, g):
         """``(C, 1 - C)``: the cumulative distribution in t on the line, to 1e-7, and its complement with digits of its
@@ -144,8 +144,8 @@ class AshikhminShirley(Distribution):
         exponent = (self.steepness(facet) - sin2) * dr.select(sin2 < 0.5, near, far)
         return dr.inv_two_pi / (self.alpha_u * self.alpha_v) * dr.exp(exponent)
 
-    def over_density(self, tan2, g):
-        return mi.Float(1)
+    def density(self, facet, g):
+        return self.eval(facet)
 
     def cdf(self, tan2, g):
         return cosine_power_cdf(tan2, g)
@@ -257,8 +257,8 @@ class ABC(Isotropic):
     def eval(self, facet):
         return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
 
-    def over_density(self, tan2, g):
-        return self.scale * self.law.norm * dr.two_pi
+    def density(self, facet, g):
+        return self.law.eval(versine(facet.cos_h, facet.sin2_h)) * dr.inv_two_pi / self.law.norm
 
     def cdf(self, tan2, g):
         c = clamp(self.law.mass(versine_of_tan2(tan2)) / self.law.norm, 0, 1)
@@ -275,27 +275,28 @@ class BentLaw:
 
     def __init__(self, kappa):
         self.rises = kappa >= 0
-        self.kappa, self.k = dr.maximum(kappa, 0), dr.maximum(-kappa, 0)
-        self.norm = dr.select(self.rises, expm1_ratio(self.kappa), log1p_ratio(self.k))
-        self.norm_above = expm1_ratio(-self.kappa)
+        self.kappa, self.k = dr.select(self.rises, kappa, 0), dr.select(self.rises, 0, -kappa)
+        # Of exp(-κ m): exp(κ s) leaves the range of float32, or its derivative does.
+        self.norm = dr.select(self.rises, expm1_ratio(-self.kappa), log1p_ratio(self.k))
 
-    def eval(self, s):
-        return dr.select(self.rises, dr.exp(self.kappa * s), 1 / (1 + self.k * s)) / self.norm
+    def eval(self, m, s):
+        return dr.select(self.rises, dr.exp(-self.kappa * m), 1 / (1 + self.k * s)) / self.norm
 
     def cdf(self, m, s):
         """``(c, 1 - c)``, where c is the mass above s."""
         above = (m < 0.5) & (self.kappa * m < 0.7)
         up, down = m / (1 + self.k), s
-        exponential = expm1_ratio(dr.select(above, -m, s) * self.kappa) / dr.select(above, self.norm_above, self.norm)
-        rational = log1p_ratio(dr.select(above, -up, down) * self.k) / self.norm
-        mass = dr.select(self.rises, exponential * dr.select(above, m, s), rational * dr.select(above, up, down))
+        weight = dr.select(above, m, s * dr.exp(-self.kappa * m))
+        exponential = expm1_ratio(-self.kappa * dr.select(above, m, s)) * weight
+        rational = log1p_ratio(dr.select(above, -up, down) * self.k) * dr.select(above, up, down)
+        mass = dr.select(self.rises, exponential, rational) / self.norm
         return dr.select(above, mass, 1 - mass), dr.select(above, 1 - mass, mass)
 
     def inverse_cdf(self, c, complement):
         """The s of a ``cdf`` value."""
         above = c < 0.5
         mass = dr.select(above, c, complement)
-        y = mass * dr.select(self.rises, dr.select(above, self.norm_above, self.norm), self.norm)
+        y = mass * self.norm * dr.select(above, 1, dr.exp(self.kappa))
         sign = dr.select(above, -1, 1)
         exponential = log1p_ratio(sign * self.kappa * y)
         rational = expm1_ratio(sign * self.k * y) * dr.select(above, 1 + self.k, 1)
@@ -316,6 +317,9 @@ class HemiEPD(Isotropic):
         super().__init__()
         self.kappa, self.gamma, self.power = kappa, gamma, gamma / (gamma + 2)
         self.law = BentLaw(kappa * self.power)
+        # Take exp(shift) out of J and e: the derivatives of exp(κ), and of 1/J, are no float32.
+        large = kappa > 40
+        self.scaled = dr.select(large, 46, 0), dr.select(large, math.exp(-46), 1)
         self.integral = self._integral()
 
     def _integral(self):
@@ -327,7 +331,7 @@ class HemiEPD(Isotropic):
         for x, weight in gauss_legendre(12):
             growth = dr.exp(log_k * dr.select(falls, x**3, x * (2 - x)))
             t = dr.maximum((growth - 1) / k, 1e-6)
-            value = expm1_ratio(self.kappa * dr.power(dr.select(falls, t, 1 - t), self.power))
+            value = expm1_ratio(self.kappa * dr.power(dr.select(falls, t, 1 - t), self.power), *self.scaled)
             integral += dr.select(falls, 3 * x * x, 2 - 2 * x) * weight * growth * value
         return integral * log_k / k
 
@@ -339,12 +343,12 @@ class HemiEPD(Isotropic):
 
     def eval(self, facet):
         power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
-        return (self.gamma + 2) * dr.inv_two_pi * power * expm1_ratio(self.kappa * power) / self.integral
+        bent = expm1_ratio(self.kappa * power, *self.scaled) / self.integral
+        return (self.gamma + 2) * dr.inv_two_pi * power * bent
 
-    def over_density(self, tan2, g):
-        _, power = cosine_power_cdf(tan2, self.gamma)
-        law = self.law.eval(power / (1 + tan2)) * self.integral
-        return expm1_ratio(self.kappa * power) / law * dr.sqrt(1 + tan2)
+    def density(self, facet, g):
+        m, s = cosine_power_cdf(facet.sin2_h / dr.square(facet.cos_h), self.gamma + 2)
+        return (self.gamma + 2) * dr.inv_two_pi * s / facet.cos_h * self.law.eval(m, s)
 
     def cdf(self, tan2, g):
         return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
@@ -414,7 +418,8 @@ class EPD(Isotropic):
 
     def _power(self, tan2):
         """exp(-(tan²θ/α²)ᵞ)"""
-        return dr.exp(-dr.power(dr.maximum(tan2 / self.alpha2, 1e-30), self.gamma))
+        log = dr.log(dr.maximum(tan2 / self.alpha2, 1e-30))
+        return dr.exp(-dr.exp(dr.minimum(self.gamma * log, 5)))  # exp(-exp(5)) is no float32
 
     def _rest(self, tan2):
         """What D cosθ dω is proportional to, per tan²θ, but for that power."""
@@ -427,11 +432,10 @@ class EPD(Isotropic):
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)
         return self.scale * self._power(facet.sin2_h / cos2) * dr.square(dr.rcp(cos2))
 
-    def over_density(self, tan2, g):
-        tan2 = dr.minimum(tan2, 1e12)
-        x = dr.minimum(tan2 / self.width, 1e15)
-        ratio = self._power(tan2) * self._rest(tan2) * dr.square(1 + x) / self.steps.eval(x / (1 + x))
-        return self.scale * dr.pi * self.width * ratio * dr.sqrt(1 + tan2)
+    def density(self, facet, g):
+        sin2 = facet.sin2_h
+        scale = dr.rcp(self.width * dr.square(facet.cos_h) + sin2)
+        return dr.inv_pi * self.width * facet.cos_h * dr.square(scale) * self.steps.eval(sin2 * scale)
 
     def cdf(self, tan2, g):
         x = dr.minimum(tan2 / self.width, 1e30)

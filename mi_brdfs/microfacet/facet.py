@@ -22,8 +22,9 @@ class Facet:
     @classmethod
     def between(cls, wi, wo) -> Facet:
         """The facet that reflects ``wi`` into ``wo``, both above the horizon."""
-        h = wi + wo
-        length2 = dr.maximum(dr.dot(h, h), 1e-36)  # opposite directions within the horizon
+        # Opposite directions within the horizon have none; derivatives divide by the length, up to its fourth power.
+        h = mi.Vector3f(wi.x + wo.x, wi.y + wo.y, dr.maximum(wi.z + wo.z, 1e-8))
+        length2 = dr.dot(h, h)
         inv_length = dr.rsqrt(length2)
         return cls(wi, wo, h * inv_length, 0.5 * length2 * inv_length)
 

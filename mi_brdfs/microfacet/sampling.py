@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, clamp, normalize_or, safe_sqrt, select
+from ..math import choose, clamp, normalize_or, safe_sqrt, select, sin_theta
 from .facet import Facet
 from .fresnel import Dielectric, Schlick
 
@@ -71,11 +71,9 @@ class Pair:
         tan2 = facet.sin2_h / dr.square(facet.cos_h)
         m = clamp(distribution.cdf(tan2, g)[0] / mass, 0, 1)
 
-        total, ratio = reflected(lobe, facet) + reflected(lobe, facet.image()), distribution.over_density(tan2, g)
-        valid = (total > 1e-37) & (ratio > 1e-37)
-        share, ratio = lobe.response(facet) / select(valid, total, 1), select(valid, ratio, 1)
-        density = self._density(lobe, facet.wi, cos, sin, m)
-        return select(valid, 2 * density * share / (ratio * mass), 0)
+        weight, other = reflected(lobe, facet), reflected(lobe, facet.image())
+        density = self._density(lobe, facet.wi, cos, sin, m) * distribution.density(facet, g) / mass
+        return density / (2 * facet.cos_d) * (weight / (weight + other))
 
 
 class LeaningPair(Pair):
@@ -125,14 +123,15 @@ def draw_tilted(tilt, u):
 
 
 def reflected(lobe, facet):
-    """What a facet reflects, ``lobe.over_facets``; nothing if that leads below the horizon."""
-    valid = (facet.cos_d > 0) & (facet.cos_o > 0)
+    """What a facet reflects, ``lobe.over_facets``, or next to nothing if that leads below the horizon. It is never
+    zero: the derivative of a share in what a pair reflects divides by the square of that."""
+    valid = (facet.cos_d > 1e-9) & (facet.cos_o > 0)
     # Elsewhere the formulas need not make sense: give them the mirror direction.
     normal = mi.Vector3f(0, 0, 1)
     safe = Facet(
         facet.wi, select(valid, facet.wo, normal), select(valid, facet.h, normal), select(valid, facet.cos_d, 1)
     )
-    return select(valid, lobe.over_facets(safe), 0)
+    return dr.maximum(select(valid, lobe.over_facets(safe), 0), 1e-17)
 
 
 class BoundedVisibleNormals:
@@ -152,7 +151,7 @@ class BoundedVisibleNormals:
         stretched = mi.Vector3f(alpha_u * wi.x, alpha_v * wi.y, wi.z)
         length = dr.sqrt(dr.dot(stretched, stretched))
         alpha = dr.minimum(dr.minimum(alpha_u, alpha_v), 1)
-        s = 1 + dr.sqrt(wi.x * wi.x + wi.y * wi.y)
+        s = 1 + sin_theta(wi)
         s2, a2 = s * s, alpha * alpha
         k = (1 - a2) * s2 / (s2 + a2 * wi.z * wi.z)
         return stretched / length, length, k, k * wi.z / length, self.TILT * alpha
@@ -171,7 +170,7 @@ class BoundedVisibleNormals:
     def _facet(distribution, wi, unit, point):
         """The facet whose stretched normal is the half vector of the unit vector and a point."""
         normal = unit + point
-        z = dr.maximum(normal.z, 1e-15)  # a cap that is nearly the whole sphere ends where the normal vanishes
+        z = dr.maximum(normal.z, 1e-9)  # a cap that is nearly the whole sphere ends where the normal vanishes
         h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
         return Facet.reflecting(wi, h * dr.rsqrt(dr.dot(h, h)))
 
@@ -205,9 +204,7 @@ class PairOfVisibleNormals(BoundedVisibleNormals):
         density, unit, point = self._density(lobe.distribution, facet)
         image = self._facet(lobe.distribution, facet.wi, unit, self._image(point))
         weight = self._weight(lobe, facet)
-        total = weight + self._weight(lobe, image)
-        valid = total > 0
-        return select(valid, 2 * density * weight / select(valid, total, 1), 0)
+        return 2 * density * (weight / (weight + self._weight(lobe, image)))
 
     @staticmethod
     def _image(point):

@@ -5,7 +5,7 @@ import mitsuba as mi
 
 from ..lobes import DimmedLobe, Lobe
 from ..lobes.mirror import AxisFrame
-from ..math import choose, luminance, safe_sqrt, square
+from ..math import choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
@@ -102,7 +102,7 @@ class Burley(Model):
         dielectric = 1 - p.metallic
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)
         alpha, aspect = square(p.roughness), dr.sqrt(1 - 0.9 * p.anisotropic)
-        alpha = dr.maximum(0.001, alpha / aspect), dr.maximum(0.001, alpha * aspect)
+        alpha = [clamp(along, 0.001, dr.inf) for along in (alpha / aspect, alpha * aspect)]
         lobes = [BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface)]
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
@@ -190,7 +190,7 @@ class SheenLobe(Lobe):
         value = schlick_weight(safe_sqrt(0.5 * (1 - cos))) * wo.z
 
         shape_a, shape_b = self._shape(wi)
-        y = dr.minimum(0.5 * dr.squared_norm(wo - wi) / (1 + frame.sin), 1 - 1e-6)
+        y = dr.clip(0.5 * dr.squared_norm(wo - wi) / (1 + frame.sin), 1e-9, 1 - 1e-6)
         power = dr.power(y, shape_a - 1)
         density = shape_a * shape_b * power * dr.power(1 - power * y, shape_b - 1) / (1 + frame.sin)
 

@@ -1,6 +1,7 @@
 import drjit as dr
 
 from ..lobes import MicrofacetLobe, over_diffuse
+from ..math import clamp
 from ..microfacet.distributions import GGX, Beckmann, Blinn
 from ..microfacet.sampling import Pair
 from ..microfacet.shadowing import vcavity
@@ -59,7 +60,7 @@ class CookTorrance(Model):
     def lobes(self, p):
         α = p.alpha
         if self.distribution == "blinn":
-            α = dr.minimum(α, 1)
+            α = clamp(α, 1e-4, 1)
             distribution = Blinn(2 / dr.square(α) - 2)
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)

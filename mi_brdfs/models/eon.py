@@ -3,7 +3,7 @@ import math
 import drjit as dr
 
 from ..lobes.diffuse import RoughDiffuseLobe
-from ..math import safe_sqrt
+from ..math import sin_theta
 from ..model import Energy, Model
 from ..parameters import Number, Reflectance
 
@@ -61,7 +61,7 @@ class EONLobe(RoughDiffuseLobe):
 
     def _loss(self, w):
         """(1 - E)/(A r), arranged so that nothing cancels at grazing, where it vanishes."""
-        cos, sin = w.z, safe_sqrt(w.x * w.x + w.y * w.y)
+        cos, sin = w.z, sin_theta(w)
         cos2 = cos * cos
         rise = dr.atan2(cos, sin) - cos * cos2 * (2 + sin) / (3 * dr.square(1 + sin))
         return self.NORMAL * cos2 / (1 + sin) + dr.inv_pi * sin * rise

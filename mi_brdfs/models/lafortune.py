@@ -3,7 +3,7 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, PowerLobe
 from ..lobes.mirror import AxisFrame
-from ..math import log1p
+from ..math import clamp, log1p
 from ..model import Energy, Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
@@ -97,4 +97,4 @@ class LafortuneLobe(PowerLobe):
         near = abs(taken) < 0.5
         log = dr.select(near, 0.5 * log1p(-dr.select(near, taken, 0)), dr.log(length / self.unit))
         # A C above 1 with a large exponent leaves the range of float32; so bright a lobe is limited.
-        return self.scale * dr.exp(dr.minimum(self.exponent * log, 60))
+        return self.scale * dr.exp(clamp(self.exponent * log, -dr.inf, 40))

@@ -100,18 +100,22 @@ class SmoothLobe(Lobe):
         """The power law's mass on the way from -wi_xy in the direction (x, y) to the edge of the disc."""
         along = x * wi.x + y * wi.y
         reach = along + dr.sqrt(along * along + wi.z * wi.z)
-        return self.law.mass(reach * reach)
+        return dr.maximum(self.law.mass(reach * reach), 1e-15)  # at grazing, rounding may leave nothing of the way
 
     def _reflectance(self, wi, x, y):
         """F for the projected direction (x, y)."""
         return self.fresnel(safe_sqrt(1 - 0.25 * (dr.square(x - wi.x) + dr.square(y - wi.y))))
+
+    def _brightness(self, wi, x, y):
+        """What the choice of an end goes by, which must not vanish."""
+        return dr.maximum(luminance(self._reflectance(wi, x, y)), 1e-8)
 
     def _end(self, wi, x, y, u):
         """``(point, W)``: the point at the fraction ``u`` of one end of a chord, and the end's mass times F."""
         mass = self._mass(wi, x, y)
         d = safe_sqrt(self.law.inverse(u * mass))
         point = (d * x - wi.x, d * y - wi.y)
-        return point, mass * luminance(self._reflectance(wi, *point))
+        return point, mass * self._brightness(wi, *point)
 
     def eval_pdf(self, wi, wo):
         dx, dy = wi.x + wo.x, wi.y + wo.y
@@ -121,8 +125,8 @@ class SmoothLobe(Lobe):
         value = self._reflectance(wi, wo.x, wo.y) * shape
         mass = self._mass(wi, x, y)
         _, other = self._end(wi, -x, -y, clamp(self.law.mass(d2) / mass, 0, 1))
-        own = luminance(self._reflectance(wi, wo.x, wo.y))
-        return self.reflectance * value, 2 * dr.inv_pi * own * shape / dr.maximum(mass * own + other, 1e-30)
+        own = self._brightness(wi, wo.x, wo.y)
+        return self.reflectance * value, 2 * dr.inv_pi * own * shape / (mass * own + other)
 
     def sample(self, wi, u, v):
         y, x = dr.sincos(dr.two_pi * v.x)

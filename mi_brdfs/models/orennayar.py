@@ -3,7 +3,7 @@ import math
 import drjit as dr
 
 from ..lobes.diffuse import RoughDiffuseLobe
-from ..math import clamp, safe_sqrt, square
+from ..math import sin_theta, square
 from ..model import Energy, Model
 from ..parameters import Choice, Flag, Number, Reflectance, Spelling
 
@@ -124,20 +124,22 @@ class FullLobe(QualitativeLobe):
         return 0.17 * self.sigma2 / (self.sigma2 + 0.13)
 
     def eval(self, wi, wo):
-        sin_i, sin_o = (safe_sqrt(w.x * w.x + w.y * w.y) for w in (wi, wo))
-        # The smaller angle has the larger cosine.
-        cos_a, cos_b = dr.minimum(wi.z, wo.z), dr.maximum(wi.z, wo.z)
-        sin_a, sin_b = dr.maximum(sin_i, sin_o), dr.minimum(sin_i, sin_o)
+        sin_i, sin_o = sin_theta(wi), sin_theta(wo)
+        flatter = wi.z < wo.z
+        cos_a, cos_b = dr.select(flatter, wi.z, wo.z), dr.select(flatter, wo.z, wi.z)
+        sin_a, sin_b = dr.select(flatter, sin_i, sin_o), dr.select(flatter, sin_o, sin_i)
         # Complements of the angles, in units of a right one: at grazing they keep digits that the angles lose.
         a, b = (dr.atan2(cos, sin) * (2 * dr.inv_pi) for cos, sin in ((cos_a, sin_a), (cos_b, sin_b)))
-        tan_b = sin_b / dr.maximum(cos_b, 1e-30)
-        tan_mean = (sin_a + sin_b) / dr.maximum(cos_a + cos_b, 1e-30)
-        cos_phi = clamp((wi.x * wo.x + wi.y * wo.y) / dr.maximum(sin_a * sin_b, 1e-30), -1, 1)
+        tan_mean = (sin_a + sin_b) / dr.maximum(cos_a + cos_b, 1e-15)
+        # cosφ sinβ and 2β/(π sinβ): at the normal, where φ is nothing, these have derivatives.
+        along = (wi.x * wo.x + wi.y * wo.y) / sin_a
+        ratio = dr.select(sin_b > 1e-3, (1 - b) / dr.maximum(sin_b, 1e-3), 2 * dr.inv_pi)
+        ratio2 = dr.square(ratio)
 
         forward = b * (3 - b * (3 - b)) - cos_a * cos_a / (1 + sin_a)  # sinα - (2β/π)³
-        c2 = self.b * dr.select(cos_phi >= 0, sin_a, forward)
-        c3 = 0.125 * self.sigma2 / (self.sigma2 + 0.09) * dr.square((1 - a) * (1 - b))
-        once = self.c1 + c2 * cos_phi * tan_b + c3 * (1 - abs(cos_phi)) * tan_mean
-        twice = self._twice() * (1 - cos_phi * dr.square(1 - b))
+        c2 = self.b * dr.select(along >= 0, sin_a, forward)
+        c3 = 0.125 * self.sigma2 / (self.sigma2 + 0.09) * dr.square(1 - a) * ratio2 * sin_b
+        once = self.c1 + c2 * along / dr.maximum(cos_b, 1e-15) + c3 * (sin_b - abs(along)) * tan_mean
+        twice = self._twice() * (1 - along * sin_b * ratio2)
         rho = self.reflectance
         return dr.maximum(rho * dr.inv_pi * (once + rho * twice), 0)

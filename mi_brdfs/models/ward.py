@@ -91,8 +91,8 @@ class ApproximateBeckmann(Distribution):
     def eval(self, facet):
         return dr.exp(-2 * self.steepness(facet) / (1 + facet.cos_h)) / (dr.pi * self.alpha_u * self.alpha_v)
 
-    def over_density(self, tan2, g):
-        return -expm1(-2 * g)
+    def density(self, facet, g):
+        return self.eval(facet) / -expm1(-2 * g)
 
     def cdf(self, tan2, g):
         v, total = versine_of_tan2(tan2), -expm1(-2 * g)
