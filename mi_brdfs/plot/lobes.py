@@ -127,11 +127,10 @@ def albedo(subject: Subject, azimuth: float) -> Curve:
     """
     theta = np.concatenate([np.arange(0, 87, 3), [87, 88, 88.5, 89, 89.5, 89.9]])
     points = variates(9, 5)
-    importance = context()
-    importance.mode = mi.TransportMode.Importance  # radiance is compressed where it is refracted, energy is not
-    part = Part("all", importance, None, int(subject.bsdf.flags()), (1,))
+    part = Part("all", context(), None, int(subject.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
-    weight = brightness(subject.sample(part, wi, np.tile(points, (len(theta), 1))).weight)
+    samples = subject.sample(part, wi, np.tile(points, (len(theta), 1)))
+    weight = brightness(samples.weight) * samples.eta**2  # radiance is compressed where it is refracted, energy is not
     return Curve(theta, weight.reshape(len(theta), -1).mean(axis=1))
 
 
