@@ -2,7 +2,7 @@
 
 from .diffuse import LambertLobe, over_diffuse
 from .lobe import Lobe
-from .microfacet import DimmedLobe, MicrofacetLobe
+from .microfacet import DimmedLobe, MicrofacetLobe, TypicalFacetLobe
 from .mirror import PowerLobe, PowerResponseLobe
 from .mixture import Mixture
 
@@ -14,5 +14,6 @@ __all__ = [
     "Mixture",
     "PowerLobe",
     "PowerResponseLobe",
+    "TypicalFacetLobe",
     "over_diffuse",
 ]

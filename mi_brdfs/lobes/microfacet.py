@@ -5,9 +5,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import safe_sqrt
+from ..math import normalize_or
 from ..microfacet.facet import Facet
-from ..microfacet.shadowing import SmithGGX
 from .lobe import Lobe
 
 
@@ -41,17 +40,32 @@ class MicrofacetLobe(Lobe):
 
 
 class DimmedLobe(MicrofacetLobe):
-    """A microfacet lobe which at grazing is dimmer than F(cosθ_i) and its distribution say: the facets seen there are
-    tilted towards the viewer, and reflect less; and a shadowing term other than Smith's may take more."""
+    """A lobe with Smith's shadowing term. At grazing it is dimmer than F(cosθ_i) says: the facets seen there are tilted
+    towards the viewer, and reflect less."""
 
     def albedo(self, wi):
-        alpha, tilt = dr.sqrt(self.distribution.roughness2()), 1 - wi.z
-        cos = dr.sqrt(wi.z * wi.z + 0.45 * alpha * tilt * safe_sqrt(tilt))  # fitted to GGX
-        z = dr.maximum(wi.z, 1e-4)  # the terms must not vanish
-        seen = mi.Vector3f(wi.x, wi.y, z)
-        mirror = Facet(seen, seen, mi.Vector3f(0, 0, 1), z)  # they do not tell wo from its opposite side
-        shadowing = self.shadowing(mirror) / SmithGGX(alpha, alpha, correlated=False)(mirror)
-        return self.reflectance * (self.fresnel(tilted(cos)) * (self.distribution.albedo(wi.z) * shadowing))
+        sin2, tilt = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12), 1 - wi.z
+        alpha2 = self.distribution.slope2(wi) / sin2
+        cos = dr.sqrt(wi.z * wi.z + 0.45 * tilt * dr.sqrt(tilt * alpha2))  # fitted to GGX
+        return self.reflectance * (self.fresnel(tilted(cos)) * self.distribution.albedo(wi.z))
+
+
+class TypicalFacetLobe(MicrofacetLobe):
+    """A lobe with any shadowing term. Its albedo is estimated from a typical facet in the plane of incidence that leans
+    towards ``wi``, and its image: their cosθ_d add up to 2 cosθ_h cosθ_i, until at grazing only the first one is
+    seen."""
+
+    def albedo(self, wi):
+        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        z, tilt = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
+        slope2 = self.distribution.slope2(mi.Vector3f(x, y, 0))
+        # The constants are fitted to Beckmann and GGX.
+        typical2 = 0.72 * slope2 / (1 + 0.3 * slope2)
+        slope = typical2 * dr.rsqrt(typical2 + z * z)  # the mirror is typical of what is narrow
+        facet = Facet.at(mi.Vector3f(wi.x, wi.y, z), slope * x, slope * y)
+        seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / z, facet.cos_h)
+        cos = dr.sqrt(z * z + 0.28 * tilt * dr.sqrt(tilt * slope2))
+        return self.reflectance * (self.fresnel(tilted(cos)) * seen)
 
 
 def tilted(cos):

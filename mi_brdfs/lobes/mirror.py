@@ -92,25 +92,36 @@ class PowerLobe(MirrorLobe):
         power = dr.select(inside, dr.exp(n * log_a), 0)
         sin = dr.sqrt(dr.maximum(versine * (2 - versine), 1e-30))
         cos_phi = dr.minimum(abs(dr.dot(wo - frame.axis, frame.up)) / sin, 1)
-        upright = (n + 2) * (1 - versine)
-        tilted = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 1e-30)) * cos_phi
-        share = self._share(frame)
-        pair = power * dr.inv_pi * (share * upright + (1 - share) * tilted)
         return (
             self.reflectance * (self.peak(wi) * power * wo.z),
-            pair * wo.z / dr.maximum(wo.z + frame.mirrored_z(wo, versine), 1e-15),
+            self._pair(frame, log_a, versine, power, cos_phi)
+            * wo.z
+            / dr.maximum(wo.z + frame.mirrored_z(wo, versine), 1e-15),
         )
 
     def sample(self, wi, u, v):
-        n, frame = self.exponent, self.frame(wi)
+        frame = self.frame(wi)
+        u, log_a, b, c = self._draw(frame, u, v)
+        wo, mirrored = frame.direction(log_a, b, c), frame.direction(log_a, -b, c)
+        z, mirrored_z = dr.maximum(wo.z, 0), dr.maximum(mirrored.z, 0)
+        return dr.select(u * (z + mirrored_z) < z, wo, mirrored)
+
+    def _draw(self, frame, u, v):
+        """``(u, log A, |B|/√(1-A²), …)`` of the mixture, with what is left of ``u``."""
+        n = self.exponent
         is_upright, u = choose(u, self._share(frame))
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         c = dr.select(is_upright, sin_phi, 2 * v.y - 1)
         b = dr.select(is_upright, abs(cos_phi), safe_sqrt(1 - c * c))
-        log_a = dr.select(is_upright, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1))
-        wo, mirrored = frame.direction(log_a, b, c), frame.direction(log_a, -b, c)
-        z, mirrored_z = dr.maximum(wo.z, 0), dr.maximum(mirrored.z, 0)
-        return dr.select(u * (z + mirrored_z) < z, wo, mirrored)
+        return u, dr.select(is_upright, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1)), b, c
+
+    def _pair(self, frame, log_a, versine, power, cos_phi):
+        """The density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
+        n = self.exponent
+        upright = (n + 2) * (1 - versine)
+        tilted = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 1e-30)) * cos_phi
+        share = self._share(frame)
+        return power * dr.inv_pi * (share * upright + (1 - share) * tilted)
 
 
 class PowerResponseLobe(MirrorLobe):

@@ -20,6 +20,8 @@ from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio
 class Distribution:
     LOSS = 1.7
     """How much light is lost to multiple reflections: the constant of :meth:`albedo`, fitted."""
+    long_tailed = False
+    """Whether there are many more steep facets than a Gaussian distribution of slopes has."""
 
     def __init__(self, alpha_u, alpha_v):
         self.alpha_u, self.alpha_v = alpha_u, alpha_v
@@ -89,6 +91,7 @@ class GGX(Distribution):
     """D = 1/(π αu αv ((h_x/αu)² + (h_y/αv)² + h_z²)²) (Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206)."""
 
     LOSS = 2.3
+    long_tailed = True
 
     def eval(self, facet):
         return 1 / (dr.pi * self.alpha_u * self.alpha_v * dr.square(self.steepness(facet) + dr.square(facet.cos_h)))
@@ -181,6 +184,8 @@ class GTR(Isotropic):
     """D ∝ (1 + (α²-1) cos²θ_h)^-γ, generalised Trowbridge-Reitz (Burley 2012, Physically based shading at Disney).
     GGX is γ = 2; γ = 1 has the tail of a clear coat."""
 
+    long_tailed = True
+
     def __init__(self, alpha, gamma):
         super().__init__()
         self.alpha2 = dr.square(alpha)
@@ -231,6 +236,8 @@ class Berry(Isotropic):
 class ABC(Isotropic):
     """D = scale·(1 + B (1 - cosθ_h))^-C (Church and Takacs 1991; Löw et al. 2012, doi:10.1145/2077341.2077350).
     ``scale`` None stands for the one with ∫ D cosθ_h dω_h = 1. Here q ∝ D, without the cosine."""
+
+    long_tailed = True
 
     def __init__(self, b, c, scale=None):
         super().__init__()
@@ -397,6 +404,7 @@ class EPD(Isotropic):
     q follows D cosθ_h, by steps over a distribution with a heavy tail: x/(1+x) for x = tan²θ_h/width.
     """
 
+    long_tailed = True
     STEPS = 16
 
     def __init__(self, alpha, gamma):

@@ -35,29 +35,24 @@ class Pair:
         """How much brighter the reflectance is at normal incidence."""
         return dr.minimum(lobe.fresnel.brightness(1) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9), 1)
 
-    def _draw(self, lobe, wi, u, v):
-        """``(u, cosψ, sinψ, m)``, with what is left of ``u``."""
-        sin, cos = dr.sincos(dr.two_pi * v.x)
-        return u, cos, sin, draw_tilted(self._tilt(lobe, wi), v.y)
+    def _azimuth(self, lobe, wi, u, v):
+        """``(u, cosψ, sinψ, which)``, with what is left of ``u``, and the choices made, for :meth:`_tan2`."""
+        sin, cos = dr.sincos(dr.two_pi * v)
+        return u, cos, sin, None
 
-    def _density(self, lobe, wi, cos, sin, m):
-        """Of that draw, times 2π."""
-        return tilted(self._tilt(lobe, wi), m)
+    def _tan2(self, lobe, wi, line, which, v):
+        """A tan²θ_h on the line."""
+        return line.inverse_cdf(draw_tilted(self._tilt(lobe, wi), v))
 
-    @staticmethod
-    def _line(distribution, wi, x, y):
-        """``(g, C(R), 1 - C(R))`` of the line along the slope (x, y), which is of length one."""
-        along, z = abs(x * wi.x + y * wi.y), dr.maximum(wi.z, 1e-15)  # of which the square is not 0
-        limit = (along + dr.sqrt(along * along + z * z)) / z
-        g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
-        return g, *distribution.cdf(limit * limit, g)
+    def _density(self, lobe, line, facet, cos, sin, q):
+        """Of the half vectors drawn so, where ``q`` is that of the distribution."""
+        return q * tilted(self._tilt(lobe, facet.wi), line.part(facet)) / line.mass
 
     def sample(self, lobe, wi, u, v):
         distribution = lobe.distribution
-        u, cos, sin, m = self._draw(lobe, wi, u, v)
+        u, cos, sin, which = self._azimuth(lobe, wi, u, v.x)
         x, y = normalize_or(distribution.alpha_u * cos, distribution.alpha_v * sin, (1, 0))
-        g, mass, rest = self._line(distribution, wi, x, y)
-        tan = safe_sqrt(distribution.inverse_cdf(m * mass, rest + (1 - m) * mass, g))
+        tan = safe_sqrt(self._tan2(lobe, wi, Line(distribution, wi, x, y), which, v.y))
         facet = Facet.at(wi, tan * x, tan * y)
         image = facet.image()
         weight, other = reflected(lobe, facet), reflected(lobe, image)
@@ -66,14 +61,39 @@ class Pair:
     def pdf(self, lobe, facet):
         distribution = lobe.distribution
         x, y = normalize_or(facet.h.x, facet.h.y, (1, 0))
-        g, mass, _ = self._line(distribution, facet.wi, x, y)
+        line = Line(distribution, facet.wi, x, y)
         cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
-        tan2 = facet.sin2_h / dr.square(facet.cos_h)
-        m = clamp(distribution.cdf(tan2, g)[0] / mass, 0, 1)
 
         weight, other = reflected(lobe, facet), reflected(lobe, facet.image())
-        density = self._density(lobe, facet.wi, cos, sin, m) * distribution.density(facet, g) / mass
+        density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
         return density / (2 * facet.cos_d) * (weight / (weight + other))
+
+
+class Line:
+    """The half vectors whose slopes lie along (x, y), which is of length one."""
+
+    def __init__(self, distribution, wi, x, y):
+        self.distribution = distribution
+        along, z = abs(x * wi.x + y * wi.y), dr.maximum(wi.z, 1e-15)  # of which the square is not 0
+        limit2 = dr.square((along + dr.sqrt(along * along + z * z)) / z)
+        self.lowest = dr.rsqrt(1 + limit2)
+        """cosθ_h where tanθ_h is R."""
+        self.g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
+        self.mass, self.rest = distribution.cdf(limit2, self.g)
+        """C(R), and what it lacks to one."""
+
+    def part(self, facet):
+        """The m of a facet on the line."""
+        return clamp(self.distribution.cdf(tan2_of(facet), self.g)[0] / self.mass, 0, 1)
+
+    def inverse_cdf(self, m):
+        """The tan²θ_h of an m."""
+        return self.distribution.inverse_cdf(m * self.mass, self.rest + (1 - m) * self.mass, self.g)
+
+
+def tan2_of(facet):
+    """tan²θ_h"""
+    return facet.sin2_h / dr.square(facet.cos_h)
 
 
 class LeaningPair(Pair):
@@ -82,35 +102,63 @@ class LeaningPair(Pair):
 
     Smith's term leans by 1, the implicit one by 4; V-cavities do not, nor do dielectrics, which reflect less where it
     leans to.
+
+    Of a distribution with a long tail, the few steep facets may reflect more at grazing than all others together. On
+    a part δ of the leaning lines the half vectors are uniform, whatever the distribution: that bounds their weights.
     """
 
     OUTWARD = -0.6
-    """Chosen by measurement, as is the lean."""
+    """Chosen by measurement, as are the lean and δ."""
+    STEEP2 = 0.25
+    """The tan²θ_h from which on facets are steep."""
 
     def __init__(self, lean: float):
         self.lean = lean
 
     def _along(self, lobe, wi):
-        """``(x, y, λ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
+        """``(x, y, λ, δ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
         distribution = lobe.distribution
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        seen = self.lean * dr.inv_pi * distribution.slope2(wi) * dr.square(self._brighter(lobe, wi))
-        return x, y, dr.minimum(seen / (seen + dr.square(wi.z)), 0.95)
+        slope2, cos2, brighter = distribution.slope2(wi), dr.square(wi.z), self._brighter(lobe, wi)
+        seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
+        leaning = dr.minimum(seen / (seen + cos2), 0.95)
+        if not distribution.long_tailed:
+            return x, y, leaning, 0
+        _, steep = distribution.cdf(self.STEEP2, (1 - cos2) / dr.maximum(slope2, 1e-20))
+        steep = 0.5 * dr.square(dr.square(1 - wi.z)) * brighter * steep
+        # The implicit term is ∝ both cosines: it takes as much again from the facets that are not steep.
+        steep = steep / (steep + (seen + cos2 if self.lean >= 4 else dr.sqrt(seen + cos2)))
+        return x, y, leaning + (1 - leaning) * steep, steep
 
-    def _draw(self, lobe, wi, u, v):
-        x, y, leaning = self._along(lobe, wi)
+    def _azimuth(self, lobe, wi, u, v):
+        x, y, leaning, steep = self._along(lobe, wi)
         leans, u = choose(u, leaning)
-        sin, cos = dr.sincos(dr.two_pi * v.x)
-        sin = dr.select(leans, 2 * v.x - 1, sin)
+        is_steep, u = choose(u, steep) if lobe.distribution.long_tailed else (False, u)
+        sin, cos = dr.sincos(dr.two_pi * v)
+        sin = dr.select(leans, 2 * v - 1, sin)
         cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
-        tilt = dr.select(leans, self.OUTWARD, self._tilt(lobe, wi))
-        return u, cos * x - sin * y, cos * y + sin * x, draw_tilted(tilt, v.y)
+        return u, cos * x - sin * y, cos * y + sin * x, (leans, is_steep)
 
-    def _density(self, lobe, wi, cos, sin, m):
-        x, y, leaning = self._along(lobe, wi)
+    def _tan2(self, lobe, wi, line, which, v):
+        leans, is_steep = which
+        tan2 = line.inverse_cdf(draw_tilted(dr.select(leans, self.OUTWARD, self._tilt(lobe, wi)), v))
+        if not lobe.distribution.long_tailed:
+            return tan2
+        cos = 1 - v * (1 - line.lowest)
+        return dr.select(leans & is_steep, (1 - cos) * (1 + cos) / dr.square(cos), tan2)
+
+    def _density(self, lobe, line, facet, cos, sin, q):
+        distribution = lobe.distribution
+        x, y, leaning, steep = self._along(lobe, facet.wi)
         lines = 0.5 * dr.pi * abs(cos * x + sin * y)
-        return dr.lerp(super()._density(lobe, wi, cos, sin, m), lines * tilted(self.OUTWARD, m), leaning)
+        outward = tilted(self.OUTWARD, line.part(facet)) * q / line.mass
+        if distribution.long_tailed:
+            # The azimuth is uniform in ψ, not in φ.
+            stretch = distribution.alpha_u * distribution.alpha_v * line.g
+            uniform = dr.inv_two_pi / (stretch * (1 - line.lowest))
+            outward = dr.lerp(outward, uniform, steep)
+        return dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
 
 
 def tilted(tilt, m):

@@ -1,6 +1,6 @@
 import mitsuba as mi
 
-from ..lobes import DimmedLobe, LambertLobe
+from ..lobes import LambertLobe, TypicalFacetLobe
 from ..microfacet.distributions import AshikhminShirley as Distribution
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Pair
@@ -50,7 +50,7 @@ class AshikhminShirley(Model):
     energy = Energy(0.509, [({}, 1)])
 
     def lobes(self, p):
-        specular = DimmedLobe(
+        specular = TypicalFacetLobe(
             mi.UnpolarizedSpectrum(1),
             Distribution(*p.exponent),
             ashikhmin_shirley,

@@ -80,11 +80,13 @@ class BlinnPhong(Model):
 
 
 class BlinnLobe(MicrofacetLobe):
-    """The lobe whose G is cosθ_i cosθ_o. Its albedo is exact at normal incidence."""
+    """The lobe whose G is cosθ_i cosθ_o. Its albedo is exact at normal incidence and for n = 0, and falls like cos²θ_i
+    if the lobe is narrow."""
 
     def albedo(self, wi):
         n = self.distribution.exponent
-        return self.reflectance * ((n + dr.exp2(-0.5 * n)) / (n + 4) * (0.1 + 0.9 * wi.z))
+        cos2 = wi.z * wi.z
+        return self.reflectance * ((n + dr.exp2(-0.5 * n)) / (n + 4) * (cos2 + (1 - cos2) / (1 + n)))
 
 
 class BlinnResponseLobe(MicrofacetLobe):
@@ -93,7 +95,8 @@ class BlinnResponseLobe(MicrofacetLobe):
     reciprocal = False
 
     def albedo(self, wi):
-        return super().albedo(wi) * (0.1 + 0.9 * wi.z)
+        cos2 = wi.z * wi.z
+        return super().albedo(wi) * dr.sqrt(cos2 + (1 - cos2) / (1 + 6 * self.distribution.exponent))
 
 
 def cosine(facet):

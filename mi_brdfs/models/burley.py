@@ -3,7 +3,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import DimmedLobe, Lobe
+from ..lobes import DimmedLobe, Lobe, TypicalFacetLobe
 from ..lobes.mirror import AxisFrame
 from ..math import choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
@@ -110,7 +110,7 @@ class Burley(Model):
         lobes.append(DimmedLobe(1, *facets, Schlick(f0), PairOfVisibleNormals()))
         if p.clearcoat is not None:
             facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), SmithGGX(0.25, 0.25, correlated=False)
-            lobes.append(DimmedLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), Pair()))
+            lobes.append(TypicalFacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), Pair()))
         return tuple(lobes)
 
 

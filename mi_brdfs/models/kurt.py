@@ -1,4 +1,4 @@
-from ..lobes import DimmedLobe, LambertLobe
+from ..lobes import LambertLobe, TypicalFacetLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
 from ..microfacet.sampling import Pair
@@ -54,7 +54,7 @@ class Kurt(Model):
 
     def lobes(self, p):
         glossy = [
-            DimmedLobe(
+            TypicalFacetLobe(
                 lobe.specular_reflectance,
                 Beckmann(*lobe.alpha),
                 Shadowing(lobe.kurt_exponent),

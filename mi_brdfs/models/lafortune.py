@@ -3,7 +3,7 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, PowerLobe
 from ..lobes.mirror import AxisFrame
-from ..math import clamp, log1p
+from ..math import clamp, log1p, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
@@ -30,8 +30,8 @@ class Lafortune(Model):
     Reciprocal. Energy-conserving for ``energy`` with ρd + Σ ρ_l <= 1. A spectral exponent is one lobe for each colour.
     One-sided.
 
-    Sampling: each lobe nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe). Where a lobe's axis lies below the
-    horizon (Cz < 0) only its tail can be seen, and most samples are lost.
+    Sampling: each lobe nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe), also where its axis lies below the
+    horizon (Cz < 0) and only its tail can be seen: there a few samples fall below the horizon.
 
     Example
     -------
@@ -98,3 +98,42 @@ class LafortuneLobe(PowerLobe):
         log = dr.select(near, 0.5 * log1p(-dr.select(near, taken, 0)), dr.log(length / self.unit))
         # A C above 1 with a large exponent leaves the range of float32; so bright a lobe is limited.
         return self.scale * dr.exp(clamp(self.exponent * log, -dr.inf, 40))
+
+    # Above the horizon, A is at most s, the sine of the axis's angle to the normal. Where the axis lies so far below it
+    # that most of the lobe does, too, t = log(s/A) is drawn ∝ t exp(-(n+1) t), and the azimuth from those above.
+
+    def _buried(self, frame):
+        """``(whether it does, log s, c² (n+1))``, where c is the cosine."""
+        cos2 = dr.square(frame.axis.z)
+        depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
+        return depth > dr.maximum(1 - cos2, 0), 0.5 * dr.log(dr.maximum(1 - cos2, 1e-30)), depth
+
+    def albedo(self, wi):
+        _, log_s, depth = self._buried(self.frame(wi))
+        return super().albedo(wi) * (dr.select(depth > 0, dr.exp((self.exponent + 1) * log_s), 1) / (1 + depth))
+
+    @staticmethod
+    def _arc(frame, t):
+        """The sine of the largest azimuth, from that of ``up``, above the horizon, or a little more."""
+        square = dr.minimum(2 * t / (1 + t), 1)  # of the cosine to the horizon, A/s being the sine
+        s2, c2 = dr.square(frame.sin), dr.square(frame.axis.z)
+        return dr.sqrt(square / (c2 + s2 * square))
+
+    def _draw(self, frame, u, v):
+        left, log_a, b, c = super()._draw(frame, u, v)
+        buried, log_s, _ = self._buried(frame)
+        t = -dr.log(dr.maximum((1 - u) * (1 - v.x), 1e-37)) / (self.exponent + 1)
+        across = (2 * v.y - 1) * self._arc(frame, t)
+        log_a, b, c = (
+            dr.select(buried, own, usual)
+            for own, usual in ((log_s - t, log_a), (safe_sqrt(1 - across * across), b), (across, c))
+        )
+        return left, log_a, b, c
+
+    def _pair(self, frame, log_a, versine, power, cos_phi):
+        n, usual = self.exponent, super()._pair(frame, log_a, versine, power, cos_phi)
+        buried, log_s, _ = self._buried(frame)
+        t = dr.maximum(log_s - log_a, 0)  # also for A < 0, where log_a is 0
+        arc = self._arc(frame, dr.maximum(t, 1e-12))
+        density = dr.square(n + 1) * t * dr.exp(-n * t - log_s) * cos_phi / (2 * arc)
+        return dr.select(buried, dr.select(1 - cos_phi * cos_phi < arc * arc, density, 0), usual)

@@ -1,6 +1,6 @@
 import drjit as dr
 
-from ..lobes import DimmedLobe, LambertLobe
+from ..lobes import DimmedLobe, LambertLobe, TypicalFacetLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
@@ -71,7 +71,8 @@ class MetallicRoughness(Model):
         else:
             shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
         diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
-        return diffuse, DimmedLobe(1, GGX(alpha, alpha), shadowing, fresnel, PairOfVisibleNormals())
+        lobe = DimmedLobe if self.shadowing == "smith" else TypicalFacetLobe
+        return diffuse, lobe(1, GGX(alpha, alpha), shadowing, fresnel, PairOfVisibleNormals())
 
 
 class FresnelDiffuseLobe(LambertLobe):

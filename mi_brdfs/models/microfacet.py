@@ -2,7 +2,7 @@ import math
 
 import drjit as dr
 
-from ..lobes import DimmedLobe, over_diffuse
+from ..lobes import DimmedLobe, TypicalFacetLobe, over_diffuse
 from ..microfacet import distributions, shadowing
 from ..microfacet.sampling import LeaningPair, Pair, visible_normals
 from ..model import Energy, Model
@@ -168,7 +168,8 @@ class Microfacet(Model):
             sampler = visible_normals(p.fresnel)
         else:
             sampler = LeaningPair(LEAN[p.shadowing.choice]) if p.shadowing.choice in LEAN else Pair()
-        specular = DimmedLobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
+        lobe = DimmedLobe if p.shadowing.choice in SMITHS else TypicalFacetLobe
+        specular = lobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
         return over_diffuse(p.diffuse_reflectance, specular)
 
 
@@ -195,6 +196,8 @@ SMITH = {
     "ggx": lambda p, correlated: shadowing.SmithGGX(*p.alpha, correlated),
     "blinn": lambda p, correlated: shadowing.SmithBlinn(p.exponent, correlated),
 }
+
+SMITHS = "smith", "smith-correlated"
 
 SUITED = {"smith": SMITH, "smith-correlated": SMITH, "schlick": ROUGHNESS_OF}
 """The distributions that a shadowing term is known for, if not all."""

@@ -1,4 +1,4 @@
-from ..lobes import DimmedLobe, over_diffuse
+from ..lobes import TypicalFacetLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.sampling import LeaningPair, Pair
@@ -61,5 +61,5 @@ class Nishino(Model):
             terms = vcavity, p.variant.fresnel, Pair()
         else:
             terms = implicit, Unit(), LeaningPair(4)
-        specular = DimmedLobe(p.specular_reflectance, distribution, *terms)
+        specular = TypicalFacetLobe(p.specular_reflectance, distribution, *terms)
         return over_diffuse(p.diffuse_reflectance, specular)
