@@ -26,9 +26,8 @@ def energy_limits(bsdf, conserves: bool | None, default: bool) -> Limits:
     largest = min((albedo for given, albedo in energy.largest if _applies(given, model)), default=None)
     if largest is None or not isfinite(largest):
         return Limits(None, "", measured)
-    # The page gives three digits.
     reason = "it receives" if largest <= 1 else f"the {largest:g} times that the manual page states"
-    return Limits(max(largest, 1) * (1 if largest <= 1 else 1.006), reason, measured)
+    return Limits(max(largest, 1), reason, measured)
 
 
 def _applies(given: dict[str, Any], model) -> bool:
