@@ -105,8 +105,9 @@ class LafortuneLobe(PowerLobe):
     def _buried(self, frame):
         """``(whether it does, log s, c² (n+1))``, where c is the cosine."""
         cos2 = dr.square(frame.axis.z)
+        sin2 = dr.maximum(1 - cos2, 1e-30)
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
-        return depth > dr.maximum(1 - cos2, 0), 0.5 * dr.log(dr.maximum(1 - cos2, 1e-30)), depth
+        return depth > sin2, 0.5 * dr.log(sin2), depth
 
     def albedo(self, wi):
         _, log_s, depth = self._buried(self.frame(wi))
@@ -133,7 +134,6 @@ class LafortuneLobe(PowerLobe):
     def _pair(self, frame, log_a, versine, power, cos_phi):
         n, usual = self.exponent, super()._pair(frame, log_a, versine, power, cos_phi)
         buried, log_s, _ = self._buried(frame)
-        t = dr.maximum(log_s - log_a, 0)  # also for A < 0, where log_a is 0
-        arc = self._arc(frame, dr.maximum(t, 1e-12))
-        density = dr.square(n + 1) * t * dr.exp(-n * t - log_s) * cos_phi / (2 * arc)
-        return dr.select(buried, dr.select(1 - cos_phi * cos_phi < arc * arc, density, 0), usual)
+        t = dr.maximum(log_s - log_a, 1e-8)  # rounding errors may leave less than nothing above the horizon
+        density = dr.square(n + 1) * t * dr.exp(-n * t - log_s) * cos_phi / (2 * self._arc(frame, t))
+        return dr.select(buried, dr.select(power > 0, density, 0), usual)
