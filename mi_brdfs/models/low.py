@@ -53,7 +53,7 @@ class Low(Model):
     a = Colour(1, (0, float("inf")), "scale A")
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
     c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
-    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum")
+    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum; 1 reflects nothing, without a derivative")
     variant = OneOf(
         {"microfacet": {"normalization": Choice(("fit", "paper", "unit"), "scale of the lobe")}, "smooth": {}},
         "which of the paper's two models",

@@ -49,11 +49,13 @@ class Toon(Model):
 
     diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy")
     diffuse_threshold = Number(0.5, (0, 1), "cosine td at which the lit band ends")
-    diffuse_smooth = Number(0.05, (0, 1), "half the width sd of its edge, in the cosine; 0 is a hard edge")
+    diffuse_smooth = Number(0.05, (0, 1), "half the width sd of its edge, in the cosine; 0 is hard, with no derivative")
     diffuse_shadow = Number(0, (0, 1), "brightness b of the dark band, as a fraction of that of the lit one")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe; its largest albedo for energy")
     specular_threshold = Number(0.9, (0, 1), "cosine ts at which the highlight ends")
-    specular_smooth = Number(0.02, (0, 1), "half the width ss of its edge, in the cosine; 0 is a hard edge")
+    specular_smooth = Number(
+        0.02, (0, 1), "half the width ss of its edge, in the cosine; 0 is hard, with no derivative"
+    )
     normalization = Choice(("energy", "none"), "scale Z")
 
     energy = Energy(
