@@ -16,10 +16,10 @@ import mitsuba as mi  # noqa: E402
 
 __version__ = "0.1.0"
 
-_OLDEST, _TESTED = (3, 7), (3, 9)
+_TESTED = (3, 9)
 _version = tuple(int(number) for number in re.findall(r"\d+", mi.__version__)[:2])
-if _version < _OLDEST:
-    raise ImportError(f"mi_brdfs needs Mitsuba 3.7 or newer, this is {mi.__version__}: pip install -U mitsuba")
+if _version < _TESTED:
+    raise ImportError(f"mi_brdfs needs Mitsuba 3.9 or newer, this is {mi.__version__}: pip install -U mitsuba")
 if _version > _TESTED:
     warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
 
