@@ -287,7 +287,7 @@ class FresnelSlot(Slot):
 
     @property
     def ranges(self) -> dict[str, Range]:
-        return {name: FresnelSet.RANGES[name] for name in FresnelSet.SETS[self.kind]}
+        return {name: FresnelSet.RANGES[name] for name in FresnelSet.SETS.get(self.kind, ())}
 
     def evaluate(self, si, active):
         def colour(name):
@@ -671,7 +671,6 @@ class FresnelSet(Parameter):
     INDEX, EXTINCTION = (0.01, 100), (0, 100)
     RANGES: ClassVar = {"eta": INDEX, "k": EXTINCTION, "f0": (0, 1), "int_ior": INDEX, "ext_ior": INDEX}
     SETS: ClassVar = {
-        "none": (),
         "conductor": ("eta", "k"),
         "material": ("material",),
         "schlick": ("f0",),

@@ -45,7 +45,7 @@ def matte(brightness, **members):
 
 def brightness(plugin):
     bsdf = mi.load_dict({"type": plugin})
-    return call(bsdf.eval, mi.BSDFContext(), direction(20), hemisphere(1, 1))[0][0, 0] * np.pi / hemisphere(1, 1)[0, 2]
+    return call(bsdf.eval, mi.BSDFContext(), np.float32([direction(20)]), hemisphere(1, 1))[0][0, 0] * np.pi / hemisphere(1, 1)[0, 2]
 
 
 def test_a_model_is_known_in_every_variant(variant):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import normalize_or
+from ..math import normalize_or, safe_sqrt
 from ..microfacet.facet import Facet
 from .lobe import Lobe
 
@@ -46,7 +46,7 @@ class DimmedLobe(MicrofacetLobe):
     def albedo(self, wi):
         sin2, tilt = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12), 1 - wi.z
         alpha2 = self.distribution.slope2(wi) / sin2
-        cos = dr.sqrt(wi.z * wi.z + 0.45 * tilt * dr.sqrt(tilt * alpha2))  # fitted to GGX
+        cos = dr.sqrt(wi.z * wi.z + 0.45 * tilt * safe_sqrt(tilt * alpha2))  # fitted to GGX
         return self.reflectance * (self.fresnel(tilted(cos)) * self.distribution.albedo(wi.z))
 
 
@@ -64,7 +64,7 @@ class TypicalFacetLobe(MicrofacetLobe):
         slope = typical2 * dr.rsqrt(typical2 + z * z)  # the mirror is typical of what is narrow
         facet = Facet.at(mi.Vector3f(wi.x, wi.y, z), slope * x, slope * y)
         seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / z, facet.cos_h)
-        cos = dr.sqrt(z * z + 0.28 * tilt * dr.sqrt(tilt * slope2))
+        cos = dr.sqrt(z * z + 0.28 * tilt * safe_sqrt(tilt * slope2))
         return self.reflectance * (self.fresnel(tilted(cos)) * seen)
 
 

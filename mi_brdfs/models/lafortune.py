@@ -105,7 +105,7 @@ class LafortuneLobe(PowerLobe):
     def _buried(self, frame):
         """``(whether it does, log s, c² (n+1))``, where c is the cosine."""
         cos2 = dr.square(frame.axis.z)
-        sin2 = dr.maximum(1 - cos2, 1e-30)
+        sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), 1e-12)  # for which 1 - c² has no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
         return depth > sin2, 0.5 * dr.log(sin2), depth
 
