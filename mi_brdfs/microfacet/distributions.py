@@ -425,9 +425,11 @@ class EPD(Isotropic):
         return median
 
     def _power(self, tan2):
-        """exp(-(tan²θ/α²)ᵞ)"""
-        log = dr.log(dr.maximum(tan2 / self.alpha2, 1e-30))
-        return dr.exp(-dr.exp(dr.minimum(self.gamma * log, 5)))  # exp(-exp(5)) is no float32
+        """(tan²θ/α²)ᵞ"""
+        x = tan2 / self.alpha2
+        # At the normal the derivative of a low power has no end; and exp(-exp(5)) is no float32.
+        power = dr.exp(dr.minimum(self.gamma * dr.log(dr.maximum(x, 1e-24)), 5))
+        return dr.select(x > 1e-24, power, 0)
 
     def _rest(self, tan2):
         """What D cosθ dω is proportional to, per tan²θ, but for that power."""
@@ -438,7 +440,8 @@ class EPD(Isotropic):
 
     def eval(self, facet):
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)
-        return self.scale * self._power(facet.sin2_h / cos2) * dr.square(dr.rcp(cos2))
+        # 1/cos⁴ as a part of the exponent: its adjoint would overflow where the power makes up for it.
+        return self.scale * dr.exp(-2 * dr.log(cos2) - self._power(facet.sin2_h / cos2))
 
     def density(self, facet, g):
         sin2 = facet.sin2_h

@@ -80,7 +80,7 @@ class Exponential(EPD):
         return 1 / dr.square(1 + tan2)
 
     def eval(self, facet):
-        return self.scale * self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14))
+        return self.scale * dr.exp(-self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14)))
 
     def albedo(self, cos):
         """∫ D cosθ_h dω_h, as the steps have it."""
