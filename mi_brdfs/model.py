@@ -70,6 +70,7 @@ class Plugin:
             bound = parameter.bind(given)
             if isinstance(bound, Slot):
                 self.slots[parameter.name] = bound
+                vars(self).update(bound.words)
             else:
                 setattr(self, parameter.name, bound)
         self.textures, self.ranges = textures_of(self.slots.values()), ranges_of(self.slots.values())

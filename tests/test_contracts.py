@@ -8,7 +8,7 @@ from support import call, direction
 import mi_brdfs
 from mi_brdfs import registry
 from mi_brdfs.lobes import LambertLobe, Lobe
-from mi_brdfs.parameters import Choice, Flag, Number, PerLobe, Reflectance
+from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance
 
 
 @pytest.fixture(autouse=True)
@@ -73,6 +73,22 @@ def test_a_choice_of_each_lobe():
     assert radiance(shade_1="half", scale_2=0.3) == pytest.approx(0.35)
     assert radiance(scale_1=0.2, scale_2=0.3, off_2=True) == pytest.approx(0.2)
     assert 'slip: shade_2 = "dim" is unknown; it must be one of "full" or "half"' in told(shade_2="dim", scale_1=0.1)
+
+
+def test_choices_are_attributes_whatever_declares_them():
+    """A word with parameters of its own, and a word among these, as any other choice."""
+
+    def lobes(self, p):
+        strength = {"flat": 0.1, "tinted": 0.2}[self.kind] + {"full": 0.0, "half": 0.05}[self.shade]
+        if self.kind == "tinted":
+            strength += {"red": 0.3, "blue": 0.4}[self.hue]
+        return (LambertLobe(strength),)
+
+    kind = OneOf({"flat": {}, "tinted": {"hue": Choice(("red", "blue"), "hue")}}, "kind")
+    model(lobes, kind=kind, shade=Choice(("full", "half"), "shade"))
+    assert radiance() == pytest.approx(0.1)
+    assert radiance(kind="tinted", shade="half") == pytest.approx(0.55)
+    assert radiance(kind="tinted", hue="blue") == pytest.approx(0.6)
 
 
 def test_a_model_without_parameters():
