@@ -354,7 +354,7 @@ class HemiEPD(Isotropic):
         return (self.gamma + 2) * dr.inv_two_pi * power * bent
 
     def density(self, facet, g):
-        m, s = cosine_power_cdf(facet.sin2_h / dr.square(facet.cos_h), self.gamma + 2)
+        m, s = cosine_power_cdf(facet.tan2_h, self.gamma + 2)
         return (self.gamma + 2) * dr.inv_two_pi * s / facet.cos_h * self.law.eval(m, s)
 
     def cdf(self, tan2, g):

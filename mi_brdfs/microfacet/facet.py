@@ -60,3 +60,7 @@ class Facet:
     def sin2_h(self):
         # Not 1 - cos², which loses the digits of narrow lobes.
         return self.h.x * self.h.x + self.h.y * self.h.y
+
+    @property
+    def tan2_h(self):
+        return self.sin2_h / dr.square(self.cos_h)

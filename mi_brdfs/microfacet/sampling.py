@@ -84,16 +84,11 @@ class Line:
 
     def part(self, facet):
         """The m of a facet on the line."""
-        return clamp(self.distribution.cdf(tan2_of(facet), self.g)[0] / self.mass, 0, 1)
+        return clamp(self.distribution.cdf(facet.tan2_h, self.g)[0] / self.mass, 0, 1)
 
     def inverse_cdf(self, m):
         """The tan²θ_h of an m."""
         return self.distribution.inverse_cdf(m * self.mass, self.rest + (1 - m) * self.mass, self.g)
-
-
-def tan2_of(facet):
-    """tan²θ_h"""
-    return facet.sin2_h / dr.square(facet.cos_h)
 
 
 class LeaningPair(Pair):
