@@ -19,8 +19,8 @@ from mi_brdfs.gallery import example, overview, picture
 from mi_brdfs.gallery.sheet import Row, sheet
 from mi_brdfs.gallery.sweeps import SWEEPS, shown
 from mi_brdfs.integrators.shading import Shading
+from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.model import Energy, Model, Plugin
-from mi_brdfs.registry import all_models
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 

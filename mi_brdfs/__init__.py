@@ -8,7 +8,7 @@ look at one in. :func:`ranges` and :func:`project` keep optimised parameters whe
 import re
 import warnings
 
-from . import llvm
+from .mitsuba import llvm
 
 llvm.point_to_extra()  # before Mitsuba is imported, which loads LLVM
 
@@ -24,11 +24,11 @@ if _version > _TESTED:
     warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
 
 from . import lobes, microfacet, parameters  # noqa: E402
-from .guests import register_installed  # noqa: E402
+from .mitsuba.guests import register_installed  # noqa: E402
+from .mitsuba.registry import info, install, list_models, register  # noqa: E402
 from .model import Energy, Model  # noqa: E402
 from .preview import preview_scene  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
-from .registry import info, install, list_models, register  # noqa: E402
 
 install()
 

@@ -9,7 +9,7 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import version as installed_version
 
-from . import llvm
+from .mitsuba import llvm
 
 BACKENDS = ("scalar", "llvm", "cuda", "metal")
 TIMEOUT = 180  # seconds; the first CUDA render on a machine compiles for a while
@@ -24,7 +24,7 @@ WHY_MISSING = {
 PROBE = f"""
 import sys
 import mi_brdfs, mitsuba as mi
-from mi_brdfs import llvm
+from mi_brdfs.mitsuba import llvm
 try:
     mi.set_variant(sys.argv[1])
 except ImportError as error:

@@ -24,6 +24,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .variants import is_scalar
+
 SHOULDER = 0.8
 
 
@@ -67,7 +69,7 @@ def render(
     film, sampler, integrator = camera.film(), camera.sampler(), scene.integrator()
     source = integrator if hasattr(integrator, "sums") else FilmPasses(integrator)
     # Mitsuba's own handler cuts a pass of a scalar variant short.
-    cut_short = mi.variant().startswith("scalar") and isinstance(source, FilmPasses)
+    cut_short = is_scalar() and isinstance(source, FilmPasses)
     own_count = sampler.sample_count()
     try:
         particles = isinstance(integrator, mi.AdjointIntegrator)
@@ -157,7 +159,7 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
 
 def _samples_per_pass() -> int:
     """About a second's worth on an ordinary scene: fixed numbers, so that results do not depend on timing."""
-    if mi.variant().startswith("scalar"):
+    if is_scalar():
         return 1 << 14
     if mi.variant().startswith("llvm"):
         return (1 << 20) * dr.thread_count()

@@ -14,13 +14,13 @@ from types import SimpleNamespace
 import drjit as dr
 import mitsuba as mi
 
-from mi_brdfs import bsdf as adapter
 from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, Mixture, PowerLobe, over_diffuse
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
 from mi_brdfs.microfacet.fresnel import Unit
-from mi_brdfs.microfacet.sampling import BoundedVisibleNormals, Pair
+from mi_brdfs.microfacet.sampling import AntitheticNormals, BoundedVisibleNormals
 from mi_brdfs.microfacet.shadowing import SmithGGX, kelemen
+from mi_brdfs.mitsuba import bsdf as adapter
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.models.phong import Phong
 from mi_brdfs.models.walter import Walter
@@ -320,7 +320,7 @@ def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=Bounde
 def ward(lobe):
     class Mutant(Ward):
         def lobes(self, p):
-            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), kelemen, Unit(), Pair())
+            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), kelemen, Unit(), AntitheticNormals())
             return LambertLobe(p.diffuse_reflectance), specular
 
     return Mutant

@@ -19,10 +19,10 @@ from mi_brdfs.bench.efficiency import Sampling, _mean, efficiency, sampling
 from mi_brdfs.bench.first import first_picture
 from mi_brdfs.bench.scenes import ALONE, BOX, PATH, SPHERE, scene_of, sphere
 from mi_brdfs.bench.timing import alternate, deviations, median_interval, time_variance
-from mi_brdfs.bsdf import ModelBSDF
 from mi_brdfs.lobes import LambertLobe, PowerLobe
+from mi_brdfs.mitsuba.bsdf import ModelBSDF
+from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.models.lambert import Lambert
-from mi_brdfs.registry import all_models
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 
@@ -47,8 +47,8 @@ class HalfLost(LambertLobe):
 class Boastful(PowerLobe):
     """Says that it reflects a hundred times as much, and takes the samples of the lobe beside it."""
 
-    def albedo(self, wi):
-        return 100 * super().albedo(wi)
+    def estimated_albedo(self, wi):
+        return 100 * super().estimated_albedo(wi)
 
 
 class Leaking(ModelBSDF):

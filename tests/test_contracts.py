@@ -6,8 +6,8 @@ import pytest
 from support import call, direction
 
 import mi_brdfs
-from mi_brdfs import registry
 from mi_brdfs.lobes import LambertLobe, Lobe
+from mi_brdfs.mitsuba import registry
 from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance
 
 
@@ -124,7 +124,7 @@ def test_a_lobe_without_an_albedo_is_named():
         pass
 
     model(lambda self, p: (Half(), Half()))
-    with pytest.raises(NotImplementedError, match="Half does not define albedo"):
+    with pytest.raises(NotImplementedError, match="Half does not define estimated_albedo"):
         radiance()
 
 

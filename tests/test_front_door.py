@@ -12,8 +12,8 @@ import pytest
 from support import call, direction
 
 import mi_brdfs
-from mi_brdfs import guests, registry
 from mi_brdfs.lobes import LambertLobe
+from mi_brdfs.mitsuba import guests, registry
 from mi_brdfs.models.eon import EON
 from mi_brdfs.parameters import Reflectance
 

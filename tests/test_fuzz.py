@@ -17,7 +17,7 @@ from fuzzing import examples, ways
 from hypothesis import strategies as st
 from support import context, interaction, numbers, per_lane
 
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 EVALUATIONS = 1_000_000
 """How many settings and pairs of directions a run tries, or more: with the first way to give each model's parameters,

@@ -18,7 +18,7 @@ from support import is_scalar
 import mi_brdfs
 from mi_brdfs.gallery import Entry, Row, example, gallery, page, picture, power_of_4, sheet, year
 from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, rgb, shown
-from mi_brdfs.registry import all_models, find_model
+from mi_brdfs.mitsuba.registry import all_models, find_model
 from mi_brdfs.render import display_image, render
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))

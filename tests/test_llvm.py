@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from mi_brdfs import llvm
+from mi_brdfs.mitsuba import llvm
 
 BAD = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
@@ -43,7 +43,7 @@ def python(code: str, library: str | None = None) -> subprocess.CompletedProcess
     ],
 )
 def test_a_safe_llvm_is_used_in_every_order_of_imports(imports):
-    says = "print(mi_brdfs.llvm.version()[0], mi_brdfs.llvm.problem())"
+    says = "print(mi_brdfs.mitsuba.llvm.version()[0], mi_brdfs.mitsuba.llvm.problem())"
     run = python(f"{imports}\nmi.set_variant('llvm_ad_rgb')\n{RENDER}\n{says}")
     assert run.returncode == 0, run.stderr[-500:]
     major, problem = run.stdout.split()[-2:]
@@ -54,7 +54,7 @@ def test_a_safe_llvm_is_used_in_every_order_of_imports(imports):
 @needs_bad
 def test_the_users_choice_is_kept_and_warned_of_once():
     switch = "mi.set_variant('llvm_ad_rgb'); mi.set_variant('scalar_rgb')\n"
-    run = python(f"import mi_brdfs, mitsuba as mi\n{switch * 2}print(mi_brdfs.llvm.loaded_file())", library=BAD)
+    run = python(f"import mi_brdfs, mitsuba as mi\n{switch * 2}print(mi_brdfs.mitsuba.llvm.loaded_file())", library=BAD)
     assert os.path.realpath(run.stdout.strip()) == os.path.realpath(BAD)
     assert run.stderr.count(f"unset {llvm.VARIABLE}") == 1
 
@@ -69,7 +69,8 @@ def test_an_active_variant_is_left_alone_but_warned_of():
     if python("import drjit as dr; assert dr.detail.llvm_version()[0] in (15, 16)").returncode:
         pytest.skip("the system's own LLVM is not one that aborts")
     run = python(
-        "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); import mi_brdfs; print(mi_brdfs.llvm.version()[0])"
+        "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); from mi_brdfs.mitsuba import llvm\n"
+        "print(llvm.version()[0])"
     )
     assert run.stdout.strip() in ("15", "16")
     assert "import mi_brdfs first" in run.stderr or "pip install karellen-llvm-core" in run.stderr
@@ -83,7 +84,7 @@ def test_arrays_that_exist_already_survive_the_import():
 
 @needs_bad
 def test_advice_without_the_extra():
-    run = python(f"{NO_EXTRA}\nimport mi_brdfs; print(mi_brdfs.llvm.problem())", library=BAD)
+    run = python(f"{NO_EXTRA}\nimport mi_brdfs; print(mi_brdfs.mitsuba.llvm.problem())", library=BAD)
     assert f"unset {llvm.VARIABLE}" in run.stdout and "pip install karellen-llvm-core" in run.stdout
 
 

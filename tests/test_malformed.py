@@ -20,9 +20,9 @@ from support import call, direction
 from test_resources import scene_of
 
 from mi_brdfs.cli.errors import one_line
+from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
-from mi_brdfs.registry import all_models
 
 MODELS = pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
 

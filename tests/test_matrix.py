@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import context, direction, interaction, is_scalar, numbers
 
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 NAMES = [model.plugins[0] for model in all_models()]
 COMPILED = ["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono_polarized"]

@@ -10,7 +10,7 @@ from fuzzing import Quantity, ways
 from support import hemisphere, interaction
 
 import mi_brdfs
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 SIDE = 10
 STARTS, PAIRS = SIDE * SIDE, 12

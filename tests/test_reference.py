@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 

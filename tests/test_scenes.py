@@ -10,7 +10,7 @@ import pytest
 from support import is_scalar
 
 import mi_brdfs
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "scenes" / "textures"))

@@ -5,8 +5,8 @@ import pytest
 from test_shading_render import check_alpha, check_finish, check_memory, check_pixels
 from test_shading_through import check_layers, check_masks
 
-from mi_brdfs import integrator as adapter
 from mi_brdfs.integrators import shading
+from mi_brdfs.mitsuba import integrator as adapter
 
 
 def finish_each_pass(patch, integrator):

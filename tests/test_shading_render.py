@@ -12,9 +12,9 @@ import pytest
 from plates import SKY, SUN, WHITE, film, from_above, load, plate, shaded
 from support import is_scalar
 
-from mi_brdfs import integrator as adapter
 from mi_brdfs import render
-from mi_brdfs.integrator import LANES
+from mi_brdfs.mitsuba import integrator as adapter
+from mi_brdfs.mitsuba.integrator import LANES
 
 # --- Passes ---------------------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from catalogue import ROWS
 from support import call, hemisphere, is_scalar, sphere
 
 import mi_brdfs
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 NAMES = [model.plugins[0] for model in all_models()]
 RICHEST = {
@@ -377,7 +377,7 @@ def meaning(model, declared):
 
 def test_a_changed_deepcopy_leaves_the_model_alone():
     """Also where it declares parameters of its own, of which one may belong to several words."""
-    model = mi_brdfs.registry.find_model("microfacet")
+    model = mi_brdfs.mitsuba.registry.find_model("microfacet")
     before = described(model.declared())
     declared = copy.deepcopy(model.declared())
     distribution = next(parameter for parameter in declared if parameter.name == "distribution")

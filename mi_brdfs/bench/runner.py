@@ -9,8 +9,9 @@ from typing import TypeVar
 import drjit as dr
 import mitsuba as mi
 
-from .. import llvm
 from ..doctor import versions
+from ..mitsuba import llvm
+from ..variants import is_measurable
 from .cases import CASES, Case
 from .efficiency import efficiency
 from .first import first
@@ -66,7 +67,7 @@ def bench(
     if unknown := sorted(wanted - set(SECTIONS)):
         raise ValueError(f"There is no section {unknown[0]!r}; there are {', '.join(SECTIONS)}.")
     variant = mi.variant()
-    if variant is None or variant.startswith("scalar") or "polarized" in variant:
+    if not is_measurable(variant):
         raise ValueError(f"Measuring needs a vectorized and unpolarized variant, not {variant}.")
     run = Run(on_progress)
     figures = []

@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .. import guests
-from ..registry import all_models
+from ..mitsuba.registry import all_models
 from .app import command, imported
 from .errors import one_line
 from .interrupts import ending_processes, interruptible

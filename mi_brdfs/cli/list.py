@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.table import Table
 
-from ..registry import all_models
+from ..mitsuba.registry import all_models
 from .app import command
 from .terminal import print_table
 

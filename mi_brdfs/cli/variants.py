@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import mitsuba as mi
 
-from .. import llvm
+from ..mitsuba import llvm
+from ..variants import is_measurable
 from .terminal import Exit, err, fail
 
 
@@ -35,7 +36,7 @@ def set_variant(wanted: str | None) -> str:
 def set_tracing_variant(wanted: str | None) -> str:
     """The same, of those that check and bench work in."""
     chosen = set_variant(wanted)
-    if chosen.startswith("scalar") or "polarized" in chosen:
+    if not is_measurable(chosen):
         fail(f"this needs a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if wanted else Exit.ERROR)
     return chosen
 

@@ -27,9 +27,9 @@ try:
 except ImportError:
     raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
 
+from ..mitsuba.registry import all_models, find_model
 from ..model import Model
 from ..preview import preview_scene
-from ..registry import all_models, find_model
 from ..render import ctrl_c, display_image, write
 from .html import Section, page
 from .sheet import Row, sheet

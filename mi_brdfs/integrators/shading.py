@@ -11,6 +11,7 @@ import mitsuba as mi
 from ..math import clamp, select
 from ..model import Plugin
 from ..parameters import Choice, Colour, ColourSlot, Flag, ParameterError, listed
+from ..variants import is_scalar
 
 
 @dataclass
@@ -224,7 +225,7 @@ def null_transmission(si, active):
 
 def may_pass(scene) -> bool:
     """Whether light may pass straight through some surface; scalar variants, which can ask each, always look."""
-    if mi.variant().startswith("scalar"):
+    if is_scalar():
         return True
     return any(mi.has_flag(it.flags(), mi.BSDFFlags.Null) for it in bsdfs_of(scene))
 

@@ -17,7 +17,7 @@ class LambertLobe(Lobe):
     def __init__(self, reflectance):
         self.reflectance = reflectance
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         return self.reflectance
 
     def eval_pdf(self, wi, wo):
@@ -52,7 +52,7 @@ class ZonalLobe(Lobe):
 
     def eval_pdf(self, wi, wo):
         pdf = self.density(wo.z) * dr.inv_two_pi
-        return self.albedo(wi) * pdf, pdf
+        return self.estimated_albedo(wi) * pdf, pdf
 
     def sample(self, wi, u, v):
         cos = self.cosine(v.x)
@@ -68,13 +68,13 @@ class AdjointZonalLobe(AdjointLobe):
         """What a lobe of an albedo of 1 makes of light from ``wi``, times π."""
         return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, 1e-15)
 
-    def albedo(self, wi):
-        return self.lobe.albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)
+    def estimated_albedo(self, wi):
+        return self.lobe.estimated_albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)
 
     def eval_pdf(self, wi, wo):
         viewer = self._mirrored(wo)
         pdf = viewer.z * dr.inv_pi
-        return self.lobe.albedo(viewer) * (self._radiance(wi) * pdf), pdf
+        return self.lobe.estimated_albedo(viewer) * (self._radiance(wi) * pdf), pdf
 
     def sample(self, wi, u, v):
         return self._mirrored(mi.warp.square_to_cosine_hemisphere(v))

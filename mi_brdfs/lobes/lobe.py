@@ -28,10 +28,10 @@ class Lobe:
     transmits = False
     """Whether the light comes from the other side of the surface."""
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         """An estimate of ∫ f |cosθ_o| dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
         exact; but where the lobe reflects anything it must be positive."""
-        raise NotImplementedError(f"{type(self).__name__} does not define albedo.")
+        raise NotImplementedError(f"{type(self).__name__} does not define estimated_albedo.")
 
     def eval_pdf(self, wi, wo):
         """``(value, pdf)``: f |cosθ_o|, and the density of ``wo`` in :meth:`sample`."""
@@ -64,8 +64,8 @@ class AdjointLobe(Lobe):
     def __init__(self, lobe: Lobe):
         self.lobe, self.glossy, self.transmits = lobe, lobe.glossy, lobe.transmits
 
-    def albedo(self, wi):
-        return self.lobe.albedo(wi)
+    def estimated_albedo(self, wi):
+        return self.lobe.estimated_albedo(wi)
 
     def eval_pdf(self, wi, wo):
         value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))

@@ -19,8 +19,8 @@ class MicrofacetLobe(Lobe):
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel, self.sampler = shadowing, fresnel, sampler
 
-    def albedo(self, wi):
-        return self.reflectance * (self.fresnel(tilted(wi.z)) * self.distribution.albedo(wi.z))
+    def estimated_albedo(self, wi):
+        return self.reflectance * (self.fresnel(facing_cosine(wi.z)) * self.distribution.estimated_albedo(wi.z))
 
     def eval_pdf(self, wi, wo):
         facet = Facet.between(wi, wo)
@@ -33,7 +33,7 @@ class MicrofacetLobe(Lobe):
     def mirror_reflectance(self, wi):
         return self.colour * self.fresnel(wi.z)
 
-    def over_facets(self, facet):
+    def weight_over_ndf(self, facet):
         """f cosθ_o·4cosθ_d/D for ρ = 1, as the one number that samplers go by: with D/q it makes the weight of a half
         vector of the density q."""
         return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet) * facet.cos_d / facet.cos_i
@@ -43,11 +43,11 @@ class DimmedLobe(MicrofacetLobe):
     """A lobe with Smith's shadowing term. At grazing it is dimmer than F(cosθ_i) says: the facets seen there are tilted
     towards the viewer, and reflect less."""
 
-    def albedo(self, wi):
-        sin2, tilt = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12), 1 - wi.z
-        alpha2 = self.distribution.slope2(wi) / sin2
-        cos = dr.sqrt(wi.z * wi.z + 0.45 * tilt * safe_sqrt(tilt * alpha2))  # fitted to GGX
-        return self.reflectance * (self.fresnel(tilted(cos)) * self.distribution.albedo(wi.z))
+    def estimated_albedo(self, wi):
+        sin2, versine = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12), 1 - wi.z
+        alpha2 = self.distribution.mean_square_slope_along(wi) / sin2
+        cos = dr.sqrt(wi.z * wi.z + 0.45 * versine * safe_sqrt(versine * alpha2))  # fitted to GGX
+        return self.reflectance * (self.fresnel(facing_cosine(cos)) * self.distribution.estimated_albedo(wi.z))
 
 
 class TypicalFacetLobe(MicrofacetLobe):
@@ -55,19 +55,19 @@ class TypicalFacetLobe(MicrofacetLobe):
     towards ``wi``, and its image: their cosθ_d add up to 2 cosθ_h cosθ_i, until at grazing only the first one is
     seen."""
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         x, y = normalize_or(wi.x, wi.y, (1, 0))
-        z, tilt = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
-        slope2 = self.distribution.slope2(mi.Vector3f(x, y, 0))
+        z, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
+        slope2 = self.distribution.mean_square_slope_along(mi.Vector3f(x, y, 0))
         # The constants are fitted to Beckmann and GGX.
         typical2 = 0.72 * slope2 / (1 + 0.3 * slope2)
         slope = typical2 * dr.rsqrt(typical2 + z * z)  # the mirror is typical of what is narrow
         facet = Facet.at(mi.Vector3f(wi.x, wi.y, z), slope * x, slope * y)
         seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / z, facet.cos_h)
-        cos = dr.sqrt(z * z + 0.28 * tilt * safe_sqrt(tilt * slope2))
-        return self.reflectance * (self.fresnel(tilted(cos)) * seen)
+        cos = dr.sqrt(z * z + 0.28 * versine * safe_sqrt(versine * slope2))
+        return self.reflectance * (self.fresnel(facing_cosine(cos)) * seen)
 
 
-def tilted(cos):
+def facing_cosine(cos):
     """A cosine that facets see, of one to the normal. None is 1: Schlick's reflectance with f0 = 0 must not vanish."""
     return dr.minimum(cos, 0.9)

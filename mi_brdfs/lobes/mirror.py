@@ -77,13 +77,13 @@ class PowerLobe(MirrorLobe):
         return dr.maximum(frame.axis.z, 0), frame.sin * dr.rsqrt(dr.two_pi * (self.exponent + 0.64))
 
     def _share(self, frame):
-        upright, tilted = self._masses(frame)
-        return upright / dr.maximum(upright + tilted, 1e-15)  # an axis straight below the surface has neither
+        axial, lateral = self._masses(frame)
+        return axial / dr.maximum(axial + lateral, 1e-15)  # an axis straight below the surface has neither
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         # Exact where the axis lies along the normal or in the horizon.
-        upright, tilted = self._masses(self.frame(wi))
-        mass = dr.sqrt(upright * upright + tilted * tilted)
+        axial, lateral = self._masses(self.frame(wi))
+        mass = dr.sqrt(axial * axial + lateral * lateral)
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 2) * mass)
 
     def eval_pdf(self, wi, wo):
@@ -109,19 +109,19 @@ class PowerLobe(MirrorLobe):
     def _draw(self, frame, u, v):
         """``(u, log A, |B|/√(1-A²), …)`` of the mixture, with what is left of ``u``."""
         n = self.exponent
-        is_upright, u = choose(u, self._share(frame))
+        is_axial, u = choose(u, self._share(frame))
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
-        c = dr.select(is_upright, sin_phi, 2 * v.y - 1)
-        b = dr.select(is_upright, abs(cos_phi), safe_sqrt(1 - c * c))
-        return u, dr.select(is_upright, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1)), b, c
+        c = dr.select(is_axial, sin_phi, 2 * v.y - 1)
+        b = dr.select(is_axial, abs(cos_phi), safe_sqrt(1 - c * c))
+        return u, dr.select(is_axial, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1)), b, c
 
     def _pair(self, frame, log_a, versine, power, cos_phi):
         """The density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
         n = self.exponent
-        upright = (n + 2) * (1 - versine)
-        tilted = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 1e-30)) * cos_phi
+        axial = (n + 2) * (1 - versine)
+        lateral = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 1e-30)) * cos_phi
         share = self._share(frame)
-        return power * dr.inv_pi * (share * upright + (1 - share) * tilted)
+        return power * dr.inv_pi * (share * axial + (1 - share) * lateral)
 
 
 class PowerResponseLobe(MirrorLobe):
@@ -133,7 +133,7 @@ class PowerResponseLobe(MirrorLobe):
 
     reciprocal = False
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         # The tanh estimates what lies above the horizon.
         visible = 0.5 + 0.5 * dr.tanh(wi.z * dr.sqrt(self.exponent + 1))
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 1) * visible)

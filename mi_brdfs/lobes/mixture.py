@@ -22,7 +22,7 @@ class Mixture:
         counts = [1.0] * len(lobes)
         if mirrored is not None:
             counts = [select(mirrored, 1.0, 0.0) if it.transmits else select(mirrored, 0.0, 1.0) for it in lobes]
-        energies = [count * luminance(lobe.albedo(wi)) for count, lobe in zip(counts, lobes, strict=True)]
+        energies = [count * luminance(lobe.estimated_albedo(wi)) for count, lobe in zip(counts, lobes, strict=True)]
         total = sum(energies)
         black = total < 1e-9  # derivatives divide by its square
         scale = dr.rcp(dr.select(black, sum(counts), total))

@@ -19,7 +19,7 @@ from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio
 
 class Distribution:
     LOSS = 1.7
-    """How much light is lost to multiple reflections: the constant of :meth:`albedo`, fitted."""
+    """How much light is lost to multiple reflections: the constant of :meth:`estimated_albedo`, fitted."""
     long_tailed = False
     """Whether there are many more steep facets than a Gaussian distribution of slopes has."""
 
@@ -30,18 +30,18 @@ class Distribution:
         """(h_x/αu)² + (h_y/αv)²."""
         return dr.square(facet.h.x / self.alpha_u) + dr.square(facet.h.y / self.alpha_v)
 
-    def roughness2(self):
+    def mean_square_slope(self):
         """About the mean square slope, over both axes."""
         return 0.5 * (dr.square(self.alpha_u) + dr.square(self.alpha_v))
 
-    def slope2(self, v):
+    def mean_square_slope_along(self, v):
         """The same along a direction, times sin²θ of that."""
         return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
 
-    def albedo(self, cos):
+    def estimated_albedo(self, cos):
         """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
         have in the direction of that cosine."""
-        r2 = self.roughness2()
+        r2 = self.mean_square_slope()
         return 1 / (1 + self.LOSS * r2 * dr.sqrt(dr.sqrt(dr.sqrt(r2))) * (0.5 + 0.5 * cos))
 
     def eval(self, facet):
@@ -68,8 +68,8 @@ class Isotropic(Distribution):
     def __init__(self):
         super().__init__(mi.Float(1), mi.Float(1))
 
-    def slope2(self, v):
-        return self.roughness2() * (v.x * v.x + v.y * v.y)
+    def mean_square_slope_along(self, v):
+        return self.mean_square_slope() * (v.x * v.x + v.y * v.y)
 
 
 class Beckmann(Distribution):
@@ -111,7 +111,7 @@ class Blinn(Isotropic):
         super().__init__()
         self.exponent = exponent
 
-    def roughness2(self):
+    def mean_square_slope(self):
         return 2 / (self.exponent + 2)
 
     def eval(self, facet):
@@ -125,7 +125,7 @@ class Blinn(Isotropic):
         return inverse_cosine_power_cdf(complement, self.exponent + 2)
 
 
-class AshikhminShirley(Distribution):
+class AshikhminShirleyNormals(Distribution):
     """D = √((nu+1)(nv+1))/(2π) cosθ_h^e, e = (nu h_x² + nv h_y²)/sin²θ_h (Ashikhmin and Shirley 2000,
     doi:10.1080/10867651.2000.10487522). Here ∫ D dω_h = 1, without a cosine, and q = D."""
 
@@ -133,11 +133,11 @@ class AshikhminShirley(Distribution):
         # An ellipse: the exponent plus one at azimuth φ is (cosφ/αu)² + (sinφ/αv)².
         super().__init__(dr.rsqrt(exponent_u + 1), dr.rsqrt(exponent_v + 1))
 
-    def roughness2(self):
-        return 2 * super().roughness2()
+    def mean_square_slope(self):
+        return 2 * super().mean_square_slope()
 
-    def slope2(self, v):
-        return 2 * super().slope2(v)
+    def mean_square_slope_along(self, v):
+        return 2 * super().mean_square_slope_along(v)
 
     def eval(self, facet):
         # e log(cosθ), where steepness is (e + 1) sin²θ
@@ -192,7 +192,7 @@ class GTR(Isotropic):
         # In s = sin²θ: 1 + (α²-1) cos²θ = α² (1 + k s)
         self.law = PowerLaw((1 - self.alpha2) / self.alpha2, gamma)
 
-    def roughness2(self):
+    def mean_square_slope(self):
         return self.alpha2
 
     def eval(self, facet):
@@ -217,7 +217,7 @@ class Berry(Isotropic):
         self.k = (1 - self.alpha2) / self.alpha2
         self.range = dr.log(1 + self.k)
 
-    def roughness2(self):
+    def mean_square_slope(self):
         return self.alpha2
 
     def eval(self, facet):
@@ -255,11 +255,11 @@ class ABC(Isotropic):
         closed = (PowerLaw(b, self.law.gamma - 1).norm - self.law.norm) / dr.select(broad, 1, b)
         return self.law.norm - dr.select(broad, quadrature, closed)
 
-    def roughness2(self):
+    def mean_square_slope(self):
         return dr.minimum(2 / (1 + self.law.k * self.law.gamma), 1)
 
-    def albedo(self, cos):
-        return super().albedo(cos) * self.total
+    def estimated_albedo(self, cos):
+        return super().estimated_albedo(cos) * self.total
 
     def eval(self, facet):
         return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
@@ -342,7 +342,7 @@ class HemiEPD(Isotropic):
             integral += dr.select(falls, 3 * x * x, 2 - 2 * x) * weight * growth * value
         return integral * log_k / k
 
-    def roughness2(self):
+    def mean_square_slope(self):
         # That of Blinn's distribution with about the same mean of log(cosθ).
         up, down = dr.maximum(self.kappa, 0), dr.maximum(-self.kappa, 0)
         narrower = dr.select(self.kappa > 0, 1 + up * up / (up + 7), 1 / (1 + 0.35 * dr.log(1 + 0.5 * down)))
@@ -435,7 +435,7 @@ class EPD(Isotropic):
         """What D cosθ dω is proportional to, per tan²θ, but for that power."""
         return 1
 
-    def roughness2(self):
+    def mean_square_slope(self):
         return dr.minimum(self.width, 1)
 
     def eval(self, facet):

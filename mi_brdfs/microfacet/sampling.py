@@ -10,7 +10,7 @@ from .facet import Facet
 from .fresnel import Dielectric, Schlick
 
 
-class Pair:
+class AntitheticNormals:
     r"""Draws a half vector, clipped to what can reflect above the horizon, and then it or its mirror image on the other
     side of the normal, with probability ∝ what they reflect. Exact for any shadowing and Fresnel term.
 
@@ -25,9 +25,9 @@ class Pair:
     grazing: m has the density 1 + τ - 2 τ m.
     """
 
-    def _tilt(self, lobe, wi):
+    def _bias(self, lobe, wi):
         """τ, chosen by measurement."""
-        shadowed = wi.z * dr.minimum(1.5 * lobe.distribution.roughness2(), 1)
+        shadowed = wi.z * dr.minimum(1.5 * lobe.distribution.mean_square_slope(), 1)
         return dr.minimum(0.75 * shadowed + 0.35 * (1 - self._brighter(lobe, wi)), 0.9)
 
     @staticmethod
@@ -42,11 +42,11 @@ class Pair:
 
     def _tan2(self, lobe, wi, line, which, v):
         """A tan²θ_h on the line."""
-        return line.inverse_cdf(draw_tilted(self._tilt(lobe, wi), v))
+        return line.inverse_cdf(draw_linear(self._bias(lobe, wi), v))
 
     def _density(self, lobe, line, facet, cos, sin, q):
         """Of the half vectors drawn so, where ``q`` is that of the distribution."""
-        return q * tilted(self._tilt(lobe, facet.wi), line.part(facet)) / line.mass
+        return q * linear_density(self._bias(lobe, facet.wi), line.part(facet)) / line.mass
 
     def sample(self, lobe, wi, u, v):
         distribution = lobe.distribution
@@ -91,7 +91,7 @@ class Line:
         return self.distribution.inverse_cdf(m * self.mass, self.rest + (1 - m) * self.mass, self.g)
 
 
-class LeaningPair(Pair):
+class AntitheticNormalsTowardViewer(AntitheticNormals):
     """The pair for shadowing terms under which, at grazing, those facets count that lean towards ``wi``, along the
     plane of incidence: a part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and τ = -0.6.
 
@@ -115,7 +115,7 @@ class LeaningPair(Pair):
         distribution = lobe.distribution
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        slope2, cos2, brighter = distribution.slope2(wi), dr.square(wi.z), self._brighter(lobe, wi)
+        slope2, cos2, brighter = distribution.mean_square_slope_along(wi), dr.square(wi.z), self._brighter(lobe, wi)
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), 0.95)
         if not distribution.long_tailed:
@@ -137,7 +137,7 @@ class LeaningPair(Pair):
 
     def _tan2(self, lobe, wi, line, which, v):
         leans, is_steep = which
-        tan2 = line.inverse_cdf(draw_tilted(dr.select(leans, self.OUTWARD, self._tilt(lobe, wi)), v))
+        tan2 = line.inverse_cdf(draw_linear(dr.select(leans, self.OUTWARD, self._bias(lobe, wi)), v))
         if not lobe.distribution.long_tailed:
             return tan2
         cos = 1 - v * (1 - line.lowest)
@@ -147,7 +147,7 @@ class LeaningPair(Pair):
         distribution = lobe.distribution
         x, y, leaning, steep = self._along(lobe, facet.wi)
         lines = 0.5 * dr.pi * abs(cos * x + sin * y)
-        outward = tilted(self.OUTWARD, line.part(facet)) * q / line.mass
+        outward = linear_density(self.OUTWARD, line.part(facet)) * q / line.mass
         if distribution.long_tailed:
             # The azimuth is uniform in ψ, not in φ.
             stretch = distribution.alpha_u * distribution.alpha_v * line.g
@@ -156,17 +156,17 @@ class LeaningPair(Pair):
         return dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
 
 
-def tilted(tilt, m):
+def linear_density(bias, m):
     """The density 1 + τ - 2 τ m on [0, 1]."""
-    return 1 + tilt - 2 * tilt * m
+    return 1 + bias - 2 * bias * m
 
 
-def draw_tilted(tilt, u):
-    return 2 * u / (1 + tilt + safe_sqrt(dr.square(1 + tilt) - 4 * tilt * u))
+def draw_linear(bias, u):
+    return 2 * u / (1 + bias + safe_sqrt(dr.square(1 + bias) - 4 * bias * u))
 
 
 def reflected(lobe, facet):
-    """What a facet reflects, ``lobe.over_facets``, or next to nothing if that leads below the horizon. It is never
+    """What a facet reflects, ``lobe.weight_over_ndf``, or next to nothing if that leads below the horizon. It is never
     zero: the derivative of a share in what a pair reflects divides by the square of that."""
     valid = (facet.cos_d > 1e-9) & (facet.cos_o > 0)
     # Elsewhere the formulas need not make sense: give them the mirror direction.
@@ -174,7 +174,7 @@ def reflected(lobe, facet):
     safe = Facet(
         facet.wi, select(valid, facet.wo, normal), select(valid, facet.h, normal), select(valid, facet.cos_d, 1)
     )
-    return dr.maximum(select(valid, lobe.over_facets(safe), 0), 1e-17)
+    return dr.maximum(select(valid, lobe.weight_over_ndf(safe), 0), 1e-17)
 
 
 class BoundedVisibleNormals:
@@ -186,7 +186,7 @@ class BoundedVisibleNormals:
     the height v = (z + b)/(1 + b) makes up for it. l = ¾ min(1, α) was chosen by measurement.
     """
 
-    TILT = 0.75
+    BIAS = 0.75
 
     def _cap(self, distribution, wi):
         """``(stretched wi, its unit vector, k, b, l)``"""
@@ -197,13 +197,13 @@ class BoundedVisibleNormals:
         s = 1 + sin_theta(wi)
         s2, a2 = s * s, alpha * alpha
         k = (1 - a2) * s2 / (s2 + a2 * wi.z * wi.z)
-        return stretched / length, length, k, k * wi.z / length, self.TILT * alpha
+        return stretched / length, length, k, k * wi.z / length, self.BIAS * alpha
 
     def _draw(self, distribution, wi, v):
         """``(unit vector of the stretched wi, point of the cap)``"""
-        unit, _, _, b, tilt = self._cap(distribution, wi)
-        # The inverse of the linear density; the small tilt of narrow lobes must not cancel.
-        height = 2 * v.y / (1 - tilt + dr.sqrt(dr.square(1 - tilt) + 4 * tilt * v.y))
+        unit, _, _, b, bias = self._cap(distribution, wi)
+        # The inverse of the linear density; the small bias of narrow lobes must not cancel.
+        height = 2 * v.y / (1 - bias + dr.sqrt(dr.square(1 - bias) + 4 * bias * v.y))
         z = height * (1 + b) - b
         sin = safe_sqrt(1 - z * z)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.x)
@@ -219,12 +219,12 @@ class BoundedVisibleNormals:
 
     def _density(self, distribution, facet):
         """``(density, unit vector of the stretched wi, point of the cap)``"""
-        unit, length, k, b, tilt = self._cap(distribution, facet.wi)
+        unit, length, k, b, bias = self._cap(distribution, facet.wi)
         normal = mi.Vector3f(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, facet.cos_h)
         point = normal * (2 * dr.dot(unit, normal) / dr.dot(normal, normal)) - unit
         height = dr.maximum(point.z + b, 0) / (1 + b)
         uniform = distribution.eval(facet) / (2 * (k * facet.cos_i + length))
-        return uniform * (1 - tilt + 2 * tilt * height), unit, point
+        return uniform * (1 - bias + 2 * bias * height), unit, point
 
     def sample(self, lobe, wi, u, v):
         return self._facet(lobe.distribution, wi, *self._draw(lobe.distribution, wi, v)).wo
@@ -233,7 +233,7 @@ class BoundedVisibleNormals:
         return self._density(lobe.distribution, facet)[0]
 
 
-class PairOfVisibleNormals(BoundedVisibleNormals):
+class AntitheticVisibleNormals(BoundedVisibleNormals):
     """One of two such normals, whose points in the cap are mirror images about its axis, with probability ∝ what they
     reflect: Fresnel's term is larger for the one and smaller for the other, and so is the shadowing."""
 
@@ -262,4 +262,4 @@ class PairOfVisibleNormals(BoundedVisibleNormals):
 def visible_normals(fresnel):
     """A sampler of visible normals for a lobe of GGX facets and Smith's shadowing: the pair where the reflectance rises
     from a few percent to one, as it does for dielectrics. Elsewhere its time is worth more than its noise."""
-    return PairOfVisibleNormals() if isinstance(fresnel, Dielectric | Schlick) else BoundedVisibleNormals()
+    return AntitheticVisibleNormals() if isinstance(fresnel, Dielectric | Schlick) else BoundedVisibleNormals()

@@ -120,7 +120,7 @@ def ashikhmin_shirley(facet):
     return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d
 
 
-class Kurt:
+class KurtShadowing:
     """(cosθ_i cosθ_o)^(1-κ) / cosθ_d (Kurt, Szirmay-Kalos and Křivánek 2010, doi:10.1145/1722991.1722996)."""
 
     def __init__(self, exponent):

@@ -1,9 +1,9 @@
 import mitsuba as mi
 
 from ..lobes import LambertLobe, TypicalFacetLobe
-from ..microfacet.distributions import AshikhminShirley as Distribution
+from ..microfacet.distributions import AshikhminShirleyNormals
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import AntitheticNormals
 from ..microfacet.shadowing import ashikhmin_shirley
 from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
@@ -28,7 +28,7 @@ class AshikhminShirley(Model):
     One-sided.
 
     Sampling: fs by a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair), so that no sample falls below the horizon; fd cosine-weighted.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals), so that no sample falls below the horizon; fd cosine-weighted.
 
     Example
     -------
@@ -52,10 +52,10 @@ class AshikhminShirley(Model):
     def lobes(self, p):
         specular = TypicalFacetLobe(
             mi.UnpolarizedSpectrum(1),
-            Distribution(*p.exponent),
+            AshikhminShirleyNormals(*p.exponent),
             ashikhmin_shirley,
             Schlick(p.specular_reflectance),
-            Pair(),
+            AntitheticNormals(),
         )
         return CoupledDiffuseLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)), specular
 
@@ -69,7 +69,7 @@ class CoupledDiffuseLobe(LambertLobe):
         m2 = m * m
         return 1 - m2 * m2 * m
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         return self.reflectance * self._g(wi.z)
 
     def eval_pdf(self, wi, wo):

@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import Blinn
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import LeaningPair
+from ..microfacet.sampling import AntitheticNormalsTowardViewer
 from ..microfacet.shadowing import implicit
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
@@ -34,7 +34,7 @@ class BlinnPhong(Model):
     Reciprocal, but for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.LeaningPair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); no sample falls below the horizon.
 
     Example
     -------
@@ -75,7 +75,7 @@ class BlinnPhong(Model):
         }[self.normalization]()
         scale = 4 * dr.two_pi / (n + 2) * scale  # in terms of D, of which G has the rest
         lobe, shadowing = (BlinnResponseLobe, cosine) if self.normalization == "original" else (BlinnLobe, implicit)
-        specular = lobe(p.specular_reflectance, Blinn(n), shadowing, Unit(), LeaningPair(4), scale)
+        specular = lobe(p.specular_reflectance, Blinn(n), shadowing, Unit(), AntitheticNormalsTowardViewer(4), scale)
         return LambertLobe(p.diffuse_reflectance), specular
 
 
@@ -83,7 +83,7 @@ class BlinnLobe(MicrofacetLobe):
     """The lobe whose G is cosθ_i cosθ_o. Its albedo is exact at normal incidence and for n = 0, and falls like cos²θ_i
     if the lobe is narrow."""
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         n = self.distribution.exponent
         cos2 = wi.z * wi.z
         return self.reflectance * ((n + dr.exp2(-0.5 * n)) / (n + 4) * (cos2 + (1 - cos2) / (1 + n)))
@@ -94,9 +94,9 @@ class BlinnResponseLobe(MicrofacetLobe):
 
     reciprocal = False
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         cos2 = wi.z * wi.z
-        return super().albedo(wi) * dr.sqrt(cos2 + (1 - cos2) / (1 + 6 * self.distribution.exponent))
+        return super().estimated_albedo(wi) * dr.sqrt(cos2 + (1 - cos2) / (1 + 6 * self.distribution.exponent))
 
 
 def cosine(facet):

@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import LeaningPair
+from ..microfacet.sampling import AntitheticNormalsTowardViewer
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 
@@ -30,7 +30,7 @@ class Brady(Model):
     lobes falls like cosθ_i towards grazing. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.LeaningPair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); no sample falls below the horizon.
 
     Example
     -------
@@ -54,10 +54,9 @@ class Brady(Model):
 
     def lobes(self, p):
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")
-        return (
-            LambertLobe(p.diffuse_reflectance),
-            FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), LeaningPair(1)),
-        )
+        sampler = AntitheticNormalsTowardViewer(1)
+        specular = FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), sampler)
+        return LambertLobe(p.diffuse_reflectance), specular
 
 
 def projected(facet):
@@ -82,7 +81,7 @@ class Exponential(EPD):
     def eval(self, facet):
         return self.scale * dr.exp(-self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14)))
 
-    def albedo(self, cos):
+    def estimated_albedo(self, cos):
         """∫ D cosθ_h dω_h, as the steps have it."""
         return self.scale * dr.pi * self.width * self.steps.total / self.STEPS
 
@@ -90,6 +89,6 @@ class Exponential(EPD):
 class FallingLobe(MicrofacetLobe):
     """A lobe whose albedo falls like the cosine, as the projected area is not divided out; wide ones less."""
 
-    def albedo(self, wi):
-        rough = dr.minimum(self.distribution.roughness2(), 1)
-        return super().albedo(wi) * (wi.z + 0.2 * rough * (1 - wi.z))
+    def estimated_albedo(self, wi):
+        rough = dr.minimum(self.distribution.mean_square_slope(), 1)
+        return super().estimated_albedo(wi) * (wi.z + 0.2 * rough * (1 - wi.z))

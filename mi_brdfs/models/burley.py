@@ -9,7 +9,7 @@ from ..math import choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Pair, PairOfVisibleNormals
+from ..microfacet.sampling import AntitheticNormals, AntitheticVisibleNormals
 from ..microfacet.shadowing import SmithGGX
 from ..model import Energy, Model
 from ..parameters import Number, NumberSlot, Reflectance, Rotation
@@ -65,7 +65,8 @@ class Burley(Model):
 
     Sampling: the base lobe by cosine with a few uniform directions, the sheen by a density of its own, the clear
     coat by a half vector or its mirror image and the specular lobe by one of two visible normals, chosen by what they
-    reflect (mi_brdfs.microfacet.sampling.Pair and PairOfVisibleNormals). No sample falls below the horizon.
+    reflect (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticVisibleNormals). No sample falls below the
+    horizon.
 
     Example
     -------
@@ -107,10 +108,10 @@ class Burley(Model):
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
         facets = GGX(*alpha), SmithGGX(*alpha, correlated=False)
-        lobes.append(DimmedLobe(1, *facets, Schlick(f0), PairOfVisibleNormals()))
+        lobes.append(DimmedLobe(1, *facets, Schlick(f0), AntitheticVisibleNormals()))
         if p.clearcoat is not None:
             facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), SmithGGX(0.25, 0.25, correlated=False)
-            lobes.append(TypicalFacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), Pair()))
+            lobes.append(TypicalFacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), AntitheticNormals()))
         return tuple(lobes)
 
 
@@ -131,7 +132,7 @@ class BaseLobe(Lobe):
     def __init__(self, reflectance, roughness, subsurface):
         self.reflectance, self.roughness, self.subsurface = reflectance, roughness, subsurface
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         # To some 10 %.
         retro = 1 + (self.roughness - 0.5) * schlick_weight(wi.z)
         return self.reflectance * dr.lerp(retro, 1.35 - 0.6 * wi.z, self.subsurface)
@@ -174,7 +175,7 @@ class SheenLobe(Lobe):
     def __init__(self, reflectance):
         self.reflectance = reflectance
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         x = 1 - wi.z
         return self.reflectance * (5e-4 + x * x * (0.05 + 0.037 * x))
 
@@ -194,11 +195,11 @@ class SheenLobe(Lobe):
         power = dr.power(y, shape_a - 1)
         density = shape_a * shape_b * power * dr.power(1 - power * y, shape_b - 1) / (1 + frame.sin)
 
-        upright, tilted = -wi.z * cos, frame.sin * safe_sqrt(1 - cos * cos)
-        highest = dr.maximum(upright + tilted, wo.z)
-        whole = upright >= tilted
-        circle = wo.z * dr.inv_two_pi / dr.select(whole, dr.maximum(upright, 1e-30), 1)
-        arc = 0.375 * wo.z / highest * safe_sqrt((tilted + wo.z - upright) / highest)
+        axial, lateral = -wi.z * cos, frame.sin * safe_sqrt(1 - cos * cos)
+        highest = dr.maximum(axial + lateral, wo.z)
+        whole = axial >= lateral
+        circle = wo.z * dr.inv_two_pi / dr.select(whole, dr.maximum(axial, 1e-30), 1)
+        arc = 0.375 * wo.z / highest * safe_sqrt((lateral + wo.z - axial) / highest)
         return self.reflectance * value, density * dr.select(whole, circle, arc)
 
     def sample(self, wi, u, v):
@@ -207,11 +208,11 @@ class SheenLobe(Lobe):
         cos = dr.power(1 - dr.power(1 - v.x, 1 / shape_b), 1 / shape_a) * (1 + frame.sin) - 1
         sin = safe_sqrt(1 - cos * cos)
 
-        upright, tilted = -wi.z * cos, frame.sin * sin
-        whole = upright >= tilted
+        axial, lateral = -wi.z * cos, frame.sin * sin
+        whole = axial >= lateral
         sin_psi, cos_psi = dr.sincos(dr.two_pi * v.y)
-        flip = dr.select(2 * u * upright > upright + tilted * cos_psi, -1, 1)
-        half = safe_sqrt(0.5 * (upright + tilted) / dr.select(whole, 1, dr.maximum(tilted, 1e-30)))
+        flip = dr.select(2 * u * axial > axial + lateral * cos_psi, -1, 1)
+        half = safe_sqrt(0.5 * (axial + lateral) / dr.select(whole, 1, dr.maximum(lateral, 1e-30)))
         s = 2 * dr.sin(dr.asin(2 * v.y - 1) / 3) * dr.minimum(half, 1)
         sin_psi = dr.select(whole, flip * sin_psi, 2 * s * safe_sqrt(1 - s * s))
         cos_psi = dr.select(whole, flip * cos_psi, 1 - 2 * s * s)

@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import MicrofacetLobe, over_diffuse
 from ..math import clamp
 from ..microfacet.distributions import GGX, Beckmann, Blinn
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import AntitheticNormals
 from ..microfacet.shadowing import vcavity
 from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance
@@ -36,7 +36,7 @@ class CookTorrance(Model):
     is a ``blendbsdf``. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
 
     Example
     -------
@@ -65,5 +65,5 @@ class CookTorrance(Model):
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1
-        specular = MicrofacetLobe(p.specular_reflectance, distribution, vcavity, p.fresnel, Pair(), scale)
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, vcavity, p.fresnel, AntitheticNormals(), scale)
         return over_diffuse(p.diffuse_reflectance, specular)

@@ -66,7 +66,7 @@ class EONLobe(RoughDiffuseLobe):
         rise = dr.atan2(cos, sin) - cos * cos2 * (2 + sin) / (3 * dr.square(1 + sin))
         return self.NORMAL * cos2 / (1 + sin) + dr.inv_pi * sin * rise
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         loss = self.a * self.retro * self._loss(wi)
         return self.reflectance * (1 - loss) + self.multiple * loss
 

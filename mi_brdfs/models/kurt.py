@@ -1,8 +1,8 @@
 from ..lobes import LambertLobe, TypicalFacetLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import Pair
-from ..microfacet.shadowing import Kurt as Shadowing
+from ..microfacet.sampling import AntitheticNormals
+from ..microfacet.shadowing import KurtShadowing
 from ..model import Energy, Model
 from ..parameters import Number, PerLobe, Reflectance, Rotation
 
@@ -27,7 +27,7 @@ class Kurt(Model):
     That D's cosine power is 4 was not checked against the paper. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
 
     Example
     -------
@@ -57,9 +57,9 @@ class Kurt(Model):
             TypicalFacetLobe(
                 lobe.specular_reflectance,
                 Beckmann(*lobe.alpha),
-                Shadowing(lobe.kurt_exponent),
+                KurtShadowing(lobe.kurt_exponent),
                 Schlick(lobe.f0),
-                Pair(),
+                AntitheticNormals(),
             )
             for lobe in p.specular
         ]

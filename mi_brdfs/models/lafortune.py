@@ -109,9 +109,11 @@ class LafortuneLobe(PowerLobe):
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
         return depth > sin2, 0.5 * dr.log(sin2), depth
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         _, log_s, depth = self._buried(self.frame(wi))
-        return super().albedo(wi) * (dr.select(depth > 0, dr.exp((self.exponent + 1) * log_s), 1) / (1 + depth))
+        return super().estimated_albedo(wi) * (
+            dr.select(depth > 0, dr.exp((self.exponent + 1) * log_s), 1) / (1 + depth)
+        )
 
     @staticmethod
     def _arc(frame, t):

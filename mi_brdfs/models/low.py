@@ -5,7 +5,7 @@ from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import clamp, luminance, normalize_or, safe_sqrt
 from ..microfacet.distributions import ABC, PowerLaw
 from ..microfacet.fresnel import Dielectric
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import AntitheticNormals
 from ..microfacet.shadowing import vcavity
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, OneOf, Reflectance
@@ -34,8 +34,8 @@ class Low(Model):
     may exceed 1. The factor 1/π was inferred from the fits. One-sided.
 
     Sampling: microfacet by a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); smooth exactly in S on the disc of projected directions, clipped to it. No
-    sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals); smooth exactly in S on the disc of projected directions, clipped
+    to it. No sample falls below the horizon.
 
     Example
     -------
@@ -75,7 +75,7 @@ class Low(Model):
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
             scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
-            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, Pair())
+            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, AntitheticNormals())
         return over_diffuse(p.diffuse_reflectance, specular)
 
 
@@ -90,7 +90,7 @@ class SmoothLobe(Lobe):
     def __init__(self, reflectance, law, fresnel):
         self.reflectance, self.law, self.fresnel = reflectance, law, fresnel
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         return self.reflectance * (self.fresnel(wi.z) * self.law.norm * dr.pi)
 
     def mirror_reflectance(self, wi):

@@ -4,7 +4,7 @@ from ..lobes import DimmedLobe, LambertLobe, TypicalFacetLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import PairOfVisibleNormals
+from ..microfacet.sampling import AntitheticVisibleNormals
 from ..microfacet.shadowing import SchlickSmith, SmithGGX
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
@@ -36,7 +36,7 @@ class MetallicRoughness(Model):
     (ibl), 1.12 and 1.72 (smith). One-sided.
 
     Sampling: the diffuse lobe by cosine, the specular one by one of two visible normals, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.PairOfVisibleNormals). No sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticVisibleNormals). No sample falls below the horizon.
 
     Example
     -------
@@ -72,7 +72,7 @@ class MetallicRoughness(Model):
             shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
         diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
         lobe = DimmedLobe if self.shadowing == "smith" else TypicalFacetLobe
-        return diffuse, lobe(1, GGX(alpha, alpha), shadowing, fresnel, PairOfVisibleNormals())
+        return diffuse, lobe(1, GGX(alpha, alpha), shadowing, fresnel, AntitheticVisibleNormals())
 
 
 class FresnelDiffuseLobe(LambertLobe):
@@ -82,7 +82,7 @@ class FresnelDiffuseLobe(LambertLobe):
         super().__init__(reflectance)
         self.fresnel = fresnel
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         # At any incidence: few pairs of directions graze their half vector.
         return self.reflectance * (1 - self.fresnel(1))
 

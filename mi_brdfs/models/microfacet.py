@@ -4,7 +4,7 @@ import drjit as dr
 
 from ..lobes import DimmedLobe, TypicalFacetLobe, over_diffuse
 from ..microfacet import distributions, shadowing
-from ..microfacet.sampling import LeaningPair, Pair, visible_normals
+from ..microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer, visible_normals
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
 
@@ -64,8 +64,8 @@ class Microfacet(Model):
     One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair and LeaningPair), so that no sample falls below the horizon; ggx with smith as
-    ``walter``.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticNormalsTowardViewer), so that no sample falls below
+    the horizon; ggx with smith as ``walter``.
 
     Example
     -------
@@ -167,7 +167,11 @@ class Microfacet(Model):
         if visible:
             sampler = visible_normals(p.fresnel)
         else:
-            sampler = LeaningPair(LEAN[p.shadowing.choice]) if p.shadowing.choice in LEAN else Pair()
+            sampler = (
+                AntitheticNormalsTowardViewer(LEAN[p.shadowing.choice])
+                if p.shadowing.choice in LEAN
+                else AntitheticNormals()
+            )
         lobe = DimmedLobe if p.shadowing.choice in SMITHS else TypicalFacetLobe
         specular = lobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
         return over_diffuse(p.diffuse_reflectance, specular)
@@ -214,7 +218,7 @@ SHADOWING = {
     "kelemen": lambda p: shadowing.kelemen,
     "ashikhmin-shirley": lambda p: shadowing.ashikhmin_shirley,
     "ashikhmin-premoze": lambda p: shadowing.ashikhmin_premoze,
-    "kurt": lambda p: shadowing.Kurt(p.shadowing.kurt_exponent),
+    "kurt": lambda p: shadowing.KurtShadowing(p.shadowing.kurt_exponent),
 }
 
 LEAN = {

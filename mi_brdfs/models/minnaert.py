@@ -70,7 +70,7 @@ class MinnaertLobe(ZonalLobe):
         self.mass = dr.select(self.held, dr.exp(math.log(self.HELD) * (exponent + 1)), 0)
         self.lost = 0.5 * (1 - exponent) * self.mass
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         mu, k = wi.z, self.exponent
         if self.normalization == "none":
             return self.reflectance * (2 / (k + 1) * dr.power(mu, k))

@@ -1,7 +1,7 @@
 from ..lobes import TypicalFacetLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import LeaningPair, Pair
+from ..microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
 from ..microfacet.shadowing import implicit, vcavity
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
@@ -34,7 +34,8 @@ class Nishino(Model):
     grazing, for narrow lobes like cos²θ_i. One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair and LeaningPair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticNormalsTowardViewer); no sample falls below the
+    horizon.
 
     Example
     -------
@@ -58,8 +59,8 @@ class Nishino(Model):
     def lobes(self, p):
         distribution = HemiEPD(p.kappa, p.gamma)
         if p.variant.choice == "microfacet":
-            terms = vcavity, p.variant.fresnel, Pair()
+            terms = vcavity, p.variant.fresnel, AntitheticNormals()
         else:
-            terms = implicit, Unit(), LeaningPair(4)
+            terms = implicit, Unit(), AntitheticNormalsTowardViewer(4)
         specular = TypicalFacetLobe(p.specular_reflectance, distribution, *terms)
         return over_diffuse(p.diffuse_reflectance, specular)

@@ -103,7 +103,7 @@ class QualitativeLobe(RoughDiffuseLobe):
         self.b = 0.45 * self.sigma2 / (self.sigma2 + 0.09)
         super().__init__(reflectance, self.RETRO * self.b / self.c1)
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         # Exact at normal incidence and at grazing.
         return self.reflectance * (self.c1 + 0.5 * self.b * (1 - wi.z * wi.z))
 
@@ -117,8 +117,8 @@ class FullLobe(QualitativeLobe):
 
     RETRO = 1
 
-    def albedo(self, wi):
-        return super().albedo(wi) + dr.square(self.reflectance) * self._twice()
+    def estimated_albedo(self, wi):
+        return super().estimated_albedo(wi) + dr.square(self.reflectance) * self._twice()
 
     def _twice(self):
         return 0.17 * self.sigma2 / (self.sigma2 + 0.13)

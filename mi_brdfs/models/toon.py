@@ -132,7 +132,7 @@ class BandsLobe(ZonalLobe):
     def __init__(self, reflected, lit, dark, mass):
         self.reflected, self.lit, self.dark, self.mass = reflected, lit, dark, dr.maximum(mass, EMPTY)
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         return self.reflected
 
     def density(self, cos):
@@ -175,7 +175,7 @@ class HighlightLobe(Lobe):
         behind = -2 * self.step.threshold - excess
         return self.step.eval(excess) * visible, self.step.eval(behind) * (1 - visible)
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         # The ring that halves the solid angle of the highlight stands for all.
         return self.reflected * self._ring(self._frame(wi), 0.5 * dr.minimum(self.mass, 1))[1]
 

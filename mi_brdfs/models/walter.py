@@ -28,7 +28,7 @@ class Walter(Model):
     One-sided.
 
     Sampling: bounded visible normals, tilted towards the normal; for dielectrics one of two, chosen by what they
-    reflect (mi_brdfs.microfacet.sampling.BoundedVisibleNormals and PairOfVisibleNormals).
+    reflect (mi_brdfs.microfacet.sampling.BoundedVisibleNormals and AntitheticVisibleNormals).
 
     Example
     -------

@@ -4,7 +4,7 @@ from ..lobes import LambertLobe, MicrofacetLobe
 from ..math import expm1
 from ..microfacet.distributions import Beckmann, Distribution, log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import Pair
+from ..microfacet.sampling import AntitheticNormals
 from ..microfacet.shadowing import kelemen
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
@@ -38,7 +38,7 @@ class Ward(Model):
     One-sided.
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
 
     Example
     -------
@@ -70,15 +70,15 @@ class Ward(Model):
     def lobes(self, p):
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)
         lobe = DarkeningLobe if self.variant in ("ward", "approximate") else MicrofacetLobe
-        specular = lobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), Pair())
+        specular = lobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), AntitheticNormals())
         return LambertLobe(p.diffuse_reflectance), specular
 
 
 class DarkeningLobe(MicrofacetLobe):
     """A lobe whose albedo falls about like the cosine, as that of Ward's own normalisation does."""
 
-    def albedo(self, wi):
-        return super().albedo(wi) * (0.1 + 0.9 * wi.z)
+    def estimated_albedo(self, wi):
+        return super().estimated_albedo(wi) * (0.1 + 0.9 * wi.z)
 
 
 class ApproximateBeckmann(Distribution):

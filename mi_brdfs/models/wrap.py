@@ -87,7 +87,7 @@ class WrapLobe(ZonalLobe):
     def __init__(self, reflected, wrap, exponent):
         self.reflected, self.wrap, self.exponent = reflected, wrap, exponent
 
-    def albedo(self, wi):
+    def estimated_albedo(self, wi):
         return self.reflected
 
 

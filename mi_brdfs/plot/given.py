@@ -11,6 +11,7 @@ from ..parameters import brief
 from ..validation.runner import name_of
 from ..validation.subject import Subject
 from ..validation.targets import find_targets
+from ..variants import is_measurable
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 
@@ -28,10 +29,9 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
     Raises:
         ValueError: if there are none, one is no BSDF, or the active variant cannot evaluate arrays of directions.
     """
-    variant = mi.variant() or ""
-    if variant.startswith("scalar") or "polarized" in variant or not variant:
+    if not is_measurable(mi.variant()):
         raise ValueError(
-            f"plots need a vectorized and unpolarized variant, not {variant or 'none'}: call "
+            f"plots need a vectorized and unpolarized variant, not {mi.variant() or 'none'}: call "
             'mi.set_variant("llvm_ad_rgb") first'
         )
     if not bsdfs:

@@ -9,6 +9,7 @@ from typing import Any
 
 import mitsuba as mi
 
+from ..variants import is_measurable
 from . import components, contract, derivatives, sampling, spectral, textures, values
 from .energy import energy_limits
 from .outcome import Findings, told
@@ -109,10 +110,10 @@ def check(
     if unknown := [word for word in wanted if word not in CHECKS]:
         raise ValueError(f"There is no check {unknown[0]!r}; there are {', '.join(CHECKS)}.")
     loaded = not isinstance(bsdf, dict)
-    if loaded and not _suits(mi.variant()):
+    if loaded and not is_measurable(mi.variant()):
         raise ValueError(f"A loaded BSDF of {mi.variant()} cannot be checked: load it in {VARIANT} or another "
                          "vectorized and unpolarized variant, or give its dict.")  # fmt: skip
-    with nullcontext() if _suits(mi.variant()) else mi.variant_context(VARIANT):
+    with nullcontext() if is_measurable(mi.variant()) else mi.variant_context(VARIANT):
         subject = Subject(bsdf if loaded else mi.load_dict(bsdf), tuple(angles))
         name = name or (bsdf["type"] if not loaded else name_of(subject.bsdf))
         tests = max(1, sampling.tests(subject))
@@ -140,7 +141,3 @@ def name_of(bsdf: mi.BSDF) -> str:
     """The id of a BSDF, or the name of its class."""
     kind = type(bsdf).__name__
     return bsdf.id() or (bsdf.class_name() if kind == "BSDF" else kind)
-
-
-def _suits(variant: str | None) -> bool:
-    return variant is not None and not variant.startswith("scalar") and "polarized" not in variant

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from albedos import axes, brightest, fault
 from reference_albedos import REFERENCES, Reference
 
-from mi_brdfs.registry import all_models
+from mi_brdfs.mitsuba.registry import all_models
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 

@@ -14,11 +14,12 @@ from typing import TypeVar
 
 import mitsuba as mi
 
-from . import llvm, models
+from .. import models
+from ..integrators.shading import Shading
+from ..model import Model, Plugin
+from . import llvm
 from .bsdf import bsdf_class
 from .integrator import integrator_class
-from .integrators.shading import Shading
-from .model import Model, Plugin
 
 AnyModel = TypeVar("AnyModel", bound=type[Model])
 

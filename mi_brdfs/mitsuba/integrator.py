@@ -6,22 +6,23 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .model import Plugin
+from ..model import Plugin
+from ..variants import is_scalar
 
 
 def integrator_class(physics: type[Plugin], base: type) -> type:
     """The integrator class of some physics for one variant, of which ``base`` is the ``mi.SamplingIntegrator``.
 
-    As with :func:`mi_brdfs.bsdf.bsdf_class`, the methods are written once below and handed to the class of each
+    As with :func:`mi_brdfs.mitsuba.bsdf.bsdf_class`, the methods are written once below and handed to the class of each
     variant.
     """
     methods = {
-        name: value for name, value in vars(CentredIntegrator).items() if name not in ("__dict__", "__weakref__")
+        name: value for name, value in vars(PixelCentreIntegrator).items() if name not in ("__dict__", "__weakref__")
     }
     return type(physics.__name__, (base,), {**methods, "physics_class": physics})
 
 
-class CentredIntegrator:
+class PixelCentreIntegrator:
     """An integrator that looks through the centres of the pixels, so that nothing is random but what its physics draws.
 
     The physics has two methods. ``shade(scene, sampler, ray, active)`` returns the unpolarized radiance along a ray,
@@ -68,7 +69,7 @@ class CentredIntegrator:
             raise ValueError(
                 f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; take an hdrfilm."
             )
-        if mi.variant().startswith("scalar"):
+        if is_scalar():
             totals, pixel = [], pixels(film)
             for index, corner in enumerate(pixel):
                 sampler.seed(seed * len(pixel) + index)
@@ -151,7 +152,7 @@ class CentredIntegrator:
         block, has_alpha = film.create_block(), mi.has_flag(film.flags(), mi.FilmFlags.Alpha)
         # A box filter takes the corner, as Mitsuba's own integrators do.
         centre = 0 if film.rfilter().is_box_filter() else 0.5
-        scalar = mi.variant().startswith("scalar")
+        scalar = is_scalar()
         for corner, total in zip(pixels(film), sums, strict=True) if scalar else [(pixels(film), sums)]:
             *colour, opacity = (mi.Float(value) for value in total)
             colour = self.physics.finish(mi.Color3f(colour) / count) * count
@@ -204,7 +205,7 @@ def pixels(film):
     border = film.rfilter().border_size() if film.sample_border() else 0
     width, height = (int(size) + 2 * border for size in film.crop_size())
     first = mi.ScalarVector2i(film.crop_offset()) - border
-    if mi.variant().startswith("scalar"):
+    if is_scalar():
         return [mi.Point2f(x, y) + first for y in range(height) for x in range(width)]
     index = dr.arange(mi.UInt32, width * height)
     return mi.Point2f(mi.Point2u(index % width, index // width)) + first

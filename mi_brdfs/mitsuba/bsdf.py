@@ -5,10 +5,11 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from .lobes import Lobe, Mixture
-from .math import clamp, select
-from .model import Model
-from .parameters import evaluate_colour
+from ..lobes import Lobe, Mixture
+from ..math import clamp, select
+from ..model import Model
+from ..parameters import evaluate_colour
+from ..variants import is_scalar
 
 
 def bsdf_class(model: type[Model], base: type) -> type:
@@ -164,7 +165,7 @@ class ModelBSDF:
         """The albedo at normal incidence: the diffuse colour and the specular lobes' together."""
         normal = mi.Vector3f(0, 0, 1)
         lobes = self._lobes(self.model.evaluate(si, active))
-        albedo = sum(lobe.albedo(normal) for lobe in lobes if not lobe.transmits)
+        albedo = sum(lobe.estimated_albedo(normal) for lobe in lobes if not lobe.transmits)
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 
     def mirror_reflectance(self, si, active=True):
@@ -196,7 +197,7 @@ class ModelBSDF:
 
     def _without_attribute(self, name, kind):
         """Zero, or in scalar variants an error, as of Mitsuba's own BSDFs."""
-        if mi.variant().startswith("scalar"):
+        if is_scalar():
             known = ", ".join(self.textures)
             raise RuntimeError(f"{self.model.plugins[0]}: Invalid attribute requested {name}; there are {known}.")
         return kind(0)
