@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from .. import guests
+from ..mitsuba import guests
 from .terminal import Exit, fail
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
