@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from .. import guests
+from ..mitsuba import guests
 from ..mitsuba.registry import all_models
 from .app import command, imported
 from .errors import one_line
