@@ -348,8 +348,7 @@ class OneOfSlot(Slot):
         return {self.name: self.choice} | {name: word for name, word in self.own.items() if isinstance(word, str)}
 
     def evaluate(self, si, active):
-        values = {name: _evaluated(own, si, active) for name, own in self.own.items()}
-        return SimpleNamespace(choice=self.choice, **values)
+        return SimpleNamespace(**{name: _evaluated(own, si, active) for name, own in self.own.items()})
 
 
 class RotationSlot(Slot):
@@ -589,8 +588,7 @@ class OneOf(Parameter):
 
     def placeholder(self, slot):
         declared = self.words[slot.choice]
-        values = {name: _placeholder(declared[name], own) for name, own in slot.own.items()}
-        return SimpleNamespace(choice=slot.choice, **values)
+        return SimpleNamespace(**{name: _placeholder(declared[name], own) for name, own in slot.own.items()})
 
     def rows(self) -> list[Row]:
         rows = [Row(self.name, "string", next(iter(self.words)), " | ".join(self.words), self.text)]

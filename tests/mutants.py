@@ -18,8 +18,8 @@ from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, Mixture, PowerLobe, over
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
 from mi_brdfs.microfacet.fresnel import Unit
-from mi_brdfs.microfacet.sampling import AntitheticNormals, BoundedVisibleNormals
-from mi_brdfs.microfacet.shadowing import SmithGGX, kelemen
+from mi_brdfs.microfacet.shadowing import Kelemen, Shadowing, SmithGGX
+from mi_brdfs.microfacet.visible import BoundedVisibleNormals
 from mi_brdfs.mitsuba import bsdf as adapter
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.models.phong import Phong
@@ -243,7 +243,7 @@ class SwappedDensity(MicrofacetLobe):
     def eval_pdf(self, wi, wo):
         value, _ = super().eval_pdf(wi, wo)
         d = self.distribution
-        swapped = MicrofacetLobe(1, type(d)(d.alpha_v, d.alpha_u), self.shadowing, self.fresnel, self.sampler)
+        swapped = MicrofacetLobe(1, type(d)(d.alpha_v, d.alpha_u), self.shadowing, self.fresnel)
         return value, swapped.eval_pdf(wi, wo)[1]
 
 
@@ -284,10 +284,14 @@ class UnnormalisedGGX(GGX):
         return super().eval(facet) * 1.3
 
 
-def one_sided_shadowing(facet):
+class OneSidedShadowing(Shadowing):
     """Smith's masking of wo alone."""
-    z = facet.cos_o
-    return 2 / (1 + dr.sqrt(1 + 0.36 * (1 - z * z) / (z * z)))
+
+    conserving = True
+
+    def __call__(self, facet):
+        z = facet.cos_o
+        return 2 / (1 + dr.sqrt(1 + 0.36 * (1 - z * z) / (z * z)))
 
 
 def lambert(lobe):
@@ -311,7 +315,8 @@ def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=Bounde
     class Mutant(Walter):
         def lobes(self, p):
             smith = shadowing or SmithGGX(*p.alpha, correlated=False)
-            specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, p.fresnel, sampler())
+            specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, p.fresnel)
+            specular.sampler = sampler()
             return over_diffuse(p.diffuse_reflectance, specular)
 
     return Mutant
@@ -320,7 +325,7 @@ def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=Bounde
 def ward(lobe):
     class Mutant(Ward):
         def lobes(self, p):
-            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), kelemen, Unit(), AntitheticNormals())
+            specular = lobe(p.specular_reflectance, Beckmann(*p.alpha), Kelemen(), Unit())
             return LambertLobe(p.diffuse_reflectance), specular
 
     return Mutant
@@ -745,7 +750,7 @@ MUTANTS = [
     mutant("flags of the whole", "components", Ward, FlagsDisagree),
     mutant("glossy flagged diffuse", "flags", phong(PowerFlaggedDiffuse), exponent=300.0),
     mutant("anisotropy not flagged", "flags", Ward, NoAnisotropicFlag, alpha_u=0.1, alpha_v=0.3),
-    mutant("one-way shadowing", "reciprocity", walter(shadowing=one_sided_shadowing), alpha=0.6),
+    mutant("one-way shadowing", "reciprocity", walter(shadowing=OneSidedShadowing()), alpha=0.6),
     mutant("one-way diffuse", "reciprocity", lambert(OneWay)),
     mutant("not a number at grazing", "finite", lambert(NotANumber)),
     mutant("negative at grazing", "finite", lambert(Negative)),

@@ -3,24 +3,51 @@
 from __future__ import annotations
 
 import drjit as dr
-import mitsuba as mi
 
-from ..math import normalize_or, safe_sqrt
-from ..microfacet.facet import Facet
+from ..math import safe_sqrt
+from ..microfacet.choice import sampler_of
+from ..microfacet.facet import Cosines, Facet
 from .lobe import Lobe
 
 
 class MicrofacetLobe(Lobe):
     """f = ρ·F(cosθ_d)·D(h)·G / (4 cosθ_i cosθ_o), for any distribution, shadowing and Fresnel term of
-    :mod:`mi_brdfs.microfacet`, drawn by one of its samplers. ρ is a ``colour`` times a ``scale``.
+    :mod:`mi_brdfs.microfacet`. ρ is a ``colour`` times a ``scale``. The sampler is the one that suits the three terms
+    (:mod:`mi_brdfs.microfacet.choice`).
     """
 
-    def __init__(self, colour, distribution, shadowing, fresnel, sampler, scale=1):
+    def __init__(self, colour, distribution, shadowing, fresnel, scale=1):
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
-        self.shadowing, self.fresnel, self.sampler = shadowing, fresnel, sampler
+        self.shadowing, self.fresnel = shadowing, fresnel
+        self.sampler = sampler_of(distribution, shadowing, fresnel)
+        self.reciprocal = shadowing.reciprocal
 
     def estimated_albedo(self, wi):
-        return self.reflectance * (self.fresnel(facing_cosine(wi.z)) * self.distribution.estimated_albedo(wi.z))
+        """F, D and G at a typical facet.
+
+        At grazing the facets seen lean towards the viewer: F is that of a larger cosine than cosθ_i, and a shadowing
+        term that does not conserve energy is evaluated at such a facet in the plane of incidence. That and its image
+        about the normal have cosθ_d that add up to 2 cosθ_h cosθ_i, until at grazing only the first one is seen.
+        ``tests/calibration/estimated_albedo.py`` fits the constants.
+        """
+        cos, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
+        sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12)
+        slope2 = self.distribution.mean_square_slope_along(wi) / sin2
+        if self.shadowing.conserving:
+            seen = self.distribution.estimated_albedo(wi.z)
+        else:
+            typical2 = 0.57 * slope2 / (1 + 0.18 * slope2)
+            slope = typical2 * dr.rsqrt(typical2 + cos * cos)  # the mirror is typical of what is narrow
+            facet = Cosines.leaning(cos, dr.sqrt(sin2), slope)
+            seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / cos, facet.cos_h)
+            seen *= self.distribution.estimated_albedo(1.7 * wi.z - 0.7)  # G has the loss at grazing
+        if not self.shadowing.lean:
+            nearer = 0.08
+        else:
+            nearer = 0.43 if self.shadowing.conserving and self.distribution.long_tailed else 0.25
+        nearer *= versine * safe_sqrt(versine * slope2)
+        # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
+        return self.reflectance * (self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9)) * seen)
 
     def eval_pdf(self, wi, wo):
         facet = Facet.between(wi, wo)
@@ -37,37 +64,3 @@ class MicrofacetLobe(Lobe):
         """f cosθ_o·4cosθ_d/D for ρ = 1, as the one number that samplers go by: with D/q it makes the weight of a half
         vector of the density q."""
         return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet) * facet.cos_d / facet.cos_i
-
-
-class DimmedLobe(MicrofacetLobe):
-    """A lobe with Smith's shadowing term. At grazing it is dimmer than F(cosθ_i) says: the facets seen there are tilted
-    towards the viewer, and reflect less."""
-
-    def estimated_albedo(self, wi):
-        sin2, versine = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12), 1 - wi.z
-        alpha2 = self.distribution.mean_square_slope_along(wi) / sin2
-        cos = dr.sqrt(wi.z * wi.z + 0.45 * versine * safe_sqrt(versine * alpha2))  # fitted to GGX
-        return self.reflectance * (self.fresnel(facing_cosine(cos)) * self.distribution.estimated_albedo(wi.z))
-
-
-class TypicalFacetLobe(MicrofacetLobe):
-    """A lobe with any shadowing term. Its albedo is estimated from a typical facet in the plane of incidence that leans
-    towards ``wi``, and its image: their cosθ_d add up to 2 cosθ_h cosθ_i, until at grazing only the first one is
-    seen."""
-
-    def estimated_albedo(self, wi):
-        x, y = normalize_or(wi.x, wi.y, (1, 0))
-        z, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
-        slope2 = self.distribution.mean_square_slope_along(mi.Vector3f(x, y, 0))
-        # The constants are fitted to Beckmann and GGX.
-        typical2 = 0.72 * slope2 / (1 + 0.3 * slope2)
-        slope = typical2 * dr.rsqrt(typical2 + z * z)  # the mirror is typical of what is narrow
-        facet = Facet.at(mi.Vector3f(wi.x, wi.y, z), slope * x, slope * y)
-        seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / z, facet.cos_h)
-        cos = dr.sqrt(z * z + 0.28 * versine * safe_sqrt(versine * slope2))
-        return self.reflectance * (self.fresnel(facing_cosine(cos)) * seen)
-
-
-def facing_cosine(cos):
-    """A cosine that facets see, of one to the normal. None is 1: Schlick's reflectance with f0 = 0 must not vanish."""
-    return dr.minimum(cos, 0.9)

@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
+from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
 
 
 class Distribution:
@@ -43,6 +44,14 @@ class Distribution:
         have in the direction of that cosine."""
         r2 = self.mean_square_slope()
         return 1 / (1 + self.LOSS * r2 * dr.sqrt(dr.sqrt(dr.sqrt(r2))) * (0.5 + 0.5 * cos))
+
+    def roughness(self):
+        """The α that Schlick's stand-in for Smith's shadowing goes by, or None if there is no such."""
+        return None
+
+    def smith(self, correlated: bool) -> Smith | None:
+        """Smith's shadowing term that belongs to this distribution, or None if that is not known."""
+        return None
 
     def eval(self, facet):
         """D(h)."""
@@ -86,6 +95,12 @@ class Beckmann(Distribution):
     def inverse_cdf(self, c, complement, g):
         return -log_complement(complement) / g
 
+    def roughness(self):
+        return dr.sqrt(self.alpha_u * self.alpha_v)
+
+    def smith(self, correlated: bool):
+        return SmithBeckmann(self.alpha_u, self.alpha_v, correlated)
+
 
 class GGX(Distribution):
     """D = 1/(π αu αv ((h_x/αu)² + (h_y/αv)² + h_z²)²) (Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206)."""
@@ -102,6 +117,12 @@ class GGX(Distribution):
 
     def inverse_cdf(self, c, complement, g):
         return c / (dr.maximum(complement, 1e-30) * g)
+
+    def roughness(self):
+        return dr.sqrt(self.alpha_u * self.alpha_v)
+
+    def smith(self, correlated: bool):
+        return SmithGGX(self.alpha_u, self.alpha_v, correlated)
 
 
 class Blinn(Isotropic):
@@ -123,6 +144,12 @@ class Blinn(Isotropic):
 
     def inverse_cdf(self, c, complement, g):
         return inverse_cosine_power_cdf(complement, self.exponent + 2)
+
+    def roughness(self):
+        return dr.rsqrt(0.5 * self.exponent + 1)
+
+    def smith(self, correlated: bool):
+        return SmithBlinn(self.exponent, correlated)
 
 
 class AshikhminShirleyNormals(Distribution):
@@ -188,12 +215,15 @@ class GTR(Isotropic):
 
     def __init__(self, alpha, gamma):
         super().__init__()
-        self.alpha2 = dr.square(alpha)
+        self.alpha, self.alpha2 = alpha, dr.square(alpha)
         # In s = sin²θ: 1 + (α²-1) cos²θ = α² (1 + k s)
         self.law = PowerLaw((1 - self.alpha2) / self.alpha2, gamma)
 
     def mean_square_slope(self):
         return self.alpha2
+
+    def roughness(self):
+        return self.alpha
 
     def eval(self, facet):
         return self.law.eval(facet.sin2_h) * dr.inv_pi / self.law.norm
@@ -409,7 +439,7 @@ class EPD(Isotropic):
 
     def __init__(self, alpha, gamma):
         super().__init__()
-        self.alpha2, self.gamma = dr.square(alpha), gamma
+        self.alpha, self.alpha2, self.gamma = alpha, dr.square(alpha), gamma
         # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3.
         median = self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma)
         self.width = self._width(dr.minimum(median, 1e12))
@@ -437,6 +467,9 @@ class EPD(Isotropic):
 
     def mean_square_slope(self):
         return dr.minimum(self.width, 1)
+
+    def roughness(self):
+        return self.alpha
 
     def eval(self, facet):
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)

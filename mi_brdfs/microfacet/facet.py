@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+
+
+class Cosines(NamedTuple):
+    """The cosines of a facet alone, as estimates need them."""
+
+    cos_i: Any
+    cos_o: Any
+    cos_h: Any
+    cos_d: Any
+
+    @classmethod
+    def leaning(cls, cos_i, sin_i, slope) -> Cosines:
+        """Those of a facet in the plane of incidence that leans towards ``wi`` by a slope."""
+        cos_h = dr.rsqrt(slope * slope + 1)
+        cos_d = (cos_i + sin_i * slope) * cos_h
+        return cls(cos_i, 2 * cos_d * cos_h - cos_i, cos_h, cos_d)
 
 
 @dataclass

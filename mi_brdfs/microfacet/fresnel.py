@@ -1,14 +1,26 @@
-"""Fresnel reflectance F(cosθ_d): each class holds its parameters, and is called with the cosine. Its ``brightness``
-is one number for a reflectance that may have a colour, about the luminance: samplers choose by it."""
+"""Fresnel reflectance F(cosθ_d): each class holds its parameters."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import drjit as dr
 
 from ..math import luminance, safe_sqrt, square
 
 
-class Unit:
+class Fresnel:
+    """A reflectance, called with the cosine."""
+
+    def __call__(self, cos: Any) -> Any:
+        raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
+
+    def brightness(self, cos: Any) -> Any:
+        """About the luminance of the reflectance, as one number: samplers go by it."""
+        return luminance(self(cos))
+
+
+class Unit(Fresnel):
     """F = 1."""
 
     def __call__(self, cos):
@@ -17,7 +29,7 @@ class Unit:
     brightness = __call__
 
 
-class Schlick:
+class Schlick(Fresnel):
     """F = f0 + (1 - f0)(1 - cosθ)⁵ (Schlick 1994, doi:10.1111/1467-8659.1330233)."""
 
     def __init__(self, f0):
@@ -32,7 +44,7 @@ class Schlick:
         return Schlick(luminance(self.f0))(cos)
 
 
-class Dielectric:
+class Dielectric(Fresnel):
     """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
     Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
@@ -53,7 +65,7 @@ class Dielectric:
     brightness = __call__
 
 
-class Conductor:
+class Conductor(Fresnel):
     """The exact unpolarized reflectance of a conductor of relative complex index ``eta`` - i ``k``."""
 
     def __init__(self, eta, k):

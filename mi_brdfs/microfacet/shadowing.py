@@ -1,19 +1,42 @@
-"""Shadowing and masking terms G: each is called with a :class:`~.facet.Facet`."""
+"""Shadowing and masking terms G."""
 
 from __future__ import annotations
 
 import functools
+from typing import Any, ClassVar
 
 import drjit as dr
 
+from .facet import Facet
 
-class Smith:
+
+class Shadowing:
+    """A shadowing term: called with a facet, it returns G. The sampler of its lobe and the estimated albedo follow from
+    the attributes (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
+
+    lean: ClassVar[float] = 0
+    """How far the facets seen at grazing lean towards the viewer; chosen by measurement."""
+    reciprocal: ClassVar[bool] = True
+    """Whether G stays the same as wi and wo are exchanged."""
+    conserving: ClassVar[bool] = False
+    """Whether all light that it takes is lost to further reflections, about as much as
+    :meth:`.distributions.Distribution.estimated_albedo` says. Only of such a term may G depend on more than the cosines
+    of a facet."""
+
+    def __call__(self, facet: Facet) -> Any:
+        raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
+
+
+class Smith(Shadowing):
     """Smith's term for facets whose Λ is in the ``stretched`` cosines,
 
     * separable, 1/((1 + Λ(wi))(1 + Λ(wo))) (Smith 1967, doi:10.1109/TAP.1967.1138991; Walter et al. 2007,
       doi:10.2312/EGWR/EGSR07/195-206);
     * height-correlated, 1/(1 + Λ(wi) + Λ(wo)) (Heitz 2014, https://jcgt.org/published/0003/02/03/).
     """
+
+    lean = 1
+    conserving = True
 
     def __init__(self, alpha_u, alpha_v, correlated: bool):
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated
@@ -73,9 +96,11 @@ class SmithBlinn(Smith):
         return v.z + dr.select(a < 1.6, rational, 0)
 
 
-class SchlickSmith:
+class SchlickSmith(Shadowing):
     """Schlick's rational stand-in for Smith's term, Π cosθ/(cosθ (1-k) + k) over both directions (Schlick 1994,
     doi:10.1111/1467-8659.1330233): k = α √(2/π) comes near it for Beckmann facets, k = α/2 for GGX (Karis 2013)."""
+
+    lean = 2
 
     def __init__(self, k):
         self.k = k
@@ -85,46 +110,70 @@ class SchlickSmith:
         return i * o
 
 
-def kelemen(facet):
+class Kelemen(Shadowing):
     """cosθ_i cosθ_o / cos²θ_d (Kelemen and Szirmay-Kalos, A microfacet based coupled specular-matte BRDF model with
     importance sampling, Eurographics short presentations, 2001)."""
-    return facet.cos_i * facet.cos_o / dr.square(facet.cos_d)
+
+    conserving = True
+
+    def __call__(self, facet):
+        return facet.cos_i * facet.cos_o / dr.square(facet.cos_d)
 
 
-def vcavity(facet):
+class VCavity(Shadowing):
     """min(1, 2 cosθ_h cosθ_i / cosθ_d, 2 cosθ_h cosθ_o / cosθ_d) (Torrance and Sparrow 1967; Cook and Torrance 1982,
     doi:10.1145/357290.357293)."""
-    return dr.minimum(1, 2 * facet.cos_h * dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d)
+
+    conserving = True
+
+    def __call__(self, facet):
+        return dr.minimum(1, 2 * facet.cos_h * dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d)
 
 
-def implicit(facet):
+class Implicit(Shadowing):
     """cosθ_i cosθ_o, which cancels the denominator."""
-    return facet.cos_i * facet.cos_o
+
+    lean = 4
+
+    def __call__(self, facet):
+        return facet.cos_i * facet.cos_o
 
 
-def neumann(facet):
+class Neumann(Shadowing):
     """cosθ_i cosθ_o / max(cosθ_i, cosθ_o) (Neumann, Neumann and Szirmay-Kalos, Compact metallic reflectance models,
     Computer Graphics Forum 18(3), 1999)."""
-    return dr.minimum(facet.cos_i, facet.cos_o)
+
+    lean = 1
+
+    def __call__(self, facet):
+        return dr.minimum(facet.cos_i, facet.cos_o)
 
 
-def ashikhmin_premoze(facet):
+class AshikhminPremoze(Shadowing):
     """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premoze, Distribution-based BRDFs, 2007)."""
-    i, o = facet.cos_i, facet.cos_o
-    return i * o / (i + o - i * o)
+
+    lean = 2
+
+    def __call__(self, facet):
+        i, o = facet.cos_i, facet.cos_o
+        return i * o / (i + o - i * o)
 
 
-def ashikhmin_shirley(facet):
+class AshikhminShirleyShadowing(Shadowing):
     """cosθ_i cosθ_o / (cosθ_d max(cosθ_i, cosθ_o)) (Ashikhmin and Shirley 2000,
     doi:10.1080/10867651.2000.10487522)."""
-    return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d
+
+    def __call__(self, facet):
+        return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d
 
 
-class KurtShadowing:
+class KurtShadowing(Shadowing):
     """(cosθ_i cosθ_o)^(1-κ) / cosθ_d (Kurt, Szirmay-Kalos and Křivánek 2010, doi:10.1145/1722991.1722996)."""
 
-    def __init__(self, exponent):
-        self.exponent = exponent
+    lean = 0.4
+
+    def __init__(self, kurt_exponent):
+        self.exponent = kurt_exponent
 
     def __call__(self, facet):
         return dr.power(facet.cos_i * facet.cos_o, 1 - self.exponent) / facet.cos_d

@@ -1,10 +1,9 @@
 import mitsuba as mi
 
-from ..lobes import LambertLobe, TypicalFacetLobe
+from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import AshikhminShirleyNormals
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import AntitheticNormals
-from ..microfacet.shadowing import ashikhmin_shirley
+from ..microfacet.shadowing import AshikhminShirleyShadowing
 from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
 
@@ -50,12 +49,11 @@ class AshikhminShirley(Model):
     energy = Energy(0.509, [({}, 1)])
 
     def lobes(self, p):
-        specular = TypicalFacetLobe(
+        specular = MicrofacetLobe(
             mi.UnpolarizedSpectrum(1),
             AshikhminShirleyNormals(*p.exponent),
-            ashikhmin_shirley,
+            AshikhminShirleyShadowing(),
             Schlick(p.specular_reflectance),
-            AntitheticNormals(),
         )
         return CoupledDiffuseLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)), specular
 

@@ -3,8 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import Blinn
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import AntitheticNormalsTowardViewer
-from ..microfacet.shadowing import implicit
+from ..microfacet.shadowing import Implicit, Shadowing
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
@@ -74,31 +73,16 @@ class BlinnPhong(Model):
             "original": lambda: dr.inv_pi,
         }[self.normalization]()
         scale = 4 * dr.two_pi / (n + 2) * scale  # in terms of D, of which G has the rest
-        lobe, shadowing = (BlinnResponseLobe, cosine) if self.normalization == "original" else (BlinnLobe, implicit)
-        specular = lobe(p.specular_reflectance, Blinn(n), shadowing, Unit(), AntitheticNormalsTowardViewer(4), scale)
+        shadowing = ResponseShadowing() if self.normalization == "original" else Implicit()
+        specular = MicrofacetLobe(p.specular_reflectance, Blinn(n), shadowing, Unit(), scale)
         return LambertLobe(p.diffuse_reflectance), specular
 
 
-class BlinnLobe(MicrofacetLobe):
-    """The lobe whose G is cosθ_i cosθ_o. Its albedo is exact at normal incidence and for n = 0, and falls like cos²θ_i
-    if the lobe is narrow."""
+class ResponseShadowing(Shadowing):
+    """The shadowing term for which f cosθ_o is D/4."""
 
-    def estimated_albedo(self, wi):
-        n = self.distribution.exponent
-        cos2 = wi.z * wi.z
-        return self.reflectance * ((n + dr.exp2(-0.5 * n)) / (n + 4) * (cos2 + (1 - cos2) / (1 + n)))
-
-
-class BlinnResponseLobe(MicrofacetLobe):
-    """The lobe whose response, cosine included, is a power of cosθ_h."""
-
+    lean = 4
     reciprocal = False
 
-    def estimated_albedo(self, wi):
-        cos2 = wi.z * wi.z
-        return super().estimated_albedo(wi) * dr.sqrt(cos2 + (1 - cos2) / (1 + 6 * self.distribution.exponent))
-
-
-def cosine(facet):
-    """The shadowing term for which f cosθ_o is D/4."""
-    return facet.cos_i
+    def __call__(self, facet):
+        return facet.cos_i

@@ -3,7 +3,7 @@ import drjit as dr
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import AntitheticNormalsTowardViewer
+from ..microfacet.shadowing import Shadowing
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 
@@ -54,14 +54,17 @@ class Brady(Model):
 
     def lobes(self, p):
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")
-        sampler = AntitheticNormalsTowardViewer(1)
-        specular = FallingLobe(p.specular_reflectance, distribution, projected, Schlick(p.f0), sampler)
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, Projected(), Schlick(p.f0))
         return LambertLobe(p.diffuse_reflectance), specular
 
 
-def projected(facet):
+class Projected(Shadowing):
     """The shadowing term that leaves 1/(wi·h) of 1/(cosθ_i cosθ_o)."""
-    return facet.cos_i * facet.cos_o / facet.cos_d
+
+    lean = 1
+
+    def __call__(self, facet):
+        return facet.cos_i * facet.cos_o / facet.cos_d
 
 
 class Exponential(EPD):
@@ -84,11 +87,3 @@ class Exponential(EPD):
     def estimated_albedo(self, cos):
         """∫ D cosθ_h dω_h, as the steps have it."""
         return self.scale * dr.pi * self.width * self.steps.total / self.STEPS
-
-
-class FallingLobe(MicrofacetLobe):
-    """A lobe whose albedo falls like the cosine, as the projected area is not divided out; wide ones less."""
-
-    def estimated_albedo(self, wi):
-        rough = dr.minimum(self.distribution.mean_square_slope(), 1)
-        return super().estimated_albedo(wi) * (wi.z + 0.2 * rough * (1 - wi.z))

@@ -3,14 +3,13 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import DimmedLobe, Lobe, TypicalFacetLobe
+from ..lobes import Lobe, MicrofacetLobe
 from ..lobes.mirror import AxisFrame
 from ..math import choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import AntitheticNormals, AntitheticVisibleNormals
-from ..microfacet.shadowing import SmithGGX
+from ..microfacet.shadowing import Shadowing, SmithGGX
 from ..model import Energy, Model
 from ..parameters import Number, NumberSlot, Reflectance, Rotation
 
@@ -108,11 +107,23 @@ class Burley(Model):
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
         facets = GGX(*alpha), SmithGGX(*alpha, correlated=False)
-        lobes.append(DimmedLobe(1, *facets, Schlick(f0), AntitheticVisibleNormals()))
+        lobes.append(MicrofacetLobe(1, *facets, Schlick(f0)))
         if p.clearcoat is not None:
-            facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), SmithGGX(0.25, 0.25, correlated=False)
-            lobes.append(TypicalFacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04), AntitheticNormals()))
+            facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), CoatShadowing()
+            lobes.append(MicrofacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04)))
         return tuple(lobes)
+
+
+class CoatShadowing(Shadowing):
+    """Smith's separable term for GGX of α = 0.25, whatever the gloss. The facets are narrower, so do not lean."""
+
+    def __call__(self, facet):
+        return self._seen(facet.cos_i) * self._seen(facet.cos_o)
+
+    @staticmethod
+    def _seen(cos):
+        alpha2 = 0.0625
+        return 2 * cos / (cos + dr.sqrt(alpha2 + (1 - alpha2) * cos * cos))
 
 
 def schlick_weight(cos):

@@ -3,8 +3,7 @@ import drjit as dr
 from ..lobes import MicrofacetLobe, over_diffuse
 from ..math import clamp
 from ..microfacet.distributions import GGX, Beckmann, Blinn
-from ..microfacet.sampling import AntitheticNormals
-from ..microfacet.shadowing import vcavity
+from ..microfacet.shadowing import VCavity
 from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance
 
@@ -65,5 +64,5 @@ class CookTorrance(Model):
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1
-        specular = MicrofacetLobe(p.specular_reflectance, distribution, vcavity, p.fresnel, AntitheticNormals(), scale)
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, VCavity(), p.fresnel, scale)
         return over_diffuse(p.diffuse_reflectance, specular)

@@ -1,7 +1,6 @@
-from ..lobes import LambertLobe, TypicalFacetLobe
+from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import AntitheticNormals
 from ..microfacet.shadowing import KurtShadowing
 from ..model import Energy, Model
 from ..parameters import Number, PerLobe, Reflectance, Rotation
@@ -54,12 +53,11 @@ class Kurt(Model):
 
     def lobes(self, p):
         glossy = [
-            TypicalFacetLobe(
+            MicrofacetLobe(
                 lobe.specular_reflectance,
                 Beckmann(*lobe.alpha),
                 KurtShadowing(lobe.kurt_exponent),
                 Schlick(lobe.f0),
-                AntitheticNormals(),
             )
             for lobe in p.specular
         ]

@@ -5,8 +5,7 @@ from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import clamp, luminance, normalize_or, safe_sqrt
 from ..microfacet.distributions import ABC, PowerLaw
 from ..microfacet.fresnel import Dielectric
-from ..microfacet.sampling import AntitheticNormals
-from ..microfacet.shadowing import vcavity
+from ..microfacet.shadowing import VCavity
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, OneOf, Reflectance
 
@@ -71,11 +70,11 @@ class Low(Model):
 
     def lobes(self, p):
         fresnel = Dielectric(p.int_ior)
-        if p.variant.choice == "smooth":
+        if self.variant == "smooth":
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
             scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
-            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, AntitheticNormals())
+            specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), VCavity(), fresnel)
         return over_diffuse(p.diffuse_reflectance, specular)
 
 

@@ -1,10 +1,9 @@
 import drjit as dr
 
-from ..lobes import DimmedLobe, LambertLobe, TypicalFacetLobe
+from ..lobes import LambertLobe, MicrofacetLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.sampling import AntitheticVisibleNormals
 from ..microfacet.shadowing import SchlickSmith, SmithGGX
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
@@ -71,8 +70,7 @@ class MetallicRoughness(Model):
         else:
             shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
         diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
-        lobe = DimmedLobe if self.shadowing == "smith" else TypicalFacetLobe
-        return diffuse, lobe(1, GGX(alpha, alpha), shadowing, fresnel, AntitheticVisibleNormals())
+        return diffuse, MicrofacetLobe(1, GGX(alpha, alpha), shadowing, fresnel)
 
 
 class FresnelDiffuseLobe(LambertLobe):

@@ -1,15 +1,90 @@
 import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-import drjit as dr
-
-from ..lobes import DimmedLobe, TypicalFacetLobe, over_diffuse
-from ..microfacet import distributions, shadowing
-from ..microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer, visible_normals
+from ..lobes import MicrofacetLobe, over_diffuse
+from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, Distribution, HemiEPD
+from ..microfacet.shadowing import (
+    AshikhminPremoze,
+    AshikhminShirleyShadowing,
+    Implicit,
+    Kelemen,
+    KurtShadowing,
+    Neumann,
+    SchlickSmith,
+    Shadowing,
+    VCavity,
+)
 from ..model import Energy, Model
-from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
+from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation, listed
 
 ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
 ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
+
+
+class Facets(NamedTuple):
+    """A word for a distribution D: the class, which is called with the values of the parameters by name, NAME_u and
+    NAME_v of an anisotropic one."""
+
+    distribution: type[Distribution]
+    parameters: dict[str, Parameter]
+
+    def make(self, values: dict[str, Any]) -> Distribution:
+        spread = {}
+        for name, value in values.items():
+            spread |= {f"{name}_u": value[0], f"{name}_v": value[1]} if isinstance(value, tuple) else {name: value}
+        return self.distribution(**spread)
+
+
+class Shadows(NamedTuple):
+    """A word for a shadowing term G, made of the distribution and the values of the parameters."""
+
+    make: Callable[..., Shadowing]
+    parameters: dict[str, Parameter] = {}  # noqa: RUF012
+    needs: str | None = None
+    """The method of a distribution that it is made by."""
+
+    def suits(self, distribution: type[Distribution]) -> bool:
+        return not self.needs or getattr(distribution, self.needs) is not getattr(Distribution, self.needs)
+
+
+DISTRIBUTIONS = {
+    "beckmann": Facets(Beckmann, {"alpha": ANISOTROPIC_ROUGHNESS}),
+    "ggx": Facets(GGX, {"alpha": ANISOTROPIC_ROUGHNESS}),
+    "blinn": Facets(Blinn, {"exponent": Number(100, (0, 1e6), "exponent n")}),
+    "gtr": Facets(GTR, {
+        "alpha": ROUGHNESS,
+        "gamma": Number(2, (0, 10), "exponent γ: the lower, the longer the tail"),
+    }),
+    "abc": Facets(ABC, {
+        "b": Number(100, (0, 1e8), "width: the higher, the narrower the highlight"),
+        "c": Number(1.5, (0, 10), "exponent of the tail: the higher, the steeper"),
+    }),
+    "hepd": Facets(HemiEPD, {
+        "kappa": Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak"),
+        "gamma": Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe"),
+    }),
+    "epd": Facets(EPD, {
+        "alpha": ROUGHNESS,
+        "gamma": Number(1, (0.1, 4), "exponent γ: the lower, the longer the tail"),
+    }),
+}  # fmt: skip
+
+SHADOWING = {
+    "smith": Shadows(lambda facets: facets.smith(correlated=False), needs="smith"),
+    "smith-correlated": Shadows(lambda facets: facets.smith(correlated=True), needs="smith"),
+    "vcavity": Shadows(lambda facets: VCavity()),
+    "schlick": Shadows(lambda facets: SchlickSmith(math.sqrt(2 / math.pi) * facets.roughness()), needs="roughness"),
+    "implicit": Shadows(lambda facets: Implicit()),
+    "neumann": Shadows(lambda facets: Neumann()),
+    "kelemen": Shadows(lambda facets: Kelemen()),
+    "ashikhmin-shirley": Shadows(lambda facets: AshikhminShirleyShadowing()),
+    "ashikhmin-premoze": Shadows(lambda facets: AshikhminPremoze()),
+    "kurt": Shadows(
+        lambda facets, kurt_exponent: KurtShadowing(kurt_exponent),
+        {"kurt_exponent": Number(0.25, (0, 0.5), "exponent κ: the higher, the brighter at grazing")},
+    ),
+}
 
 NEARLY_ALL = ("beckmann", "ggx", "blinn", "abc", "hepd")
 
@@ -65,7 +140,7 @@ class Microfacet(Model):
 
     Sampling: a half vector or its mirror image, chosen by what they reflect
     (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticNormalsTowardViewer), so that no sample falls below
-    the horizon; ggx with smith as ``walter``.
+    the horizon; ggx with smith, smith-correlated or schlick by visible normals (mi_brdfs.microfacet.choice).
 
     Example
     -------
@@ -82,39 +157,8 @@ class Microfacet(Model):
 
     diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
-    distribution = OneOf(
-        {
-            "beckmann": {"alpha": ANISOTROPIC_ROUGHNESS},
-            "ggx": {"alpha": ANISOTROPIC_ROUGHNESS},
-            "blinn": {"exponent": Number(100, (0, 1e6), "exponent n")},
-            "gtr": {"alpha": ROUGHNESS, "gamma": Number(2, (0, 10), "exponent γ: the lower, the longer the tail")},
-            "abc": {
-                "b": Number(100, (0, 1e8), "width: the higher, the narrower the highlight"),
-                "c": Number(1.5, (0, 10), "exponent of the tail: the higher, the steeper"),
-            },
-            "hepd": {
-                "kappa": Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak"),
-                "gamma": Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe"),
-            },
-            "epd": {"alpha": ROUGHNESS, "gamma": Number(1, (0.1, 4), "exponent γ: the lower, the longer the tail")},
-        },
-        "distribution D of the facets",
-    )
-    shadowing = OneOf(
-        {
-            "smith": {},
-            "smith-correlated": {},
-            "vcavity": {},
-            "schlick": {},
-            "implicit": {},
-            "neumann": {},
-            "kelemen": {},
-            "ashikhmin-shirley": {},
-            "ashikhmin-premoze": {},
-            "kurt": {"kurt_exponent": Number(0.25, (0, 0.5), "exponent κ: the higher, the brighter at grazing")},
-        },
-        "shadowing term G",
-    )
+    distribution = OneOf({word: it.parameters for word, it in DISTRIBUTIONS.items()}, "distribution D of the facets")
+    shadowing = OneOf({word: it.parameters for word, it in SHADOWING.items()}, "shadowing term G")
     fresnel = FresnelSet()
     rotation = Rotation()
     energy = Energy(
@@ -151,83 +195,16 @@ class Microfacet(Model):
 
     def __init__(self, props):
         super().__init__(props)
-        words = self.slots["distribution"].words | self.slots["shadowing"].words
-        distribution, term = words["distribution"], words["shadowing"]
-        suited = SUITED.get(term, DISTRIBUTIONS)
-        if distribution not in suited:
+        suited = [word for word, it in DISTRIBUTIONS.items() if SHADOWING[self.shadowing].suits(it.distribution)]
+        if self.distribution not in suited:
             raise ParameterError(
-                f'microfacet: shadowing = "{term}" is not known for distribution = "{distribution}"; '
-                f'take it with {listed(list(suited))}, or another one such as "vcavity".'
+                f'microfacet: shadowing = "{self.shadowing}" is not known for distribution = "{self.distribution}"; '
+                f'take it with {listed(suited)}, or another one such as "vcavity".'
             )
 
     def lobes(self, p):
-        distribution = DISTRIBUTIONS[p.distribution.choice](p.distribution)
-        term = SHADOWING[p.shadowing.choice](p)
-        visible = p.distribution.choice == "ggx" and p.shadowing.choice == "smith"
-        if visible:
-            sampler = visible_normals(p.fresnel)
-        else:
-            sampler = (
-                AntitheticNormalsTowardViewer(LEAN[p.shadowing.choice])
-                if p.shadowing.choice in LEAN
-                else AntitheticNormals()
-            )
-        lobe = DimmedLobe if p.shadowing.choice in SMITHS else TypicalFacetLobe
-        specular = lobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
-        return over_diffuse(p.diffuse_reflectance, specular)
-
-
-DISTRIBUTIONS = {
-    "beckmann": lambda p: distributions.Beckmann(*p.alpha),
-    "ggx": lambda p: distributions.GGX(*p.alpha),
-    "blinn": lambda p: distributions.Blinn(p.exponent),
-    "gtr": lambda p: distributions.GTR(p.alpha, p.gamma),
-    "abc": lambda p: distributions.ABC(p.b, p.c),
-    "hepd": lambda p: distributions.HemiEPD(p.kappa, p.gamma),
-    "epd": lambda p: distributions.EPD(p.alpha, p.gamma),
-}
-
-ROUGHNESS_OF = {
-    "beckmann": lambda p: dr.sqrt(p.alpha[0] * p.alpha[1]),
-    "ggx": lambda p: dr.sqrt(p.alpha[0] * p.alpha[1]),
-    "blinn": lambda p: dr.rsqrt(0.5 * p.exponent + 1),
-    "gtr": lambda p: p.alpha,
-    "epd": lambda p: p.alpha,
-}
-
-SMITH = {
-    "beckmann": lambda p, correlated: shadowing.SmithBeckmann(*p.alpha, correlated),
-    "ggx": lambda p, correlated: shadowing.SmithGGX(*p.alpha, correlated),
-    "blinn": lambda p, correlated: shadowing.SmithBlinn(p.exponent, correlated),
-}
-
-SMITHS = "smith", "smith-correlated"
-
-SUITED = {"smith": SMITH, "smith-correlated": SMITH, "schlick": ROUGHNESS_OF}
-"""The distributions that a shadowing term is known for, if not all."""
-
-SHADOWING = {
-    "smith": lambda p: SMITH[p.distribution.choice](p.distribution, correlated=False),
-    "smith-correlated": lambda p: SMITH[p.distribution.choice](p.distribution, correlated=True),
-    "vcavity": lambda p: shadowing.vcavity,
-    "schlick": lambda p: shadowing.SchlickSmith(
-        math.sqrt(2 / math.pi) * ROUGHNESS_OF[p.distribution.choice](p.distribution)
-    ),
-    "implicit": lambda p: shadowing.implicit,
-    "neumann": lambda p: shadowing.neumann,
-    "kelemen": lambda p: shadowing.kelemen,
-    "ashikhmin-shirley": lambda p: shadowing.ashikhmin_shirley,
-    "ashikhmin-premoze": lambda p: shadowing.ashikhmin_premoze,
-    "kurt": lambda p: shadowing.KurtShadowing(p.shadowing.kurt_exponent),
-}
-
-LEAN = {
-    "smith": 1,
-    "smith-correlated": 1,
-    "schlick": 2,
-    "implicit": 4,
-    "neumann": 1,
-    "ashikhmin-premoze": 2,
-    "kurt": 1,
-}
-"""For the sampler, how far the facets seen at grazing lean: not at all under the other terms. Chosen by measurement."""
+        distribution = DISTRIBUTIONS[self.distribution].make(vars(p.distribution))
+        shadowing = SHADOWING[self.shadowing].make(distribution, **vars(p.shadowing))
+        return over_diffuse(
+            p.diffuse_reflectance, MicrofacetLobe(p.specular_reflectance, distribution, shadowing, p.fresnel)
+        )

@@ -1,8 +1,7 @@
-from ..lobes import TypicalFacetLobe, over_diffuse
+from ..lobes import MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
-from ..microfacet.shadowing import implicit, vcavity
+from ..microfacet.shadowing import Implicit, VCavity
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
 
@@ -58,9 +57,6 @@ class Nishino(Model):
 
     def lobes(self, p):
         distribution = HemiEPD(p.kappa, p.gamma)
-        if p.variant.choice == "microfacet":
-            terms = vcavity, p.variant.fresnel, AntitheticNormals()
-        else:
-            terms = implicit, Unit(), AntitheticNormalsTowardViewer(4)
-        specular = TypicalFacetLobe(p.specular_reflectance, distribution, *terms)
+        terms = (VCavity(), p.variant.fresnel) if self.variant == "microfacet" else (Implicit(), Unit())
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, *terms)
         return over_diffuse(p.diffuse_reflectance, specular)

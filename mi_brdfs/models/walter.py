@@ -1,6 +1,5 @@
-from ..lobes import DimmedLobe, over_diffuse
+from ..lobes import MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import GGX
-from ..microfacet.sampling import visible_normals
 from ..microfacet.shadowing import SmithGGX
 from ..model import Energy, Model
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
@@ -50,11 +49,10 @@ class Walter(Model):
     energy = Energy(0.989, [({}, 1)])
 
     def lobes(self, p):
-        specular = DimmedLobe(
+        specular = MicrofacetLobe(
             p.specular_reflectance,
             GGX(*p.alpha),
             SmithGGX(*p.alpha, correlated=self.shadowing == "correlated"),
             p.fresnel,
-            visible_normals(p.fresnel),
         )
         return over_diffuse(p.diffuse_reflectance, specular)

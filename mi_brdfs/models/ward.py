@@ -4,8 +4,7 @@ from ..lobes import LambertLobe, MicrofacetLobe
 from ..math import expm1
 from ..microfacet.distributions import Beckmann, Distribution, log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.fresnel import Unit
-from ..microfacet.sampling import AntitheticNormals
-from ..microfacet.shadowing import kelemen
+from ..microfacet.shadowing import Kelemen, Shadowing
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
 
@@ -69,16 +68,8 @@ class Ward(Model):
 
     def lobes(self, p):
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)
-        lobe = DarkeningLobe if self.variant in ("ward", "approximate") else MicrofacetLobe
-        specular = lobe(p.specular_reflectance, distribution, SHADOWING[self.variant], Unit(), AntitheticNormals())
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, SHADOWING[self.variant](), Unit())
         return LambertLobe(p.diffuse_reflectance), specular
-
-
-class DarkeningLobe(MicrofacetLobe):
-    """A lobe whose albedo falls about like the cosine, as that of Ward's own normalisation does."""
-
-    def estimated_albedo(self, wi):
-        return super().estimated_albedo(wi) * (0.1 + 0.9 * wi.z)
 
 
 class ApproximateBeckmann(Distribution):
@@ -103,9 +94,25 @@ class ApproximateBeckmann(Distribution):
         return tan2_of_versine(-log_complement(complement * total + (1 - total)) / (2 * g))
 
 
-SHADOWING = {
-    "balanced": kelemen,
-    "ward": lambda facet: dr.square(dr.square(facet.cos_h)) * dr.sqrt(facet.cos_i * facet.cos_o),
-    "ward-duer": lambda facet: dr.square(dr.square(facet.cos_h)),
-    "approximate": lambda facet: dr.sqrt(facet.cos_i * facet.cos_o),
-}
+class WardDuer(Shadowing):
+    """h_z⁴: what is left of D's 1/h_z⁴ is 1/(cosθ_i cosθ_o)."""
+
+    def __call__(self, facet):
+        return dr.square(dr.square(facet.cos_h))
+
+
+class GeometricMean(Shadowing):
+    """√(cosθ_i cosθ_o)."""
+
+    def __call__(self, facet):
+        return dr.sqrt(facet.cos_i * facet.cos_o)
+
+
+class Ward1992(Shadowing):
+    """h_z⁴ √(cosθ_i cosθ_o)."""
+
+    def __call__(self, facet):
+        return dr.square(dr.square(facet.cos_h)) * dr.sqrt(facet.cos_i * facet.cos_o)
+
+
+SHADOWING = {"balanced": Kelemen, "ward": Ward1992, "ward-duer": WardDuer, "approximate": GeometricMean}

@@ -1,0 +1,24 @@
+"""Which sampler suits a distribution, a shadowing and a Fresnel term: the same one, whatever model puts them
+together."""
+
+from __future__ import annotations
+
+from .distributions import GGX, Distribution
+from .fresnel import Dielectric, Fresnel, Schlick
+from .sampling import AntitheticNormals, AntitheticNormalsTowardViewer, Sampler
+from .shadowing import SchlickSmith, Shadowing, SmithGGX
+from .visible import AntitheticVisibleNormals, BoundedVisibleNormals
+
+
+def sampler_of(distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel) -> Sampler:
+    """The sampler of a lobe of these terms; chosen by measurement, as are how far shadowing terms lean."""
+    rises = isinstance(fresnel, Dielectric | Schlick)  # at grazing, from a few percent to one
+    if isinstance(distribution, GGX) and isinstance(shadowing, SmithGGX):
+        if not shadowing.correlated:
+            # A pair takes longer, which is worth it only where the reflectance rises.
+            return AntitheticVisibleNormals() if rises else BoundedVisibleNormals()
+        if not rises:
+            return AntitheticVisibleNormals()
+    if isinstance(distribution, GGX) and isinstance(shadowing, SchlickSmith):
+        return AntitheticVisibleNormals()
+    return AntitheticNormalsTowardViewer(shadowing.lean) if shadowing.lean else AntitheticNormals()
