@@ -71,10 +71,10 @@ class Low(Model):
 
     def lobes(self, p):
         fresnel = Dielectric(p.int_ior)
-        if p.variant.choice == "smooth":
+        if self.variant == "smooth":
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
-            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
+            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[self.normalization]
             specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), vcavity, fresnel, AntitheticNormals())
         return over_diffuse(p.diffuse_reflectance, specular)
 

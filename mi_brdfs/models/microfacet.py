@@ -6,7 +6,8 @@ from ..lobes import DimmedLobe, TypicalFacetLobe, over_diffuse
 from ..microfacet import distributions, shadowing
 from ..microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer, visible_normals
 from ..model import Energy, Model
-from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation, listed
+from ..parameters import FresnelSet, Number, OneOf, ParameterError, Reflectance, Rotation
+from ..parameters.messages import listed
 
 ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
 ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
@@ -151,28 +152,24 @@ class Microfacet(Model):
 
     def __init__(self, props):
         super().__init__(props)
-        words = self.slots["distribution"].words | self.slots["shadowing"].words
-        distribution, term = words["distribution"], words["shadowing"]
-        suited = SUITED.get(term, DISTRIBUTIONS)
-        if distribution not in suited:
+        suited = SUITED.get(self.shadowing, DISTRIBUTIONS)
+        if self.distribution not in suited:
             raise ParameterError(
-                f'microfacet: shadowing = "{term}" is not known for distribution = "{distribution}"; '
+                f'microfacet: shadowing = "{self.shadowing}" is not known for distribution = "{self.distribution}"; '
                 f'take it with {listed(list(suited))}, or another one such as "vcavity".'
             )
 
     def lobes(self, p):
-        distribution = DISTRIBUTIONS[p.distribution.choice](p.distribution)
-        term = SHADOWING[p.shadowing.choice](p)
-        visible = p.distribution.choice == "ggx" and p.shadowing.choice == "smith"
+        distribution = DISTRIBUTIONS[self.distribution](p.distribution)
+        term = SHADOWING[self.shadowing](self.distribution, p)
+        visible = self.distribution == "ggx" and self.shadowing == "smith"
         if visible:
             sampler = visible_normals(p.fresnel)
         else:
             sampler = (
-                AntitheticNormalsTowardViewer(LEAN[p.shadowing.choice])
-                if p.shadowing.choice in LEAN
-                else AntitheticNormals()
+                AntitheticNormalsTowardViewer(LEAN[self.shadowing]) if self.shadowing in LEAN else AntitheticNormals()
             )
-        lobe = DimmedLobe if p.shadowing.choice in SMITHS else TypicalFacetLobe
+        lobe = DimmedLobe if self.shadowing in SMITHS else TypicalFacetLobe
         specular = lobe(p.specular_reflectance, distribution, term, p.fresnel, sampler)
         return over_diffuse(p.diffuse_reflectance, specular)
 
@@ -207,18 +204,18 @@ SUITED = {"smith": SMITH, "smith-correlated": SMITH, "schlick": ROUGHNESS_OF}
 """The distributions that a shadowing term is known for, if not all."""
 
 SHADOWING = {
-    "smith": lambda p: SMITH[p.distribution.choice](p.distribution, correlated=False),
-    "smith-correlated": lambda p: SMITH[p.distribution.choice](p.distribution, correlated=True),
-    "vcavity": lambda p: shadowing.vcavity,
-    "schlick": lambda p: shadowing.SchlickSmith(
-        math.sqrt(2 / math.pi) * ROUGHNESS_OF[p.distribution.choice](p.distribution)
+    "smith": lambda distribution, p: SMITH[distribution](p.distribution, correlated=False),
+    "smith-correlated": lambda distribution, p: SMITH[distribution](p.distribution, correlated=True),
+    "vcavity": lambda distribution, p: shadowing.vcavity,
+    "schlick": lambda distribution, p: shadowing.SchlickSmith(
+        math.sqrt(2 / math.pi) * ROUGHNESS_OF[distribution](p.distribution)
     ),
-    "implicit": lambda p: shadowing.implicit,
-    "neumann": lambda p: shadowing.neumann,
-    "kelemen": lambda p: shadowing.kelemen,
-    "ashikhmin-shirley": lambda p: shadowing.ashikhmin_shirley,
-    "ashikhmin-premoze": lambda p: shadowing.ashikhmin_premoze,
-    "kurt": lambda p: shadowing.KurtShadowing(p.shadowing.kurt_exponent),
+    "implicit": lambda distribution, p: shadowing.implicit,
+    "neumann": lambda distribution, p: shadowing.neumann,
+    "kelemen": lambda distribution, p: shadowing.kelemen,
+    "ashikhmin-shirley": lambda distribution, p: shadowing.ashikhmin_shirley,
+    "ashikhmin-premoze": lambda distribution, p: shadowing.ashikhmin_premoze,
+    "kurt": lambda distribution, p: shadowing.KurtShadowing(p.shadowing.kurt_exponent),
 }
 
 LEAN = {

@@ -58,7 +58,7 @@ class Nishino(Model):
 
     def lobes(self, p):
         distribution = HemiEPD(p.kappa, p.gamma)
-        if p.variant.choice == "microfacet":
+        if self.variant == "microfacet":
             terms = vcavity, p.variant.fresnel, AntitheticNormals()
         else:
             terms = implicit, Unit(), AntitheticNormalsTowardViewer(4)
