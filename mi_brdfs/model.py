@@ -10,7 +10,8 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
-from .parameters import Given, Parameter, Row, Slot, ranges_of, textures_of
+from .parameters import Parameter, ParameterRow, PropertyReader
+from .parameters.parameter import BoundParameters
 
 
 class Energy(NamedTuple):
@@ -43,9 +44,8 @@ class Plugin:
     """What a plugin is by its declarations. A subclass's docstring is its manual page, and its class attributes declare
     the parameters (:mod:`mi_brdfs.parameters`).
 
-    An instance belongs to one plugin instance. It holds the parameters that are textures as ``slots``, by declared
-    name, with all their ``textures`` and ``ranges`` by property name; choices are attributes under their declared
-    names.
+    An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, with all their
+    ``textures`` and ``ranges`` by property name; choices are attributes under their declared names.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -58,22 +58,16 @@ class Plugin:
             raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
         for parameter in cls.declared():
             for name in {parameter.name, *parameter.names}:
-                if hasattr(Model, name) or name in ("slots", "textures", "ranges"):
+                if hasattr(Model, name) or name in ("parameters", "textures", "ranges"):
                     raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, as every model has that.")
 
     def __init__(self, props: mi.Properties):
-        given = Given(self.plugins[0], props)
+        reader = PropertyReader(self.plugins[0], props)
         declared = self.declared()
-        given.reject_unknown([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
-        self.slots: dict[str, Slot] = {}
-        for parameter in declared:
-            bound = parameter.bind(given)
-            if isinstance(bound, Slot):
-                self.slots[parameter.name] = bound
-                vars(self).update(bound.words)
-            else:
-                setattr(self, parameter.name, bound)
-        self.textures, self.ranges = textures_of(self.slots.values()), ranges_of(self.slots.values())
+        reader.reject_unknown([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
+        self.parameters = BoundParameters(declared, reader)
+        self.textures, self.ranges = self.parameters.textures, self.parameters.ranges
+        vars(self).update(self.parameters.chosen)
         for name in props.keys():
             props.mark_queried(name)
 
@@ -84,16 +78,12 @@ class Plugin:
         return [value for value in members.values() if isinstance(value, Parameter)]
 
     def evaluate(self, si, active) -> SimpleNamespace:
-        """The values of the parameters that are textures, at a surface interaction."""
-        return SimpleNamespace(**{name: slot.evaluate(si, active) for name, slot in self.slots.items()})
+        """Return the values of the parameters at a surface interaction, except for choices."""
+        return SimpleNamespace(**self.parameters.evaluate(si, active))
 
     def described(self) -> str:
         """The class and the parameters, as Mitsuba's plugins show themselves."""
-        words = {it.name: getattr(self, it.name) for it in self.declared() if it.name not in self.slots}
-        for slot in self.slots.values():
-            words |= slot.words
-        lines = [f"  {name} = {value}" for name, value in words.items()]
-        lines += [f"  {name} = {texture}" for name, texture in self.textures.items()]
+        lines = [f"  {name} = {value}" for name, value in (self.parameters.chosen | self.textures).items()]
         return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 
     @classmethod
@@ -102,10 +92,10 @@ class Plugin:
         return inspect.cleandoc(cls.__doc__).splitlines()[0]
 
     @classmethod
-    def parameter_rows(cls) -> list[Row]:
+    def parameter_rows(cls) -> list[ParameterRow]:
         """The table of parameters, with its heading."""
         rows = [row for parameter in cls.declared() for row in parameter.rows()]
-        return [Row("parameter", "type", "default", "range", "meaning"), *rows]
+        return [ParameterRow("parameter", "type", "default", "range", "meaning"), *rows]
 
     @classmethod
     def manual(cls) -> str:
@@ -128,8 +118,7 @@ class Model(Plugin):
 
     def placeholders(self) -> SimpleNamespace:
         """Stand-ins for these values, to learn of which lobes the model consists."""
-        declared = [parameter for parameter in self.declared() if parameter.name in self.slots]
-        return SimpleNamespace(**{p.name: p.placeholder(self.slots[p.name]) for p in declared})
+        return SimpleNamespace(**self.parameters.placeholders())
 
     @classmethod
     def manual(cls) -> str:

@@ -8,7 +8,7 @@ from support import call, direction
 import mi_brdfs
 from mi_brdfs.lobes import LambertLobe, Lobe
 from mi_brdfs.mitsuba import registry
-from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance
+from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Spelling
 
 
 @pytest.fixture(autouse=True)
@@ -53,6 +53,20 @@ def test_a_pair_without_a_default():
     assert radiance(alpha=0.2) == pytest.approx(0.4)
 
 
+def test_a_pair_in_another_spelling():
+    """Given as that it is a pair, too."""
+
+    def lobes(self, p):
+        alpha_u, alpha_v = p.alpha
+        return (LambertLobe(alpha_u + alpha_v),)
+
+    spelling = Spelling("width", (0, 10), 0.1, "ten times the roughness")
+    roughness = Number(0.1, (0, 1), "roughness", anisotropic=True, spelling=spelling)
+    model(lobes, alpha=roughness)
+    assert radiance(alpha=0.2) == pytest.approx(0.4)
+    assert radiance(width=3) == pytest.approx(0.6)
+
+
 def test_a_choice_of_each_lobe():
     """Numbered like everything else of a lobe, and a flag, too."""
 
@@ -89,6 +103,21 @@ def test_choices_are_attributes_whatever_declares_them():
     assert radiance() == pytest.approx(0.1)
     assert radiance(kind="tinted", shade="half") == pytest.approx(0.55)
     assert radiance(kind="tinted", hue="blue") == pytest.approx(0.6)
+
+
+def test_words_within_words():
+    """With parameters of their own, too."""
+    hue = OneOf({"red": {}, "blue": {"depth": Number(0.4, (0, 1), "depth")}}, "hue")
+    kind = OneOf({"flat": {}, "tinted": {"hue": hue}}, "kind")
+
+    def lobes(self, p):
+        blue = self.kind == "tinted" and self.hue == "blue"
+        return (LambertLobe(p.kind.hue.depth if blue else 0.1),)
+
+    model(lobes, kind=kind)
+    assert radiance(kind="tinted") == pytest.approx(0.1)
+    assert radiance(kind="tinted", hue="blue", depth=0.6) == pytest.approx(0.6)
+    assert 'depth does not belong to hue = "red"' in told(kind="tinted", depth=0.6)
 
 
 def test_a_model_without_parameters():
@@ -128,7 +157,7 @@ def test_a_lobe_without_an_albedo_is_named():
         radiance()
 
 
-@pytest.mark.parametrize("name", ["lobes", "evaluate", "slots", "textures", "energy", "plugins"])
+@pytest.mark.parametrize("name", ["lobes", "evaluate", "parameters", "textures", "energy", "plugins"])
 def test_a_parameter_is_not_called_like_what_models_have(name):
     with pytest.raises(TypeError, match=f"Slip: a parameter cannot be called {name}, as every model has that."):
         model(**({"lobes": matte} | {name: Number(1, (0, 1), "number")}))

@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import clamp, select
 from ..model import Plugin
-from ..parameters import Choice, Colour, ColourSlot, Flag, ParameterError, listed
+from ..parameters import Choice, Colour, Flag, ParameterError, PropertyReader
+from ..parameters.messages import listed
 from ..variants import is_scalar
-
-
-@dataclass
-class RadianceSlot(ColourSlot):
-    dark: bool = False
-    """Whether it is a literal zero."""
 
 
 class Radiance(Colour):
     """A colour of light."""
 
-    def bind(self, given):
-        texture = given.colour(self.name, self.default, self.limits)
+    dark: bool
+    """Once bound, whether it is a literal zero."""
+
+    def bind(self, reader: PropertyReader) -> Radiance:
+        texture = reader.colour(self.name, self.default, self.limits)
         # Not from the texture: evaluating it may wait for a thread that loads a BSDF, and waits for Python.
-        values = given.numbers(self.name) if self.name in given else [self.default]
+        values = reader.colour_values(self.name) if self.name in reader else [self.default]
         dark = values is not None and not any(values)
         if not dark:  # in spectral variants, black is no emission spectrum
-            texture = given.props.get_emissive_texture(self.name)
-        return RadianceSlot({self.name: texture}, self.limits, dark)
+            texture = reader.props.get_emissive_texture(self.name)
+        return self.replace(textures={self.name: texture}, ranges={self.name: self.limits}, dark=dark)
 
 
 class Shading(Plugin):
@@ -122,7 +119,7 @@ class Shading(Plugin):
 
     def _check(self, scene):
         """Raise if there is nothing to shade with, and warn once of what is not mirrored."""
-        if not scene.emitters() and self.slots["ambient"].dark:
+        if not scene.emitters() and self.parameters["ambient"].dark:
             raise ParameterError("shading: the scene has no light; add an emitter to it, or give ambient.")
         if self.environment_reflection and scene.environment() is None:
             raise ParameterError("shading: environment_reflection needs an environment; add an envmap or constant.")

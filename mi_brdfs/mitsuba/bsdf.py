@@ -8,7 +8,7 @@ import mitsuba as mi
 from ..lobes import Lobe, Mixture
 from ..math import clamp, select
 from ..model import Model
-from ..parameters import evaluate_colour
+from ..parameters.colours import evaluate_colour
 from ..variants import is_scalar
 
 
@@ -35,7 +35,6 @@ class ModelBSDF:
         self.textures = self.model.textures
 
         flags = mi.BSDFFlags
-        slots = self.model.slots.values()
         common = flags.FrontSide
         if any(texture.is_spatially_varying() for texture in self.textures.values()):
             common |= flags.SpatiallyVarying
@@ -47,7 +46,7 @@ class ModelBSDF:
             else:
                 kind = flags.GlossyReflection if lobe.glossy else flags.DiffuseReflection
             component = kind | common
-            if lobe.glossy and (lobe.anisotropic or any(slot.anisotropic for slot in slots)):
+            if lobe.glossy and (lobe.anisotropic or self.model.parameters.uses_tangents):
                 component |= flags.Anisotropic
             if not lobe.reciprocal:
                 component |= flags.NonSymmetric

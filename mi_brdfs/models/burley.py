@@ -1,5 +1,3 @@
-from dataclasses import dataclass
-
 import drjit as dr
 import mitsuba as mi
 
@@ -11,20 +9,14 @@ from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing, SmithGGX
 from ..model import Energy, Model
-from ..parameters import Number, NumberSlot, Reflectance, Rotation
+from ..parameters import Number, Reflectance, Rotation
 
 
 class Anisotropy(Number):
     """A number that makes the lobes anisotropic if it is given."""
 
-    def bind(self, given):
-        slot = super().bind(given)
-        return AnisotropySlot(slot.textures, slot.limits, slot.paired) if self.name in given else slot
-
-
-@dataclass
-class AnisotropySlot(NumberSlot):
-    anisotropic = True
+    def bind(self, reader):
+        return super().bind(reader).replace(uses_tangents=self.name in reader)
 
 
 class Burley(Model):

@@ -73,7 +73,7 @@ class Low(Model):
         if self.variant == "smooth":
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
-            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[p.variant.normalization]
+            scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[self.normalization]
             specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), VCavity(), fresnel)
         return over_diffuse(p.diffuse_reflectance, specular)
 

@@ -16,7 +16,8 @@ from ..microfacet.shadowing import (
     VCavity,
 )
 from ..model import Energy, Model
-from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation, listed
+from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation
+from ..parameters.messages import listed
 
 ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
 ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)

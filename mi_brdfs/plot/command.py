@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..parameters import listed
+from ..parameters.messages import listed
 from . import albedo, cartesian, hemisphere, polar, sphere
 
 KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo, sphere)}

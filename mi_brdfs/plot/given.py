@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import mitsuba as mi
 
-from ..parameters import brief
+from ..parameters.messages import brief
 from ..validation.runner import name_of
 from ..validation.subject import Subject
 from ..validation.targets import find_targets

@@ -32,7 +32,7 @@ def energy_limits(bsdf, conserves: bool | None, default: bool) -> Limits:
 
 def _applies(given: dict[str, Any], model) -> bool:
     """Whether a configuration on the page includes the model's. One that fixes numbers is taken not to."""
-    words = {name: word for slot in model.slots.values() for name, word in slot.words.items()} | vars(model)
+    chosen = model.parameters.chosen
     return all(
-        words.get(name) in (value if isinstance(value, tuple) else (value,)) for name, value in given.items()
+        chosen.get(name) in (value if isinstance(value, tuple) else (value,)) for name, value in given.items()
     ) and not any(isinstance(value, float) for value in given.values())

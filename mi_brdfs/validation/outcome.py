@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..parameters import brief
+from ..parameters.messages import brief
 from .report import Finding
 
 

@@ -1,0 +1,143 @@
+"""The parameters of a Fresnel term."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import ClassVar
+
+import mitsuba as mi
+
+from ..math import clamp
+from ..microfacet.fresnel import Conductor, Dielectric, Schlick, Unit
+from .colours import constant_texture, evaluate_colour, rgb_texture, scaled_colour
+from .messages import interval, listed, shown
+from .parameter import Parameter, ParameterRow
+from .reader import PropertyReader, Range
+
+
+class FresnelSet(Parameter):
+    """The Fresnel term: of a conductor (eta and k, or a material's name), Schlick's (f0), of a dielectric (int_ior
+    over ext_ior), or none (F = 1). Evaluated, a function of the cosine."""
+
+    INDEX: ClassVar[Range] = (0.01, 100)
+    EXTINCTION: ClassVar[Range] = (0, 100)
+    RANGES: ClassVar[dict[str, Range]] = {
+        "eta": INDEX,
+        "k": EXTINCTION,
+        "f0": (0, 1),
+        "int_ior": INDEX,
+        "ext_ior": INDEX,
+    }
+    SETS: ClassVar[dict[str, tuple[str, ...]]] = {
+        "conductor": ("eta", "k"),
+        "material": ("material",),
+        "schlick": ("f0",),
+        "dielectric": ("int_ior", "ext_ior"),
+    }
+
+    def __init__(self) -> None:
+        super().__init__("Fresnel reflectance")
+
+    @property
+    def names(self) -> list[str]:
+        return [name for names in self.SETS.values() for name in names]
+
+    def bind(self, reader: PropertyReader) -> FresnelSet:
+        textures = self._textures(reader)
+        ranges = {name: limits for name, limits in self.RANGES.items() if name in textures}
+        return self.replace(textures=textures, ranges=ranges)
+
+    def _textures(self, reader: PropertyReader) -> dict[str, mi.Texture]:
+        """Return the textures of the set that was given."""
+        given = {kind: [name for name in names if name in reader] for kind, names in self.SETS.items()}
+        chosen = [kind for kind, names in given.items() if names]
+        if len(chosen) > 1:
+            first, second = (given[kind][0] for kind in chosen[:2])
+            raise reader.error(
+                first, f"excludes {second}; give one of eta and k, material, f0, int_ior and ext_ior, or none for F = 1"
+            )
+        if given["conductor"]:
+            for name, other in (("eta", "k"), ("k", "eta")):
+                if other not in reader:
+                    raise reader.error(name, f"needs {other} beside it")
+            eta, k = (scaled_colour(reader, name, 0, self.RANGES[name]) for name in ("eta", "k"))
+            return eta | k
+        if given["material"]:
+            return self._material(reader)
+        if given["schlick"]:
+            return {"f0": reader.colour("f0", 0, self.RANGES["f0"])}
+        if given["dielectric"]:
+            return {"int_ior": self._ior(reader, "int_ior", "bk7"), "ext_ior": self._ior(reader, "ext_ior", "air")}
+        return {}
+
+    def _ior(self, reader: PropertyReader, name: str, default: str) -> mi.Texture:
+        """Return an index of refraction given as a number, a texture, or the name of a substance that Mitsuba knows."""
+        if name in reader and not isinstance(reader.props[name], str):
+            return reader.number(name, 1, self.INDEX)
+        try:
+            index = mi.lookup_ior(reader.props, name, default)
+        except RuntimeError as error:
+            known = str(error).partition("choices are:")[2].strip()
+            problem = f"= {shown(reader.props[name])} is unknown; it must be a number or one of {known}"
+            raise reader.error(name, problem) from None
+        return constant_texture(index)
+
+    def _material(self, reader: PropertyReader) -> dict[str, mi.Texture]:
+        """Return the indices of one of Mitsuba's conductors."""
+        material = reader.text("material")
+        if material == "none":
+            return {}
+        folder = Path(mi.__file__).parent / "data" / "ior"
+        known = sorted(path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd"))
+        if material not in known:
+            closest = difflib.get_close_matches(material, known, n=3, cutoff=0.0)
+            raise reader.error(
+                "material",
+                f"= {shown(material)} is unknown; the closest of Mitsuba's {len(known)} conductors are "
+                f'{listed(closest, quote=True)}, and "none" means F = 1',
+            )
+        return {name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Conductor | Schlick | Dielectric | Unit:
+        def colour(name: str) -> mi.UnpolarizedSpectrum:
+            return clamp(evaluate_colour(self.textures, name, si, active), *self.RANGES[name])
+
+        def number(name: str) -> mi.Float:
+            return clamp(self.textures[name].eval_1(si, active), *self.RANGES[name])
+
+        if "eta" in self.textures:
+            return Conductor(colour("eta"), colour("k"))
+        if "f0" in self.textures:
+            return Schlick(colour("f0"))
+        if "int_ior" in self.textures:
+            return Dielectric(number("int_ior") / number("ext_ior"))
+        return Unit()
+
+    def placeholder(self) -> Unit:
+        return Unit()
+
+    def rows(self) -> list[ParameterRow]:
+        index, extinction = interval(*self.INDEX), interval(*self.EXTINCTION)
+        return [
+            ParameterRow("eta, k", "colour", "-", f"{index}, {extinction}",
+                         "complex index of refraction of a conductor, relative to the exterior"),
+            ParameterRow("material", "string", "none", "Mitsuba's conductors | none",
+                         "a conductor by name; none means F = 1"),
+            ParameterRow("f0", "colour", "-", "[0, 1]",
+                         "Schlick's approximation with this reflectance at normal incidence"),
+            ParameterRow("int_ior, ext_ior", "number or name", "bk7, air", index,
+                         "indices of refraction of a dielectric, inside and outside"),
+        ]  # fmt: skip
+
+
+def _measured(path: Path) -> mi.Texture:
+    """Return the texture of a measured spectrum: as it is in spectral variants, and else as the rgb colour or luminance
+    that Mitsuba's own conductors make of it."""
+    wavelengths, values = mi.spectrum_from_file(str(path))
+    if mi.is_spectral:
+        spectrum = {"wavelengths": wavelengths, "values": values}
+        return mi.load_dict(
+            {"type": "irregular"} | {name: ", ".join(map(repr, numbers)) for name, numbers in spectrum.items()}
+        )
+    return rgb_texture(mi.spectrum_list_to_srgb(wavelengths, values, bounded=False, d65=False))

@@ -1,0 +1,129 @@
+"""Parameters that have parameters of their own."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import mitsuba as mi
+
+from .messages import listed
+from .parameter import BoundParameters, Parameter, ParameterRow
+from .reader import PropertyReader
+
+
+class OneOf(Parameter):
+    """One of several words, by default the first, each with parameters of its own.
+
+    The word is an attribute of the model, like a :class:`Choice`. Evaluated, it has the parameters of the word as
+    attributes.
+    """
+
+    own: BoundParameters
+    """Once bound, the parameters of the chosen word."""
+
+    def __init__(self, words: dict[str, dict[str, Parameter]], text: str):
+        super().__init__(text)
+        self.words = words
+        for declared in words.values():
+            for name, parameter in declared.items():
+                parameter.__set_name__(None, name)
+
+    @property
+    def names(self) -> list[str]:
+        own = [name for declared in self.words.values() for p in declared.values() for name in p.names]
+        return list(dict.fromkeys([self.name, *own]))
+
+    def bind(self, reader: PropertyReader) -> OneOf:
+        word = reader.choice(self.name, tuple(self.words))
+        declared = self.words[word].values()
+        allowed = [name for parameter in declared for name in parameter.names]
+        for name in self.names[1:]:
+            if name in reader and name not in allowed:
+                has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
+                raise reader.error(name, f'does not belong to {self.name} = "{word}", which {has} of its own')
+        own = BoundParameters(declared, reader)
+        return self.replace(
+            own=own,
+            textures=own.textures,
+            ranges=own.ranges,
+            chosen={self.name: word, **own.chosen},
+            uses_tangents=own.uses_tangents,
+        )
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
+        return SimpleNamespace(**self.own.evaluate(si, active))
+
+    def placeholder(self) -> SimpleNamespace:
+        return SimpleNamespace(**self.own.placeholders())
+
+    def rows(self) -> list[ParameterRow]:
+        rows = [ParameterRow(self.name, "string", next(iter(self.words)), " | ".join(self.words), self.text)]
+        users: dict[Parameter, list[str]] = {}
+        for word, declared in self.words.items():
+            for parameter in declared.values():
+                users.setdefault(parameter, []).append(word)
+        for parameter, words in users.items():
+            rows += [row._replace(text=f"with {listed(words, 'and')}: {row.text}") for row in parameter.rows()]
+        return rows
+
+
+class PerLobe(Parameter):
+    """The parameters of one to ``most`` lobes of a kind: NAME_1, NAME_2 … Evaluated, a list of their values.
+
+    Lobe i exists if any of its names is given. A single lobe may drop the number, and exists if nothing is given.
+    """
+
+    lobes: list[BoundParameters]
+    """Once bound, the parameters of each lobe."""
+
+    def __init__(self, most: int, **declared: Parameter):
+        super().__init__("")
+        self.declared = declared
+        for name, parameter in declared.items():
+            parameter.__set_name__(None, name)
+        self.numbers = ["", *(f"_{i}" for i in range(1, most + 1))]
+
+    def _lobe(self, number: str) -> list[Parameter]:
+        return [parameter.numbered(number) for parameter in self.declared.values()]
+
+    def _names(self, number: str) -> list[str]:
+        return [name for parameter in self._lobe(number) for name in parameter.names]
+
+    @property
+    def names(self) -> list[str]:
+        return [name for number in self.numbers for name in self._names(number)]
+
+    @property
+    def shown(self) -> list[str]:
+        return self._names("_i")
+
+    def bind(self, reader: PropertyReader) -> PerLobe:
+        lobes = [BoundParameters(self._lobe(number), reader) for number in self._given(reader)]
+        return self.replace(
+            lobes=lobes,
+            textures={name: texture for lobe in lobes for name, texture in lobe.textures.items()},
+            ranges={name: limits for lobe in lobes for name, limits in lobe.ranges.items()},
+            uses_tangents=any(lobe.uses_tangents for lobe in lobes),
+        )
+
+    def _given(self, reader: PropertyReader) -> list[str]:
+        """Return the numbers of the lobes that exist, and raise if they are not in order."""
+        names = {number: [name for name in self._names(number) if name in reader] for number in self.numbers}
+        first = {number: given[0] for number, given in names.items() if given}
+        numbers = list(first) or [""]
+        if "" in numbers and len(numbers) > 1:
+            raise reader.error(first[""], f"excludes {first[numbers[1]]}; number the names of all lobes, or of none")
+        for number, expected in zip(numbers, self.numbers[1:], strict=False):
+            if number not in ("", expected):
+                problem = f"leaves a gap; number the lobes from 1, so that this one is {expected[1:]}"
+                raise reader.error(first[number], problem)
+        return numbers
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> list[SimpleNamespace]:
+        return [SimpleNamespace(**lobe.chosen, **lobe.evaluate(si, active)) for lobe in self.lobes]
+
+    def placeholder(self) -> list[SimpleNamespace]:
+        return [SimpleNamespace(**lobe.chosen, **lobe.placeholders()) for lobe in self.lobes]
+
+    def rows(self) -> list[ParameterRow]:
+        return [row for parameter in self._lobe("_i") for row in parameter.rows()]

@@ -1,0 +1,58 @@
+"""The words of messages and tables: what a value is, and how to show it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import mitsuba as mi
+
+_KINDS = {"Color": "a colour", "Spectrum": "a spectrum", "Array3": "a vector", "Transform": "a transform"}
+
+
+def kind_of(value: Any) -> str:
+    """Return a word or two for what a value is."""
+    if isinstance(value, bool):
+        return "a boolean"
+    if isinstance(value, str):
+        return "a string"
+    if isinstance(value, mi.Texture):
+        return "a texture"
+    if isinstance(value, mi.Object):
+        return "a BSDF" if isinstance(value, mi.BSDF) else f"a {value.class_name()}"
+    if isinstance(value, (int, float)):
+        return "a number"
+    kind = type(value).__name__
+    return next((known for part, known in _KINDS.items() if part in kind), f"a {kind}")
+
+
+def shown(value: Any) -> str:
+    """Return a value as it appears in a message, on one line."""
+    if isinstance(value, mi.Object):
+        return value.class_name()
+    if hasattr(value, "wavelengths"):
+        numbers = ", ".join(f"{number:g}" for number in value.values[:6])
+        return f"[{numbers}, …]" if len(value.values) > 6 else f"[{numbers}]"
+    text = brief(f"{value:.6g}" if isinstance(value, float) else str(value))
+    return f'"{text}"' if isinstance(value, str) else text
+
+
+def brief(text: str) -> str:
+    """Return a scene author's text on one line, of at most 80 characters, without terminal control characters."""
+    text = "".join(character if character.isprintable() else "�" for character in " ".join(text.split()))
+    return text if len(text) <= 80 else f"{text[:80]}…"
+
+
+def listed(words: Iterable[str], last: str = "or", quote: bool = False) -> str:
+    """Join words as a sentence lists them: a, b or c."""
+    words = [f'"{word}"' if quote else word for word in words]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def interval(low: float, high: float) -> str:
+    return f"[{low:g}, {high:g}]" if math.isfinite(high) else f"[{low:g}, ∞)"
+
+
+def number_or_none(value: float | None) -> str:
+    return "none" if value is None else f"{value:g}"

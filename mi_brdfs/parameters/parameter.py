@@ -1,0 +1,121 @@
+"""What all parameters have in common."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+from typing import Any, NamedTuple, TypeVar
+
+import mitsuba as mi
+
+from .reader import PropertyReader, Range
+
+P = TypeVar("P", bound="Parameter")
+
+
+class ParameterRow(NamedTuple):
+    """A line of the parameter table on a manual page."""
+
+    name: str
+    type: str
+    default: str
+    range: str
+    text: str
+
+
+class Parameter:
+    """A parameter of a plugin: as a class attribute its declaration, and as a bound copy its value in one instance.
+
+    A declaration does not change: :meth:`bind` returns a copy that holds, besides, what the instance was given.
+    """
+
+    name: str
+    """The attribute that it was assigned to."""
+
+    def __init__(self, text: str):
+        self.text = text
+        self.number = ""
+        """What follows each of its names where it belongs to one of several lobes: "_1", "_2" …"""
+        self.textures: dict[str, mi.Texture] = {}
+        """Once bound, its textures by property name. A parameter without a default that was not given has none."""
+        self.ranges: dict[str, Range] = {}
+        """What the values of these are limited to."""
+        self.chosen: dict[str, str | bool] = {}
+        """Once bound, the choices made with it, by declared name."""
+        self.uses_tangents = False
+        """Once bound, whether it refers to the tangent directions, so that lobes are anisotropic."""
+
+    def __set_name__(self, owner: type | None, name: str) -> None:
+        self.name = name
+
+    def __repr__(self) -> str:
+        members = ", ".join(f"{name}={value!r}" for name, value in vars(self).items())
+        return f"{type(self).__name__}({members})"
+
+    def replace(self: P, **members: Any) -> P:
+        """Return a copy with some attributes replaced."""
+        replaced = copy.copy(self)
+        vars(replaced).update(members)
+        return replaced
+
+    def numbered(self: P, number: str) -> P:
+        """Return the declaration for one of several lobes."""
+        return self.replace(number=number)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the properties that it may be given as, the usual one first."""
+        return [self.name + self.number]
+
+    @property
+    def shown(self) -> list[str]:
+        """These names as messages list them."""
+        return self.names
+
+    def bind(self, reader: PropertyReader) -> Parameter | str | bool:
+        """Return a copy that holds what a plugin was given; a choice or a flag returns its value instead."""
+        raise NotImplementedError(f"{type(self).__name__} does not define bind.")
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
+        """Return the value of a bound parameter at a surface interaction."""
+        raise NotImplementedError(f"{type(self).__name__} does not define evaluate.")
+
+    def placeholder(self) -> Any:
+        """Return a value that a bound parameter may have, to build a model's lobes before there is a surface point."""
+        raise NotImplementedError(f"{type(self).__name__} does not define placeholder.")
+
+    def rows(self) -> list[ParameterRow]:
+        """Return its lines in the table of the manual page."""
+        raise NotImplementedError(f"{type(self).__name__} does not define rows.")
+
+
+class BoundParameters(dict[str, Parameter]):
+    """Several parameters bound together, by declared name, with all their ``textures`` and ``ranges``.
+
+    Choices are not among the parameters: ``chosen`` has their words and flags.
+    """
+
+    def __init__(self, declared: Iterable[Parameter], reader: PropertyReader):
+        super().__init__()
+        self.textures: dict[str, mi.Texture] = {}
+        self.ranges: dict[str, Range] = {}
+        self.chosen: dict[str, str | bool] = {}
+        self.uses_tangents = False
+        for parameter in declared:
+            bound = parameter.bind(reader)
+            if not isinstance(bound, Parameter):
+                self.chosen[parameter.name] = bound
+                continue
+            self[parameter.name] = bound
+            self.textures |= bound.textures
+            self.ranges |= bound.ranges
+            self.chosen |= bound.chosen
+            self.uses_tangents |= bound.uses_tangents
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> dict[str, Any]:
+        """Return the values at a surface interaction, by declared name."""
+        return {name: parameter.evaluate(si, active) for name, parameter in self.items()}
+
+    def placeholders(self) -> dict[str, Any]:
+        """Return values that these may have, by declared name."""
+        return {name: parameter.placeholder() for name, parameter in self.items()}

@@ -1,0 +1,114 @@
+"""The properties that Mitsuba hands to a plugin, read with errors that say what is wrong and what would be right."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import mitsuba as mi
+
+from .messages import brief, interval, kind_of, listed, shown
+
+Range = tuple[float, float]
+"""The lowest and the highest value that a parameter may have; the latter may be infinite."""
+
+_SPECTRA = ("SRGBReflectanceSpectrum", "SRGBEmitterSpectrum", "RegularSpectrum", "IrregularSpectrum")
+
+
+class ParameterError(ValueError):
+    """A parameter that a plugin cannot accept. The message is one sentence that says what it would."""
+
+
+class PropertyReader:
+    """Reads the properties ``props`` of the plugin called ``plugin``.
+
+    Its methods raise a :class:`ParameterError` that names plugin, parameter, value and remedy.
+    """
+
+    def __init__(self, plugin: str, props: mi.Properties):
+        self.plugin, self.props = plugin, props
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.props
+
+    def error(self, name: str, problem: str) -> ParameterError:
+        return ParameterError(f"{self.plugin}: {name} {problem}.")
+
+    def reject_unknown(self, known: list[str], shown: list[str]) -> None:
+        """Raise if there is a property that is not ``known``. The message lists the names in ``shown``."""
+        for name in self.props.keys():
+            if name in known:
+                continue
+            if name.startswith("_arg_") and shown:
+                raise ParameterError(
+                    f"{self.plugin}: {kind_of(self.props[name])} is nested without a name; "
+                    f"give it the name of the parameter it is meant for, {listed(shown)}."
+                )
+            if not known:
+                raise ParameterError(f"{self.plugin}: unknown parameter {brief(name)}; it has no parameters.")
+            closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+            raise ParameterError(
+                f"{self.plugin}: unknown parameter {brief(name)}; did you mean {closest}? Known are {', '.join(shown)}."
+            )
+
+    def number(self, name: str, default: float, limits: Range) -> mi.Texture:
+        """Return the texture of a number."""
+        allowed = f"a number in {interval(*limits)} or a texture"
+        if name in self:
+            value = self.props[name]
+            if isinstance(value, mi.Texture):
+                if value.class_name() in _SPECTRA:
+                    raise self.error(name, f"is a colour; it must be {allowed}")
+            else:
+                self._check(name, [value], limits, allowed)
+        return self.props.get_unbounded_texture(name, default)
+
+    def colour(self, name: str, default: float, limits: Range) -> mi.Texture:
+        """Return the texture of a colour."""
+        allowed = f"a number, rgb or spectrum within {interval(*limits)} or a texture"
+        if name in self and (values := self.colour_values(name)) is not None:
+            self._check(name, values, limits, allowed)
+        bounded = limits[1] <= 1
+        return (self.props.get_texture if bounded else self.props.get_unbounded_texture)(name, default)
+
+    def colour_values(self, name: str) -> list[Any] | None:
+        """Return the values of a given number, rgb colour or spectrum, and None for a texture."""
+        value, kind = self.props[name], self.props.type(name)
+        if isinstance(value, mi.Texture):
+            return None
+        if kind == mi.Properties.Type.Spectrum:
+            return list(value.values)
+        return list(value) if kind == mi.Properties.Type.Color else [value]
+
+    def _check(self, name: str, numbers: Iterable[Any], limits: Range, allowed: str) -> None:
+        value = self.props[name]
+        for number in numbers:
+            if isinstance(number, bool) or not isinstance(number, (int, float)):
+                raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be {allowed}")
+            if not math.isfinite(number) or not limits[0] <= number <= limits[1]:
+                raise self.error(name, f"= {shown(value)} is not allowed; it must be {allowed}")
+
+    def choice(self, name: str, words: tuple[str, ...]) -> str:
+        """Return the given one of several words, by default the first."""
+        if name not in self:
+            return words[0]
+        value = self.props[name]
+        if not isinstance(value, str) or value not in words:
+            raise self.error(name, f"= {shown(value)} is unknown; it must be one of {listed(words, quote=True)}")
+        return value
+
+    def flag(self, name: str, default: bool) -> bool:
+        if name not in self:
+            return default
+        value = self.props[name]
+        if not isinstance(value, bool):
+            raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be true or false")
+        return value
+
+    def text(self, name: str) -> str:
+        value = self.props[name]
+        if not isinstance(value, str):
+            raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be a name")
+        return value

@@ -1,0 +1,159 @@
+"""Numbers, choices and flags."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import clamp
+from .messages import interval, number_or_none
+from .parameter import Parameter, ParameterRow
+from .reader import PropertyReader, Range
+
+
+class Spelling(NamedTuple):
+    """Another way to give a number: as ``name`` within ``limits``, of which it is ``scale`` times the value."""
+
+    name: str
+    limits: Range
+    scale: float
+    text: str
+
+
+class Number(Parameter):
+    """A scalar within ``limits``.
+
+    An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and evaluates to a pair; with
+    ``lone_default``, one of the pair alone leaves the other at the default. One with another ``spelling`` may be given
+    as that instead. Without a default it is None where it is not given.
+    """
+
+    def __init__(
+        self,
+        default: float | None,
+        limits: Range,
+        text: str,
+        *,
+        anisotropic: bool = False,
+        lone_default: bool = False,
+        spelling: Spelling | None = None,
+    ):
+        super().__init__(text)
+        self.default, self.limits, self.spelling = default, limits, spelling
+        self.anisotropic, self.lone_default = anisotropic, lone_default
+        self.scale = 1.0
+
+    @property
+    def pair(self) -> list[str]:
+        """The two names for the tangent directions."""
+        return [f"{self.name}_{axis}{self.number}" for axis in "uv"] if self.anisotropic else []
+
+    @property
+    def other(self) -> str:
+        """The name of its other spelling."""
+        return self.spelling.name + self.number if self.spelling else ""
+
+    @property
+    def names(self) -> list[str]:
+        return [self.name + self.number, *self.pair, *([self.other] if self.spelling else [])]
+
+    def bind(self, reader: PropertyReader) -> Number:
+        single, given = self.names[0], [name for name in self.pair if name in reader]
+        if self.default is None and not any(name in reader for name in self.names):
+            return self.replace()
+        if self.spelling and self.other in reader:
+            if single in reader:
+                raise reader.error(single, f"excludes {self.other}; give either {single} or {self.other}")
+            return self._holding(reader, [self.other], self.spelling.limits, scale=self.spelling.scale)
+        if given and single in reader:
+            raise reader.error(single, f"excludes {given[0]}; give either {single} or {' and '.join(self.pair)}")
+        if len(given) == 1 and not self.lone_default:
+            missing = next(name for name in self.pair if name not in reader)
+            raise reader.error(given[0], f"needs {missing} beside it; give both, or {single} alone")
+        return self._holding(reader, self.pair if given else [single], self.limits, uses_tangents=bool(given))
+
+    def _holding(self, reader: PropertyReader, names: list[str], limits: Range, **members: Any) -> Number:
+        """Return a copy bound to the properties of these names."""
+        textures = {name: reader.number(name, self.default or 0, limits) for name in names}
+        return self.replace(textures=textures, ranges=dict.fromkeys(names, limits), **members)
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
+        if not self.textures:
+            return None
+        values = [clamp(texture.eval_1(si, active), *self.ranges[name]) for name, texture in self.textures.items()]
+        if self.scale != 1:
+            values = [value * self.scale for value in values]
+        return (values[0], values[-1]) if self.anisotropic else values[0]
+
+    def placeholder(self) -> Any:
+        if not self.textures:
+            return None
+        value = mi.Float(self.default or 0)
+        return (value, value) if self.anisotropic else value
+
+    def rows(self) -> list[ParameterRow]:
+        single, range_ = self.names[0], interval(*self.limits)
+        rows = [ParameterRow(single, "number", number_or_none(self.default), range_, self.text)]
+        if self.anisotropic:
+            lone = f"; one alone leaves the other at {number_or_none(self.default)}" if self.lone_default else ""
+            text = f"instead of {single}: its values along dp_du and across{lone}"
+            rows.append(ParameterRow(", ".join(self.pair), "number", "-", range_, text))
+        if self.spelling:
+            text = f"instead of {single}: {self.spelling.text}"
+            rows.append(ParameterRow(self.other, "number", "-", interval(*self.spelling.limits), text))
+        return rows
+
+
+class Rotation(Parameter):
+    """An optional turn of the tangent frame. Evaluated, its (cosine, sine)."""
+
+    def __init__(self) -> None:
+        super().__init__("turn of the tangent frame, counter-clockwise about n from dp_du, in turns (1 is 360°)")
+
+    def bind(self, reader: PropertyReader) -> Rotation:
+        if self.name not in reader:
+            return self.replace()
+        return self.replace(textures={self.name: reader.number(self.name, 0, (-1e4, 1e4))}, uses_tangents=True)
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Float, mi.Float] | None:
+        if not self.textures:
+            return None
+        turns = self.textures[self.name].eval_1(si, active)
+        sin, cos = dr.sincos(dr.two_pi * (turns - dr.round(turns)))  # whole turns would take the digits
+        return cos, sin
+
+    def placeholder(self) -> None:
+        return None
+
+    def rows(self) -> list[ParameterRow]:
+        return [ParameterRow(self.name, "number", "none", "any", self.text)]
+
+
+class Choice(Parameter):
+    """One of several words, by default the first: an attribute of the model, or of its lobe in a :class:`PerLobe`."""
+
+    def __init__(self, choices: tuple[str, ...], text: str):
+        super().__init__(text)
+        self.choices = choices
+
+    def bind(self, reader: PropertyReader) -> str:
+        return reader.choice(self.names[0], self.choices)
+
+    def rows(self) -> list[ParameterRow]:
+        return [ParameterRow(self.names[0], "string", self.choices[0], " | ".join(self.choices), self.text)]
+
+
+class Flag(Parameter):
+    """True or false: an attribute like a :class:`Choice`."""
+
+    def __init__(self, default: bool, text: str):
+        super().__init__(text)
+        self.default = default
+
+    def bind(self, reader: PropertyReader) -> bool:
+        return reader.flag(self.names[0], self.default)
+
+    def rows(self) -> list[ParameterRow]:
+        return [ParameterRow(self.names[0], "boolean", str(self.default).lower(), "true | false", self.text)]
