@@ -62,11 +62,28 @@ def test_flags_tell_anisotropy_textures_and_reciprocity():
     textured = mi.load_dict({"type": "ward", "specular_reflectance": {"type": "checkerboard"}})
     original = mi.load_dict({"type": "phong", "normalization": "original"})
     plain = mi.load_dict({"type": "ward"})
-    for bsdf, flag in [(pair, flags.Anisotropic), (turned, flags.Anisotropic), (original, flags.NonSymmetric)]:
+    for bsdf, flag in [(pair, flags.Anisotropic), (original, flags.NonSymmetric)]:
         assert mi.has_flag(bsdf.flags(1), flag) and not mi.has_flag(bsdf.flags(0), flag)
         assert not mi.has_flag(plain.flags(), flag)
+    assert not mi.has_flag(turned.flags(), flags.Anisotropic)
     assert mi.has_flag(textured.flags(), flags.SpatiallyVarying)
     assert not mi.has_flag(plain.flags(), flags.SpatiallyVarying)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "bsdf, anisotropic",
+    [
+        ({"type": "kurt", "alpha_1": 0.1, "alpha_u_2": 0.1, "alpha_v_2": 0.4}, [False, False, True]),
+        ({"type": "burley", "anisotropic": 0.5, "clearcoat": 1.0}, [False, True, False]),
+        ({"type": "ashikhminshirley", "exponent_u": 10, "exponent_v": 40}, [False, True]),
+        ({"type": "microfacet", "diffuse_reflectance": 0.5, "alpha_u": 0.1, "alpha_v": 0.4}, [False, True]),
+    ],
+)
+def test_anisotropy_belongs_to_a_lobe(bsdf, anisotropic):
+    loaded = mi.load_dict(bsdf)
+    flagged = [mi.has_flag(loaded.flags(k), mi.BSDFFlags.Anisotropic) for k in range(loaded.component_count())]
+    assert flagged == anisotropic
 
 
 @pytest.mark.parametrize("name", TWO_LOBES)

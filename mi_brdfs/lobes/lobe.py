@@ -22,8 +22,7 @@ class Lobe:
     """Whether f(wi, wo) = f(wo, wi)."""
 
     anisotropic = False
-    """Whether f may change as both directions turn about the normal, even without parameters for the two tangent
-    directions or a rotation."""
+    """Whether f may change as both directions turn about the normal."""
 
     transmits = False
     """Whether the light comes from the other side of the surface."""

@@ -20,7 +20,7 @@ class MicrofacetLobe(Lobe):
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
         self.sampler = sampler_of(distribution, shadowing, fresnel)
-        self.reciprocal = shadowing.reciprocal
+        self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
 
     def estimated_albedo(self, wi):
         """F, D and G at a typical facet.

@@ -19,6 +19,8 @@ from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
 
 
 class Distribution:
+    """A distribution of two roughnesses, αu along dp_du and αv across: anisotropic, unless both are the same object."""
+
     LOSS = 1.7
     """How much light is lost to multiple reflections: the constant of :meth:`estimated_albedo`, fitted."""
     long_tailed = False
@@ -26,6 +28,7 @@ class Distribution:
 
     def __init__(self, alpha_u, alpha_v):
         self.alpha_u, self.alpha_v = alpha_u, alpha_v
+        self.anisotropic = alpha_u is not alpha_v
 
     def steepness(self, facet):
         """(h_x/αu)² + (h_y/αv)²."""
@@ -75,7 +78,8 @@ class Isotropic(Distribution):
     """A distribution whose own parameters replace the roughness."""
 
     def __init__(self):
-        super().__init__(mi.Float(1), mi.Float(1))
+        one = mi.Float(1)
+        super().__init__(one, one)
 
     def mean_square_slope_along(self, v):
         return self.mean_square_slope() * (v.x * v.x + v.y * v.y)
@@ -158,7 +162,8 @@ class AshikhminShirleyNormals(Distribution):
 
     def __init__(self, exponent_u, exponent_v):
         # An ellipse: the exponent plus one at azimuth φ is (cosφ/αu)² + (sinφ/αv)².
-        super().__init__(dr.rsqrt(exponent_u + 1), dr.rsqrt(exponent_v + 1))
+        alpha = dr.rsqrt(exponent_u + 1)
+        super().__init__(alpha, alpha if exponent_u is exponent_v else dr.rsqrt(exponent_v + 1))
 
     def mean_square_slope(self):
         return 2 * super().mean_square_slope()

@@ -46,7 +46,7 @@ class ModelBSDF:
             else:
                 kind = flags.GlossyReflection if lobe.glossy else flags.DiffuseReflection
             component = kind | common
-            if lobe.glossy and (lobe.anisotropic or self.model.parameters.uses_tangents):
+            if lobe.glossy and lobe.anisotropic:
                 component |= flags.Anisotropic
             if not lobe.reciprocal:
                 component |= flags.NonSymmetric

@@ -12,13 +12,6 @@ from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
 
 
-class Anisotropy(Number):
-    """A number that makes the lobes anisotropic if it is given."""
-
-    def bind(self, reader):
-        return super().bind(reader).replace(uses_tangents=self.name in reader)
-
-
 class Burley(Model):
     """Burley's principled BRDF (2012), known as the Disney BRDF.
 
@@ -78,7 +71,7 @@ class Burley(Model):
     specular = Number(0.5, (0, 1), "reflectance of the dielectric at normal incidence, in units of 0.08")
     spec_tint = Number(0, (0, 1), "tint of the dielectric's reflection towards the hue of C")
     roughness = Number(0.5, (0, 1), "roughness of the base and the specular lobe; the facets' is its square")
-    anisotropic = Anisotropy(0, (0, 1), "how far the highlight is drawn out along dp_du")
+    anisotropic = Number(0, (0, 1), "how far the highlight is drawn out along dp_du")
     sheen = Number(None, (0, 1), "scale of the sheen; not given, there is none")
     sheen_tint = Number(0.5, (0, 1), "tint of the sheen towards the hue of C")
     clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; not given, there is none")
@@ -86,6 +79,10 @@ class Burley(Model):
     rotation = Rotation()
 
     energy = Energy(0.688, [({"metallic": 1.0, "clearcoat": 0.0}, 1), ({}, 1.89)])
+
+    def __init__(self, props):
+        super().__init__(props)
+        self.is_stretched = "anisotropic" in props
 
     def lobes(self, p):
         brightness = luminance(p.base_color)
@@ -99,7 +96,9 @@ class Burley(Model):
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
         facets = GGX(*alpha), SmithGGX(*alpha, correlated=False)
-        lobes.append(MicrofacetLobe(1, *facets, Schlick(f0)))
+        specular = MicrofacetLobe(1, *facets, Schlick(f0))
+        specular.anisotropic = self.is_stretched
+        lobes.append(specular)
         if p.clearcoat is not None:
             facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), CoatShadowing()
             lobes.append(MicrofacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04)))

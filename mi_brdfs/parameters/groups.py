@@ -42,13 +42,8 @@ class OneOf(Parameter):
                 has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
                 raise reader.error(name, f'does not belong to {self.name} = "{word}", which {has} of its own')
         own = BoundParameters(declared, reader)
-        return self.replace(
-            own=own,
-            textures=own.textures,
-            ranges=own.ranges,
-            chosen={self.name: word, **own.chosen},
-            uses_tangents=own.uses_tangents,
-        )
+        chosen = {self.name: word, **own.chosen}
+        return self.replace(own=own, textures=own.textures, ranges=own.ranges, chosen=chosen)
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
         return SimpleNamespace(**self.own.evaluate(si, active))
@@ -103,7 +98,6 @@ class PerLobe(Parameter):
             lobes=lobes,
             textures={name: texture for lobe in lobes for name, texture in lobe.textures.items()},
             ranges={name: limits for lobe in lobes for name, limits in lobe.ranges.items()},
-            uses_tangents=any(lobe.uses_tangents for lobe in lobes),
         )
 
     def _given(self, reader: PropertyReader) -> list[str]:

@@ -42,8 +42,6 @@ class Parameter:
         """What the values of these are limited to."""
         self.chosen: dict[str, str | bool] = {}
         """Once bound, the choices made with it, by declared name."""
-        self.uses_tangents = False
-        """Once bound, whether it refers to the tangent directions, so that lobes are anisotropic."""
 
     def __set_name__(self, owner: type | None, name: str) -> None:
         self.name = name
@@ -100,7 +98,6 @@ class BoundParameters(dict[str, Parameter]):
         self.textures: dict[str, mi.Texture] = {}
         self.ranges: dict[str, Range] = {}
         self.chosen: dict[str, str | bool] = {}
-        self.uses_tangents = False
         for parameter in declared:
             bound = parameter.bind(reader)
             if not isinstance(bound, Parameter):
@@ -110,7 +107,6 @@ class BoundParameters(dict[str, Parameter]):
             self.textures |= bound.textures
             self.ranges |= bound.ranges
             self.chosen |= bound.chosen
-            self.uses_tangents |= bound.uses_tangents
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> dict[str, Any]:
         """Return the values at a surface interaction, by declared name."""

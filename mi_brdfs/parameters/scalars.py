@@ -25,9 +25,9 @@ class Spelling(NamedTuple):
 class Number(Parameter):
     """A scalar within ``limits``.
 
-    An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and evaluates to a pair; with
-    ``lone_default``, one of the pair alone leaves the other at the default. One with another ``spelling`` may be given
-    as that instead. Without a default it is None where it is not given.
+    An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and evaluates to a pair, of the same
+    object twice where it was given alone; with ``lone_default``, one of the pair alone leaves the other at the default.
+    One with another ``spelling`` may be given as that instead. Without a default it is None where it is not given.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Number(Parameter):
         if len(given) == 1 and not self.lone_default:
             missing = next(name for name in self.pair if name not in reader)
             raise reader.error(given[0], f"needs {missing} beside it; give both, or {single} alone")
-        return self._holding(reader, self.pair if given else [single], self.limits, uses_tangents=bool(given))
+        return self._holding(reader, self.pair if given else [single], self.limits)
 
     def _holding(self, reader: PropertyReader, names: list[str], limits: Range, **members: Any) -> Number:
         """Return a copy bound to the properties of these names."""
@@ -91,7 +91,9 @@ class Number(Parameter):
         if not self.textures:
             return None
         value = mi.Float(self.default or 0)
-        return (value, value) if self.anisotropic else value
+        if not self.anisotropic:
+            return value
+        return (value, mi.Float(value)) if len(self.textures) == 2 else (value, value)
 
     def rows(self) -> list[ParameterRow]:
         single, range_ = self.names[0], interval(*self.limits)
@@ -115,7 +117,7 @@ class Rotation(Parameter):
     def bind(self, reader: PropertyReader) -> Rotation:
         if self.name not in reader:
             return self.replace()
-        return self.replace(textures={self.name: reader.number(self.name, 0, (-1e4, 1e4))}, uses_tangents=True)
+        return self.replace(textures={self.name: reader.number(self.name, 0, (-1e4, 1e4))})
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Float, mi.Float] | None:
         if not self.textures:
