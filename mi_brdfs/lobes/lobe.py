@@ -27,6 +27,9 @@ class Lobe:
     transmits = False
     """Whether the light comes from the other side of the surface."""
 
+    seldom = False
+    """Whether it is drawn from so seldom, beside others, that it is faster to branch than to draw from it always."""
+
     def estimated_albedo(self, wi):
         """An estimate of ∫ f |cosθ_o| dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
         exact; but where the lobe reflects anything it must be positive."""

@@ -54,5 +54,8 @@ class Mixture:
 
         wo = self.lobes[0].sample(self.wi, u, v)
         for k, lobe in enumerate(self.lobes[1:], start=1):
-            wo = dr.select(index == k, lobe.sample(self.wi, u, v), wo)
+            if lobe.seldom:
+                wo = dr.if_stmt((wo,), index == k, lambda wo, lobe=lobe: lobe.sample(self.wi, u, v), lambda wo: wo)
+            else:
+                wo = dr.select(index == k, lobe.sample(self.wi, u, v), wo)
         return wo, index

@@ -76,7 +76,8 @@ class AntitheticNormals(Sampler):
         line = Line(distribution, facet.wi, x, y)
         cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
 
-        weight, other = reflected(lobe, facet), reflected(lobe, facet.image())
+        # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
+        weight, other = dr.maximum(lobe.weight_over_ndf(facet), 1e-17), reflected(lobe, facet.image())
         density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
         return density / (2 * facet.cos_d) * (weight / (weight + other))
 
@@ -181,9 +182,7 @@ def reflected(lobe, facet):
     """What a facet reflects, ``lobe.weight_over_ndf``, or next to nothing if that leads below the horizon. It is never
     zero: the derivative of a share in what a pair reflects divides by the square of that."""
     valid = (facet.cos_d > 1e-9) & (facet.cos_o > 0)
-    # Elsewhere the formulas need not make sense: give them the mirror direction.
-    normal = mi.Vector3f(0, 0, 1)
-    safe = Facet(
-        facet.wi, select(valid, facet.wo, normal), select(valid, facet.h, normal), select(valid, facet.cos_d, 1)
-    )
+    # Elsewhere the formulas need not make sense, but must be finite.
+    wo = mi.Vector3f(facet.wo.x, facet.wo.y, dr.maximum(facet.wo.z, 1e-9))
+    safe = Facet(facet.wi, wo, facet.h, dr.maximum(facet.cos_d, 1e-9))
     return dr.maximum(select(valid, lobe.weight_over_ndf(safe), 0), 1e-17)

@@ -79,7 +79,8 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
     def pdf(self, lobe, facet):
         density, unit, point = self._density(lobe.distribution, facet)
         image = self._facet(lobe.distribution, facet.wi, unit, self._image(point))
-        weight = self._weight(lobe, facet)
+        # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
+        weight = dr.maximum(lobe.weight_over_ndf(facet), 1e-17) / dr.maximum(facet.cos_d, 1e-9)
         return 2 * density * (weight / (weight + self._weight(lobe, image)))
 
     @staticmethod

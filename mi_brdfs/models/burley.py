@@ -5,7 +5,7 @@ from ..lobes import Lobe, MicrofacetLobe
 from ..lobes.mirror import AxisFrame
 from ..math import choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
-from ..microfacet.facet import Facet
+from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing, SmithGGX
 from ..model import Energy, Model
@@ -101,7 +101,7 @@ class Burley(Model):
         lobes.append(specular)
         if p.clearcoat is not None:
             facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), CoatShadowing()
-            lobes.append(MicrofacetLobe(0.25 * p.clearcoat, *facets, Schlick(0.04)))
+            lobes.append(CoatLobe(0.25 * p.clearcoat, *facets, Schlick(0.04)))
         return tuple(lobes)
 
 
@@ -115,6 +115,16 @@ class CoatShadowing(Shadowing):
     def _seen(cos):
         alpha2 = 0.0625
         return 2 * cos / (cos + dr.sqrt(alpha2 + (1 - alpha2) * cos * cos))
+
+
+class CoatLobe(MicrofacetLobe):
+    """A lobe of facets so narrow that its albedo is about that of a mirror."""
+
+    seldom = True
+
+    def estimated_albedo(self, wi):
+        mirror = Cosines(wi.z, wi.z, 1, wi.z)
+        return self.reflectance * (self.fresnel(dr.minimum(wi.z, 0.9)) * self.shadowing(mirror))
 
 
 def schlick_weight(cos):
@@ -158,21 +168,22 @@ class BaseLobe(Lobe):
 
     def sample(self, wi, u, v):
         uniform, _ = choose(u, self._uniform(wi))
-        cos = dr.select(uniform, v.x, dr.sqrt(v.x))
+        cos = dr.select(uniform, v.y, dr.sqrt(v.y))
         sin = dr.sqrt(1 - cos * cos)
-        sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
+        sin_phi, cos_phi = dr.sincos(dr.two_pi * v.x)  # as of half vectors: once for both lobes
         return mi.Vector3f(sin * cos_phi, sin * sin_phi, cos)
 
 
 class SheenLobe(Lobe):
     r"""f = ρ (1 - cosθ_d)⁵, which is bright where wo is far from wi.
 
-    Drawn about the axis -wi: a = -(wi·wo) from a beta-like (Kumaraswamy) density of y = (1 + a)/(1 + sinθ_i), and then
-    the azimuth ψ nearly ∝ cosθ_o = A + B cosψ: exactly, by a choice among ψ and ψ + π, if all of the circle lies above
-    the horizon, and else by a density ¾ (1-s²) of s = sin(ψ/2)/sin(ψ₀/2), with ψ₀ where the circle meets the horizon.
+    Drawn about the axis -wi: m = 1 - cosθ_d from the density ∝ t^3.5 (1 - t^4.5)² of its share t in what it can be
+    (Kumaraswamy's; the exponents are fitted), and then the azimuth ψ nearly ∝ cosθ_o = A + B cosψ: exactly, by a choice
+    among ψ and ψ + π, if all of the circle lies above the horizon, and else by a density ¾ (1-s²) of
+    s = sin(ψ/2)/sin(ψ₀/2), with ψ₀ where the circle meets the horizon.
     """
 
-    glossy = False
+    glossy, seldom = False, True
 
     def __init__(self, reflectance):
         self.reflectance = reflectance
@@ -182,20 +193,24 @@ class SheenLobe(Lobe):
         return self.reflectance * (5e-4 + x * x * (0.05 + 0.037 * x))
 
     @staticmethod
-    def _shape(wi):
-        """The exponents of the density A B y^(A-1) (1 - y^A)^(B-1), fitted."""
-        x = 1 - wi.z
-        return 5 + 1.5 * x, 2.7 - 1.3 * x
+    def _largest(sin):
+        """The largest m there is: of the direction in the horizon opposite to wi."""
+        cos_d2 = 0.5 * (1 - sin)
+        return (1 - cos_d2) / (1 + dr.sqrt(dr.maximum(cos_d2, 1e-12)))
 
     def eval_pdf(self, wi, wo):
         frame = AxisFrame(-wi)
         cos = dr.dot(frame.axis, wo)
-        value = schlick_weight(safe_sqrt(0.5 * (1 - cos))) * wo.z
+        sin_d2 = dr.minimum(0.25 * dr.squared_norm(wo - wi), 1)
+        cos_d = dr.sqrt(dr.maximum(1 - sin_d2, 1e-12))
+        m = sin_d2 / (1 + cos_d)
+        m2 = m * m
+        value = m2 * m2 * m * wo.z
 
-        shape_a, shape_b = self._shape(wi)
-        y = dr.clip(0.5 * dr.squared_norm(wo - wi) / (1 + frame.sin), 1e-9, 1 - 1e-6)
-        power = dr.power(y, shape_a - 1)
-        density = shape_a * shape_b * power * dr.power(1 - power * y, shape_b - 1) / (1 + frame.sin)
+        largest = self._largest(frame.sin)
+        t = dr.clip(m / largest, 1e-9, 1 - 1e-6)
+        t_3_5 = t * t * t * dr.sqrt(t)
+        density = 13.5 * t_3_5 * dr.square(1 - t_3_5 * t) / (4 * cos_d * largest)  # dcos = 4 cosθ_d dm
 
         axial, lateral = -wi.z * cos, frame.sin * safe_sqrt(1 - cos * cos)
         highest = dr.maximum(axial + lateral, wo.z)
@@ -206,16 +221,16 @@ class SheenLobe(Lobe):
 
     def sample(self, wi, u, v):
         frame = AxisFrame(-wi)
-        shape_a, shape_b = self._shape(wi)
-        cos = dr.power(1 - dr.power(1 - v.x, 1 / shape_b), 1 / shape_a) * (1 + frame.sin) - 1
-        sin = safe_sqrt(1 - cos * cos)
+        m = self._largest(frame.sin) * dr.power(1 - dr.cbrt(1 - v.x), 2 / 9)
+        sin_d2 = m * (2 - m)
+        cos, sin = 2 * sin_d2 - 1, 2 * (1 - m) * dr.sqrt(sin_d2)
 
         axial, lateral = -wi.z * cos, frame.sin * sin
         whole = axial >= lateral
-        sin_psi, cos_psi = dr.sincos(dr.two_pi * v.y)
-        flip = dr.select(2 * u * axial > axial + lateral * cos_psi, -1, 1)
+        sin_a, cos_a = dr.sincos(dr.select(whole, dr.two_pi * v.y, dr.asin(2 * v.y - 1) / 3))
+        flip = dr.select(2 * u * axial > axial + lateral * cos_a, -1, 1)
         half = safe_sqrt(0.5 * (axial + lateral) / dr.select(whole, 1, dr.maximum(lateral, 1e-30)))
-        s = 2 * dr.sin(dr.asin(2 * v.y - 1) / 3) * dr.minimum(half, 1)
-        sin_psi = dr.select(whole, flip * sin_psi, 2 * s * safe_sqrt(1 - s * s))
-        cos_psi = dr.select(whole, flip * cos_psi, 1 - 2 * s * s)
+        s = 2 * sin_a * dr.minimum(half, 1)
+        sin_psi = dr.select(whole, flip * sin_a, 2 * s * safe_sqrt(1 - s * s))
+        cos_psi = dr.select(whole, flip * cos_a, 1 - 2 * s * s)
         return frame.axis * cos + frame.up * (sin * cos_psi) + frame.side * (sin * sin_psi)
