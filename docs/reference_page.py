@@ -15,9 +15,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from mi_brdfs.gallery import example, overview, picture
+from mi_brdfs.gallery import overview, picture
 from mi_brdfs.gallery.sheet import Row, sheet
-from mi_brdfs.gallery.sweeps import SWEEPS, shown
+from mi_brdfs.gallery.sweeps import shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.model import Energy, Model, Plugin
@@ -72,13 +72,13 @@ def _code(text: str) -> str:
 
 def thumbnail(model: type[Model], size: int = SIZE, spp: int = SAMPLES) -> Image.Image:
     """The example in the preview scene."""
-    return picture(example(model), size, spp)
+    return picture(model.example(), size, spp)
 
 
 def strip(model: type[Model], spp: int = STRIP_SAMPLES) -> Image.Image:
     """The main sweep."""
     name = model.plugins[0]
-    main = SWEEPS[name][0]
+    main = sweeps_of(model)[0]
     pictures = [picture(bsdf, SIZE, spp) for bsdf in main.bsdfs(name)]
     return sheet([Row(main.heading(name), pictures, [shown(value) for value in main.values])])
 
@@ -93,7 +93,7 @@ def _picture(model: type[Model]) -> str:
 
 
 def _strip(model: type[Model]) -> str:
-    name, main = model.plugins[0], SWEEPS[model.plugins[0]][0]
+    name, main = model.plugins[0], sweeps_of(model)[0]
     return f"![{main.heading(name)}: {', '.join(map(shown, main.values))}](../../docs/sweeps/{name}.jpg)"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 from math import isfinite
 from types import SimpleNamespace
@@ -90,6 +91,12 @@ class Plugin:
     def summary(cls) -> str:
         """The first line of the manual page."""
         return inspect.cleandoc(cls.__doc__).splitlines()[0]
+
+    @classmethod
+    def example(cls) -> dict[str, Any]:
+        """The plugin dict at the end of the manual page, or else the defaults."""
+        last = inspect.cleandoc(cls.__doc__).rpartition("\n\n")[2]
+        return ast.literal_eval(last) if last.startswith("{") else {"type": cls.plugins[0]}
 
     @classmethod
     def parameter_rows(cls) -> list[ParameterRow]:

@@ -3,7 +3,7 @@ import signal
 import mitsuba as mi
 import pytest
 
-import mi_brdfs  # noqa: F401
+from mi_brdfs.mitsuba.registry import MODELS
 
 mi.set_variant("scalar_rgb")  # variant_context needs one to return to
 
@@ -24,6 +24,15 @@ def llvm_rgb():
     """The variant that most tests run in."""
     with mi.variant_context("llvm_ad_rgb"):
         yield
+
+
+@pytest.fixture
+def as_before():
+    """Names of plugins go back to whom they belonged to; Mitsuba itself cannot forget one."""
+    models = dict(MODELS)
+    yield
+    MODELS.clear()
+    MODELS.update(models)
 
 
 OTHERS = ("llvm_ad_spectral", "llvm_ad_mono_polarized", "scalar_rgb", "scalar_spectral")

@@ -13,8 +13,9 @@ import pytest
 from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, phong
 from rich.console import Console
 
+import mi_brdfs
 from mi_brdfs.bench import SECTIONS, Figure, Results, Target, bench, process, resources, runner, sizes, timing
-from mi_brdfs.bench.cases import BESIDE, BUILT_INS, CASES, DEFAULTS, Case
+from mi_brdfs.bench.cases import BUILT_INS, TABLE, Case, all_cases, built_ins, defaults
 from mi_brdfs.bench.efficiency import Sampling, _mean, efficiency, sampling
 from mi_brdfs.bench.first import first_picture
 from mi_brdfs.bench.scenes import ALONE, BOX, PATH, SPHERE, scene_of, sphere
@@ -89,12 +90,9 @@ def small(monkeypatch):
 pytestmark = pytest.mark.usefixtures("llvm_rgb", "small")
 
 
-def measured(section, cases, monkeypatch):
+def measured(section, cases):
     """The figures of a section for some cases only, by subject and name."""
-    module = sys.modules[section.__module__]
-    for name in {"CASES", "BESIDE"} & set(vars(module)):
-        monkeypatch.setattr(module, name, cases)
-    run = runner.Run(lambda *_: None)
+    run = runner.Run(lambda *_: None, cases)
     return {(figure.subject, figure.name): figure for figure in section(run)}
 
 
@@ -102,14 +100,46 @@ def measured(section, cases, monkeypatch):
 
 
 def test_cases_are_of_all_models():
-    """Three of each, the defaults first; and each has a name of its own."""
-    by_model = {}
-    for case in CASES:
+    """Several of each, the defaults first; and each has a name of its own."""
+    cases, by_model = all_cases(), {}
+    for case in cases:
         by_model.setdefault(case.bsdf["type"], []).append(case.bsdf)
     assert list(by_model) == [model.plugins[0] for model in all_models()]
-    assert all(len(sets) >= 3 and sets[0] == {"type": name} for name, sets in by_model.items())
-    assert len({case.name for case in CASES}) == len(CASES)
-    assert len(DEFAULTS) == len(all_models()) <= len(BUILT_INS)
+    assert all(len(sets) >= 2 and sets[0] == {"type": name} for name, sets in by_model.items())
+    assert len({case.name for case in cases}) == len(cases)
+    assert [case for case in cases if case in TABLE] == TABLE
+    assert defaults(cases) == [{"type": model.plugins[0]} for model in all_models()]
+
+
+def test_as_many_built_ins_as_asked_for():
+    assert built_ins(3) == BUILT_INS[:3]
+    assert built_ins(len(BUILT_INS) + 2) == BUILT_INS + BUILT_INS[:2]
+
+
+class Guest(Lambert):
+    """A model of somebody else's.
+
+    {"type": "guest", "reflectance": 0.9}
+    """
+
+
+def test_guests_are_measured(as_before):
+    """By their defaults and their example; in processes of their own if these can import them."""
+    mi_brdfs.register(Guest)
+    mi_brdfs.register(type("Local", (Lambert,), {"__doc__": "It cannot be imported."}))
+    cases = {case.name: case for case in all_cases() if case.name.split()[0] in ("guest", "local")}
+    assert {name: case.bsdf for name, case in cases.items()} == {
+        "guest": {"type": "guest"}, "guest example": {"type": "guest", "reflectance": 0.9}, "local": {"type": "local"},
+    }  # fmt: skip
+    assert defaults(list(cases.values())) == [{"type": "guest"}]
+    figures = measured(efficiency, list(cases.values()))
+    assert all(figures[name, "80°"].value == pytest.approx(1, abs=1e-3) for name in cases)
+    assert process.in_new_process(first_picture, defaults(list(cases.values()))) > 0
+
+
+def test_what_another_model_takes_the_name_of_has_no_cases_in_the_table(as_before):
+    mi_brdfs.register(type("Other", (Lambert,), {"__doc__": "Another.", "plugins": ("low",)}), replace=True)
+    assert [case.name for case in all_cases() if case.bsdf["type"] == "low"] == ["low"]
 
 
 @pytest.mark.slow
@@ -124,7 +154,7 @@ def test_no_two_built_ins_are_of_the_same_code():
 def test_the_same_model_is_the_same_model():
     """``same`` says that the two reflect the same: to the noise, or where ``principled`` differs (its Fresnel and
     shadowing terms, its coat) nearly."""
-    same = [case for case in BESIDE if case.same]
+    same = [case for case in TABLE if case.same]
     assert {case.bsdf["type"] for case in same} == {"lambert", "walter", "microfacet", "burley", "metallicroughness"}
     for case in same:
         ours, theirs = (sampling(bsdf)["whole"].albedo for bsdf in (case.bsdf, case.builtin))
@@ -166,7 +196,7 @@ def test_the_mean_of_the_lobes_is_weighted_by_energy():
     assert _mean(whole, lobes, 0) == pytest.approx((0.3 * 1 + 0.1 * 0.6) / 0.4)
 
 
-def test_efficiencies_that_miss_their_targets(monkeypatch):
+def test_efficiencies_that_miss_their_targets():
     """A lobe below 0.95, a mixture far below its lobes, and ours below the built-in's, each by its reason."""
     diffuse = {"type": "diffuse"}
     cases = [
@@ -176,7 +206,7 @@ def test_efficiencies_that_miss_their_targets(monkeypatch):
         Case("phong", {"type": "phong"}),
         Case("another model", WALTER, diffuse),
     ]
-    figures = measured(efficiency, cases, monkeypatch)
+    figures = measured(efficiency, cases)
     missed = {subject: {t.reason for t in figure.missed} for (subject, name), figure in figures.items() if name == "5°"}
     assert missed == {
         "lambert": set(),
@@ -246,10 +276,9 @@ def test_what_is_slower_and_quieter_is_told(monkeypatch):
     render once."""
     burley = {"type": "burley", "sheen": 0.5, "clearcoat": 0.5}
     cases = [Case("burley", burley, WALTER, True), Case("other", LAMBERT, WALTER)]
-    monkeypatch.setattr(timing, "BESIDE", cases)
     calls, alternate = [], timing.alternate
     monkeypatch.setattr(runner, "alternate", lambda *given: calls.append(given) or alternate(*given))
-    run = runner.Run(lambda *_: None)
+    run = runner.Run(lambda *_: None, cases)
     times = {(f.subject, f.name): f for f in timing.time(run)}
     variances = {(f.subject, f.name): f for f in timing.variance(run)}
     assert len(calls) == 3 + 2
@@ -266,9 +295,9 @@ def test_what_is_slower_and_quieter_is_told(monkeypatch):
     assert times[other, SPHERE].targets
 
 
-def test_nothing_is_compared_with_no_noise(monkeypatch):
+def test_nothing_is_compared_with_no_noise():
     black = {"type": "diffuse", "reflectance": 0.0}
-    figures = measured(timing.variance, [Case("black", LAMBERT, black, True)], monkeypatch)
+    figures = measured(timing.variance, [Case("black", LAMBERT, black, True)])
     assert {name for _, name in figures} == {BOX, f"{BOX}, variance"}  # whose other walls are not black
 
 
@@ -447,11 +476,11 @@ def test_the_readme_has_the_summary(monkeypatch, tmp_path):
 
 def test_bench_runs_what_is_asked_for(monkeypatch):
     told = []
-    monkeypatch.setattr(resources, "CASES", CASES[:2])
+    monkeypatch.setattr(runner, "all_cases", lambda: TABLE[:2])
     found = bench(iter(["recompiles"]), lambda *progress: told.append(progress))
     assert told == [("recompiles", 0, 2), ("recompiles", 1, 2)]
     assert found.sections == ["recompiles"] and found.setup["variant"] == "llvm_ad_rgb"
-    assert not found.missed and set(found.cases) == {case.name for case in CASES}
+    assert not found.missed and set(found.cases) == {case.name for case in TABLE[:2]}
 
 
 def test_wrong_usage():
@@ -471,4 +500,4 @@ def test_bench_of_everything():
     assert not [figure for figure in found.of("recompiles") if figure.missed]
     assert dr.thread_count() == threads and mi.variant() == "llvm_ad_rgb"
     json.dumps(found.to_dict(), allow_nan=False)
-    assert found.markdown().count("\n| `") == sum(case.same for case in BESIDE)
+    assert found.markdown().count("\n| `") == sum(case.same for case in TABLE)

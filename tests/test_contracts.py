@@ -7,16 +7,9 @@ from support import call, direction
 
 import mi_brdfs
 from mi_brdfs.lobes import LambertLobe, Lobe
-from mi_brdfs.mitsuba import registry
 from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Spelling
 
-
-@pytest.fixture(autouse=True)
-def as_before(llvm_rgb):
-    models = dict(registry.MODELS)
-    yield
-    registry.MODELS.clear()
-    registry.MODELS.update(models)
+pytestmark = pytest.mark.usefixtures("llvm_rgb", "as_before")
 
 
 def model(lobes, **declared):

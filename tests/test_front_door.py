@@ -12,19 +12,15 @@ import pytest
 from support import call, direction
 
 import mi_brdfs
+from mi_brdfs.bench.cases import all_cases, defaults
+from mi_brdfs.bench.first import first_picture
+from mi_brdfs.bench.process import in_new_process
 from mi_brdfs.lobes import LambertLobe
-from mi_brdfs.mitsuba import guests, registry
+from mi_brdfs.mitsuba import guests
 from mi_brdfs.models.eon import EON
 from mi_brdfs.parameters import Reflectance
 
-
-@pytest.fixture(autouse=True)
-def as_before():
-    """Mitsuba cannot forget a plugin, but names here go back to whom they belonged to."""
-    models = dict(registry.MODELS)
-    yield
-    registry.MODELS.clear()
-    registry.MODELS.update(models)
+pytestmark = pytest.mark.usefixtures("as_before")
 
 
 def matte(brightness, **members):
@@ -215,6 +211,18 @@ def test_commands_take_in_a_file(guest):
     assert command(guest, "plot", "chalk", *option, "-o", "lobes.png").returncode == 0
     assert command(guest, "gallery", "chalk", *option, "-o", "pictures", "--size", 32, "--spp", 4).returncode == 0
     assert {"index.html", "overview.png", "chalk.png"} <= {file.name for file in (guest / "pictures").iterdir()}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_processes_of_the_bench_know_an_imported_file(guest, monkeypatch):
+    """Wherever they run; not what nobody can import."""
+    monkeypatch.chdir(guest)
+    guests.import_models("chalk.py")
+    monkeypatch.chdir("/")
+    mi_brdfs.register(matte(0.5))
+    cases = [case for case in all_cases() if case.bsdf["type"] in ("chalk", "matte")]
+    assert defaults(cases) == [{"type": "chalk"}]
+    assert in_new_process(first_picture, defaults(cases)) > 0
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

@@ -16,9 +16,12 @@ from PIL import Image
 from support import is_scalar
 
 import mi_brdfs
-from mi_brdfs.gallery import Entry, Row, example, gallery, page, picture, power_of_4, sheet, year
-from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, rgb, shown
+from mi_brdfs.gallery import Entry, Row, gallery, page, picture, power_of_4, sheet, year
+from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, rgb, shown, sweeps_of
+from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import all_models, find_model
+from mi_brdfs.model import Model
+from mi_brdfs.parameters import Choice, Number, Reflectance
 from mi_brdfs.render import display_image, render
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
@@ -31,19 +34,51 @@ NAMES = [model.plugins[0] for model in all_models()]
 
 
 def test_every_model_has_sweeps():
-    assert list(SWEEPS) == NAMES
-    for name, sweeps in SWEEPS.items():
+    """Those in the table, in the order of the models, or what its declarations make."""
+    assert list(SWEEPS) == [name for name in NAMES if name in SWEEPS]
+    for model in all_models():
+        sweeps = sweeps_of(model)
         parameters = [sweep.parameter for sweep in sweeps]
-        assert parameters and len(set(parameters)) == len(parameters), name
-        assert all(2 <= len(set(sweep.values)) == len(sweep.values) <= 5 for sweep in sweeps), name
+        assert parameters and len(set(parameters)) == len(parameters), model
+        assert all(2 <= len(set(sweep.values)) == len(sweep.values) <= 5 for sweep in sweeps), model
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", SWEEPS)
-def test_sweeps_load(name):
+@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+def test_sweeps_load(model):
     """Their parameters are declared, and the values in the declared ranges."""
-    for sweep in SWEEPS[name]:
-        for bsdf in sweep.bsdfs(name):
+    for sweep in sweeps_of(model):
+        for bsdf in sweep.bsdfs(model.plugins[0]):
+            mi.load_dict(bsdf)
+
+
+@pytest.mark.usefixtures("llvm_rgb", "as_before")
+def test_sweeps_of_others_models_come_from_their_declarations():
+    """With what else the example on the manual page gives, and without what excludes the parameter."""
+
+    class Brushed(Model):
+        """Brushed.
+
+        {"type": "brushed", "alpha_u": 0.1, "alpha_v": 0.3, "tint": 0.9}
+        """
+
+        tint = Reflectance(0.5, "colour")
+        alpha = Number(0.1, (0, 1), "roughness", anisotropic=True)
+        exponent = Number(9, (0, 1e6), "exponent")
+        mood = Choice(("dull", "bright"), "mood")
+
+        def lobes(self, p):
+            return (LambertLobe(p.tint),)
+
+    mi_brdfs.register(Brushed)
+    given = {"alpha_u": 0.1, "alpha_v": 0.3, "tint": 0.9}
+    assert sweeps_of(Brushed) == [
+        Sweep("alpha", (0, 0.25, 0.5, 0.75, 1), {"tint": 0.9}),
+        Sweep("exponent", (1, 3, 9, 27, 81), given),
+        Sweep("mood", ("dull", "bright"), given),
+    ]
+    for sweep in sweeps_of(Brushed):
+        for bsdf in sweep.bsdfs("brushed"):
             mi.load_dict(bsdf)
 
 
@@ -155,7 +190,7 @@ def test_the_command_writes_a_page_and_its_pictures(tmp_path):
 def test_the_page_has_all_about_a_model():
     text = html.unescape(page([Entry(find_model("disney")).section()], "64 samples"))
     assert find_model("disney").summary() in text and "<code>disney</code>" in text and "2012" in text
-    assert find_model("disney").manual() in text and str(example(find_model("disney"))) in text
+    assert find_model("disney").manual() in text and str(find_model("disney").example()) in text
     assert "64 samples" in text
 
 
@@ -218,12 +253,12 @@ def difference(name: str, bsdf: dict) -> float:
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("name", THUMBNAILS)
 def test_thumbnails_show_the_models(name):
-    assert difference(name, example(find_model(name))) < 4, f"{name} {STALE} {name}"
+    assert difference(name, find_model(name).example()) < 4, f"{name} {STALE} {name}"
 
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_thumbnails_tell_lobes_and_models_apart():
-    assert difference("ward", example(find_model("ward")) | {"specular_reflectance": 0.24}) > 8
+    assert difference("ward", find_model("ward").example() | {"specular_reflectance": 0.24}) > 8
     assert difference("walter", {"type": "cooktorrance", "material": "Au", "alpha": 0.2}) > 8
 
 

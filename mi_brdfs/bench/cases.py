@@ -1,9 +1,14 @@
-"""What is measured: each model with several sets of parameters, beside the built-in that matches it."""
+"""What is measured: each model with some sets of parameters, beside the built-in that matches it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle, islice
 from typing import Any
+
+from ..mitsuba.guests import source
+from ..mitsuba.registry import all_models, find_model, is_own
 
 Plugin = dict[str, Any]
 
@@ -59,7 +64,7 @@ COATED = {"base_color": rgb(0.6, 0.1, 0.05), "roughness": 0.4, "clearcoat": 0.5,
 METAL = {"base_color": GOLD, "metallic": 1.0, "roughness": 0.4}
 VELVET = {"base_color": rgb(0.2, 0.1, 0.4), "roughness": 0.8, "sheen": 1.0}
 
-CASES = [
+TABLE = [
     case("ashikhminshirley", plastic(0.14)),
     case("ashikhminshirley anisotropic", exponent_u=13, exponent_v=310),
     case("ashikhminshirley metal", exponent=1000, specular_reflectance=0.9, diffuse_reflectance=0.0),
@@ -132,14 +137,43 @@ CASES = [
     case("wrap sphere", wrap=0.5, domain="sphere"),
 ]  # fmt: skip
 
-BESIDE = [case for case in CASES if case.builtin]
-"""The cases with a built-in beside them."""
+"""Of models of the pack, the defaults first."""
 
-DEFAULTS = list({case.bsdf["type"]: case.bsdf for case in reversed(CASES)}.values())[::-1]
-"""Every model with its default parameters."""
 
-PAIRS = list({case.bsdf["type"]: case for case in reversed(BESIDE)}.values())[::-1]
-"""Of each model, the first case with a built-in beside it."""
+def all_cases() -> list[Case]:
+    """Of every model that is registered: those of the table, or else its defaults and the example of its manual
+    page."""
+    table: dict[str, list[Case]] = {}
+    for each in TABLE:
+        table.setdefault(each.bsdf["type"], []).append(each)
+    found = []
+    for model in all_models():
+        name = model.plugins[0]
+        if is_own(model) and name in table:
+            found += table[name]
+        else:
+            found.append(case(name))
+            if (example := model.example()) != {"type": name}:
+                found.append(Case(f"{name} example", example))
+    return found
+
+
+def pairs(cases: Sequence[Case]) -> list[Case]:
+    """Of each model, the first case with a built-in beside it."""
+    return list({case.bsdf["type"]: case for case in reversed(cases) if case.builtin}.values())[::-1]
+
+
+def defaults(cases: Sequence[Case]) -> list[Plugin]:
+    """The first case of each model that a new process can know: not of a notebook's."""
+    names = dict.fromkeys(case.bsdf["type"] for case in cases)
+    first = {name: next(case.bsdf for case in cases if case.bsdf["type"] == name) for name in names}
+    return [bsdf for name, bsdf in first.items() if source(find_model(name))]
+
+
+def built_ins(count: int) -> list[Plugin]:
+    """So many built-ins, of different code as far as there are."""
+    return list(islice(cycle(BUILT_INS), count))
+
 
 BUILT_INS = [
     diffuse(),
@@ -164,4 +198,4 @@ BUILT_INS = [
     {"type": "principledthin"},
     {"type": "hair"},
 ]
-"""As many built-ins as there are models, no two of the same code."""
+"""No two of the same code."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..validation.sampling import variates
 from ..validation.subject import Part, Subject, brightness, direction, interaction, numbers
 from . import sizes
-from .cases import CASES, Plugin
+from .cases import Plugin
 from .report import Figure, Target
 
 WHOLE, GAIN = "whole", "gain"
@@ -41,7 +41,7 @@ def efficiency(run) -> Iterator[Figure]:
     average over all its sets and angles, 1.1 of ``principled``.
     """
     gains: dict[str, list[float]] = {}
-    for case in run.steps(CASES):
+    for case in run.steps(run.cases):
         ours = sampling(case.bsdf)
         theirs = sampling(case.builtin)[WHOLE].least() if case.same else None
         lobes = {name: part for name, part in ours.items() if name != WHOLE and part.albedo.any()}

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from . import sizes
-from .cases import BUILT_INS, DEFAULTS, PAIRS, Plugin
+from .cases import Plugin, built_ins, defaults, pairs
 from .process import in_new_process
 from .report import Figure, Target
 from .scenes import PATH, sphere, spheres
@@ -23,15 +23,16 @@ SIZE = 16
 def first(run) -> Iterator[Figure]:
     """The time from loading a scene to its first, small picture, traced and compiled, over that with the built-in: in
     fresh processes that find no compiled kernels, in turn, the median of the pairs. One sphere with the default
-    parameters of a model; and one sphere for each model, beside as many built-ins, no two of the same code.
+    parameters of a model; and one sphere for each model, beside as many built-ins.
 
     Targets: 1.15 for one model, 1.5 for all of them.
     """
-    singles = [(case.name, [case.bsdf], [case.builtin], case.builtin["type"]) for case in PAIRS]
-    scenes = [*singles, (ALL, DEFAULTS, BUILT_INS[: len(DEFAULTS)], f"{len(DEFAULTS)} built-ins")]
+    singles = [(case.name, [case.bsdf], [case.builtin], case.builtin["type"]) for case in pairs(run.cases)]
+    models = defaults(run.cases)
+    scenes = [*singles, (ALL, models, built_ins(len(models)), f"{len(models)} built-ins")]
     for name, ours, theirs, beside in run.steps(scenes):
-        pairs = sizes.FIRST_ALL_PAIRS if name == ALL else sizes.FIRST_PAIRS
-        seconds = np.array([_pair(ours, theirs, k % 2 == 1) for k in range(pairs)]).T
+        count = sizes.FIRST_ALL_PAIRS if name == ALL else sizes.FIRST_PAIRS
+        seconds = np.array([_pair(ours, theirs, k % 2 == 1) for k in range(count)]).T
         median, interval = median_interval(seconds[0] / seconds[1])
         target = Target("≤", 1.5 if name == ALL else 1.15, beside)
         yield Figure("first", name, "first picture", median, 2, "×", interval, (target,))

@@ -13,11 +13,14 @@ from typing import Any
 
 import mitsuba as mi
 
+from ..mitsuba import guests
+
 
 def in_new_process(function: Callable, *arguments) -> Any:
-    """What a function returns in a process without kernels of earlier runs: these lie in the user's folder, so it gets
-    an empty one. Arguments and result are of the types that JSON has."""
-    call = json.dumps([mi.variant(), function.__module__, function.__name__, arguments])
+    """What a function returns in a process that knows the same models (:func:`mi_brdfs.mitsuba.guests.source`), but no
+    kernels of earlier runs: these lie in the user's folder, so it gets an empty one. Arguments and result are of the
+    types that JSON has."""
+    call = json.dumps([sys.path, guests.sources(), mi.variant(), function.__module__, function.__name__, arguments])
     with TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-c", f"from {__name__} import answer; answer()", call],
@@ -30,6 +33,8 @@ def in_new_process(function: Callable, *arguments) -> Any:
 
 def answer():
     """What the new process does: the call that is its argument."""
-    variant, module, name, arguments = json.loads(sys.argv[1])
+    sys.path[:], sources, variant, module, name, arguments = json.loads(sys.argv[1])
+    for source in sources:
+        guests.import_models(source)
     mi.set_variant(variant)
     print(json.dumps(getattr(importlib.import_module(module), name)(*arguments)))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..validation.derivatives import kernels_of
 from . import sizes
-from .cases import CASES, DEFAULTS, Plugin
+from .cases import Plugin, defaults
 from .process import in_new_process
 from .report import Figure, Target
 from .scenes import PATH, sphere
@@ -33,7 +33,7 @@ def recompiles(run) -> Iterator[Figure]:
     Target: 0.
     """
     counts: dict[str, np.ndarray] = {}
-    for case in run.steps(CASES):
+    for case in run.steps(run.cases):
         model = case.bsdf["type"]
         counts[model] = counts.get(model, 0) + np.array(fresh_kernels(case.bsdf))
     for model, (parameters, changed, loaded) in counts.items():
@@ -78,11 +78,12 @@ def cycles(run) -> Iterator[Figure]:
 
     Targets: within 1.1 of the first rounds, and below 5 MB.
     """
-    edge = -(-sizes.EDGE // len(DEFAULTS))
-    rounds = max(2 * edge, -(-sizes.CYCLES // len(DEFAULTS)))
+    bsdfs = defaults(run.cases)
+    edge = -(-sizes.EDGE // len(bsdfs))
+    rounds = max(2 * edge, -(-sizes.CYCLES // len(bsdfs)))
     for _ in run.steps([rounds]):
-        seconds, memory = in_new_process(load_render_discard, DEFAULTS, rounds)
-    subject = f"{rounds * len(DEFAULTS)} cycles"
+        seconds, memory = in_new_process(load_render_discard, bsdfs, rounds)
+    subject = f"{rounds * len(bsdfs)} cycles"
     limit = (Target("≤", 1.1, "flat"),)
     yield Figure("cycles", subject, "last over first", slowdown(seconds, edge), 2, "×", targets=limit)
     if memory:

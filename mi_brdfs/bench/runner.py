@@ -12,7 +12,7 @@ import mitsuba as mi
 from ..doctor import versions
 from ..mitsuba import llvm
 from ..variants import is_measurable
-from .cases import CASES, Case
+from .cases import Case, all_cases
 from .efficiency import efficiency
 from .first import first
 from .report import Figure, Results
@@ -33,8 +33,14 @@ class Run:
     """One call of :func:`bench`: what the sections share."""
 
     on_progress: Callable[[str, int, int], None]
+    cases: list[Case]
     section: str = ""
     _renders: dict[tuple[str, str], Renders] = field(default_factory=dict)
+
+    @property
+    def beside(self) -> list[Case]:
+        """The cases with a built-in beside them."""
+        return [case for case in self.cases if case.builtin]
 
     def steps(self, items: Sequence[T]) -> Iterator[T]:
         """The items, telling how many are done."""
@@ -53,8 +59,9 @@ class Run:
 def bench(
     only: Iterable[str] | None = None, on_progress: Callable[[str, int, int], None] = lambda section, done, of: None
 ) -> Results:
-    """Measure the models of this package beside Mitsuba's own, in the active variant; but for ``scalar``, which is
-    measured in ``scalar_rgb``. Times mean something only while the machine does nothing else.
+    """Measure all models, also those that were registered by others, beside Mitsuba's own in the active variant;
+    except ``scalar``, which is measured in ``scalar_rgb``. Times mean something only while the machine does nothing
+    else.
 
     Args:
         only: the names of the sections to run, by default all of :data:`SECTIONS`.
@@ -69,11 +76,11 @@ def bench(
     variant = mi.variant()
     if not is_measurable(variant):
         raise ValueError(f"Measuring needs a vectorized and unpolarized variant, not {variant}.")
-    run = Run(on_progress)
+    run = Run(on_progress, all_cases())
     figures = []
     for run.section in (name for name in SECTIONS if name in wanted):
         figures += SECTIONS[run.section](run)
     setup = versions() | {"variant": variant, "threads": str(dr.thread_count())}
     if variant.startswith("llvm"):
         setup["llvm"] = llvm.dotted(llvm.version())
-    return Results(figures, setup, {case.name: asdict(case) for case in CASES})
+    return Results(figures, setup, {case.name: asdict(case) for case in run.cases})

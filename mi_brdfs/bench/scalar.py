@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from . import sizes
-from .cases import PAIRS, Plugin
+from .cases import Plugin, pairs
 from .report import Figure, Target
 from .scenes import PATH, sphere
 from .timing import median_interval
@@ -28,7 +28,7 @@ def scalar(run) -> Iterator[Figure]:
     dr.set_thread_count(1)
     try:
         with mi.variant_context("scalar_rgb"):
-            for case in run.steps([case for case in PAIRS if case.name in AT_MOST]):
+            for case in run.steps([case for case in pairs(run.cases) if case.name in AT_MOST]):
                 seconds = np.array([[_seconds(bsdf, seed) for bsdf in (case.bsdf, case.builtin)]
                                     for seed in range(sizes.SCALAR_PAIRS)]).T  # fmt: skip
                 median, interval = median_interval(seconds[0] / seconds[1])

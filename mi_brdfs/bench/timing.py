@@ -13,7 +13,7 @@ import numpy as np
 
 from ..validation.subject import brightness
 from . import sizes
-from .cases import BESIDE, Plugin
+from .cases import Plugin
 from .report import Figure, Target
 from .scenes import ALONE, BOX, SPHERE, scene_of
 
@@ -40,7 +40,7 @@ def time(run) -> Iterator[Figure]:
 
     Target: 1.05.
     """
-    for case in run.steps(BESIDE):
+    for case in run.steps(run.beside):
         for scene in (SPHERE, BOX):
             renders = run.renders(case, scene)
             median, interval = median_interval(renders.slower)
@@ -60,7 +60,7 @@ def variance(run) -> Iterator[Figure]:
 
     Targets: 1 by ``path``; and for ``walter`` with BSDF samples alone 0.5 at α = 0.5 and 0.3 at α = 1.
     """
-    for case in run.steps(BESIDE):
+    for case in run.steps(run.beside):
         for scene in (ALONE, SPHERE, BOX) if case.same else (SPHERE, BOX):
             renders = run.renders(case, scene)
             noise = deviations(renders.pictures)

@@ -13,8 +13,6 @@ from ..mitsuba import guests
 from .terminal import Exit, fail
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
-imported: list[str] = []
-"""What was given as --import, for processes that a command starts."""
 
 
 def main() -> None:
@@ -33,7 +31,6 @@ def _import(names: list[str] | None) -> None:
             guests.import_models(name)
         except (ImportError, ValueError) as error:
             fail(f"--import {name}: {error}", Exit.USAGE)
-        imported.append(name)
 
 
 Imports = Annotated[

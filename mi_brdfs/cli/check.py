@@ -18,7 +18,7 @@ from rich.text import Text
 
 from ..mitsuba import guests
 from ..mitsuba.registry import all_models
-from .app import command, imported
+from .app import command
 from .errors import one_line
 from .interrupts import ending_processes, interruptible
 from .options import check_folder, check_names, write_json
@@ -100,7 +100,8 @@ def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs
                 reports.append(target.check(only, on_progress=partial(progress.advance, task)))
             return reports
         # Started anew: a process with Dr.Jit's threads must not be forked.
-        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=(variant, imported))
+        known = variant, guests.sources()
+        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known)
         with pool, ending_processes():
             for future in [pool.submit(target.check, only) for target in targets]:
                 reports.append(future.result())
@@ -108,11 +109,11 @@ def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs
     return reports
 
 
-def _start_job(variant: str, imported: list[str]) -> None:
+def _start_job(variant: str, sources: list[str]) -> None:
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as it is for a shell's job in the background
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
-    for name in imported:
-        guests.import_models(name)
+    for source in sources:
+        guests.import_models(source)
     mi.set_variant(variant)
 
 

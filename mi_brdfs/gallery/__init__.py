@@ -10,8 +10,6 @@ It needs ``pip install 'mi_brdfs[gallery]'``.
 
 from __future__ import annotations
 
-import ast
-import inspect
 import os
 import re
 from collections.abc import Callable, Iterable
@@ -104,12 +102,6 @@ def power_of_4(spp: int) -> int:
     return 4 ** max(((spp - 1).bit_length() + 1) // 2, 1)
 
 
-def example(model: type[Model]) -> dict:
-    """The plugin dict that a manual page has as its example, at its end, or else the defaults."""
-    last = inspect.cleandoc(model.__doc__).rpartition("\n\n")[2]
-    return ast.literal_eval(last) if last.startswith("{") else {"type": model.plugins[0]}
-
-
 def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
     """Models with their names and years."""
     rows = []
@@ -131,7 +123,7 @@ class Entry:
     def __init__(self, model: type[Model]):
         self.model, self.type = model, model.plugins[0]
         self.sweeps = sweeps_of(model)
-        self.bsdfs = [example(model), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
+        self.bsdfs = [model.example(), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
         self.pictures: list[Image.Image] = []
 
     def rows(self) -> list[Row]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..mitsuba.registry import is_own
 from ..model import Model
 from ..parameters import Choice, Number
 
@@ -163,15 +164,21 @@ SWEEPS: dict[str, list[Sweep]] = {
 
 def sweeps_of(model: type[Model]) -> list[Sweep]:
     """The sweeps that show a model: those above, or of a model that is not among them, each number over its range (or
-    about its default, if the range is wide) and each choice."""
-    if model.plugins[0] in SWEEPS:
-        return SWEEPS[model.plugins[0]]
+    about its default, if the range is wide) and each choice, with what else the example on its manual page gives."""
+    name = model.plugins[0]
+    if is_own(model) and name in SWEEPS:
+        return SWEEPS[name]
     sweeps = []
     for parameter in model.declared():
         if isinstance(parameter, Number) and parameter.default is not None:
-            sweeps.append(Sweep(parameter.name, tuple(_values(parameter)), {}))
+            values = tuple(_values(parameter))
         elif isinstance(parameter, Choice):
-            sweeps.append(Sweep(parameter.name, parameter.choices, {}))
+            values = parameter.choices
+        else:
+            continue
+        hidden = {"type", *parameter.names}
+        given = {name: value for name, value in model.example().items() if name not in hidden}
+        sweeps.append(Sweep(parameter.name, values, given))
     return sweeps
 
 

@@ -11,10 +11,13 @@ import warnings
 from pathlib import Path
 from types import ModuleType
 
-from .registry import models_in, register
+from ..model import Model
+from .registry import all_models, is_own, models_in, register
 
 ENTRY_POINTS = "mi_brdfs.models"
 """The group of entry points by which installed packages bring models."""
+_files: dict[str, str] = {}
+"""The files that were imported by their paths, by the names of their modules."""
 
 
 def register_installed() -> None:
@@ -45,6 +48,21 @@ def import_models(target: str) -> None:
         register(model)
 
 
+def source(model: type[Model]) -> str | None:
+    """What another process gives to :func:`import_models` to know a model: None if nothing does, as for one that was
+    defined in a notebook or within a function."""
+    module = sys.modules.get(model.__module__)
+    if model.__module__ == "__main__" or module is None or model not in models_in(module):
+        return None
+    return _files.get(model.__module__, model.__module__)
+
+
+def sources() -> list[str]:
+    """The sources of all models that others have brought."""
+    found = dict.fromkeys(source(model) for model in all_models() if not is_own(model))
+    return [each for each in found if each]
+
+
 def _file(path: Path) -> ModuleType:
     if not path.is_file():
         raise ImportError("no such file")
@@ -55,6 +73,7 @@ def _file(path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         raise ImportError(_sentence(error, path)) from None
+    _files[path.stem] = str(path.resolve())
     return module
 
 

@@ -98,6 +98,11 @@ def models_in(module: ModuleType) -> list[type[Model]]:
     return sorted(found, key=lambda model: model.plugins)
 
 
+def is_own(model: type[Model]) -> bool:
+    """Whether a model is one of the pack."""
+    return model.__module__.startswith(f"{models.__name__}.")
+
+
 def _take_in_own():
     """The models of the files in ``mi_brdfs/models``."""
     for file in pkgutil.iter_modules(models.__path__):
