@@ -4,12 +4,12 @@ import io
 import json
 import sys
 from contextlib import nullcontext
-from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from generate import readme
 from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, phong
 from rich.console import Console
 
@@ -24,10 +24,6 @@ from mi_brdfs.lobes import LambertLobe, PowerLobe
 from mi_brdfs.mitsuba.bsdf import ModelBSDF
 from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.models.lambert import Lambert
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
-
-import bench_page
 
 LAMBERT, WALTER = {"type": "lambert"}, {"type": "walter", "alpha": 0.5}
 ANISOTROPIC = {"type": "walter", "alpha_u": 0.1, "alpha_v": 0.4}
@@ -452,23 +448,20 @@ def test_results_in_markdown():
     assert "* Of 3 targets 2 are missed !" in text
 
 
-def test_the_summary_in_the_readme_is_current():
-    assert bench_page.README.read_text(encoding="utf-8") == bench_page.readme(), "run python docs/bench_page.py"
-
-
 def test_the_readme_has_the_summary(monkeypatch, tmp_path):
     """Between its marks, once; what is outside stays."""
-    monkeypatch.setattr(bench_page, "MEASURED", tmp_path / "bench.json")
-    monkeypatch.setattr(bench_page, "README", tmp_path / "README.md")
-    bench_page.MEASURED.write_text(json.dumps(results().to_dict()), encoding="utf-8")
-    bench_page.README.write_text("before\n<!-- bench -->\nold\n<!-- end of bench -->\nafter\n", encoding="utf-8")
+    monkeypatch.setattr(readme, "MEASURED", tmp_path / "bench.json")
+    monkeypatch.setattr(readme, "README", tmp_path / "README.md")
+    readme.MEASURED.write_text(json.dumps(results().to_dict()), encoding="utf-8")
+    models = "<!-- models -->\nold\n<!-- end of models -->\n"
+    readme.README.write_text(f"{models}<!-- bench -->\nold\n<!-- end of bench -->\nafter\n", encoding="utf-8")
     for _ in range(2):
-        bench_page.main()
-        text = bench_page.README.read_text(encoding="utf-8")
-        assert text == f"before\n<!-- bench -->\n\n{results().markdown()}\n<!-- end of bench -->\nafter\n"
-    bench_page.README.write_text("no place", encoding="utf-8")
-    with pytest.raises(ValueError, match="no place"):
-        bench_page.main()
+        readme.page().make()
+        text = readme.README.read_text(encoding="utf-8")
+        assert text.endswith(f"\n<!-- bench -->\n\n{results().markdown()}\n<!-- end of bench -->\nafter\n")
+    readme.README.write_text(models, encoding="utf-8")
+    with pytest.raises(ValueError, match="no place between <!-- bench -->"):
+        readme.page().make()
 
 
 # --- All together ---------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
+from generate import models as docs
 from PIL import Image
 from support import is_scalar
 
@@ -23,10 +24,6 @@ from mi_brdfs.mitsuba.registry import all_models, find_model
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import Choice, Number, Reflectance
 from mi_brdfs.render import display_image, render
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
-
-import reference_page as docs
 
 NAMES = [model.plugins[0] for model in all_models()]
 
@@ -236,7 +233,7 @@ def test_a_missing_package(tmp_path, package):
 
 # --- The pictures in the documentation ------------------------------------------------------------------------------
 
-STALE = "looks different; if that is meant, run python docs/reference_page.py"
+STALE = "looks different; if that is meant, run python docs/generate"
 QUICK = ("blinnphong", "ward")
 THUMBNAILS = [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in NAMES]
 

@@ -1,17 +1,11 @@
 """The scenes of ``shading``: pixel by pixel what the formulas say, and the same in every variant, for every seed."""
 
-import sys
-from pathlib import Path
-
 import mitsuba as mi
 import numpy as np
 import pytest
+from generate import shading
 from plates import NAMES, SCENES, load, shaded
 from support import is_scalar
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
-
-import shading_pictures
 
 rgb = np.array
 
@@ -216,16 +210,16 @@ def test_same_picture_for_any_seed_and_samples(name):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("path", shading_pictures.SCENES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", shading.SCENES, ids=lambda path: path.stem)
 def test_picture_shows_the_scene(path):
     """Rendered anew with few samples, the picture differs by its noise, and as JPEG has it."""
-    stored = np.array(mi.Bitmap(str(shading_pictures.PICTURES / f"{path.stem}.jpg")), np.float64) / 255
-    now = np.array(shading_pictures.picture(path, spp=64), np.float64) / 255
-    assert abs(stored - now).mean() < 0.02, "stale: run python docs/shading_pictures.py"
+    stored = np.array(mi.Bitmap(str(shading.PICTURES / f"{path.stem}.jpg")), np.float64) / 255
+    now = np.array(shading.picture(path, spp=64), np.float64) / 255
+    assert abs(stored - now).mean() < 0.02, f"stale: run python docs/generate {path.stem}"
 
 
 def test_every_scene_has_a_picture_in_the_readme():
     text = (SCENES / "README.md").read_text(encoding="utf-8")
     for name in NAMES:
         assert f"(../../docs/scenes/shading/{name}.jpg)" in text
-        assert (shading_pictures.PICTURES / f"{name}.jpg").is_file(), "run python docs/shading_pictures.py"
+        assert (shading.PICTURES / f"{name}.jpg").is_file()

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..mitsuba.registry import is_own
 from ..model import Model
-from ..parameters import Choice, Number
+from ..parameters import Choice, Number, Parameter, Reflectance
 
 
 @dataclass(frozen=True)
@@ -164,26 +164,30 @@ SWEEPS: dict[str, list[Sweep]] = {
 
 def sweeps_of(model: type[Model]) -> list[Sweep]:
     """The sweeps that show a model: those above, or of a model that is not among them, each number over its range (or
-    about its default, if the range is wide) and each choice, with what else the example on its manual page gives."""
+    about its default, if the range is wide) and each choice, with what else the example on its manual page gives. If
+    it has neither, its colours take their place."""
     name = model.plugins[0]
     if is_own(model) and name in SWEEPS:
         return SWEEPS[name]
-    sweeps = []
+    numbers, colours = [], []
     for parameter in model.declared():
-        if isinstance(parameter, Number) and parameter.default is not None:
-            values = tuple(_values(parameter))
-        elif isinstance(parameter, Choice):
-            values = parameter.choices
-        else:
-            continue
-        hidden = {"type", *parameter.names}
-        given = {name: value for name, value in model.example().items() if name not in hidden}
-        sweeps.append(Sweep(parameter.name, values, given))
-    return sweeps
+        if values := _values(parameter):
+            own = {"type", *parameter.names}
+            given = {name: value for name, value in model.example().items() if name not in own}
+            of_its_kind = colours if isinstance(parameter, Reflectance) else numbers
+            of_its_kind.append(Sweep(parameter.name, values, given))
+    return numbers or colours
 
 
-def _values(number: Number) -> list[float]:
-    low, high = number.limits
+def _values(parameter: Parameter) -> tuple:
+    """What to show of a parameter; nothing of one that may be missing, or of another kind."""
+    if isinstance(parameter, Choice):
+        return parameter.choices
+    if not isinstance(parameter, Number | Reflectance) or parameter.default is None:
+        return ()
+    if isinstance(parameter, Reflectance):
+        return 0.1, 0.3, 0.5, 0.7, 0.9
+    low, high = parameter.limits
     if high - low <= 10:
-        return [low + (high - low) * k / 4 for k in range(5)]
-    return [min(max(number.default * 3.0**k, low), high) for k in range(-2, 3)]
+        return tuple(low + (high - low) * k / 4 for k in range(5))
+    return tuple(min(max(parameter.default * 3.0**k, low), high) for k in range(-2, 3))

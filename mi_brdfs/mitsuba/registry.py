@@ -123,6 +123,11 @@ def all_models() -> list[type[Model]]:
     return sorted(set(MODELS.values()), key=lambda model: model.plugins)
 
 
+def own_models() -> list[type[Model]]:
+    """Those of the pack among them."""
+    return [model for model in all_models() if is_own(model)]
+
+
 def find_model(name: str) -> type[Model]:
     """The model of a plugin name.
 

@@ -1,10 +1,8 @@
-"""Write the pictures of scenes/shading/README.md: each scene shaded, and below it path-traced.
-
-python docs/shading_pictures.py
-"""
+"""The pictures of scenes/shading/README.md: each scene shaded, and below it path-traced."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import mi_brdfs  # noqa: F401
@@ -14,7 +12,9 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 
 import numpy as np
 
-ROOT = Path(__file__).parents[1]
+from .made import ROOT, Picture
+from .scenes import read
+
 SCENES = sorted((ROOT / "scenes" / "shading").glob("*.xml"))
 PICTURES = ROOT / "docs" / "scenes" / "shading"
 FINER, SAMPLES, QUALITY = 3, 1024, 88
@@ -31,11 +31,9 @@ def picture(path: Path, spp: int = SAMPLES) -> mi.Bitmap:
     return display_image(mi.Bitmap(np.concatenate([shaded, traced])))
 
 
-def main():
-    mi.set_variant("llvm_ad_rgb")
-    for path in SCENES:
-        picture(path).write(str(PICTURES / f"{path.stem}.jpg"), quality=QUALITY)
+def pictures() -> list[Picture]:
+    return [Picture(PICTURES / f"{path.stem}.jpg", partial(read, path), partial(_draw, path)) for path in SCENES]
 
 
-if __name__ == "__main__":
-    main()
+def _draw(scene: Path, path: Path) -> None:
+    picture(scene).write(str(path), quality=QUALITY)

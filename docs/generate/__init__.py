@@ -1,0 +1,1 @@
+"""Pages and pictures that are generated; ``python docs/generate --help``."""

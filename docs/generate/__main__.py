@@ -1,0 +1,50 @@
+"""The command: ``python docs/generate``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from generate import models, readme, scenes, shading
+from generate.made import ROOT, Page, Picture
+
+import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
+
+
+def everything() -> list[Page | Picture]:
+    """All that is generated, each after what it is made from."""
+    pages = [*scenes.pages(), *models.pages(), readme.page()]
+    return [*pages, *models.pictures(), *scenes.pictures(), *shading.pictures()]
+
+
+def main(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME…", help="Of models and scenes, to be made if current, too.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Make everything, stale or not.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Say what is stale, and exit with 1 if something is.")] = False,
+) -> None:
+    """Make the pages and pictures that are stale: the reference of the models, the tables in README.md, the page of the
+    scenes and the scene with all models; thumbnails, sweeps, pictures of scenes."""
+    mi.set_variant("llvm_ad_rgb")
+    made, wanted = everything(), set(names or ())
+    if unknown := wanted - {each.path.stem for each in made}:
+        raise typer.BadParameter(f"nothing is called {min(unknown)}")
+    stale = False
+    for each in made:
+        if each.is_stale() or (not check and (every or each.path.stem in wanted)):
+            stale = True
+            print(each.path.relative_to(ROOT).as_posix(), flush=True)
+            if not check:
+                each.make()
+    if check and stale:
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,82 @@
+"""Pages and pictures as files that are current or stale."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import io
+import tokenize
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+ROOT = Path(__file__).parents[2]
+DIGESTS = ROOT / "docs" / "digests.txt"
+"""What each picture was made from."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A file of text that says what others say already."""
+
+    path: Path
+    text: Callable[[], str]
+    """What it should say now."""
+
+    def is_stale(self) -> bool:
+        return not self.path.is_file() or self.path.read_text(encoding="utf-8") != self.text()
+
+    def make(self) -> None:
+        self.path.write_text(self.text(), encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture, which is stale once it would be made from something else. The code of models and integrators is not
+    looked at: tests render pictures anew and compare."""
+
+    path: Path
+    sources: Callable[[], Iterable[str | bytes]]
+    """What it is made from."""
+    draw: Callable[[Path], None]
+    """Writes it."""
+
+    def is_stale(self) -> bool:
+        return not self.path.is_file() or read_digests().get(_name(self.path)) != self._digest()
+
+    def make(self) -> None:
+        self.draw(self.path)
+        write_digests(read_digests() | {_name(self.path): self._digest()})
+
+    def _digest(self) -> str:
+        digest = hashlib.sha256()
+        for source in self.sources():
+            digest.update(hashlib.sha256(source.encode() if isinstance(source, str) else source).digest())
+        return digest.hexdigest()[:16]
+
+
+def _name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def read_digests() -> dict[str, str]:
+    """The digests of the sources by picture."""
+    lines = DIGESTS.read_text(encoding="utf-8").splitlines() if DIGESTS.is_file() else []
+    return {name: digest for digest, name in map(str.split, lines)}
+
+
+def write_digests(digests: dict[str, str]) -> None:
+    """Write them, less those of pictures that are no more."""
+    lines = [f"{digests[name]}  {name}\n" for name in sorted(digests) if (ROOT / name).is_file()]
+    DIGESTS.write_text("".join(lines), encoding="utf-8")
+
+
+def code(module: ModuleType) -> str:
+    """The code of a module, without what only readers see of it."""
+    tokens = tokenize.generate_tokens(io.StringIO(inspect.getsource(module)).readline)
+    return "".join(
+        token.string
+        for token in tokens
+        if token.type != tokenize.COMMENT and not token.string.isspace() and not token.string.startswith('"""')
+    )

@@ -1,0 +1,140 @@
+"""What is generated is made from what there is now, and one command says what is not."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from generate import made, models, scenes
+from generate.__main__ import everything
+from generate.made import ROOT, Page, Picture
+
+import mi_brdfs
+from mi_brdfs.mitsuba import registry
+from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.models.lambert import Lambert
+
+EVERYTHING = everything()
+
+
+def name(made):
+    return made.path.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("made", EVERYTHING, ids=name)
+def test_nothing_is_stale(made):
+    assert not made.is_stale(), "run python docs/generate"
+
+
+def test_digests_are_of_the_pictures():
+    assert set(made.read_digests()) == {name(each) for each in EVERYTHING if isinstance(each, Picture)}
+
+
+def test_one_thumbnail_and_strip_a_model():
+    for folder in models.THUMBNAILS, models.STRIPS:
+        assert {path.stem for path in folder.iterdir()} == {model.plugins[0] for model in own_models()}
+
+
+class Chalk(Lambert):
+    """Chalk (1899).
+
+    Example
+    -------
+    <bsdf type="chalk">
+        <float name="reflectance" value="0.9"/>
+    </bsdf>
+
+    {"type": "chalk", "reflectance": 0.9}
+    """
+
+
+def test_another_model_makes_its_own_pages_and_pictures_stale(monkeypatch, as_before):
+    """And what shows all models. Models of others are none of ours."""
+    Chalk.plugins = ("chalk",)
+    mi_brdfs.register(Chalk)
+    assert not [each for each in everything() if each.is_stale()]
+    monkeypatch.setattr(registry, "is_own", lambda model: True)
+    assert {name(each) for each in everything() if each.is_stale()} == {
+        "README.md", "mi_brdfs/models/README.md", "scenes/catalogue.xml",
+        "docs/thumbnails/chalk.png", "docs/sweeps/chalk.jpg", "docs/gallery.jpg",
+    }  # fmt: skip
+    text = scenes.catalogue()
+    assert text.count('<shape type="sphere">') == len(own_models())
+    assert text.count('        <bsdf type="chalk">\n            <float name="reflectance" value="0.9"/>\n') == 1
+    assert "minnaert 1941" in text and "lambert 1760, chalk 1899, minnaert 1941" in " ".join(text.split())
+
+
+@pytest.mark.parametrize("count", [1, 2, 21, 22, 30, 40])
+def test_balls_do_not_touch(monkeypatch, count):
+    """However many models there are."""
+    monkeypatch.setattr(scenes, "own_models", lambda: [Lambert] * count)
+    text = scenes.catalogue()
+    number = r"([\d.e-]+)"
+    pattern = rf'x="{number}" y="{number}" z="{number}"/>\n(?: *<float name="radius" value="{number}"/>\n)? *<bsdf'
+    balls = [[float(value or 1) for value in found] for found in re.findall(pattern, text)]
+    assert len(balls) == count
+    for k, (x, y, z, radius) in enumerate(balls):
+        assert abs(x) <= 7.5 and any(z - radius == pytest.approx(step) for _, step in scenes.ROWS.values())
+        assert all(y != b or x - a > radius + r for a, b, _, r in balls[:k])
+
+
+@pytest.fixture
+def drawn(monkeypatch, tmp_path):
+    """A picture in a folder of its own, and what it is made from."""
+    monkeypatch.setattr(made, "ROOT", tmp_path)
+    monkeypatch.setattr(made, "DIGESTS", tmp_path / "digests.txt")
+    sources = ["a", b"b"]
+    return Picture(tmp_path / "picture.png", lambda: sources, lambda path: path.write_bytes(b"drawn")), sources
+
+
+def test_a_picture_is_stale_until_it_is_made(drawn):
+    picture, sources = drawn
+    assert picture.is_stale()
+    picture.make()
+    assert not picture.is_stale() and picture.path.read_bytes() == b"drawn"
+    sources[:] = ["ab", b""]
+    assert picture.is_stale()
+    picture.make()
+    assert not picture.is_stale()
+    picture.path.unlink()
+    assert picture.is_stale()
+
+
+def test_digests_of_pictures_that_are_gone_are_dropped(drawn):
+    picture, _ = drawn
+    picture.make()
+    made.write_digests(made.read_digests() | {"gone.png": "0"})
+    assert set(made.read_digests()) == {"picture.png"}
+
+
+def test_a_page_is_stale_until_it_is_made(tmp_path):
+    page = Page(tmp_path / "page.md", lambda: "now")
+    assert page.is_stale()
+    page.make()
+    assert not page.is_stale()
+    page.path.write_text("then")
+    assert page.is_stale()
+
+
+def test_scenes_are_read_without_comments_and_with_their_files(tmp_path):
+    def sources(comment, spp, texture):
+        (tmp_path / "t.png").write_bytes(texture)
+        text = f'<scene version="3.0.0"><!-- {comment} --><integer name="s" value="{spp}"/>\n'
+        (tmp_path / "s.xml").write_text(text + '<string name="filename" value="t.png"/></scene>')
+        return scenes.read(tmp_path / "s.xml")
+
+    first = sources("one", 1, b"t")
+    assert first == sources("two", 1, b"t")
+    assert first != sources("one", 2, b"t") and first != sources("one", 1, b"u")
+
+
+def command(*arguments):
+    words = [sys.executable, ROOT / "docs" / "generate", *arguments]
+    return subprocess.run(words, capture_output=True, text=True, timeout=120)
+
+
+def test_the_command_lists_what_is_stale():
+    done = command("--check")
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    wrong = command("nothing")
+    assert wrong.returncode == 2 and "nothing is called nothing" in wrong.stderr
