@@ -128,7 +128,8 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         distribution = lobe.distribution
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        slope2, cos2, brighter = distribution.mean_square_slope_along(wi), dr.square(wi.z), self._brighter(lobe, wi)
+        slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
+        cos2 = dr.square(dr.maximum(wi.z, 1e-15))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), 0.95)
         if not distribution.long_tailed:

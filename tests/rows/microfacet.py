@@ -89,6 +89,7 @@ EXTREME = [
 ]
 # Entries of the kit whose sampling the named models' rows test.
 EXTREME += [
+    row("beckmann", "smith", "black where it faces", {"f0": 0.0}, partial(ref.fresnel_schlick, f0=0), alpha=0.3),
     row("beckmann", "kelemen"),
     row("beckmann", "kurt", κ=0.4),
     row("ggx", "smith", "conductor", {"eta": 0.2, "k": 3.0}, CONDUCTOR, alpha=0.2),
