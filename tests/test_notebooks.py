@@ -1,11 +1,13 @@
 """The notebooks run, and do what they say."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
-from notebooks import NOTEBOOKS, code_cells, read_notebook, run_notebook
+import mi_brdfs
+from notebooks import FOLDER, NOTEBOOKS, code_cells, read_notebook, run_notebook
 
 # --- What they say --------------------------------------------------------------------------------------------------
 
@@ -126,11 +128,23 @@ SAYS = {
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("as_before")
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook(path):
     names = run_notebook(path)
     if path.stem in SAYS:
         SAYS[path.stem](names)
+
+
+def test_a_model_is_written_on_public_names():
+    """Those that docs/extending.md names."""
+    notebook = read_notebook(FOLDER / "write_your_own_brdf.ipynb")
+    code = "\n".join("".join(cell["source"]) for cell in code_cells(notebook))
+    taken = set(re.findall(r"from (mi_brdfs[.\w]*) import", code)) | set(re.findall(r"\b(mi_brdfs\.\w+)", code))
+    public = {f"mi_brdfs.{name}" for name in mi_brdfs.__all__} | {"mi_brdfs", "mi_brdfs.plot", "mi_brdfs.validation"}
+    assert "mi_brdfs.register" in taken and taken <= public
+    page = (FOLDER.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in page for name in taken & {"mi_brdfs.plot", "mi_brdfs.validation", "mi_brdfs.lobes"})
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
