@@ -17,11 +17,12 @@ from PIL import Image
 from support import is_scalar
 
 import mi_brdfs
-from mi_brdfs.gallery import Entry, Row, gallery, page, picture, power_of_4, sheet, year
+from mi_brdfs.gallery import Entry, Row, gallery, overview, page, picture, power_of_4, sheet, year
 from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, rgb, shown, sweeps_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import all_models, find_model
 from mi_brdfs.model import Model
+from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.parameters import Choice, Number, Reflectance
 from mi_brdfs.render import display_image, render
 
@@ -62,6 +63,7 @@ def test_sweeps_of_others_models_come_from_their_declarations():
         tint = Reflectance(0.5, "colour")
         alpha = Number(0.1, (0, 1), "roughness", anisotropic=True)
         exponent = Number(9, (0, 1e6), "exponent")
+        width = Number(2, (0.001, 2), "width")
         mood = Choice(("dull", "bright"), "mood")
 
         def lobes(self, p):
@@ -71,7 +73,8 @@ def test_sweeps_of_others_models_come_from_their_declarations():
     given = {"alpha_u": 0.1, "alpha_v": 0.3, "tint": 0.9}
     assert sweeps_of(Brushed) == [
         Sweep("alpha", (0, 0.25, 0.5, 0.75, 1), {"tint": 0.9}),
-        Sweep("exponent", (1, 3, 9, 27, 81), given),
+        Sweep("exponent", (1, 3, 9, 30, 80), given),
+        Sweep("width", (0.2, 0.7, 2.0), given),
         Sweep("mood", ("dull", "bright"), given),
     ]
     for sweep in sweeps_of(Brushed):
@@ -97,6 +100,13 @@ def test_years():
 
 def test_powers_of_4():
     assert [power_of_4(spp) for spp in (1, 2, 4, 5, 16, 17, 64, 65)] == [4, 4, 4, 16, 16, 64, 64, 256]
+
+
+@pytest.mark.parametrize("count, columns, rows", [(1, 1, 1), (7, 7, 1), (8, 4, 2), (21, 7, 3), (22, 6, 4)])
+def test_rows_of_the_overview_are_even(count, columns, rows):
+    sizes = {n: np.array(overview([(Lambert, Image.new("RGB", (80, 80)))] * n).size) for n in (1, 8, count)}
+    cell = (sizes[8] - sizes[1]) / (3, 1)
+    assert tuple((sizes[count] - sizes[1]) / cell + 1) == (columns, rows)
 
 
 def test_labels_cover_no_picture_and_are_not_cut():

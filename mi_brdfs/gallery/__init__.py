@@ -33,6 +33,8 @@ from .html import Section, page
 from .sheet import Row, sheet
 from .sweeps import shown, sweeps_of
 
+__all__ = ["gallery"]
+
 SIZE, SPP = 192, 16
 PER_ROW = 7
 
@@ -103,10 +105,11 @@ def power_of_4(spp: int) -> int:
 
 
 def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
-    """Models with their names and years."""
-    rows = []
-    for first in range(0, len(portraits), PER_ROW):
-        some = portraits[first : first + PER_ROW]
+    """Models with their names and years, in rows of the same length but for the last."""
+    rows, lines = [], -(-len(portraits) // PER_ROW)
+    length = -(-len(portraits) // lines)
+    for first in range(0, len(portraits), length):
+        some = portraits[first : first + length]
         rows.append(Row("", [image for _, image in some], [f"{model.plugins[0]}\n{year(model)}" for model, _ in some]))
     return sheet(rows)
 

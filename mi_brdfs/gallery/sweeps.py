@@ -164,8 +164,8 @@ SWEEPS: dict[str, list[Sweep]] = {
 
 def sweeps_of(model: type[Model]) -> list[Sweep]:
     """The sweeps that show a model: those above, or of a model that is not among them, each number over its range (or
-    about its default, if the range is wide) and each choice, with what else the example on its manual page gives. If
-    it has neither, its colours take their place."""
+    about its default, if that has orders of magnitude) and each choice, with what else the example on its manual page
+    gives. If it has neither, its reflectances take their place."""
     name = model.plugins[0]
     if is_own(model) and name in SWEEPS:
         return SWEEPS[name]
@@ -188,6 +188,7 @@ def _values(parameter: Parameter) -> tuple:
     if isinstance(parameter, Reflectance):
         return 0.1, 0.3, 0.5, 0.7, 0.9
     low, high = parameter.limits
-    if high - low <= 10:
+    if high - low <= 10 and not 0 < low < 1e-2 * high:
         return tuple(low + (high - low) * k / 4 for k in range(5))
-    return tuple(min(max(parameter.default * 3.0**k, low), high) for k in range(-2, 3))
+    about = (float(f"{parameter.default * 3.0**k:.1g}") for k in range(-2, 3))
+    return tuple(dict.fromkeys(min(max(value, low), high) for value in about))
