@@ -374,6 +374,28 @@ def ward(i, o, diffuse_reflectance, specular_reflectance, alpha_u, alpha_v, vari
 
 
 @_brdf
+def schlick(i, o, specular_reflectance, diffuse_reflectance, roughness, isotropy, variant):
+    """Schlick 1994: D by its equations for Z, A and G over 4 pi NL NV, and a diffuse layer below what S(u) reflects."""
+    (cos_h, tan_h, phi_h), cos_d = _half(i, o), _cos_d(i, o)
+    sin2, w = (cos_h * tan_h) ** 2, np.cos(phi_h)
+    zenith = roughness / (sin2 + roughness * cos_h**2) ** 2  # 1 + r t^2 - t^2, where t is the cosine of h
+    azimuth = np.sqrt(isotropy / (isotropy**2 - isotropy**2 * w**2 + w**2))
+    g = _schlick(i, o, roughness)
+    match variant:
+        case "shadowed":
+            d = g * zenith * azimuth
+        case "interreflection":
+            d = g * zenith * azimuth + 1 - g
+        case "plain":
+            d = zenith * azimuth
+        case _:
+            raise ValueError(variant)
+    s = fresnel_schlick(cos_d, specular_reflectance)
+    below = 0 if diffuse_reflectance is None else fresnel_schlick(cos_d, diffuse_reflectance) / np.pi
+    return s * d / (4 * np.pi * i[:, 2] * o[:, 2]) + (1 - s) * below
+
+
+@_brdf
 def lafortune(i, o, diffuse_reflectance, lobes, normalization):
     """Lafortune et al. 1997: a sum of lobes (Cx ix ox + Cy iy oy + Cz iz oz)^n; `energy` bounds the albedo of each."""
     if normalization not in ("energy", "none"):
