@@ -51,7 +51,7 @@ class Boastful(PowerLobe):
 class Leaking(ModelBSDF):
     """Keeps all its instances alive."""
 
-    instances = []  # noqa: RUF012
+    instances = []
 
     def __init__(self, props):
         ModelBSDF.__init__(self, props)

@@ -10,9 +10,9 @@ from albedos import albedos, brightest, choices, fault, white
 from reference_albedos import REFERENCES
 from support import direction
 
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 
-PLUGINS = {model: model.plugins[0] for model in all_models()}
+PLUGINS = {model: model.plugins[0] for model in own_models()}
 CONFIGURATIONS = [(model, given, albedo) for model in PLUGINS for given, albedo in model.energy.largest]
 
 

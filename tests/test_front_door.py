@@ -88,7 +88,7 @@ def test_a_name_can_be_taken_explicitly():
 @pytest.mark.parametrize(
     "model, error, message",
     [
-        (int, TypeError, "register takes a subclass of mi_brdfs.Model, which <class 'int'> is not."),
+        (int, TypeError, "register takes a subclass of mi_brdfs.Model, or of a term"),
         (matte(1, __doc__=None), ValueError, "Matte has no docstring: write its manual page there"),
         (matte(1, plugins=("my matte",)), ValueError, "Matte: 'my matte' cannot be a plugin name; take letters"),
     ],
@@ -160,7 +160,7 @@ class EntryPoint:
 def test_entry_points_bring_models_and_failures_stay_alone(monkeypatch):
     entries = [EntryPoint("broken", ImportError("No module named 'nowhere'")), EntryPoint("matte", matte(0.3))]
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: entries)
-    with pytest.warns(UserWarning, match="The model broken is left out: ImportError: No module named 'nowhere'"):
+    with pytest.warns(UserWarning, match="The entry point broken is left out: ImportError: No module named 'nowhere'"):
         guests.register_installed()
     assert brightness("matte") == pytest.approx(0.15)
 
@@ -237,7 +237,7 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     "text, message",
     [
         (None, "--import guest.py: no such file"),
-        ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model"),
+        ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model, nor a term"),
         ("\n1 / 0", "--import guest.py: line 2: ZeroDivisionError: division by zero"),
         ("def f(:", "--import guest.py: line 1: invalid syntax"),
         (GUEST.replace("Chalk(", "Ward("), 'the name "ward" belongs to mi_brdfs.models.ward.Ward'),
@@ -254,7 +254,7 @@ def test_wrong_files_are_told_in_a_sentence(tmp_path, text, message):
 def test_the_page_on_extending_works(pytestconfig, tmp_path):
     """Its model has a manual page, and passes checks."""
     page = (pytestconfig.rootpath / "docs" / "extending.md").read_text(encoding="utf-8")
-    code = re.search(r"```python\n(.*?)```", page, re.S)[1].replace(
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.S)).replace(
         "import mi_brdfs\n", "import mi_brdfs\nimport mitsuba as mi\n", 1
     )
     (tmp_path / "lommel.py").write_text(code, encoding="utf-8")

@@ -17,14 +17,14 @@ from fuzzing import examples, ways
 from hypothesis import strategies as st
 from support import context, interaction, numbers, per_lane
 
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 
 EVALUATIONS = 1_000_000
 """How many settings and pairs of directions a run tries, or more: with the first way to give each model's parameters,
 and as many again with the others, which take long to compile."""
 LANES, EXAMPLES = 1 << 14, 6
 
-MODELS = all_models()
+MODELS = own_models()
 CASES = [
     pytest.param(model, options, id=f"{model.plugins[0]} {options}", marks=[pytest.mark.slow] if k else [])
     for model in MODELS

@@ -20,13 +20,13 @@ import mi_brdfs
 from mi_brdfs.gallery import Entry, Row, gallery, overview, page, picture, power_of_4, sheet, year
 from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, rgb, shown, sweeps_of
 from mi_brdfs.lobes import LambertLobe
-from mi_brdfs.mitsuba.registry import all_models, find_model
+from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import Model
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.parameters import Choice, Number, Reflectance
 from mi_brdfs.render import display_image, render
 
-NAMES = [model.plugins[0] for model in all_models()]
+NAMES = [model.plugins[0] for model in own_models()]
 
 # --- Sweeps and sheets ----------------------------------------------------------------------------------------------
 
@@ -34,7 +34,7 @@ NAMES = [model.plugins[0] for model in all_models()]
 def test_every_model_has_sweeps():
     """Those in the table, in the order of the models, or what its declarations make."""
     assert list(SWEEPS) == [name for name in NAMES if name in SWEEPS]
-    for model in all_models():
+    for model in own_models():
         sweeps = sweeps_of(model)
         parameters = [sweep.parameter for sweep in sweeps]
         assert parameters and len(set(parameters)) == len(parameters), model
@@ -42,7 +42,7 @@ def test_every_model_has_sweeps():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_sweeps_load(model):
     """Their parameters are declared, and the values in the declared ranges."""
     for sweep in sweeps_of(model):
@@ -271,7 +271,7 @@ def test_thumbnails_tell_lobes_and_models_apart():
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_strips_show_the_main_sweeps(model):
     name = model.plugins[0]
     committed = blocks(Image.open(docs.STRIPS / f"{name}.jpg"))

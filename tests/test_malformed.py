@@ -20,11 +20,11 @@ from support import call, direction
 from test_resources import scene_of
 
 from mi_brdfs.cli.errors import one_line
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
 
-MODELS = pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+MODELS = pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 
 
 @pytest.fixture(scope="module")

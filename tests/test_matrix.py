@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from support import context, direction, interaction, is_scalar, numbers
 
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 
-NAMES = [model.plugins[0] for model in all_models()]
+NAMES = [model.plugins[0] for model in own_models()]
 COMPILED = ["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono_polarized"]
 NOISE = np.random.default_rng(1).uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32)
 

@@ -10,7 +10,7 @@ from fuzzing import Quantity, ways
 from support import hemisphere, interaction
 
 import mi_brdfs
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 
 SIDE = 10
 STARTS, PAIRS = SIDE * SIDE, 12
@@ -127,7 +127,7 @@ def problems(model):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_adam_ends_within_the_ranges(model):
     """From a hundred starts each; and it gets nearer to the values that it is to find."""
     for name, problem in problems(model):
@@ -144,7 +144,7 @@ LIMITED_WITHIN = {"burley": ("roughness", "anisotropic"), "lafortune": ("cx", "c
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_derivatives_beyond_the_ranges_lead_back(model):
     """Each value that a descent inwards lowers has the derivative that it has at the limit, and the others none; and
     forward derivatives are those at the limit."""

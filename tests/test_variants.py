@@ -16,9 +16,9 @@ from catalogue import ROWS
 from support import call, hemisphere, is_scalar, sphere
 
 import mi_brdfs
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 
-NAMES = [model.plugins[0] for model in all_models()]
+NAMES = [model.plugins[0] for model in own_models()]
 RICHEST = {
     row.bsdf["type"]: row
     for row in sorted(ROWS, key=lambda row: len(row.bsdf))
@@ -346,7 +346,7 @@ def rows_of(model):
 
 
 @pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("model", all_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_copies_of_declarations(model, how):
     """They say the same and accept the same, and belong to a model as well as the original does."""
     declared = model.declared()
@@ -363,7 +363,7 @@ def test_copies_of_declarations(model, how):
 
 def test_declarations_in_another_process():
     """One that starts from nothing understands what it is sent."""
-    models = all_models()
+    models = own_models()
     with fresh_process() as process:
         said = list(process.map(meaning, models, [model.declared() for model in models]))
     with mi.variant_context("scalar_rgb"):

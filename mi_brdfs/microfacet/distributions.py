@@ -16,9 +16,10 @@ import mitsuba as mi
 
 from ..math import clamp, expm1, expm1_ratio, gauss_legendre, log1p, log1p_ratio, log_cos
 from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
+from .term import Term
 
 
-class Distribution:
+class Distribution(Term):
     """A distribution of two roughnesses, αu along dp_du and αv across: anisotropic, unless both are the same object."""
 
     LOSS = 1.7

@@ -7,9 +7,10 @@ from typing import Any
 import drjit as dr
 
 from ..math import luminance, safe_sqrt, square
+from .term import Term
 
 
-class Fresnel:
+class Fresnel(Term):
     """A reflectance, called with the cosine."""
 
     def __call__(self, cos: Any) -> Any:

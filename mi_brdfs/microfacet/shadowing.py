@@ -8,9 +8,10 @@ from typing import Any, ClassVar
 import drjit as dr
 
 from .facet import Facet
+from .term import Term
 
 
-class Shadowing:
+class Shadowing(Term):
     """A shadowing term: called with a facet, it returns G. The sampler of its lobe and the estimated albedo follow from
     the attributes (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
 

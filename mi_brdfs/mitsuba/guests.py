@@ -11,8 +11,10 @@ import warnings
 from pathlib import Path
 from types import ModuleType
 
+from ..microfacet.term import Term
 from ..model import Model
-from .registry import all_models, is_own, models_in, register
+from ..models.microfacet import BROUGHT
+from .registry import all_models, is_own, models_in, register, terms_in
 
 ENTRY_POINTS = "mi_brdfs.models"
 """The group of entry points by which installed packages bring models."""
@@ -21,45 +23,50 @@ _files: dict[str, str] = {}
 
 
 def register_installed() -> None:
-    """Register what installed packages bring by entry points: a model each, or a module with models. One that fails is
-    left out with a warning."""
+    """Register what installed packages bring by entry points: a model or a term of the kit each, or a module with
+    some. One that fails is left out with a warning."""
     for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
         try:
             brought = entry.load()
-            for model in models_in(brought) if isinstance(brought, ModuleType) else [brought]:
-                register(model)
+            for each in _brought_by(brought) if isinstance(brought, ModuleType) else [brought]:
+                register(each)
         except Exception as error:
             package = f" of {entry.dist.name}" if entry.dist else ""
-            warnings.warn(f"The model {entry.name}{package} is left out: {_sentence(error)}", stacklevel=2)
+            warnings.warn(f"The entry point {entry.name}{package} is left out: {_sentence(error)}", stacklevel=2)
 
 
 def import_models(target: str) -> None:
-    """Import a file, ``FILE.py``, or a module by its dotted name, and register the models that it defines.
+    """Import a file, ``FILE.py``, or a module by its dotted name, and register the models and the terms of the kit that
+    it defines.
 
     Raises:
         ImportError: if it cannot be imported, or fails.
-        ValueError: if it defines no models, or one that cannot be registered.
+        ValueError: if it defines none, or one that cannot be registered.
     """
     module = _file(Path(target)) if target.endswith(".py") else _module(target)
-    found = models_in(module)
+    found = _brought_by(module)
     if not found:
-        raise ValueError("it defines no subclass of mi_brdfs.Model")
-    for model in found:
-        register(model)
+        raise ValueError("it defines no subclass of mi_brdfs.Model, nor a term of the kit with a word")
+    for each in found:
+        register(each)
 
 
-def source(model: type[Model]) -> str | None:
-    """What another process gives to :func:`import_models` to know a model: None if nothing does, as for one that was
-    defined in a notebook or within a function."""
-    module = sys.modules.get(model.__module__)
-    if model.__module__ == "__main__" or module is None or model not in models_in(module):
+def _brought_by(module: ModuleType) -> list[type[Model] | type[Term]]:
+    return [*terms_in(module), *models_in(module)]
+
+
+def source(brought: type[Model] | type[Term]) -> str | None:
+    """What another process gives to :func:`import_models` to know a model or a term: None if nothing does, as for one
+    that was defined in a notebook or within a function."""
+    module = sys.modules.get(brought.__module__)
+    if brought.__module__ == "__main__" or module is None or brought not in _brought_by(module):
         return None
-    return _files.get(model.__module__, model.__module__)
+    return _files.get(brought.__module__, brought.__module__)
 
 
 def sources() -> list[str]:
-    """The sources of all models that others have brought."""
-    found = dict.fromkeys(source(model) for model in all_models() if not is_own(model))
+    """The sources of all models and terms that others have brought."""
+    found = dict.fromkeys(map(source, [*BROUGHT.values(), *(model for model in all_models() if not is_own(model))]))
     return [each for each in found if each]
 
 

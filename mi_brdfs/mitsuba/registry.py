@@ -16,12 +16,17 @@ import mitsuba as mi
 
 from .. import models
 from ..integrators.shading import Shading
+from ..microfacet.distributions import Distribution
+from ..microfacet.fresnel import Fresnel
+from ..microfacet.shadowing import Shadowing
+from ..microfacet.term import Term
 from ..model import Model, Plugin
+from ..models.microfacet import add_term
 from . import llvm
 from .bsdf import bsdf_class
 from .integrator import integrator_class
 
-AnyModel = TypeVar("AnyModel", bound=type[Model])
+Registered = TypeVar("Registered", bound=type[Model] | type[Term])
 
 MODELS: dict[str, type[Model]] = {}
 INTEGRATORS: dict[str, type[Plugin]] = {name: Shading for name in Shading.plugins}
@@ -32,30 +37,42 @@ _variants: dict[str, dict[str, type[Plugin]]] = {}
 # --- Which models there are -----------------------------------------------------------------------------------------
 
 
-def register(model: AnyModel, *, replace: bool = False) -> AnyModel:
+def register(brought: Registered, *, replace: bool = False) -> Registered:
     """Make a model of your own known by its names, ``model.plugins``, in every variant, present and future, and to all
-    commands and functions that take a name. Also a decorator::
+    commands and functions that take a name; or a distribution, a shadowing or a Fresnel term to ``microfacet`` (a
+    Fresnel term to all plugins with such parameters) by its ``word``. Also a decorator::
 
         @mi_brdfs.register
-        class Schlick94(mi_brdfs.Model):
+        class Lommel(mi_brdfs.Model):
             ...
 
     Registering an edited class again, as in a notebook, replaces its former self. BSDFs that were loaded before remain
     what they were.
 
     Args:
-        model: a subclass of :class:`mi_brdfs.Model`.
-        replace: take a name that belongs to Mitsuba or to another model.
+        brought: a subclass of :class:`mi_brdfs.Model`, or of :class:`mi_brdfs.microfacet.Distribution`, ``Shadowing``
+            or ``Fresnel``.
+        replace: take a name or word that belongs to Mitsuba or to another one.
 
     Returns:
-        The model.
+        The class.
 
     Raises:
-        TypeError: if it is not a subclass of ``mi_brdfs.Model``.
-        ValueError: if a name is taken or cannot be one, or the model has no docstring.
+        TypeError: if it is no such class.
+        ValueError: if a name is taken or cannot be one, or a model has no docstring.
     """
-    if not (isinstance(model, type) and issubclass(model, Model)):
-        raise TypeError(f"register takes a subclass of mi_brdfs.Model, which {model!r} is not.")
+    if isinstance(brought, type) and issubclass(brought, Model):
+        _register_model(brought, replace)
+    elif isinstance(brought, type) and issubclass(brought, (Distribution, Shadowing, Fresnel)):
+        add_term(brought, replace)
+    else:
+        raise TypeError(
+            f"register takes a subclass of mi_brdfs.Model, or of a term of mi_brdfs.microfacet; {brought!r} is neither."
+        )
+    return brought
+
+
+def _register_model(model: type[Model], replace: bool) -> None:
     if not (model.__doc__ or "").strip():
         raise ValueError(f"{model.__name__} has no docstring: write its manual page there, the first line a summary.")
     for name in model.plugins:
@@ -72,7 +89,6 @@ def register(model: AnyModel, *, replace: bool = False) -> AnyModel:
     MODELS.update(dict.fromkeys(model.plugins, model))
     for variant in _variants:
         _register_in(variant)
-    return model
 
 
 def _owner(name: str, model: type[Model]) -> str | None:
@@ -90,12 +106,17 @@ def _same(one: type[Model], other: type[Model]) -> bool:
 
 def models_in(module: ModuleType) -> list[type[Model]]:
     """The models that a module defines, in the order of their names."""
-    found = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Model) and value.__module__ == module.__name__
-    ]
-    return sorted(found, key=lambda model: model.plugins)
+    return sorted(_defined(module, Model), key=lambda model: model.plugins)
+
+
+def terms_in(module: ModuleType) -> list[type[Term]]:
+    """The terms with a word that a module defines."""
+    return [term for term in _defined(module, Term) if term.word]
+
+
+def _defined(module: ModuleType, kind: type) -> list[type]:
+    classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, kind)]
+    return [value for value in classes if value.__module__ == module.__name__]
 
 
 def is_own(model: type[Model]) -> bool:

@@ -1,9 +1,11 @@
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+import re
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 from ..lobes import MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, Distribution, HemiEPD
+from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import (
     AshikhminPremoze,
     AshikhminShirleyShadowing,
@@ -15,8 +17,10 @@ from ..microfacet.shadowing import (
     Shadowing,
     VCavity,
 )
+from ..microfacet.term import Term
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation
+from ..parameters import fresnel as fresnel_parameters
 from ..parameters.messages import listed
 
 ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
@@ -24,24 +28,17 @@ ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", ani
 
 
 class Facets(NamedTuple):
-    """A word for a distribution D: the class, which is called with the values of the parameters by name, NAME_u and
-    NAME_v of an anisotropic one."""
+    """A word for a distribution D, made of the values of the parameters."""
 
     distribution: type[Distribution]
-    parameters: dict[str, Parameter]
-
-    def make(self, values: dict[str, Any]) -> Distribution:
-        spread = {}
-        for name, value in values.items():
-            spread |= {f"{name}_u": value[0], f"{name}_v": value[1]} if isinstance(value, tuple) else {name: value}
-        return self.distribution(**spread)
+    parameters: Mapping[str, Parameter]
 
 
 class Shadows(NamedTuple):
     """A word for a shadowing term G, made of the distribution and the values of the parameters."""
 
     make: Callable[..., Shadowing]
-    parameters: dict[str, Parameter] = {}  # noqa: RUF012
+    parameters: Mapping[str, Parameter] = {}
     needs: str | None = None
     """The method of a distribution that it is made by."""
 
@@ -204,8 +201,42 @@ class Microfacet(Model):
             )
 
     def lobes(self, p):
-        distribution = DISTRIBUTIONS[self.distribution].make(vars(p.distribution))
+        distribution = DISTRIBUTIONS[self.distribution].distribution.of_values(vars(p.distribution))
         shadowing = SHADOWING[self.shadowing].make(distribution, **vars(p.shadowing))
         return over_diffuse(
             p.diffuse_reflectance, MicrofacetLobe(p.specular_reflectance, distribution, shadowing, p.fresnel)
         )
+
+
+# --- Words of others ------------------------------------------------------------------------------------------------
+
+BROUGHT: dict[tuple[str, str], type[Term]] = {}
+"""The terms that others have brought, by the name of the choice and the word."""
+
+
+def add_term(term: type[Term], replace: bool) -> None:
+    """Make a distribution, a shadowing or a Fresnel term known by its word: see :func:`mi_brdfs.register`."""
+    name, word = term.__name__, term.word
+    if not word or not re.fullmatch(r"[a-z][a-z0-9-]*", word):
+        raise ValueError(f'{name}: word is {word!r}; it must be small letters, digits and -, as word = "student-t".')
+    kinds = {Distribution: Microfacet.distribution, Shadowing: Microfacet.shadowing, Fresnel: fresnel_parameters.OTHERS}
+    kind, choice = next((kind, choice) for kind, choice in kinds.items() if issubclass(term, kind))
+    former = BROUGHT.get((choice.name, word))
+    own = former and (former.__module__, former.__qualname__) == (term.__module__, term.__qualname__)
+    if word in choice.words and not (own or replace):
+        owner = f"{former.__module__}.{former.__qualname__}" if former else "mi_brdfs"
+        raise ValueError(
+            f'{name}: the word "{word}" belongs to {owner}; take another one, or register with replace=True.'
+        )
+    others = [it for it in Microfacet.declared() if it is not choice and not (kind is Fresnel and it.name == "fresnel")]
+    taken = {name for parameter in others for name in parameter.names}
+    if clash := next((name for it in term.parameters for name in (it, f"{it}_u", f"{it}_v") if name in taken), None):
+        raise ValueError(f"{name}: a parameter cannot be called {clash}, as microfacet has that.")
+    choice.add(word, term.parameters)
+    BROUGHT[choice.name, word] = term
+    if kind is Distribution:
+        DISTRIBUTIONS[word] = Facets(term, term.parameters)
+    elif kind is Shadowing:
+        SHADOWING[word] = Shadows(lambda facets, **values: term.of_values(values), term.parameters)
+    else:
+        fresnel_parameters.TERMS[word] = term

@@ -9,16 +9,23 @@ from typing import ClassVar
 import mitsuba as mi
 
 from ..math import clamp
-from ..microfacet.fresnel import Conductor, Dielectric, Schlick, Unit
+from ..microfacet.fresnel import Conductor, Dielectric, Fresnel, Schlick, Unit
 from .colours import constant_texture, evaluate_colour, rgb_texture, scaled_colour
+from .groups import OneOf
 from .messages import interval, listed, shown
 from .parameter import Parameter, ParameterRow
 from .reader import PropertyReader, Range
 
+OTHERS = OneOf({}, "another Fresnel term").replace(name="fresnel")
+"""The words that others have brought."""
+TERMS: dict[str, type[Fresnel]] = {}
+"""Their terms."""
+
 
 class FresnelSet(Parameter):
     """The Fresnel term: of a conductor (eta and k, or a material's name), Schlick's (f0), of a dielectric (int_ior
-    over ext_ior), or none (F = 1). Evaluated, a function of the cosine."""
+    over ext_ior), or none (F = 1); or another one by its word, with parameters of its own. Evaluated, a function of the
+    cosine."""
 
     INDEX: ClassVar[Range] = (0.01, 100)
     EXTINCTION: ClassVar[Range] = (0, 100)
@@ -36,15 +43,30 @@ class FresnelSet(Parameter):
         "dielectric": ("int_ior", "ext_ior"),
     }
 
+    word: str | None = None
+    """Once bound, the chosen one of these words, if there is one."""
+    own: OneOf
+    """… and its parameters."""
+
     def __init__(self) -> None:
         super().__init__("Fresnel reflectance")
 
     @property
     def names(self) -> list[str]:
-        return [name for names in self.SETS.values() for name in names]
+        common = [name for names in self.SETS.values() for name in names]
+        return [*common, *OTHERS.names] if TERMS else common
 
     def bind(self, reader: PropertyReader) -> FresnelSet:
         textures = self._textures(reader)
+        if TERMS and (other := next((name for name in OTHERS.names if name in reader), None)):
+            if textures:
+                raise reader.error(other, f"excludes {next(iter(textures))}; give one Fresnel term")
+            if OTHERS.name not in reader:
+                words = listed(TERMS, quote=True)
+                raise reader.error(other, f"needs {OTHERS.name} beside it, which is {words}")
+            own = OTHERS.bind(reader)
+            word = own.chosen[own.name]
+            return self.replace(own=own, word=word, textures=own.textures, ranges=own.ranges, chosen=own.chosen)
         ranges = {name: limits for name, limits in self.RANGES.items() if name in textures}
         return self.replace(textures=textures, ranges=ranges)
 
@@ -99,7 +121,10 @@ class FresnelSet(Parameter):
             )
         return {name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Conductor | Schlick | Dielectric | Unit:
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Fresnel:
+        if self.word:
+            return TERMS[self.word].of_values(vars(self.own.evaluate(si, active)))
+
         def colour(name: str) -> mi.UnpolarizedSpectrum:
             return clamp(evaluate_colour(self.textures, name, si, active), *self.RANGES[name])
 
@@ -114,12 +139,12 @@ class FresnelSet(Parameter):
             return Dielectric(number("int_ior") / number("ext_ior"))
         return Unit()
 
-    def placeholder(self) -> Unit:
-        return Unit()
+    def placeholder(self) -> Fresnel:
+        return TERMS[self.word].of_values(vars(self.own.placeholder())) if self.word else Unit()
 
     def rows(self) -> list[ParameterRow]:
         index, extinction = interval(*self.INDEX), interval(*self.EXTINCTION)
-        return [
+        rows = [
             ParameterRow("eta, k", "colour", "-", f"{index}, {extinction}",
                          "complex index of refraction of a conductor, relative to the exterior"),
             ParameterRow("material", "string", "none", "Mitsuba's conductors | none",
@@ -129,6 +154,7 @@ class FresnelSet(Parameter):
             ParameterRow("int_ior, ext_ior", "number or name", "bk7, air", index,
                          "indices of refraction of a dielectric, inside and outside"),
         ]  # fmt: skip
+        return rows + OTHERS.rows() if TERMS else rows
 
 
 def _measured(path: Path) -> mi.Texture:

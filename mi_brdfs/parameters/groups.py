@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 
 import mitsuba as mi
@@ -21,12 +22,17 @@ class OneOf(Parameter):
     own: BoundParameters
     """Once bound, the parameters of the chosen word."""
 
-    def __init__(self, words: dict[str, dict[str, Parameter]], text: str):
+    def __init__(self, words: Mapping[str, Mapping[str, Parameter]], text: str):
         super().__init__(text)
-        self.words = words
-        for declared in words.values():
-            for name, parameter in declared.items():
-                parameter.__set_name__(None, name)
+        self.words: dict[str, Mapping[str, Parameter]] = {}
+        for word, declared in words.items():
+            self.add(word, declared)
+
+    def add(self, word: str, declared: Mapping[str, Parameter]) -> None:
+        """Add a word with its parameters."""
+        for name, parameter in declared.items():
+            parameter.__set_name__(None, name)
+        self.words[word] = declared
 
     @property
     def names(self) -> list[str]:

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from albedos import axes, brightest, fault
 from reference_albedos import REFERENCES, Reference
 
-from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.mitsuba.registry import own_models
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -50,7 +50,7 @@ def main():
     arguments = parser.parse_args()
     mi.set_variant("llvm_ad_rgb")
     verdicts = []
-    for model in all_models():
+    for model in own_models():
         name = model.plugins[0]
         if arguments.models and name not in arguments.models:
             continue

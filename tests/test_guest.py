@@ -1,0 +1,82 @@
+"""A package of somebody else, ``tests/guest``, that brings a model and a distribution by an entry point: nothing in
+the project knows of it."""
+
+import importlib.metadata
+import subprocess
+import sys
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import call, hemisphere, is_scalar
+
+import mi_brdfs
+
+pytestmark = pytest.mark.skipif(
+    not importlib.metadata.entry_points(group="mi_brdfs.models", name="guest"),
+    reason="the guest is not installed: pip install ./tests/guest",
+)
+
+KIT = {"type": "microfacet", "distribution": "student-t", "alpha_u": 0.2, "alpha_v": 0.5, "gamma": 2.2,
+       "shadowing": "vcavity"}  # fmt: skip
+
+
+def lommel_seeliger(wi, wo):
+    return 0.6 / (4 * np.pi * (wi[:, 2] + wo[:, 2])) * wo[:, 2]
+
+
+def student_t(wi, wo):
+    h = wi + wo
+    h /= np.linalg.norm(h, axis=1, keepdims=True)
+    cos_d = (wi * h).sum(axis=1)
+    t = ((h[:, 0] / 0.2) ** 2 + (h[:, 1] / 0.5) ** 2) / h[:, 2] ** 2
+    ndf = (1 + t / 1.2) ** -2.2 / (np.pi * 0.2 * 0.5 * h[:, 2] ** 4)
+    shadowing = np.minimum(1, 2 * h[:, 2] * np.minimum(wi[:, 2], wo[:, 2]) / cos_d)
+    return ndf * shadowing / (4 * wi[:, 2])
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+@pytest.mark.parametrize(
+    "bsdf, reference", [({"type": "lommelseeliger", "w": 0.6}, lommel_seeliger), (KIT, student_t)], ids=["model", "D"]
+)
+def test_formulas(variant, bsdf, reference):
+    count = 40 if is_scalar() else 10_000
+    wi, wo = hemisphere(count, 1), hemisphere(count, 2)
+    got = call(mi.load_dict(bsdf).eval, mi.BSDFContext(), wi, wo)[0][:, 0]
+    expected = reference(wi.astype(np.float64), wo.astype(np.float64))
+    np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-6 * expected.max())
+
+
+def command(folder, *words):
+    done = subprocess.run(
+        [sys.executable, "-m", "mi_brdfs.cli", *words], cwd=folder, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_it_is_listed_and_has_a_page(tmp_path):
+    assert {"lommelseeliger", "dust"} <= set(mi_brdfs.list_models())
+    assert "The law of Lommel and Seeliger" in command(tmp_path, "list")
+    assert "single-scattering albedo w" in command(tmp_path, "info", "dust")
+    page = command(tmp_path, "info", "microfacet")
+    assert "student-t" in page and "with beckmann, ggx and student-t" not in page
+
+
+@pytest.mark.parametrize("word", ["dust", "kit.xml"])
+def test_it_passes_all_checks(tmp_path, word):
+    (tmp_path / "kit.xml").write_text(
+        '<bsdf type="microfacet" version="3.0.0"><string name="distribution" value="student-t"/>'
+        '<string name="shadowing" value="vcavity"/></bsdf>'
+    )
+    assert "fail" not in command(tmp_path, "check", word)
+
+
+def test_it_is_plotted_and_pictured(tmp_path):
+    command(tmp_path, "plot", "dust", "-o", "dust.png")
+    command(tmp_path, "gallery", "dust", "-o", "pictures", "--size", "32", "--spp", "4")
+    assert (tmp_path / "dust.png").exists() and (tmp_path / "pictures" / "lommelseeliger.png").exists()
+
+
+def test_it_is_benched(tmp_path):
+    assert "lommelseeliger" in command(tmp_path, "bench", "--only", "efficiency")
