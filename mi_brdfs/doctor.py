@@ -44,7 +44,7 @@ if not 0.1 < mean < 2:
 
 
 @dataclass(frozen=True)
-class Finding:
+class BackendStatus:
     """What became of one backend's test render."""
 
     backend: str
@@ -55,7 +55,7 @@ class Finding:
     """The reason of a failure, or the library that works."""
 
 
-def examine() -> list[Finding]:
+def examine() -> list[BackendStatus]:
     """Try every backend that this build of Mitsuba has."""
     import mitsuba as mi
 
@@ -67,7 +67,7 @@ def examine() -> list[Finding]:
     return findings
 
 
-def next_step(findings: list[Finding]) -> str:
+def next_step(findings: list[BackendStatus]) -> str:
     """The next thing to do, or that there is nothing to do."""
     if any(it.backend == "llvm" and it.state == "aborts" for it in findings):
         return f"Next: {llvm.cure()}"
@@ -76,7 +76,7 @@ def next_step(findings: list[Finding]) -> str:
     return f"Nothing but scalar variants works, and they are slow. Next: {llvm.cure()}"
 
 
-def any_fast(findings: list[Finding]) -> bool:
+def any_fast(findings: list[BackendStatus]) -> bool:
     """Whether at least one vectorized backend works."""
     return any(it.state == "works" and it.backend != "scalar" for it in findings)
 
@@ -87,22 +87,22 @@ def versions() -> dict[str, str]:
     return {**packages, "python": platform.python_version(), "system": platform.platform(terse=True)}
 
 
-def _try(backend: str, variants: tuple[str, ...]) -> Finding:
+def _try(backend: str, variants: tuple[str, ...]) -> BackendStatus:
     chosen = next((name for name in variants if name.endswith("_rgb")), variants[0])
     command = [sys.executable, "-c", PROBE, chosen]
     try:
         run = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
-        return Finding(backend, variants, "fails", f"no image within {TIMEOUT} seconds")
+        return BackendStatus(backend, variants, "fails", f"no image within {TIMEOUT} seconds")
     if run.returncode == 0:
-        return Finding(backend, variants, "works", _last_line(run.stdout))
+        return BackendStatus(backend, variants, "works", _last_line(run.stdout))
     if run.returncode < 0:
         name = signal.Signals(-run.returncode).name
         detail = f"the test render died of {name}; {_last_line(run.stdout)}".rstrip("; ")
-        return Finding(backend, variants, "aborts", detail)
+        return BackendStatus(backend, variants, "aborts", detail)
     if run.returncode == MISSING:
-        return Finding(backend, variants, "missing", WHY_MISSING.get(backend, _last_line(run.stderr)))
-    return Finding(backend, variants, "fails", _last_line(run.stderr))
+        return BackendStatus(backend, variants, "missing", WHY_MISSING.get(backend, _last_line(run.stderr)))
+    return BackendStatus(backend, variants, "fails", _last_line(run.stderr))
 
 
 def _last_line(text: str) -> str:
