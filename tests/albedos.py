@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 from scipy.stats import qmc
-from support import context, interaction, per_lane
+from support import per_lane
 
+from mi_brdfs.measure.arrays import luminance
+from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.parameters import Choice, Colour, Flag, Number, OneOf, PerLobe
 
 STEEPEST = 89.9
@@ -27,18 +29,14 @@ rounded."""
 def albedos(bsdf, wi, log2_count, seed=1):
     """The directional albedos at several directions: the means of sample's weights over the same low-discrepancy
     variates. 2⁸ are good to about 1 %, 2¹⁴ to some 1e-4."""
-    count = 1 << log2_count
-    u = np.tile(variates(log2_count, seed), len(wi))
-    _, weight = bsdf.sample(
-        context(), interaction(np.repeat(wi, count, axis=0)), mi.Float(u[0]), mi.Point2f(u[1:]), True
-    )
-    return np.array(mi.luminance(weight), np.float64).reshape(len(wi), count).mean(axis=1)
+    probe = BSDFProbe(bsdf)
+    return luminance(probe.weights(probe.whole, wi, variates(log2_count, seed))).mean(axis=1)
 
 
 @cache
 def variates(log2_count, seed):
-    """Points of the unit cube, shape (3, 2^log2_count)."""
-    return np.float32(qmc.Sobol(3, seed=seed).random_base2(log2_count)).clip(0, 1 - 2**-24).T
+    """Points of the unit cube, shape (2^log2_count, 3), by other means than the checker's."""
+    return np.float32(qmc.Sobol(3, seed=seed).random_base2(log2_count)).clip(0, 1 - 2**-24)
 
 
 # --- The space of settings ------------------------------------------------------------------------------------------

@@ -2,51 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from mi_brdfs.measure import directions
+from mi_brdfs.measure.arrays import context as context
+from mi_brdfs.measure.arrays import interaction as interaction
+from mi_brdfs.measure.arrays import numbers as numbers
+from mi_brdfs.measure.directions import direction as direction
+from mi_brdfs.variants import is_scalar as is_scalar
 
-def direction(theta: float, phi: float = 0.0) -> np.ndarray:
-    """The float32 unit vector at these angles, in degrees."""
-    theta, phi = np.radians([theta, phi])
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], np.float32)
-
-
-def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
-    """Uniform directions with cosines of at least ``lowest``, shape (count, 3), float32."""
-    rng = np.random.default_rng(seed)
-    z, phi = rng.uniform(lowest, 1, count), rng.uniform(0, 2 * np.pi, count)
-    sin = np.sqrt(1 - z * z)
-    return np.stack([sin * np.cos(phi), sin * np.sin(phi), z], axis=-1).astype(np.float32)
+hemisphere = partial(directions.hemisphere, lowest=0.02)
+"""Uniform directions above the horizon, shape (count, 3), float32."""
 
 
-def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
+def sphere(count: int, seed: int) -> np.ndarray:
     """The same, every other one below the horizon."""
-    w = hemisphere(count, seed, lowest)
+    w = hemisphere(count, seed)
     w[::2, 2] *= -1
     return w
-
-
-def interaction(wi) -> mi.SurfaceInteraction3f:
-    """A surface interaction for one direction of the local frame, or for an array of shape (N, 3)."""
-    si = dr.zeros(mi.SurfaceInteraction3f)
-    si.wi = mi.Vector3f(np.asarray(wi, np.float32).T)
-    if not is_scalar():
-        dr.make_opaque(si.wi)
-    if mi.is_spectral:
-        si.wavelengths = mi.UnpolarizedSpectrum(450, 520, 580, 640)
-    return si
-
-
-def context(component=None, mask=None):
-    """A BSDF context, of one component or of some types if they are given."""
-    ctx = mi.BSDFContext()
-    if component is not None:
-        ctx.component = component
-    if mask is not None:
-        ctx.type_mask = int(mask)
-    return ctx
 
 
 def per_lane() -> mi.Texture:
@@ -63,20 +40,6 @@ def per_lane() -> mi.Texture:
             return self.value
 
     return Lanes()
-
-
-def is_scalar() -> bool:
-    return mi.variant().startswith("scalar")
-
-
-def numbers(value) -> np.ndarray:
-    """A float, spectrum or Mueller matrix (of which the first entry counts) as floats of shape (N, channels)."""
-    if mi.is_polarized and isinstance(value, mi.Spectrum):
-        value = value[0, 0]
-    array = np.array(value, np.float64)
-    if is_scalar():
-        return array.reshape(1, -1)
-    return array.reshape(-1, array.shape[-1]).T if array.ndim > 1 else array.reshape(-1, 1)
 
 
 def call(method, ctx, wi, *arrays):

@@ -14,12 +14,15 @@ from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, ph
 from rich.console import Console
 
 import mi_brdfs
-from mi_brdfs.bench import SECTIONS, Figure, Results, Target, bench, process, resources, runner, sizes, timing
+from mi_brdfs.bench import SECTIONS, Figure, Results, Target, bench, process, renders, resources, sizes, timing
+from mi_brdfs.bench import run as bench_run
 from mi_brdfs.bench.cases import BUILT_INS, TABLE, Case, all_cases, built_ins, defaults
 from mi_brdfs.bench.efficiency import Sampling, _mean, efficiency, sampling
 from mi_brdfs.bench.first import first_picture
+from mi_brdfs.bench.renders import alternate
+from mi_brdfs.bench.run import BenchRun
 from mi_brdfs.bench.scenes import ALONE, BOX, PATH, SPHERE, scene_of, sphere
-from mi_brdfs.bench.timing import alternate, deviations, median_interval, time_variance
+from mi_brdfs.bench.timing import deviations, median_interval, time_variance
 from mi_brdfs.lobes import LambertLobe, PowerLobe
 from mi_brdfs.mitsuba.bsdf import ModelBSDF
 from mi_brdfs.mitsuba.registry import all_models
@@ -88,7 +91,7 @@ pytestmark = pytest.mark.usefixtures("llvm_rgb", "small")
 
 def measured(section, cases):
     """The figures of a section for some cases only, by subject and name."""
-    run = runner.Run(lambda *_: None, cases)
+    run = BenchRun(lambda *_: None, cases)
     return {(figure.subject, figure.name): figure for figure in section(run)}
 
 
@@ -245,7 +248,7 @@ def test_a_bsdf_beside_itself(scene):
 def test_pairs_are_rendered_in_turn_and_alone(monkeypatch):
     """One first, then the other, with the same seed; and while one is rendered the other is not loaded, or else it
     would be part of the kernel."""
-    rendered, render = [], timing.render
+    rendered, render = [], renders.render
 
     def recording(scene, seed):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
@@ -259,7 +262,7 @@ def test_pairs_are_rendered_in_turn_and_alone(monkeypatch):
     for bsdf in (WALTER, LAMBERT):
         recording(scene_of(bsdf, SPHERE), 0)
         expected[bsdf["type"]] = rendered.pop()[2]
-    monkeypatch.setattr(timing, "render", recording)
+    monkeypatch.setattr(renders, "render", recording)
     alternate(WALTER, LAMBERT, SPHERE)
     assert all(kernels == expected[name] for name, _, kernels in rendered)
     pairs = [dict((rendered[k][:2], rendered[k + 1][:2])) for k in range(2, len(rendered), 2)]
@@ -272,9 +275,9 @@ def test_what_is_slower_and_quieter_is_told(monkeypatch):
     render once."""
     burley = {"type": "burley", "sheen": 0.5, "clearcoat": 0.5}
     cases = [Case("burley", burley, WALTER, True), Case("other", LAMBERT, WALTER)]
-    calls, alternate = [], timing.alternate
-    monkeypatch.setattr(runner, "alternate", lambda *given: calls.append(given) or alternate(*given))
-    run = runner.Run(lambda *_: None, cases)
+    calls = []
+    monkeypatch.setattr(bench_run, "alternate", lambda *given: calls.append(given) or alternate(*given))
+    run = BenchRun(lambda *_: None, cases)
     times = {(f.subject, f.name): f for f in timing.time(run)}
     variances = {(f.subject, f.name): f for f in timing.variance(run)}
     assert len(calls) == 3 + 2

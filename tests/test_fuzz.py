@@ -182,7 +182,7 @@ def some_of(functions):
 
 
 def lanes(options):
-    """Arguments for :meth:`Subject.fill`."""
+    """Arguments for :meth:`FuzzedPlugin.fill`."""
     filled = st.fixed_dictionaries({quantity.name: some_of(SETTINGS) for quantity in options.quantities})
     return st.tuples(filled, some_of(INCIDENT), some_of(REFLECTED), st.integers(0, 2**32 - 1))
 
@@ -190,7 +190,7 @@ def lanes(options):
 # --- Outputs --------------------------------------------------------------------------------------------------------
 
 
-class Subject:
+class FuzzedPlugin:
     """A plugin with some options, whose quantities differ from lane to lane. A range without an end has ``largest``."""
 
     def __init__(self, model, options, largest, lanes=LANES):
@@ -312,16 +312,16 @@ def faults(answers):
 @pytest.mark.parametrize("model, options", CASES)
 def test_values(model, options):
     """Finite, not negative, of a density wherever they are positive."""
-    subject, evaluated = Subject(model, options, largest=1e20), 0  # the rest of float32 is for the height of lobes
+    plugin, evaluated = FuzzedPlugin(model, options, largest=1e20), 0  # the rest of float32 is for the height of lobes
 
     @examples(EXAMPLES, lanes(options))
     def fuzz(drawn):
         nonlocal evaluated
-        subject.fill(*drawn)
-        for part, answers in subject.answers().items():
+        plugin.fill(*drawn)
+        for part, answers in plugin.answers().items():
             for fault, wrong in faults(answers):
-                assert not wrong.any(), f"{fault}: {subject.reproduction(part, np.argmax(wrong))}"
-        evaluated += subject.lanes
+                assert not wrong.any(), f"{fault}: {plugin.reproduction(part, np.argmax(wrong))}"
+        evaluated += plugin.lanes
 
     fuzz()
     assert evaluated * len(MODELS) >= EVALUATIONS
@@ -331,19 +331,19 @@ def test_values(model, options):
 def test_values_of_a_scalar_variant(model, options):
     """Where Python's floats divide: by zero they raise an error, and they go on below the least of float32."""
     with mi.variant_context("scalar_rgb"):
-        subject = Subject(model, options, largest=1e20, lanes=50)
+        plugin = FuzzedPlugin(model, options, largest=1e20, lanes=50)
 
         @examples(2, lanes(options))
         def fuzz(drawn):
-            subject.fill(*drawn)
-            for lane in range(subject.lanes):
+            plugin.fill(*drawn)
+            for lane in range(plugin.lanes):
                 try:
-                    found = subject.answers(lane)
+                    found = plugin.answers(lane)
                 except Exception as error:
-                    raise AssertionError(subject.reproduction(None, lane)) from error
+                    raise AssertionError(plugin.reproduction(None, lane)) from error
                 for part, answers in found.items():
                     for fault, wrong in faults(answers):
-                        assert not wrong.any(), f"{fault}: {subject.reproduction(part, lane)}"
+                        assert not wrong.any(), f"{fault}: {plugin.reproduction(part, lane)}"
 
         fuzz()
 
@@ -365,14 +365,14 @@ def test_derivatives_forward(model, derivative_lanes):
 
 
 def fuzz_derivatives(model, options, mode, count):
-    subject = Subject(model, options, largest=1e3)
+    plugin = FuzzedPlugin(model, options, largest=1e3)
 
-    @examples(-(-count // subject.lanes), lanes(options))
+    @examples(-(-count // plugin.lanes), lanes(options))
     def fuzz(drawn):
-        subject.fill(*drawn)
-        for name, derivative in subject.derivatives(mode).items():
+        plugin.fill(*drawn)
+        for name, derivative in plugin.derivatives(mode).items():
             wrong = ~np.isfinite(derivative).all(axis=1)
-            assert not wrong.any(), f"the derivative for {name}: {subject.reproduction(None, np.argmax(wrong))}"
+            assert not wrong.any(), f"the derivative for {name}: {plugin.reproduction(None, np.argmax(wrong))}"
 
     fuzz()
 

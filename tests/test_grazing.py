@@ -7,10 +7,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from support import context, interaction, numbers
-from test_fuzz import CASES, Subject, directions, magnitudes
+from test_fuzz import CASES, FuzzedPlugin, directions, magnitudes
 
 from mi_brdfs.math import luminance
-from mi_brdfs.validation.sampling import variates
+from mi_brdfs.measure.variates import lattice, sampling_efficiency
 
 SETTINGS = 48
 LARGEST_WEIGHT = 20
@@ -50,22 +50,22 @@ def drawn(options, rng):
 def test_weights(model, options):
     """Of every lobe alone and of their mixture, from 30° to 89°, most of them beyond 80°, at any azimuth."""
     rng = np.random.default_rng(1)
-    points = variates(8, 1)
-    subject = Subject(model, options, largest=1e6, lanes=SETTINGS * len(points))
+    points = lattice(8, 1)
+    plugin = FuzzedPlugin(model, options, largest=1e6, lanes=SETTINGS * len(points))
     settings = drawn(options, rng)
     theta = np.radians(
         np.where(rng.random(SETTINGS) < 0.2, rng.uniform(30, 80, SETTINGS), rng.uniform(80, 89, SETTINGS))
     )
     wi = directions(np.cos(theta), np.sin(theta), rng)
 
-    subject.values = {name: np.repeat(value, len(points), axis=-1) for name, value in settings.items()}
-    subject.enter()
+    plugin.values = {name: np.repeat(value, len(points), axis=-1) for name, value in settings.items()}
+    plugin.enter()
     si = interaction(np.repeat(wi, len(points), axis=0))
     u, x, y = np.tile(points.T, SETTINGS)
-    count = subject.bsdf.component_count()
+    count = plugin.bsdf.component_count()
     parts = [None, *range(count)] if count > 1 else [None]
     weights = [
-        luminance(subject.bsdf.sample(context(part), si, mi.Float(u), mi.Point2f(x, y), True)[1]) for part in parts
+        luminance(plugin.bsdf.sample(context(part), si, mi.Float(u), mi.Point2f(x, y), True)[1]) for part in parts
     ]
     dr.eval(weights)
     for part, weight in zip(parts, weights, strict=True):
@@ -74,7 +74,7 @@ def test_weights(model, options):
         black = mean <= 1e-30
         mean = np.where(black, 1, mean)
         largest = weight.max(axis=1) / mean
-        eta = np.where(black, 1, mean**2 / np.where(black, 1, (weight**2).mean(axis=1)))
+        eta = np.where(black, 1, sampling_efficiency(weight))
         for wrong, figure in ((largest > LARGEST_WEIGHT, largest), (eta < LEAST_ETA, eta)):
             k = np.argmax(wrong)
             at = {name: value[..., k].tolist() for name, value in settings.items()}

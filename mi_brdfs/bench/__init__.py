@@ -4,7 +4,8 @@
 measured by name; their docstrings say how.
 """
 
-from .report import Figure, Results, Target
+from .figure import Figure, Target
+from .report import Results
 from .runner import SECTIONS, bench
 
 __all__ = ["SECTIONS", "Figure", "Results", "Target", "bench"]

@@ -8,11 +8,14 @@ from typing import NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..validation.sampling import variates
-from ..validation.subject import Part, Subject, brightness, direction, interaction, numbers
+from ..measure.arrays import Array, luminance
+from ..measure.directions import direction
+from ..measure.probe import BSDFProbe, Part
+from ..measure.variates import lattice, sampling_efficiency
 from . import sizes
 from .cases import Plugin
-from .report import Figure, Target
+from .figure import Figure, Target
+from .run import BenchRun
 
 WHOLE, GAIN = "whole", "gain"
 UP_TO_60 = {"walter alpha 0.5": 0.91, "walter alpha 1": 0.97}
@@ -22,16 +25,16 @@ UP_TO_60 = {"walter alpha 0.5": 0.91, "walter alpha 1": 0.97}
 class Sampling(NamedTuple):
     """What the samples of a part say: arrays over the angles and azimuths."""
 
-    albedo: np.ndarray
-    eta: np.ndarray
+    albedo: Array
+    eta: Array
     """0 where the part is black."""
 
-    def least(self) -> np.ndarray:
-        """Over the azimuths."""
+    def least(self) -> Array:
+        """Return the least efficiency over the azimuths, for each angle."""
         return self.eta.min(axis=1)
 
 
-def efficiency(run) -> Iterator[Figure]:
+def efficiency(run: BenchRun) -> Iterator[Figure]:
     """η = E[w]²/E[w²] of the luminance w of the weights that ``sample`` returns, those of zero counted: 1 is perfect,
     and 1/η - 1 the relative variance of one sample under uniform light. Of anisotropic parts it is the least over three
     azimuths. From points that fill the space of the variates evenly: good to 0.001.
@@ -71,28 +74,23 @@ def efficiency(run) -> Iterator[Figure]:
 
 
 def _mean(whole: Sampling, lobes: Iterable[Sampling], k: int) -> float:
-    """The mean efficiency of the lobes, weighted by what they reflect, at an angle and at the whole's worst azimuth
-    there."""
+    """Return the mean efficiency of the lobes, weighted by what they reflect, at an angle and at the whole's worst
+    azimuth there."""
     worst = int(np.argmin(whole.eta[k]))
     albedo, eta = np.array([(lobe.albedo[k, worst], lobe.eta[k, worst]) for lobe in lobes]).T
     return float(albedo @ eta / albedo.sum())
 
 
 def sampling(bsdf: Plugin) -> dict[str, Sampling]:
-    """What samples say of the whole BSDF, and of each component if there are several."""
-    subject = Subject(mi.load_dict(bsdf), sizes.ANGLES)
-    return {part.name: _sampling(subject.bsdf, part) for part in subject.parts}
+    """Return what samples say of the whole BSDF, and of each component if there are several."""
+    probe = BSDFProbe(mi.load_dict(bsdf))
+    return {part.name: _sampling(probe, part) for part in probe.parts}
 
 
-def _sampling(bsdf: mi.BSDF, part: Part) -> Sampling:
+def _sampling(probe: BSDFProbe, part: Part) -> Sampling:
     azimuths = sizes.AZIMUTHS if part.has(mi.BSDFFlags.Anisotropic) else sizes.AZIMUTHS[:1]
     directions = np.array([direction(theta, phi) for theta in sizes.ANGLES for phi in azimuths])
-    points = variates(sizes.LOG2_POINTS, 1)
-    wi, repeated = np.repeat(directions, len(points), axis=0), np.tile(points, (len(directions), 1))
-    u, v = mi.Float(repeated[:, 0].copy()), mi.Point2f(np.ascontiguousarray(repeated[:, 1:].T))
-    _, weight = bsdf.sample(part.context, interaction(wi), u, v, True)
-    w = brightness(numbers(weight, len(wi))).reshape(len(sizes.ANGLES), len(azimuths), -1)
-    albedo, squares = w.mean(axis=2), (w**2).mean(axis=2)
-    eta = albedo**2 / np.where(squares > 0, squares, 1)
+    w = luminance(probe.weights(part, directions, lattice(sizes.LOG2_POINTS, 1)))
+    w = w.reshape(len(sizes.ANGLES), len(azimuths), -1)
     full = len(sizes.ANGLES), len(sizes.AZIMUTHS)
-    return Sampling(np.broadcast_to(albedo, full), np.broadcast_to(eta, full))
+    return Sampling(np.broadcast_to(w.mean(axis=-1), full), np.broadcast_to(sampling_efficiency(w), full))

@@ -11,8 +11,9 @@ import numpy as np
 
 from . import sizes
 from .cases import Plugin, built_ins, defaults, pairs
+from .figure import Figure, Target
 from .process import in_new_process
-from .report import Figure, Target
+from .run import BenchRun
 from .scenes import PATH, sphere, spheres
 from .timing import median_interval
 
@@ -20,7 +21,7 @@ ALL = "all models"
 SIZE = 16
 
 
-def first(run) -> Iterator[Figure]:
+def first(run: BenchRun) -> Iterator[Figure]:
     """The time from loading a scene to its first, small picture, traced and compiled, over that with the built-in: in
     fresh processes that find no compiled kernels, in turn, the median of the pairs. One sphere with the default
     parameters of a model; and one sphere for each model, beside as many built-ins.

@@ -12,11 +12,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..validation.derivatives import kernels_of
+from ..measure.kernels import launched_kernels
 from . import sizes
 from .cases import Plugin, defaults
+from .figure import Figure, Target
 from .process import in_new_process
-from .report import Figure, Target
+from .run import BenchRun
 from .scenes import PATH, sphere
 
 SIZE = 16
@@ -25,7 +26,7 @@ SIZE = 16
 # --- Kernels --------------------------------------------------------------------------------------------------------
 
 
-def recompiles(run) -> Iterator[Figure]:
+def recompiles(run: BenchRun) -> Iterator[Figure]:
     """The kernels compiled for a new value of a parameter, each in turn, and for loading the same scene again after it
     was discarded; of all sets of parameters of a model together. Whether one is compiled depends on what earlier runs
     left on the disk, so they are told by their hashes: what counts are those that the first picture did not need.
@@ -64,13 +65,13 @@ def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
 
 def _launched(scene: mi.Scene) -> set[int]:
     """The kernels of a picture."""
-    return kernels_of(lambda: dr.eval(mi.render(scene, spp=1)))
+    return launched_kernels(lambda: dr.eval(mi.render(scene, spp=1)))
 
 
 # --- Time and memory ------------------------------------------------------------------------------------------------
 
 
-def cycles(run) -> Iterator[Figure]:
+def cycles(run: BenchRun) -> Iterator[Figure]:
     """Loading, rendering and discarding scenes in a process of its own, each with one model, round after round over all
     of them: how long the last rounds take over the first after a warm-up, and how much the memory grows. The time is
     that of the thread that loads and traces, the best of a model in each part, which other processes disturb least,

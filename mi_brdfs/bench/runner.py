@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 
 import drjit as dr
 import mitsuba as mi
@@ -12,48 +11,20 @@ import mitsuba as mi
 from ..doctor import versions
 from ..mitsuba import llvm
 from ..variants import is_measurable
-from .cases import Case, all_cases
+from .cases import all_cases
 from .efficiency import efficiency
+from .figure import Figure
 from .first import first
-from .report import Figure, Results
+from .report import Results
 from .resources import cycles, recompiles
+from .run import BenchRun
 from .scalar import scalar
-from .timing import Renders, alternate, time, variance
+from .timing import time, variance
 
-SECTIONS: dict[str, Callable[[Run], Iterator[Figure]]] = {
+SECTIONS: dict[str, Callable[[BenchRun], Iterator[Figure]]] = {
     section.__name__: section for section in (efficiency, time, variance, first, recompiles, cycles, scalar)
 }
 """What is measured by name, in the order in which it is; the docstring of each says how, and what the targets are."""
-
-T = TypeVar("T")
-
-
-@dataclass
-class Run:
-    """One call of :func:`bench`: what the sections share."""
-
-    on_progress: Callable[[str, int, int], None]
-    cases: list[Case]
-    section: str = ""
-    _renders: dict[tuple[str, str], Renders] = field(default_factory=dict)
-
-    @property
-    def beside(self) -> list[Case]:
-        """The cases with a built-in beside them."""
-        return [case for case in self.cases if case.builtin]
-
-    def steps(self, items: Sequence[T]) -> Iterator[T]:
-        """The items, telling how many are done."""
-        for done, item in enumerate(items):
-            self.on_progress(self.section, done, len(items))
-            yield item
-
-    def renders(self, case: Case, scene: str) -> Renders:
-        """A case beside its built-in in one of the scenes; rendered once for all sections."""
-        key = case.name, scene
-        if key not in self._renders:
-            self._renders[key] = alternate(case.bsdf, case.builtin, scene)
-        return self._renders[key]
 
 
 def bench(
@@ -76,7 +47,7 @@ def bench(
     variant = mi.variant()
     if not is_measurable(variant):
         raise ValueError(f"Measuring needs a vectorized and unpolarized variant, not {variant}.")
-    run = Run(on_progress, all_cases())
+    run = BenchRun(on_progress, all_cases())
     figures = []
     for run.section in (name for name in SECTIONS if name in wanted):
         figures += SECTIONS[run.section](run)

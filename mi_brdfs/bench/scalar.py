@@ -11,14 +11,15 @@ import numpy as np
 
 from . import sizes
 from .cases import Plugin, pairs
-from .report import Figure, Target
+from .figure import Figure, Target
+from .run import BenchRun
 from .scenes import PATH, sphere
 from .timing import median_interval
 
 AT_MOST = {"lambert": 12, "walter": 40}
 
 
-def scalar(run) -> Iterator[Figure]:
+def scalar(run: BenchRun) -> Iterator[Figure]:
     """The time of a small picture of a sphere in ``scalar_rgb`` with one thread, over that with the built-in: the
     median of pairs in turn. Almost all of it is calls of the BSDF.
 

@@ -2,59 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from .cases import Case
-from .report import MISSED, Results
+from .figure import MISSED, Figure
 from .scenes import BOX, SPHERE
 
 HEAD = ["", "η", "η of the built-in", "time: sphere", "box", "time × variance: sphere", "box"]
 
+Sections = dict[str, list[Figure]]
 
-def summary(results: Results) -> str:
-    """The cases beside the same model of Mitsuba's in a table, and the rest in a list. What was not measured is left
-    out."""
-    setup = results.setup
+
+def summary(figures: Sequence[Figure], setup: dict[str, str], cases: dict[str, dict[str, Any]]) -> str:
+    """Return the cases beside the same model of Mitsuba's in a table, and the rest in a list; what was not measured is
+    left out. The arguments are those of :class:`~mi_brdfs.bench.Results`."""
+    sections: Sections = {}
+    for figure in figures:
+        sections.setdefault(figure.section, []).append(figure)
     versions = ", ".join(f"{name} {setup[key]}" for name, key in
                          (("Mitsuba", "mitsuba"), ("Dr.Jit", "drjit"), ("LLVM", "llvm")) if key in setup)  # fmt: skip
     lines = [
         f"Measured by `mi-brdfs bench` with {versions}, in `{setup['variant']}` with {setup['threads']} threads.",
         "",
     ]
-    rows = [row for case in results.cases.values() if (row := _row(results, Case(**case)))]
+    rows = [row for case in cases.values() if (row := _row(sections, Case(**case)))]
     if rows:
         lines += [f"| {' | '.join(cells)} |" for cells in (HEAD, ["---"] * len(HEAD), *rows)] + [""]
-    return "\n".join(lines + [f"* {sentence}" for sentence in _sentences(results)]) + "\n"
+    return "\n".join(lines + [f"* {sentence}" for sentence in _sentences(sections)]) + "\n"
 
 
-def _row(results: Results, case: Case) -> list[str]:
-    """The cells of a case, or none if nothing of it was measured."""
+def _row(sections: Sections, case: Case) -> list[str]:
+    """Return the cells of a case, or none if nothing of it was measured."""
     if not case.same:
         return []
-    ours, theirs = (_range(results, subject) for subject in (case.name, case.beside))
+    ours, theirs = (_range(sections, subject) for subject in (case.name, case.beside))
     cells = [
-        _figure(results, section, case.beside, scene) for section in ("time", "variance") for scene in (SPHERE, BOX)
+        _figure(sections, section, case.beside, scene) for section in ("time", "variance") for scene in (SPHERE, BOX)
     ]
     plugin, *words = case.name.split(maxsplit=1)
     name = f"`{plugin}` {words[0] if words else ''}".strip()
     return [f"{name} / `{case.builtin['type']}`", ours, theirs, *cells] if any([ours, *cells]) else []
 
 
-def _range(results: Results, subject: str) -> str:
-    """The efficiencies of a row."""
-    figures = [f for f in results.of("efficiency") if f.subject == subject and f.name.endswith("°")]
+def _range(sections: Sections, subject: str) -> str:
+    """Return the efficiencies of a row."""
+    figures = [f for f in sections.get("efficiency", []) if f.subject == subject and f.name.endswith("°")]
     if not figures:
         return ""
     least, largest = (choose(figure.value for figure in figures) for choose in (min, max))
     return f"{least:.3f} to {largest:.3f}{MISSED if any(f.missed for f in figures) else ''}"
 
 
-def _figure(results: Results, section: str, subject: str, name: str) -> str:
-    return next((f.marked for f in results.of(section) if (f.subject, f.name) == (subject, name)), "")
+def _figure(sections: Sections, section: str, subject: str, name: str) -> str:
+    return next((f.marked for f in sections.get(section, []) if (f.subject, f.name) == (subject, name)), "")
 
 
-def _sentences(results: Results) -> Iterator[str]:
-    judged = {name: [f for f in results.of(name) if f.targets] for name in results.sections}
+def _sentences(sections: Sections) -> Iterator[str]:
+    judged = {name: [f for f in figures if f.targets] for name, figures in sections.items()}
     lobes = [f for f in judged.get("efficiency", []) if any(t.reason == "each lobe" for t in f.targets)]
     if lobes:
         worst = {f.name: f for f in sorted(lobes, key=lambda f: f.value, reverse=True)}
@@ -64,7 +69,7 @@ def _sentences(results: Results) -> Iterator[str]:
         told = ", ".join(f"{figure.subject} {figure.marked}" for figure in first)
         yield f"The time to the first picture, traced and compiled, over the built-in's: {told}."
     if kernels := judged.get("recompiles"):
-        changed = sum(f.value for f in results.of("recompiles") if not f.targets)
+        changed = sum(f.value for f in sections["recompiles"] if not f.targets)
         compiled = sum(f.value for f in kernels)
         yield f"Changing {changed} parameters, and loading a scene again, compiles {compiled} kernels."
     if cycles := judged.get("cycles"):
@@ -73,5 +78,6 @@ def _sentences(results: Results) -> Iterator[str]:
     if scalar := judged.get("scalar"):
         told = ", ".join(f"{figure.subject} {figure.marked}" for figure in scalar)
         yield f"The time in `scalar_rgb`, over the built-in's: {told}."
-    targets = sum(len(figure.targets) for figure in results.figures)
-    yield f"Of {targets} targets {len(results.missed)} are missed{MISSED}; `mi-brdfs bench` names them."
+    figures = [figure for section in sections.values() for figure in section]
+    targets, missed = sum(len(figure.targets) for figure in figures), sum(len(figure.missed) for figure in figures)
+    yield f"Of {targets} targets {missed} are missed{MISSED}; `mi-brdfs bench` names them."

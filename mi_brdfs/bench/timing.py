@@ -1,40 +1,22 @@
-"""Pictures by ours and by the built-in in turn: how long they take, and how noisy they are."""
+"""How long pictures by ours take beside those by the built-in, and how noisy they are."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from math import comb
-from time import perf_counter
-from typing import NamedTuple
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 
-from ..validation.subject import brightness
+from ..measure.arrays import Array
 from . import sizes
-from .cases import Plugin
-from .report import Figure, Target
-from .scenes import ALONE, BOX, SPHERE, scene_of
+from .figure import Figure, Target
+from .run import BenchRun
+from .scenes import ALONE, BOX, SPHERE
 
 ALONE_AT_MOST = {"walter alpha 0.5": 0.5, "walter alpha 1": 0.3}
 
 
-class Renders(NamedTuple):
-    """Pictures of two BSDFs, one for each seed."""
-
-    seconds: np.ndarray
-    """Of shape (2, seeds)."""
-    pictures: np.ndarray
-    """The luminance of the pixels, of shape (2, seeds, pixels)."""
-
-    @property
-    def slower(self) -> np.ndarray:
-        """How much longer the first takes, for each pair."""
-        return self.seconds[0] / self.seconds[1]
-
-
-def time(run) -> Iterator[Figure]:
+def time(run: BenchRun) -> Iterator[Figure]:
     """The time of rendering a sphere and the Cornell box, over that with the built-in: the median of pairs rendered in
     turn, in one process, with its interval. Compiling is not part of it, tracing is.
 
@@ -50,7 +32,7 @@ def time(run) -> Iterator[Figure]:
                 yield Figure("time", case.beside, f"{scene}, {name}", 1e3 * float(np.median(seconds)), 0, " ms")
 
 
-def variance(run) -> Iterator[Figure]:
+def variance(run: BenchRun) -> Iterator[Figure]:
     """Time × variance at equal numbers of samples, over that of the built-in: how much longer it takes to get a picture
     of the same noise. The variance is that of a pixel's luminance among pictures of different seeds, the same for both,
     relative to its mean squared, and averaged over the pixels; the interval is a bootstrap over the seeds. The scenes
@@ -74,38 +56,13 @@ def variance(run) -> Iterator[Figure]:
             yield Figure("variance", case.beside, f"{scene}, variance", float(ours / theirs), 2, "×")
 
 
-def alternate(ours: Plugin, theirs: Plugin, scene: str) -> Renders:
-    """Render both in a scene in turn, now one first, now the other. Only one of the two is loaded at a time: the
-    kernel of a render has the code of every BSDF that is alive."""
-    seconds, pictures = np.zeros((2, sizes.PAIRS)), [[], []]
-    dicts = [scene_of(bsdf, scene) for bsdf in (ours, theirs)]
-    for each in dicts:
-        render(each, 0)  # compiles
-    for seed in range(sizes.PAIRS):
-        for k in (0, 1) if seed % 2 else (1, 0):
-            seconds[k, seed], picture = render(dicts[k], seed)
-            pictures[k].append(brightness(picture.reshape(-1, picture.shape[-1])))
-    return Renders(seconds, np.array(pictures))
-
-
-def render(scene: dict, seed: int) -> tuple[float, np.ndarray]:
-    """``(seconds, picture)`` of a scene that is loaded before and discarded afterwards."""
-    loaded = mi.load_dict(scene)
-    dr.sync_thread()
-    start = perf_counter()
-    picture = mi.render(loaded, spp=sizes.SPP, seed=seed)
-    dr.eval(picture)
-    dr.sync_thread()
-    return perf_counter() - start, np.array(picture, np.float64)
-
-
 # --- Statistics -----------------------------------------------------------------------------------------------------
 
 
-def median_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """The median and its interval of 95 % confidence, of any distribution: the k-th smallest and the k-th largest
-    value, as each lies beyond the true median with the probability that fewer than k of n coins fall heads. Of fewer
-    than six values it is their range, of less confidence."""
+def median_interval(values: Array) -> tuple[float, tuple[float, float]]:
+    """Return the median and its interval of 95 % confidence, of any distribution: the k-th smallest and the k-th
+    largest value, as each lies beyond the true median with the probability that fewer than k of n coins fall heads. Of
+    fewer than six values it is their range, of less confidence."""
     ordered = np.sort(values)
     n, k, beyond = len(ordered), 0, 0.0
     while (beyond := beyond + comb(n, k) / 2**n) <= 0.025:
@@ -114,21 +71,21 @@ def median_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
     return float(np.median(ordered)), (float(ordered[k - 1]), float(ordered[n - k]))
 
 
-def deviations(pictures: np.ndarray) -> np.ndarray:
-    """How far the picture of each seed is from the mean of the seeds: the squared difference of a pixel over its mean
-    squared, averaged over the pixels that are brighter than a thousandth of the picture: one in a shadow may be black
-    but for a seed or two. The mean over the seeds is the relative variance. Shape (2, seeds), for pictures of shape
-    (2, seeds, pixels)."""
+def deviations(pictures: Array) -> Array:
+    """Return how far the picture of each seed is from the mean of the seeds: the squared difference of a pixel over its
+    mean squared, averaged over the pixels that are brighter than a thousandth of the picture: one in a shadow may be
+    black except in a seed or two. The mean over the seeds is the relative variance. Shape (2, seeds), for pictures of
+    shape (2, seeds, pixels)."""
     mean, seeds = pictures.mean(axis=1, keepdims=True), pictures.shape[1]
     lit = mean > 1e-3 * mean.mean(axis=2, keepdims=True)
     relative = np.where(lit, pictures / np.where(lit, mean, 1) - 1, 0) ** 2
     return relative.sum(axis=2) / np.maximum(lit.sum(axis=2), 1) * seeds / (seeds - 1)
 
 
-def time_variance(slower: np.ndarray, noise: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """Time × variance of the first over that of the second, and its interval of 95 % confidence."""
+def time_variance(slower: Array, noise: Array) -> tuple[float, tuple[float, float]]:
+    """Return time × variance of the first over that of the second, and its interval of 95 % confidence."""
 
-    def ratio(seeds):
+    def ratio(seeds: Array) -> Array:
         ours, theirs = noise[:, seeds].mean(axis=-1)
         return np.median(slower[seeds], axis=-1) * ours / theirs
 

@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import mitsuba as mi
 import typer
@@ -26,8 +26,8 @@ from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
 from .variants import set_tracing_variant
 
 if TYPE_CHECKING:
+    from ..measure.sources import BSDFSource
     from ..validation import Report
-    from ..validation.targets import Target
 
 
 @command()
@@ -53,8 +53,8 @@ def check(
 ) -> None:
     """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit status 1 if one
     fails."""
+    from ..measure.sources import find_sources
     from ..validation import CHECKS
-    from ..validation.targets import find_targets
 
     check_names(only, CHECKS, "check")
     if bool(targets) == every:
@@ -67,7 +67,7 @@ def check(
         found = []
         for word in targets or [model.plugins[0] for model in all_models()]:
             try:
-                found += find_targets(word)
+                found += find_sources(word)
             except Exception as error:
                 text = one_line(error)
                 fail(text if text.startswith(word) else f"{word}: {text}", Exit.USAGE)
@@ -84,8 +84,8 @@ def check(
         raise typer.Exit(Exit.ERROR)
 
 
-def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs: int) -> list[Report]:
-    """The reports on all targets, from processes of their own if there are several jobs."""
+def _check_all(sources: list[BSDFSource], only: list[str] | None, variant: str, jobs: int) -> list[Report]:
+    """Return the reports on all BSDFs, from processes of their own if there are several jobs."""
     from ..validation import CHECKS
 
     subject = TextColumn("Checking {task.description}", markup=False)
@@ -93,20 +93,27 @@ def _check_all(targets: list[Target], only: list[str] | None, variant: str, jobs
     each = len(only or CHECKS)
     reports = []
     with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("", total=len(targets) * each)
+        task = progress.add_task("", total=len(sources) * each)
         if jobs == 1:
-            for target in targets:
-                progress.update(task, description=target.name)
-                reports.append(target.check(only, on_progress=partial(progress.advance, task)))
+            for source in sources:
+                progress.update(task, description=source.name)
+                reports.append(_check_one(source, only, on_progress=partial(progress.advance, task)))
             return reports
         # Started anew: a process with Dr.Jit's threads must not be forked.
         known = variant, guests.sources()
         pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known)
         with pool, ending_processes():
-            for future in [pool.submit(target.check, only) for target in targets]:
+            for future in [pool.submit(_check_one, source, only) for source in sources]:
                 reports.append(future.result())
                 progress.update(task, description=reports[-1].name, advance=each)
     return reports
+
+
+def _check_one(source: BSDFSource, only: list[str] | None, **given: Any) -> Report:
+    """Return the report on a BSDF, in the active variant."""
+    from ..validation import check
+
+    return check(source.load(), name=source.name, only=only, **given)
 
 
 def _start_job(variant: str, sources: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of the lobes of any BSDF, of whomever: ``plot.polar({"type": "ward"})`` shows them in a notebook.
+"""Pictures of the lobes of any BSDF: ``plot.polar({"type": "ward"})`` shows them in a notebook.
 
 :func:`polar` and :func:`cartesian` draw the plane of incidence, :func:`hemisphere` maps all directions, :func:`albedo`
 says how much is reflected in all, and :func:`sphere` is the lobe as a body to turn with the mouse. Each takes one BSDF

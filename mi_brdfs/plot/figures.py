@@ -105,8 +105,8 @@ def hemisphere(
     """
     check_angles(angles)
     found = with_smooth_part(named(bsdfs, labels))
-    rows = [(it, side) for it in found for side in ((1, -1) if lobes.transmits(it.subject) else (1,))]
-    pictures = [[lobes.disc(it.subject, theta, azimuth, side, resolution) for theta in angles] for it, side in rows]
+    rows = [(it, side) for it in found for side in ((1, -1) if lobes.transmits(it.probe) else (1,))]
+    pictures = [[lobes.disc(it.probe, theta, azimuth, side, resolution) for theta in angles] for it, side in rows]
     top = largest(picture for row in pictures for picture in row)
     middles = [line for row in pictures for picture in row for line in (picture[resolution // 2],
                                                                         picture[:, resolution // 2])]  # fmt: skip
@@ -147,7 +147,7 @@ def albedo(
     ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
     handles = []
     for k, it in enumerate(found):
-        handles += ax.plot(*lobes.albedo(it.subject, azimuth), label=it.label, **_look(k))
+        handles += ax.plot(*lobes.albedo(it.probe, azimuth), label=it.label, **_look(k))
     _calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])
@@ -161,7 +161,7 @@ def albedo(
 # --- The plane of incidence -----------------------------------------------------------------------------------------
 
 
-class Line(NamedTuple):
+class LabelledCurve(NamedTuple):
     """A curve of a panel."""
 
     label: str
@@ -176,11 +176,11 @@ def _planar(draw: Callable, heights: tuple[float, float], bsdfs, angles, azimuth
     check_angles(angles)
     scales = scales_of(scale)
     found = with_smooth_part(named(bsdfs, labels))
-    whole = any(lobes.transmits(it.subject) for it in found)
+    whole = any(lobes.transmits(it.probe) for it in found)
 
-    def line(it: Named, theta: float, k: int) -> Line:
+    def line(it: Named, theta: float, k: int) -> LabelledCurve:
         label = it.label if len(found) > 1 else _incidence(theta)
-        return Line(label, theta, lobes.in_plane_of_incidence(it.subject, theta, azimuth), _look(k))
+        return LabelledCurve(label, theta, lobes.in_plane_of_incidence(it.probe, theta, azimuth), _look(k))
 
     if len(found) > 1:
         panels = {_incidence(theta): [line(it, theta, k) for k, it in enumerate(found)] for theta in angles}
@@ -208,7 +208,7 @@ def _planar(draw: Callable, heights: tuple[float, float], bsdfs, angles, azimuth
     return figure
 
 
-def _draw_polar(ax: Axes, lines: list[Line], log: bool, whole: bool) -> None:
+def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool) -> None:
     low, high = _range(lines) if log else (0, largest(line.curve.value for line in lines))
     end = 1.06 * (high - low)
     if log:
@@ -247,7 +247,7 @@ def _at(theta, radius) -> tuple[np.ndarray, np.ndarray]:
     return radius * np.sin(np.radians(theta)), radius * np.cos(np.radians(theta))
 
 
-def _draw_cartesian(ax: Axes, lines: list[Line], log: bool, whole: bool) -> None:
+def _draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool) -> None:
     end = 180 if whole else 90
     if log:
         low, high = _range(lines)
@@ -265,12 +265,12 @@ def _draw_cartesian(ax: Axes, lines: list[Line], log: bool, whole: bool) -> None
     ax.set_ylabel(quantity(QUANTITY), fontsize=TEXT, color=INK)
 
 
-def _shade(line: Line, lines: list[Line]) -> str:
+def _shade(line: LabelledCurve, lines: list[LabelledCurve]) -> str:
     """The colour of what belongs to an angle of incidence: the curve's, unless all curves share the angle."""
     return FAINT if all(line.theta_i == other.theta_i for other in lines) else line.look["color"]
 
 
-def _range(lines: list[Line]) -> tuple[int, float]:
+def _range(lines: list[LabelledCurve]) -> tuple[int, float]:
     even = np.linspace(-lobes.GRAZING, lobes.GRAZING, 181)
     return decades([np.interp(even, *line.curve) for line in lines], largest(line.curve.value for line in lines))
 

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import mitsuba as mi
 
+from ..measure.probe import BSDFProbe
+from ..measure.sources import find_sources, name_of
 from ..parameters.messages import brief
-from ..validation.runner import name_of
-from ..validation.subject import Subject
-from ..validation.targets import find_targets
 from ..variants import is_measurable
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
@@ -20,11 +19,11 @@ class Named(NamedTuple):
     """A BSDF and its name in the legend."""
 
     label: str
-    subject: Subject
+    probe: BSDFProbe
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
-    """The BSDFs loaded, with the labels given or found.
+    """Return the BSDFs loaded, with the labels given or found.
 
     Raises:
         ValueError: if there are none, one is no BSDF, or the active variant cannot evaluate arrays of directions.
@@ -43,7 +42,7 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
         found = [(label, bsdf) for label, (_, bsdf) in zip(labels, found, strict=True)]
     # Legends leave out what begins with an underscore.
-    return [Named(label.lstrip("_"), Subject(bsdf, ())) for label, bsdf in found]
+    return [Named(label.lstrip("_"), BSDFProbe(bsdf)) for label, bsdf in found]
 
 
 def check_angles(angles: Sequence[float]) -> None:
@@ -56,30 +55,34 @@ def check_angles(angles: Sequence[float]) -> None:
 
 
 def scales_of(scale: str) -> tuple[str, ...]:
-    """The scales that are drawn: linear, log, or both."""
+    """Return the scales that are drawn: linear, log, or both."""
     if scale not in SCALES:
         raise ValueError(f"there is no scale {scale!r}; there are {', '.join(SCALES)}")
     return SCALES[scale]
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:
-    """The same, if each has more than delta functions, and with a label that says so if it has them, too."""
+    """Return the same, if each has more than delta functions, and with a label that says so if it has them, too.
+
+    Raises:
+        ValueError: if one has delta functions only.
+    """
     for it in found:
-        if not it.subject.components:
+        if not it.probe.components:
             raise ValueError(f"{it.label} reflects and transmits in single directions only: there is no lobe to draw")
-    return [it._replace(label=f"{it.label} without its delta lobe") if it.subject.deltas else it for it in found]
+    return [it._replace(label=f"{it.label} without its delta lobe") if it.probe.deltas else it for it in found]
 
 
 def quantity(name: str) -> str:
-    """The label of what is plotted, which says what becomes of colours."""
+    """Return the label of what is plotted, which says what becomes of colours."""
     return name + (", luminance" if mi.is_rgb else ", mean of the spectrum" if mi.is_spectral else "")
 
 
 def _loaded(given, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
     if isinstance(given, str):
-        for target in find_targets(given):
-            bsdf = target.load()
-            yield target.name, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+        for source in find_sources(given):
+            bsdf = source.load()
+            yield source.name, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
         return
     bsdf = mi.load_dict(given) if isinstance(given, dict) else given
     if not isinstance(bsdf, mi.BSDF):
@@ -89,8 +92,8 @@ def _loaded(given, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
 
 
 def _labels_of_dicts(bsdfs) -> dict[int, str]:
-    """A label for each dict, by its identity: the type, and the parameters that the others of this type do not share.
-    The only one of its type shows them all."""
+    """Return a label for each dict, by its identity: the type, and the parameters that the others of this type do not
+    share. The only one of its type shows them all."""
     told = [
         (given, {name: _shown(value) for name, value in given.items() if name != "type"})
         for given in bsdfs
@@ -105,7 +108,7 @@ def _labels_of_dicts(bsdfs) -> dict[int, str]:
 
 
 def _shown(value) -> str:
-    """A parameter's value in a label."""
+    """Return a parameter's value in a label."""
     if isinstance(value, dict):
         value = value.get("value", value.get("type"))
     if isinstance(value, bool):

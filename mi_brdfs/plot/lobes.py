@@ -7,13 +7,17 @@ narrow, it is known from directions that the sampler draws: no lobe is too narro
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..validation.sampling import variates
-from ..validation.subject import Part, Subject, brightness, context, direction, on_side, random
+from ..measure.arrays import Array, context, luminance
+from ..measure.directions import direction, from_plane, on_side, to_plane
+from ..measure.probe import BSDFProbe, Part
+from ..measure.variates import lattice, random
 
 GRAZING = 89.99
 """The last angle above the horizon that is drawn."""
@@ -23,86 +27,86 @@ MOST_POINTS = 20_000
 class Curve(NamedTuple):
     """Values over the signed angle, in its order."""
 
-    theta: np.ndarray
-    value: np.ndarray
+    theta: Array
+    value: Array
 
 
 class Mesh(NamedTuple):
     """Values over directions, shape (…, 3) and (…)."""
 
-    wo: np.ndarray
-    value: np.ndarray
+    wo: Array
+    value: Array
 
 
-def transmits(subject: Subject) -> bool:
-    """Whether a part that is no delta function sends light through."""
-    return subject.whole.has(mi.BSDFFlags.Transmission)
+def transmits(probe: BSDFProbe) -> bool:
+    """Return whether a part that is no delta function sends light through."""
+    return probe.whole.has(mi.BSDFFlags.Transmission)
 
 
-def in_plane(theta, azimuth: float) -> np.ndarray:
-    """The directions at signed angles in the plane of incidence, shape (N, 3), float32."""
+def in_plane(theta: ArrayLike, azimuth: float) -> Array:
+    """Return the directions at signed angles in the plane of incidence, shape (N, 3), float32."""
     return direction(-np.asarray(theta), np.full(np.shape(theta), azimuth)).T
 
 
-def value(subject: Subject, wi, wo) -> np.ndarray:
-    """The luminance of f |cosθ_o|, shape (N,)."""
-    return brightness(subject.eval(subject.whole, wi, wo)) if len(wo) else np.zeros(0)
+def value(probe: BSDFProbe, wi: Array, wo: Array) -> Array:
+    """Return the luminance of f |cosθ_o|, shape (N,)."""
+    return luminance(probe.eval(probe.whole, wi, wo)) if len(wo) else np.zeros(0)
 
 
-def drawn(subject: Subject, wi, count: int) -> np.ndarray:
-    """Directions as the sampler draws them, those of black samples left out, shape (at most count, 3)."""
-    samples = subject.sample(subject.whole, wi, random(count, 1))
+def drawn(probe: BSDFProbe, wi: Array, count: int) -> Array:
+    """Return directions as the sampler draws them, those of black samples left out, shape (at most count, 3)."""
+    samples = probe.sample(probe.whole, wi, random(count, 1))
     return samples.wo[samples.lit]
 
 
-def largest(values) -> float:
-    """The largest of the finite values in some arrays, or 1 if none is above 0."""
+def largest(values: Iterable[Array]) -> float:
+    """Return the largest of the finite values in some arrays, or 1 if none is above 0."""
     found = max(float(np.max(each, where=np.isfinite(each), initial=0)) for each in values)
     return found if found > 0 else 1.0
 
 
-def decades(values, peak: float) -> tuple[int, float]:
-    """The decade where a logarithmic scale begins, and the logarithm of its largest value: it shows nine tenths of
-    what is not black in each of some arrays, but at least two decades and at most six."""
+def decades(values: Iterable[Array], peak: float) -> tuple[int, float]:
+    """Return the decade where a logarithmic scale begins, and the logarithm of its largest value: it shows nine tenths
+    of what is not black in each of some arrays, but at least two decades and at most six."""
     high = float(np.log10(peak))
     return int(np.floor(np.clip(np.log10(dim(values)), high - 6, high - 2))), high
 
 
-def dim(values) -> float:
-    """What nine tenths of the positive values are above, in that of some arrays where it is least."""
+def dim(values: Iterable[Array]) -> float:
+    """Return what nine tenths of the positive values are above, in that of some arrays where it is least."""
     return min((np.quantile(each[each > 0], 0.1) for each in values if (each > 0).any()), default=1.0)
 
 
 # --- Curves ---------------------------------------------------------------------------------------------------------
 
 
-def in_plane_of_incidence(subject: Subject, theta_i: float, azimuth: float) -> Curve:
-    """The lobe in the plane of incidence, in both half-spaces if the BSDF transmits: finest where it bends most, so
-    that straight lines between its points stay within 0.2 % of the peak and 2 % of the value."""
+def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float) -> Curve:
+    """Return the lobe in the plane of incidence, in both half-spaces if the BSDF transmits: finest where it bends most,
+    so that straight lines between its points stay within 0.2 % of the peak and 2 % of the value."""
     wi = direction(theta_i, azimuth)
-    wo = drawn(subject, wi, 4096)
+    wo = drawn(probe, wi, 4096)
     along = -(wo[:, 0] * np.cos(np.radians(azimuth)) + wo[:, 1] * np.sin(np.radians(azimuth)))
     seeds = np.degrees(np.arctan2(along, wo[:, 2]))
     seeds = np.quantile(seeds, np.linspace(0, 1, 129)) if len(seeds) else seeds
     seeds = np.concatenate([seeds, [-theta_i, 0, theta_i]])
     pieces = [(-GRAZING, GRAZING)]
-    if transmits(subject):
+    if transmits(probe):
         pieces = [(-180, GRAZING - 180), *pieces, (180 - GRAZING, 180)]
     curves = []
     for start, end in pieces:
         inside = seeds[(seeds > start) & (seeds < end)]
         theta = np.unique(np.concatenate([np.linspace(start, end, 2 * round(end - start) + 1), inside]))
-        curves.append(_refined(lambda angles: value(subject, wi, in_plane(angles, azimuth)), theta))
+        curves.append(_refined(lambda angles: value(probe, wi, in_plane(angles, azimuth)), theta))
     return Curve(*(np.concatenate(column) for column in zip(*curves, strict=True)))
 
 
-def _refined(evaluate, theta) -> Curve:
-    """A curve through points at these angles, and between them wherever it leaves the chord."""
+def _refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
+    """Return a curve through points at these angles, and between them wherever it leaves the chord."""
     points, values = [theta], [evaluate(theta)]
     left, right = (theta[:-1], values[0][:-1]), (theta[1:], values[0][1:])
     while len(left[0]) and sum(map(len, points)) < MOST_POINTS:
-        middle = (left[0] + right[0]) / 2
-        middle = middle, evaluate(middle)
+        between = (left[0] + right[0]) / 2
+        middle = between, evaluate(between)
         points.append(middle[0])
         values.append(middle[1])
         peak = max(np.nan_to_num(each, posinf=0).max() for each in values)
@@ -120,65 +124,54 @@ def _refined(evaluate, theta) -> Curve:
     return Curve(np.concatenate(points)[order], np.concatenate(values)[order])
 
 
-def albedo(subject: Subject, azimuth: float) -> Curve:
-    """The part of the light that is reflected or transmitted, over the angle of incidence; delta functions count.
+def albedo(probe: BSDFProbe, azimuth: float) -> Curve:
+    """Return the part of the light that is reflected or transmitted over the angle of incidence; delta functions count.
 
     It is the mean weight of samples of the BSDF's own sampler, the same at each angle, so that the curve is smooth.
     """
     theta = np.concatenate([np.arange(0, 87, 3), [87, 88, 88.5, 89, 89.5, 89.9]])
-    points = variates(9, 5)
-    part = Part("all", context(), None, int(subject.bsdf.flags()), (1,))
+    points = lattice(9, 5)
+    part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
-    samples = subject.sample(part, wi, np.tile(points, (len(theta), 1)))
-    weight = brightness(samples.weight) * samples.eta**2  # radiance is compressed where it is refracted, energy is not
+    samples = probe.sample(part, wi, np.tile(points, (len(theta), 1)))
+    weight = luminance(samples.weight) * samples.eta**2  # radiance is compressed where it is refracted, energy is not
     return Curve(theta, weight.reshape(len(theta), -1).mean(axis=1))
 
 
 # --- Maps and meshes ------------------------------------------------------------------------------------------------
 
 
-def to_disc(w, azimuth: float) -> np.ndarray:
-    """Directions in the disc on which the distance from the middle is θ/90°, and the azimuth is that seen from the
-    normal, turned so that wi is on the left; shape (N, 2)."""
-    w = np.asarray(w, np.float64)
-    cos, sin = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
-    x, y = -(w[:, 0] * cos + w[:, 1] * sin), w[:, 0] * sin - w[:, 1] * cos
-    length = np.hypot(x, y)
-    radius = np.arctan2(length, abs(w[:, 2])) / (np.pi / 2)
-    return np.stack([x, y], axis=-1) * (radius / np.maximum(length, 1e-30))[:, None]
+def disc(probe: BSDFProbe, theta_i: float, azimuth: float, side: int, resolution: int) -> Array:
+    """Return a picture of the hemisphere above (1) or below (-1), in rows from the bottom, each pixel the mean over it.
 
-
-def from_disc(points, azimuth: float) -> np.ndarray:
-    """The directions above the horizon of points of the disc, shape (N, 3), float32."""
-    x, y = np.asarray(points, np.float64).T
-    return direction(90 * np.hypot(x, y), np.degrees(np.arctan2(y, x)) + azimuth + 180).T
-
-
-def disc(subject: Subject, theta_i: float, azimuth: float, side: int, resolution: int) -> np.ndarray:
-    """A picture of the hemisphere above (1) or below (-1), in rows from the bottom, each pixel the mean over it; what
-    lies outside of the disc is as its rim. Pixels in which many samples fall are divided more finely."""
+    It is the disc of :func:`~mi_brdfs.measure.directions.to_plane` with wi on the left; what lies outside of it is as
+    its rim. Pixels in which many samples fall are divided more finely.
+    """
     wi, n = direction(theta_i, azimuth), resolution
-    wo = drawn(subject, wi, 1 << 14)
-    hit = np.clip(((to_disc(wo[wo[:, 2] * side > 0], azimuth) + 1) * n / 2).astype(int), 0, n - 1)
-    crowded = np.bincount(hit[:, 1] * n + hit[:, 0], minlength=n * n) > len(wo) / 1000
+    axis = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
+    wo = drawn(probe, wi, 1 << 14)
+    x, y = (
+        np.clip(((each / 90 + 1) * n / 2).astype(int), 0, n - 1) for each in to_plane(wo[wo[:, 2] * side > 0], axis)
+    )
+    crowded = np.bincount(y * n + x, minlength=n * n) > len(wo) / 1000
     picture = np.zeros(n * n)
     for pixels, parts in ((np.flatnonzero(~crowded), 3), (np.flatnonzero(crowded), 48)):
         step = np.stack(np.meshgrid(np.arange(parts), np.arange(parts)), axis=-1).reshape(-1, 2) + 0.5
         corner = np.stack([pixels % n, pixels // n], axis=-1)
-        points = ((corner[:, None] + step / parts) * 2 / n - 1).reshape(-1, 2)
-        points /= np.maximum(np.hypot(*points.T) * 90 / GRAZING, 1)[:, None]
-        values = value(subject, wi, on_side(from_disc(points, azimuth), side))
+        points = 90 * ((corner[:, None] + step / parts) * 2 / n - 1).reshape(-1, 2)
+        points /= np.maximum(np.hypot(*points.T) / GRAZING, 1)[:, None]
+        values = value(probe, wi, from_plane(points[:, 0], points[:, 1], side, axis).astype(np.float32))
         picture[pixels] = values.reshape(len(pixels), parts * parts).mean(axis=1)
     return picture.reshape(n, n)
 
 
-def meshes(subject: Subject, theta_i: float, azimuth: float, resolution: int) -> list[Mesh]:
-    """The lobe over all directions, one mesh for each half-space into which it reflects or transmits. Their lines are
-    ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws."""
+def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int) -> list[Mesh]:
+    """Return the lobe over all directions, one mesh for each half-space into which it reflects or transmits. Their
+    lines are ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws."""
     wi = direction(theta_i, azimuth)
-    wo = drawn(subject, wi, 4096)
+    wo = drawn(probe, wi, 4096)
     found = []
-    for side in (1, -1) if transmits(subject) else (1,):
+    for side in (1, -1) if transmits(probe) else (1,):
         mine = wo[wo[:, 2] * side > 0].astype(np.float64)
         theta = np.degrees(np.arctan2(np.hypot(mine[:, 0], mine[:, 1]), abs(mine[:, 2])))
         phi = np.degrees(np.arctan2(mine[:, 1], mine[:, 0])) % 360
@@ -186,12 +179,12 @@ def meshes(subject: Subject, theta_i: float, azimuth: float, resolution: int) ->
         phi = _lines(np.linspace(0, 360, 2 * resolution), phi, (azimuth + 180) % 360)
         grid = np.stack([angles.ravel() for angles in np.meshgrid(theta, phi, indexing="ij")])
         directions = on_side(direction(*grid).T, side)
-        values = value(subject, wi, directions).reshape(len(theta), len(phi))
+        values = value(probe, wi, directions).reshape(len(theta), len(phi))
         found.append(Mesh(directions.reshape(*values.shape, 3), values))
     return found
 
 
-def _lines(even, sampled, mirror: float) -> np.ndarray:
-    """The angles of grid lines."""
+def _lines(even: Array, sampled: Array, mirror: float) -> Array:
+    """Return the angles of grid lines."""
     dense = np.quantile(sampled, np.linspace(0, 1, len(even))) if len(sampled) else []
     return np.unique(np.concatenate([even, dense, [mirror]]).clip(even[0], even[-1]))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import mitsuba as mi
 import numpy as np
 
+from ..measure.directions import direction
 from . import lobes
 from .figures import COLOURS, FAINT, INK
 from .given import check_angles, named, quantity, scales_of, with_smooth_part
@@ -48,11 +49,11 @@ def sphere(
     check_angles([angle])
     scales = scales_of(scale)
     found = with_smooth_part(named(bsdfs, labels))
-    wi = lobes.direction(angle, azimuth)
-    bodies = [lobes.meshes(it.subject, angle, azimuth, resolution) for it in found]
-    drawn = [lobes.drawn(it.subject, wi, samples) for it in found]
+    wi = direction(angle, azimuth)
+    bodies = [lobes.meshes(it.probe, angle, azimuth, resolution) for it in found]
+    drawn = [lobes.drawn(it.probe, wi, samples) for it in found]
     # A little outside of the body, which would hide half of each.
-    points = [lobes.Mesh(1.005 * wo, lobes.value(it.subject, wi, wo)) for it, wo in zip(found, drawn, strict=True)]
+    points = [lobes.Mesh(1.005 * wo, lobes.value(it.probe, wi, wo)) for it, wo in zip(found, drawn, strict=True)]
     values = [mesh.value for body in bodies for mesh in body]
     peak = lobes.largest(values)
 

@@ -6,46 +6,39 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .derivatives import attach, traced_floats
+from ..measure.arrays import Array, context, interaction, numbers, sample_arguments, vectors
+from ..measure.directions import angles_of, hemisphere, on_side, scattered
+from ..measure.variates import random
 from .outcome import Findings, Outcome, told
 from .report import Finding
-from .subject import (
-    angles_of,
-    context,
-    hemisphere,
-    interaction,
-    numbers,
-    on_side,
-    random,
-    scattered,
-    variates_of,
-    vectors,
-)
+from .run import Run
+from .traversal import attach, traced_floats, value_of
 
 COUNT = 2000
 
 
-def active(run) -> Findings:
-    """Lanes that are not active get no light: ``eval`` and the weight of ``sample`` are zero there, for masks as for
-    ``False``, and so is the density of plugins of ours (Mitsuba's own rely on it that calls of a scene mask it); others
-    get what they get when all are active. And no derivative comes from them, whatever directions they have."""
-    subject, part = run.subject, run.subject.whole
-    outcome, ours = Outcome("active", part.name), hasattr(run.subject.bsdf, "model")
+def active(run: Run) -> Findings:
+    """Check that lanes that are not active get no light: ``eval`` and the weight of ``sample`` are zero there, for
+    masks as for ``False``, and so is the density of plugins of ours (Mitsuba's own rely on it that calls of a scene
+    mask it); others get what they get when all are active. And no derivative comes from them, whatever directions they
+    have."""
+    probe, part = run.probe, run.probe.whole
+    outcome = Outcome("active", part.name)
     wi, u = scattered(COUNT, 61, part.sides), random(COUNT, 62)
-    samples = subject.sample(part, wi, u)
+    samples = probe.sample(part, wi, u)
     wo = np.where(np.arange(COUNT)[:, None] % 3, samples.wo, on_side(hemisphere(COUNT, 63), part.sides[0]))
     half = np.random.default_rng(64).random(COUNT) < 0.5
-    bsdf, si, towards = subject.bsdf, interaction(wi), vectors(wo)
+    bsdf, si, towards = probe.bsdf, interaction(wi), vectors(wo)
 
-    def called(mask):
-        bs, weight = bsdf.sample(part.context, si, *variates_of(u), mask)
+    def called(mask: bool | mi.Bool) -> dict[str, Array]:
+        bs, weight = bsdf.sample(part.context, si, *sample_arguments(u), mask)
         value, density = bsdf.eval_pdf(part.context, si, towards, mask)
         found = {
             "eval": bsdf.eval(part.context, si, towards, mask),
             "pdf": bsdf.pdf(part.context, si, towards, mask),
             "eval_pdf's value": value,
             "eval_pdf's density": density,
-            "the weight of sample": dr.select(subject.is_smooth(bs), weight, 0),
+            "the weight of sample": dr.select(probe.is_smooth(bs), weight, 0),
             "the density of sample": bs.pdf,
         }
         dr.eval(found)
@@ -58,7 +51,7 @@ def active(run) -> Findings:
         (False, np.zeros(COUNT, bool), "where active is False"),
     ):
         for name, value in called(mask).items():
-            if ours or name not in ("pdf", "eval_pdf's density", "the density of sample"):
+            if probe.is_ours or name not in ("pdf", "eval_pdf's density", "the density of sample"):
                 stray = (value[~lit] != 0).any(axis=1)
                 if stray.any():
                     k = np.flatnonzero(~lit)[int(np.argmax(stray))]
@@ -78,12 +71,12 @@ def active(run) -> Findings:
     yield outcome.finding("Inactive lanes get no light, no weight and no derivative.")
 
 
-def _check_derivatives(run, outcome, wi, wo, lit):
-    """Reverse derivatives of all parameters, with inactive lanes, must be those of the others alone. Some inactive
-    lanes have directions of length 0, as those of rays that hit nothing."""
-    subject, part = run.subject, run.subject.whole
+def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Array) -> None:
+    """Check that reverse derivatives of all parameters, with inactive lanes, are those of the others alone. Some
+    inactive lanes have directions of length 0, as those of rays that hit nothing."""
+    probe, part = run.probe, run.probe.whole
     params, keys, _ = traced_floats(run, "active")
-    originals = {key: type(params[key])(params[key]) for key in keys}
+    originals = {key: value_of(params, key) for key in keys}
     kept = (lit | (np.arange(len(lit)) % 4 > 0))[:, None]
     found = []
     try:
@@ -93,7 +86,7 @@ def _check_derivatives(run, outcome, wi, wo, lit):
         ):
             for key in keys:
                 attach(params, key)
-            value = subject.bsdf.eval(part.context, interaction(directions[0]), vectors(directions[1]), mask)
+            value = probe.bsdf.eval(part.context, interaction(directions[0]), vectors(directions[1]), mask)
             if dr.grad_enabled(value):
                 dr.backward(dr.sum(value, axis=None))
             total = float(np.sum(np.array(dr.detach(value), np.float64)))
@@ -113,29 +106,29 @@ def _check_derivatives(run, outcome, wi, wo, lit):
             )
 
 
-def mode(run) -> Findings:
-    """When light is traced from the emitters, ``TransportMode.Importance``, reflection is what it is the other way: f
-    with its directions exchanged, times the cosine of ``wo``. That is the same unless the component is flagged
-    NonSymmetric. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
-    for part in run.subject.parts:
+def mode(run: Run) -> Findings:
+    """Check the mode ``TransportMode.Importance``, in which light is traced from the emitters: reflection is what it is
+    the other way, f with its directions exchanged, times the cosine of ``wo``. That is the same unless the component is
+    flagged NonSymmetric. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
+    for part in run.probe.parts:
         if not part.has(mi.BSDFFlags.Reflection):
             yield Finding("mode", part.name, "skip", "Not checked, as it does not reflect.")
             continue
-        outcome, tolerance = Outcome("mode", part.name), 10 * run.subject.rounding(part)
+        outcome, tolerance = Outcome("mode", part.name), 10 * run.rounding(part)
         traced = context(part.component)
         traced.mode = mi.TransportMode.Importance
         traced = part._replace(context=traced)
         symmetric = not part.has(mi.BSDFFlags.NonSymmetric)
         for side in part.sides:
             wi, wo = on_side(hemisphere(COUNT, 65), side), on_side(hemisphere(COUNT, 66), side)
-            samples = run.subject.sample(traced, wi, random(COUNT, 67))
+            samples = run.probe.sample(traced, wi, random(COUNT, 67))
             near = (np.arange(COUNT) % 2 == 0) & (samples.wo[:, 2] * side > 0.01)
             wo[near] = samples.wo[near]
-            got = run.subject.eval(traced, wi, wo)
+            got = run.probe.eval(traced, wi, wo)
             if symmetric:
-                expected = run.subject.eval(part, wi, wo)
+                expected = run.probe.eval(part, wi, wo)
             else:
-                expected = run.subject.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
+                expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
             larger = np.nan_to_num(np.maximum(got, expected))
             error = np.nan_to_num(abs(got - expected) / np.maximum(larger, 1e-6 * larger.max() + 1e-12)).max(axis=1)
             off = error > tolerance
@@ -166,15 +159,15 @@ LAMBERTIAN = 1e-3
 """How far f may change for a reflectance to be known exactly."""
 
 
-def reflectance(run) -> Findings:
-    """``eval_diffuse_reflectance``, which denoisers and renderers of albedos ask for, is finite and in [0, 1]. Where f
-    is constant it is π f, and of other diffuse plugins of ours, the albedo at normal incidence within 5 %. What is
-    Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
-    subject, part = run.subject, run.subject.whole
-    outcome, normal = Outcome("reflectance", part.name), np.float32([0, 0, part.sides[0]])
+def reflectance(run: Run) -> Findings:
+    """Check that ``eval_diffuse_reflectance``, which denoisers and renderers of albedos ask for, is finite and in [0,
+    1]. Where f is constant it is π f, and of other diffuse plugins of ours, the albedo at normal incidence within 5 %.
+    What is Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
+    probe, part = run.probe, run.probe.whole
+    outcome, normal = Outcome("reflectance", part.name), np.array([0, 0, part.sides[0]], np.float32)
     try:
         found = [
-            numbers(subject.bsdf.eval_diffuse_reflectance(interaction(wi), True), 1)[0]
+            numbers(probe.bsdf.eval_diffuse_reflectance(interaction(wi), True), 1)[0]
             for wi in (normal, on_side(hemisphere(1, 71)[0], part.sides[0]))
         ]
     except Exception as error:
@@ -182,30 +175,31 @@ def reflectance(run) -> Findings:
         return
     got = found[0]
     wi, wo = (on_side(hemisphere(200, seed), part.sides[0]) for seed in (72, 73))
-    f = subject.eval(part, wi, wo) / abs(wo[:, 2:].astype(np.float64))
-    up = subject.eval(part, normal, normal[None])[0]
-    diffuse = not any(int(subject.bsdf.flags()) & int(kind) for kind in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
-    diffuse = diffuse and not subject.deltas
+    f = probe.eval(part, wi, wo) / abs(wo[:, 2:].astype(np.float64))
+    up = probe.eval(part, normal, normal[None])[0]
+    diffuse = not any(int(probe.bsdf.flags()) & int(kind) for kind in (mi.BSDFFlags.Glossy, mi.BSDFFlags.Delta))
+    diffuse = diffuse and not probe.deltas
     constant = diffuse and (np.ptp(f, axis=0) <= LAMBERTIAN * f.max(axis=0)).all() and f.any()
     if not np.isfinite(found).all() or np.min(found) < 0:
         outcome.fault(f"it is {next(v for v in np.ravel(found) if not v >= 0 or v == np.inf):.4g}", np.inf)
     elif constant:
         expected = np.pi * f.mean(axis=0)
         _compare(outcome, got, expected, 2 * LAMBERTIAN, "π f is")
-    elif np.allclose(got, np.pi * up, rtol=1e-4) and not hasattr(subject.bsdf, "model"):
+    elif np.allclose(got, np.pi * up, rtol=1e-4) and not probe.is_ours:
         yield Finding("reflectance", part.name, "skip", "It is Mitsuba's stand-in, π times eval towards the normal.")
         return
     else:
         if np.max(found) > 1 + 1e-4:
             outcome.fault(f"it is {np.max(found):.4g}, but nothing reflects more than 1", np.inf)
-        if diffuse and hasattr(subject.bsdf, "model"):
-            samples = subject.sample(part, normal, random(1 << 14, 74))
+        if diffuse and probe.is_ours:
+            samples = probe.sample(part, normal, random(1 << 14, 74))
             albedo = (samples.weight * (samples.wo[:, 2:] * normal[2] > 0)).mean(axis=0)
             _compare(outcome, got, np.minimum(albedo, 1), 0.05, "the albedo at normal incidence is")
     yield outcome.finding(f"It is {', '.join(f'{channel:.3g}' for channel in got)}.")
 
 
-def _compare(outcome, got, expected, tolerance: float, words: str):
+def _compare(outcome: Outcome, got: Array, expected: Array, tolerance: float, words: str) -> None:
+    """Add a fault if a channel is off."""
     error = abs(got - expected) / np.maximum(expected, 1e-6)
     if (error > tolerance).any():
         k = int(np.argmax(error))

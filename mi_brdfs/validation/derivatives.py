@@ -1,69 +1,34 @@
-"""Checks of what an optimiser needs: derivatives for the parameters, and updates that compile nothing."""
+"""The check of the derivatives that an optimiser needs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import contextmanager
+from collections.abc import Iterator
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..measure.arrays import Array, interaction, numbers, sample_arguments, vectors
+from ..measure.directions import angles_of, direction, hemisphere, on_side
+from ..measure.probe import Part
+from ..measure.variates import random
 from ..ranges import ranges
+from .differences import differences
 from .outcome import Findings, Outcome, relative
 from .report import Finding
-from .subject import angles_of, direction, hemisphere, interaction, numbers, on_side, random, variates_of, vectors
+from .run import Run
+from .traversal import attach, restored, set_value, traced_floats, value_of
 
 TOLERANCE = 0.02
 COUNT = 2000
 
 
-def traced_floats(run, check: str):
-    """``(params, keys, findings)``: the parameters that are floats, and what to say of the others."""
-    params = mi.traverse(run.subject.bsdf)
-    keys, findings = [], []
-    for key in params.keys():
-        if not _is_traced(params, key):
-            findings.append(Finding(check, key, "skip", "Not a number of floating point that Dr.Jit traces."))
-        elif check == "gradients" and int(params.flags(key)) & int(mi.ParamFlags.NonDifferentiable):
-            findings.append(Finding(check, key, "skip", "Declared not differentiable."))
-        else:
-            keys.append(key)
-    return params, keys, findings
-
-
-def _is_traced(params, key) -> bool:
-    try:
-        value = params[key]
-    except TypeError:  # it may be None, which Mitsuba does not expect itself
-        return False
-    return dr.is_arithmetic_v(value) and dr.is_float_v(value) and dr.is_jit_v(value)
-
-
-def _value(params, key):
-    return type(params[key])(params[key])
-
-
-def set_value(params, key, value):
-    params[key] = type(params[key])(value)
-    params.update()
-
-
-@contextmanager
-def restored(params, key):
-    """The value of a parameter, which gets it back in the end."""
-    original = _value(params, key)
-    try:
-        yield original
-    finally:
-        set_value(params, key, original)
-
-
-def gradients(run) -> Findings:
-    """The derivatives of ``eval`` for each parameter are finite, also at grazing and normal incidence, and equal to
-    finite differences: to 2 % on average, besides the error of these, over directions as they are drawn. At a kink,
-    the derivatives of both sides will do, and what lies between; where the differences of two steps disagree, as at a
-    jump, they prove nothing and do not count, and where that is so of most, a value beside the one given is looked at.
+def gradients(run: Run) -> Findings:
+    """Check that the derivatives of ``eval`` for each parameter are finite, also at grazing and normal incidence, and
+    equal to finite differences: to 2 % on average, besides the error of these, over directions as they are drawn. At a
+    kink, the derivatives of both sides will do, and what lies between; where the differences of two steps disagree, as
+    at a jump, they prove nothing and do not count, and where that is so of most, a value beside the one given is looked
+    at.
 
     Where ``eval`` has a derivative, so has what ``sample`` returns, which integrators that are differentiated step by
     step use (``prb`` calls ``eval`` again): the direction, or else the weight. For plugins of ours, which detach the
@@ -73,13 +38,14 @@ def gradients(run) -> Findings:
     where a derivative inside the limit is not zero, the reverse derivative of the sum of the values or that of its
     negative is not, and a step against it leads to the limit.
 
-    And the derivatives of ``eval`` and ``pdf`` for the directions are finite."""
-    subject, part = run.subject, run.subject.whole
+    And the derivatives of ``eval`` and ``pdf`` for the directions are finite.
+    """
+    probe, part = run.probe, run.probe.whole
     yield _directional(run)
     params, keys, findings = traced_floats(run, "gradients")
     yield from findings
     wi, u = on_side(hemisphere(COUNT, 12), part.sides[0]), random(COUNT, 13)
-    samples = subject.sample(part, wi, u)
+    samples = probe.sample(part, wi, u)
     kept = samples.drawn & (samples.pdf > 0) & (wi[:, 2] * part.sides[0] > 0.05)
     wi, wo, scale = wi[kept], np.ascontiguousarray(samples.wo[kept]), 1 / samples.pdf[kept]
     u = u[kept]
@@ -87,18 +53,18 @@ def gradients(run) -> Findings:
         wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (12, 14))
         scale = np.full(COUNT, 2 * np.pi)
     wi, scale = np.ascontiguousarray(wi), scale[:, None]
-    edges, limits = _edges(part), ranges(subject.bsdf) if hasattr(subject.bsdf, "model") else {}
+    edges, limits = _edges(part), ranges(probe.bsdf) if probe.is_ours else {}
 
-    def values():
-        return subject.eval(part, wi, wo)
+    def values() -> Array:
+        return probe.eval(part, wi, wo)
 
     for key in keys:
         with restored(params, key) as original:
             outcome = Outcome("gradients", key)
-            derivative, total = _derivatives(params, key, part, subject, wi, wo)
-            at_edges, total_at_edges = _derivatives(params, key, part, subject, *edges)
+            derivative, total = _derivatives(run, params, key, wi, wo)
+            at_edges, total_at_edges = _derivatives(run, params, key, *edges)
             if len(u):
-                _check_weight(outcome, subject, params, key, wi, u, derivative * scale)
+                _check_weight(run, outcome, params, key, wi, u, derivative * scale)
             set_value(params, key, original)
             for name, found in (
                 ("of its derivatives", derivative),
@@ -111,7 +77,7 @@ def gradients(run) -> Findings:
             size = float(np.mean(abs(np.array(original, np.float64))))
             # Mitsuba itself refuses negative values of a measured spectrum.
             for limit, beyond, inside in _beyond(None if key.endswith(".values") else limits.get(key)):
-                _check_way_back(outcome, subject, params, key, (limit, beyond, inside), wi, wo)
+                _check_way_back(run, outcome, params, key, (limit, beyond, inside), wi, wo)
             set_value(params, key, original)
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
@@ -124,10 +90,10 @@ def gradients(run) -> Findings:
                 set_value(params, key, original + shift)
                 if shift:
                     # At an index of refraction of 1, no reflection turns into total reflection: look beside it.
-                    derivative, _ = _derivatives(params, key, part, subject, wi, wo)
-                differences = _differences(params, key, values, part_of * step)
-                if differences[2].mean() > trusted.mean():
-                    low, high, trusted, noise = differences
+                    derivative, _ = _derivatives(run, params, key, wi, wo)
+                tried = differences(params, key, values, part_of * step)
+                if tried.trusted.mean() > trusted.mean():
+                    low, high, trusted, noise = tried
                     compared = derivative
                 if trusted.mean() > 0.95:
                     break
@@ -152,14 +118,14 @@ def gradients(run) -> Findings:
         yield Finding("gradients", "whole", "skip", "It has no parameters.")
 
 
-def _directional(run) -> Finding:
-    """Whether ``eval`` and ``pdf`` have finite derivatives for both directions, where formulas break and elsewhere."""
-    outcome, subject, part = Outcome("gradients", "wi and wo"), run.subject, run.subject.whole
+def _directional(run: Run) -> Finding:
+    """Check that derivatives of ``eval`` and ``pdf`` for the directions are finite, also where formulas break."""
+    outcome, probe, part = Outcome("gradients", "wi and wo"), run.probe, run.probe.whole
     wi, wo = _edges(part)
-    mirrored = np.float32([-1, -1, 1])
+    mirrored = np.array([-1, -1, 1], np.float32)
     some = on_side(hemisphere(500, 15), part.sides[0]), on_side(hemisphere(500, 16), part.sides[0])
     wi, wo = np.concatenate([wi, wi, some[0], some[0]]), np.concatenate([wo, wi * mirrored, *some])
-    for name, method in (("eval", subject.bsdf.eval), ("pdf", subject.bsdf.pdf)):
+    for name, method in (("eval", probe.bsdf.eval), ("pdf", probe.bsdf.pdf)):
         si, towards = interaction(wi), vectors(wo)
         dr.enable_grad(si.wi, towards)
         result = method(part.context, si, towards, True)
@@ -178,10 +144,12 @@ def _directional(run) -> Finding:
     return outcome.finding("The derivatives of eval and pdf for the directions are finite.")
 
 
-def _check_weight(outcome, subject, params, key, wi, u, expected):
-    """The derivative of ``sample``'s weight, where that of value over pdf is ``expected``."""
+def _check_weight(
+    run: Run, outcome: Outcome, params: mi.SceneParameters, key: str, wi: Array, u: Array, expected: Array
+) -> None:
+    """Check the derivative of ``sample``'s weight, where that of value over pdf is ``expected``."""
     attach(params, key)
-    bs, weight = subject.bsdf.sample(subject.whole.context, interaction(wi), *variates_of(u), True)
+    bs, weight = run.probe.bsdf.sample(run.probe.whole.context, interaction(wi), *sample_arguments(u), True)
     twice = bs.wo * 2  # only ends of the graph keep a derivative, and the weight may depend on the direction
     moved, found = np.zeros(1), np.zeros(1)
     if dr.grad_enabled(weight) or dr.grad_enabled(twice):
@@ -195,8 +163,7 @@ def _check_weight(outcome, subject, params, key, wi, u, expected):
     size, error = abs(expected).mean(), abs(np.nan_to_num(found) - expected).mean()
     if moved.any() or not size > 0:
         return
-    ours = hasattr(subject.bsdf, "model")
-    if abs(found).mean() < 0.01 * size or (ours and error > TOLERANCE * size):
+    if abs(found).mean() < 0.01 * size or (run.probe.is_ours and error > TOLERANCE * size):
         outcome.fault(
             f"the derivatives of sample's weight average {abs(found).mean():.3g} in size, but those of eval over pdf "
             f"{size:.3g}, and differ by {error / size:.0%}",
@@ -204,8 +171,8 @@ def _check_weight(outcome, subject, params, key, wi, u, expected):
         )
 
 
-def _beyond(limits):
-    """``(limit, beyond, inside)`` for each finite end of a range: values of a parameter."""
+def _beyond(limits: tuple[float, float] | None) -> Iterator[tuple[float, float, float]]:
+    """Yield ``(limit, beyond, inside)`` for each finite end of a range: values of a parameter."""
     if limits is None:
         return
     low, high = limits
@@ -216,17 +183,26 @@ def _beyond(limits):
             yield limit, limit + step, limit - 0.1 * step
 
 
-def _check_way_back(outcome, subject, params, key, values, wi, wo):
-    """Whether an optimiser returns from a value beyond a limit."""
+def _check_way_back(
+    run: Run,
+    outcome: Outcome,
+    params: mi.SceneParameters,
+    key: str,
+    values: tuple[float, float, float],
+    wi: Array,
+    wo: Array,
+) -> None:
+    """Check that an optimiser returns from a value beyond a limit; ``values`` are those of :func:`_beyond`."""
     limit, beyond, inside = values
-    kind, part, few = type(_value(params, key)), subject.whole, slice(0, 500)
+    probe, part = run.probe, run.probe.whole
+    kind, few = type(value_of(params, key)), slice(0, 500)
     wi, wo = np.ascontiguousarray(wi[few]), np.ascontiguousarray(wo[few])
 
-    def backward(value, signs):
-        """The value there, and the derivatives of its sum with some signs."""
+    def backward(value: float, signs: tuple[int, ...]) -> tuple[Array, list[Array]]:
+        """Return the values there, and the derivatives of their sum with some signs."""
         set_value(params, key, dr.full(kind, value, dr.width(params[key])))
         attach(params, key)
-        result = subject.bsdf.eval(part.context, interaction(wi), vectors(wo), True)
+        result = probe.bsdf.eval(part.context, interaction(wi), vectors(wo), True)
         found = []
         for sign in signs:
             if dr.grad_enabled(result):
@@ -240,8 +216,8 @@ def _check_way_back(outcome, subject, params, key, values, wi, wo):
 
     value, ways = backward(beyond, (1, -1))
     set_value(params, key, dr.full(kind, limit, dr.width(params[key])))
-    error = relative(value, subject.eval(part, wi, wo)).max(initial=0)
-    if error > 10 * subject.rounding(part):
+    error = relative(value, probe.eval(part, wi, wo)).max(initial=0)
+    if error > 10 * run.rounding(part):
         outcome.fault(f"at {beyond:g}, beyond its limit of {limit:g}, eval is not that at the limit", error)
     outwards = max((float((found * np.sign(limit - beyond)).max()) for found in ways), default=0.0)
     if outwards > 0:
@@ -260,30 +236,23 @@ def _check_way_back(outcome, subject, params, key, values, wi, wo):
         )
 
 
-def attach(params, key):
-    """Make a parameter what derivatives are taken for."""
-    value = type(params[key])(dr.detach(params[key]))
-    dr.enable_grad(value)
-    params[key] = value
-    params.update()
-
-
-def _edges(part):
+def _edges(part: Part) -> tuple[Array, Array]:
+    """Return pairs of directions where formulas break: normal, grazing, mirrored, equal."""
     edge = np.array([direction(t, phi) for t in (0, 1e-3, 45, 89, 89.9, 89.99) for phi in (0, 50, 180)])
     edge = on_side(edge, part.sides[0])
     wi, wo = (np.ascontiguousarray(w.reshape(-1, 3)) for w in np.broadcast_arrays(edge[:, None], edge[None]))
     return wi, wo
 
 
-def _derivatives(params, key, part, subject, wi, wo):
-    """``(derivatives, total)`` for a parameter: of each value as all entries of the parameter grow alike, by forward
-    differentiation, and of the sum of the values by reverse differentiation, in which other things go wrong."""
+def _derivatives(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: Array) -> tuple[Array, Array]:
+    """Return ``(derivatives, total)`` for a parameter: of each value as all entries of the parameter grow alike, by
+    forward differentiation, and of the sum of the values by reverse differentiation, in which other things go wrong."""
     if not len(wo):
         return np.zeros((0, 1)), np.zeros(1)
     found = []
     for reverse in (False, True):
         attach(params, key)
-        result = subject.bsdf.eval(part.context, interaction(wi), vectors(wo), True)
+        result = run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), True)
         attached = dr.grad_enabled(result)
         if reverse:
             if attached:
@@ -294,82 +263,5 @@ def _derivatives(params, key, part, subject, wi, wo):
                 dr.forward(params[key])
             found.append(numbers(dr.grad(result), len(wo)).copy())
         dr.disable_grad(params[key])
-    return found
-
-
-def _differences(params, key, values, step):
-    """``(low, high, trusted, noise)``: bounds of the derivatives, by differences of two steps, extrapolated. The bounds
-    are the same, but where the differences to the two sides do not approach each other: at a kink any derivative
-    between them will do. Where one side changes nothing, the other counts, if that is so of most, as at the end of a
-    range: where it is so of some, they may be reflected totally."""
-    original, centre = _value(params, key), values()
-
-    def at(shift):
-        set_value(params, key, original + shift)
-        return values()
-
-    def quotients(h):
-        return (at(h) - centre) / h, (centre - at(-h)) / h
-
-    (above, below), (nearer_above, nearer_below) = quotients(step), quotients(step / 2)
-    noise = 4e-7 * abs(centre) / step
-    up, down = 2 * nearer_above - above, 2 * nearer_below - below
-    lone = (above == 0) != (below == 0)
-    if lone.sum() > 0.5 * ((above != 0) | (below != 0)).sum():
-        up, down = np.where(above == 0, down, up), np.where(below == 0, up, down)
-    else:
-        lone[:] = False
-    gap, nearer_gap = abs(above - below), abs(nearer_above - nearer_below)
-    slopes = (above, nearer_above), (below, nearer_below)
-    settled = [abs(near - far) <= 0.3 * np.maximum(abs(near), abs(far)) + 4 * noise for far, near in slopes]
-    kink = (
-        ~lone
-        & settled[0]
-        & settled[1]
-        & (nearer_gap > 0.75 * gap)
-        & (nearer_gap > 0.05 * abs(nearer_above) + 4 * noise)
-    )
-    first, second = (above + below) / 2, (nearer_above + nearer_below) / 2
-    smooth = np.where(lone, up, (4 * second - first) / 3)
-    change = np.where(lone, up - np.where(above == 0, below, above), first - second)
-    trusted = kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)
-    noise = noise + np.where(kink, 0, 0.5 * abs(change))
-    low, high = (np.where(kink, choose(up, down), smooth) for choose in (np.minimum, np.maximum))
-    return low, high, trusted & np.isfinite(low) & np.isfinite(high), noise
-
-
-def kernels_of(work: Callable[[], object]) -> set[int]:
-    """The kernels that some work launches, by hash: whether one is compiled depends on the cache that earlier runs
-    left. They must be recorded, by ``dr.JitFlag.KernelHistory``."""
-    dr.kernel_history_clear()
-    work()
-    return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
-
-
-def recompiles(run) -> Findings:
-    """A new value of a parameter compiles no kernel, after its first update."""
-    subject, part = run.subject, run.subject.whole
-    params, keys, findings = traced_floats(run, "recompiles")
-    yield from findings
-    wi, u = on_side(hemisphere(64, 1), part.sides[0]), random(64, 2)
-
-    def launched():
-        return kernels_of(lambda: subject.sample(part, wi, u))
-
-    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-        for key in keys:
-            outcome, kernels = Outcome("recompiles", key), []
-            with restored(params, key) as original:
-                for step in range(4):
-                    value = original * (0.97 - 0.01 * step) + 1e-4
-                    dr.make_opaque(value)
-                    set_value(params, key, value)
-                    kernels.append(launched())
-            fresh = len(set.union(*kernels) - kernels[0])
-            if not kernels[0]:
-                outcome.fault("no kernel was launched at all")
-            if fresh:
-                outcome.fault(f"{fresh} kernels are compiled for three new values")
-            yield outcome.finding("No kernel is compiled for a new value.")
-    if not keys and not findings:
-        yield Finding("recompiles", "whole", "skip", "It has no parameters.")
+    derivatives, total = found
+    return derivatives, total

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
-if TYPE_CHECKING:
-    from .sampling import Trial
+from .trial import Trial
 
 Verdict = Literal["fail", "pass", "skip", "info"]
 """The gravest first."""
@@ -44,6 +43,7 @@ class Report:
 
     @property
     def failures(self) -> list[Finding]:
+        """The findings that failed."""
         return [finding for finding in self.findings if finding.verdict == "fail"]
 
     @property
@@ -54,16 +54,16 @@ class Report:
         return " ".join(["Nothing was judged.", *dict.fromkeys(finding.message for finding in self.findings)])
 
     def verdict(self, check: str) -> Verdict | None:
-        """The gravest verdict of a check, if it was made."""
+        """Return the gravest verdict of a check, or None if it was not made."""
         found = [finding.verdict for finding in self.of(check)]
         return next((verdict for verdict in get_args(Verdict) if verdict in found), None)
 
     def of(self, check: str) -> list[Finding]:
-        """The findings of one check."""
+        """Return the findings of one check."""
         return [finding for finding in self.findings if finding.check == check]
 
     def to_dict(self) -> dict[str, Any]:
-        """The report in types that JSON has."""
+        """Return the report in types that JSON has."""
         return {"name": self.name, "passed": self.passed, "findings": [asdict(finding) for finding in self.findings]}
 
     def __str__(self) -> str:

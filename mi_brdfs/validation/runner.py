@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from typing import Any
 
 import mitsuba as mi
 
+from ..measure.probe import BSDFProbe
+from ..measure.sources import name_of
 from ..variants import is_measurable
-from . import components, contract, derivatives, sampling, spectral, textures, values
-from .energy import energy_limits
+from . import components, contract, derivatives, energy, recompiles, sampling, spectral, textures, values
 from .outcome import Findings, told
 from .report import Finding, Report
-from .subject import SCATTERED, Incident, Part, Samples, Subject, random
+from .run import Run
 
 CHECKS: dict[str, Callable[[Run], Findings]] = {
     check.__name__: check
@@ -28,13 +28,13 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         sampling.weight,
         sampling.pdf,
         sampling.chi2,
-        sampling.albedo,
-        sampling.efficiency,
+        energy.albedo,
+        energy.efficiency,
         components.components,
         components.flags,
         textures.textures,
         derivatives.gradients,
-        derivatives.recompiles,
+        recompiles.recompiles,
         contract.active,
         contract.mode,
         contract.reflectance,
@@ -47,36 +47,6 @@ VARIANT = "llvm_ad_rgb"
 """What a plugin dict is checked in where the active variant does not do."""
 
 
-@dataclass
-class Run:
-    """One call of :func:`check`: what the checks share."""
-
-    subject: Subject
-    significance: float
-    tests: int
-    """How many statistical tests there are in all."""
-    conserves: bool | None
-    """Whether the whole is judged to conserve energy; None if its manual page says so or not."""
-    given: dict | None
-    """The dict that the BSDF was given as, if it was."""
-    trials: dict[str, tuple[list, list]] = field(default_factory=dict)
-    """Of the sampler, by the name of the part, once they are made: for the directions that were asked for, and for some
-    at random."""
-    _samples: dict = field(default_factory=dict)
-
-    def samples(self, part: Part, incident: Incident) -> Samples:
-        """Samples for a direction of incidence, the same for every check."""
-        key = part.name, incident.name
-        if key not in self._samples:
-            self._samples[key] = self.subject.sample(part, incident.wi, random(SCATTERED, 11))
-        return self._samples[key]
-
-    @property
-    def energy(self):
-        default = self.given is not None and set(self.given) == {"type"}
-        return energy_limits(self.subject.bsdf, self.conserves, default)
-
-
 def check(
     bsdf: dict[str, Any] | mi.BSDF,
     *,
@@ -87,7 +57,7 @@ def check(
     conserves: bool | None = None,
     on_progress: Callable[[], None] = lambda: None,
 ) -> Report:
-    """Check a BSDF, of whomever: that its sampler draws what its density says, that its parts fit together, that its
+    """Check any BSDF: that its sampler draws what its density says, that its parts fit together, that its
     values make sense and that it can be differentiated.
 
     A plugin dict is checked in the active variant if that is vectorized and unpolarized, and else in ``llvm_ad_rgb``.
@@ -114,30 +84,23 @@ def check(
         raise ValueError(f"A loaded BSDF of {mi.variant()} cannot be checked: load it in {VARIANT} or another "
                          "vectorized and unpolarized variant, or give its dict.")  # fmt: skip
     with nullcontext() if is_measurable(mi.variant()) else mi.variant_context(VARIANT):
-        subject = Subject(bsdf if loaded else mi.load_dict(bsdf), tuple(angles))
-        name = name or (bsdf["type"] if not loaded else name_of(subject.bsdf))
-        tests = max(1, sampling.tests(subject))
-        run = Run(subject, significance, tests, conserves, None if loaded else bsdf)
+        probe = BSDFProbe(bsdf if loaded else mi.load_dict(bsdf))
+        name = name or (bsdf["type"] if not loaded else name_of(probe.bsdf))
+        run = Run(probe, tuple(angles), significance, conserves, None if loaded else bsdf)
         findings = [
             Finding("components", f"component {k}", "skip", "A delta function, which cannot be evaluated or tested.")
-            for k in subject.deltas
+            for k in probe.deltas
         ]
         for word in wanted:
-            if subject.parts:
+            if probe.parts:
                 findings += _found(word, run)
             on_progress()
-        return Report(name, findings, sampling.shown(run))
+        return Report(name, findings, list(run.shown_trials()))
 
 
 def _found(word: str, run: Run) -> Findings:
-    """The findings of a check; if it raises, that is another."""
+    """Yield the findings of a check; if it raises, that is another."""
     try:
         yield from CHECKS[word](run)
     except Exception as error:
         yield Finding(word, "whole", "fail", f"It could not be checked to the end, as it raised {told(error)}.")
-
-
-def name_of(bsdf: mi.BSDF) -> str:
-    """The id of a BSDF, or the name of its class."""
-    kind = type(bsdf).__name__
-    return bsdf.id() or (bsdf.class_name() if kind == "BSDF" else kind)

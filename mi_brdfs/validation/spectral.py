@@ -7,9 +7,13 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ..measure.arrays import numbers
+from ..measure.directions import angles_of, hemisphere, on_side
+from ..measure.probe import BSDFProbe
+from ..measure.variates import random
 from .outcome import Findings, Outcome, told
 from .report import Finding
-from .subject import Subject, angles_of, hemisphere, numbers, on_side, random
+from .run import Run
 
 COUNT = 1000
 TOLERANCE = 5e-3
@@ -18,11 +22,11 @@ BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
 
 
-def spectral(run) -> Findings:
-    """What is grey is the same in rgb and in spectral variants, to 0.5 %: all rgb colours become grey ones, as bright
-    as they are. Those of plugins of ours are also tried brighter than 1, where they may be; Mitsuba's own plugins limit
-    them to 1 in spectral variants. For this the BSDF must be given as a dict."""
-    part = run.subject.whole
+def spectral(run: Run) -> Findings:
+    """Check that what is grey is the same in rgb and in spectral variants, to 0.5 %: all rgb colours become grey ones,
+    as bright as they are. Those of plugins of ours are also tried brighter than 1, where they may be; Mitsuba's own
+    plugins limit them to 1 in spectral variants. For this the BSDF must be given as a dict."""
+    part = run.probe.whole
     if run.given is None:
         yield Finding("spectral", part.name, "skip", "To load it in two variants, its dict is needed.")
         return
@@ -42,8 +46,8 @@ def spectral(run) -> Findings:
     with mi.variant_context(other):
         try:
             got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
-        except (RuntimeError, TypeError) as error:
-            yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(error)}.")
+        except (RuntimeError, TypeError) as failure:
+            yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
             return
     outcome, worst = Outcome("spectral", part.name), 0.0
     for words in tried:
@@ -63,13 +67,13 @@ def spectral(run) -> Findings:
 
 
 def _greys(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The BSDF in grey, by what is special of it in words. The variant must be one of rgb."""
-    subject = _load(given)
-    ours, params = hasattr(subject.bsdf, "model"), mi.traverse(subject.bsdf)
-    bright = {}
+    """Return the BSDF in grey, by what is special of it in words. The variant must be one of rgb."""
+    probe = _load(given)
+    params = mi.traverse(probe.bsdf)
+    bright: dict[str, Any] = {}
     for key in params.keys():
         name, _, rest = key.partition(".")
-        if rest == "value" and (ours or isinstance(params[key], mi.Color3f)):
+        if rest == "value" and (probe.is_ours or isinstance(params[key], mi.Color3f)):
             try:
                 grey = given | {name: _rgb(float(numbers(params[key], 1).mean()))}
                 _load(grey)
@@ -77,7 +81,7 @@ def _greys(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
                 continue
             given, bright = grey, bright | {name: _rgb(BRIGHT)}
     tried = {"": given}
-    for name, colour in bright.items() if ours else ():
+    for name, colour in bright.items() if probe.is_ours else ():
         try:
             _load(given | {name: colour})
         except RuntimeError:  # a reflectance
@@ -86,8 +90,8 @@ def _greys(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return tried
 
 
-def _load(given: dict[str, Any]) -> Subject:
-    return Subject(mi.load_dict(given), (0,))
+def _load(given: dict[str, Any]) -> BSDFProbe:
+    return BSDFProbe(mi.load_dict(given))
 
 
 def _rgb(grey: float) -> dict[str, Any]:

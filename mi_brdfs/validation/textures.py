@@ -7,28 +7,32 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from .derivatives import restored, set_value
+from ..measure.arrays import Array, interaction, numbers
+from ..measure.directions import hemisphere, on_side
+from ..measure.probe import BSDFProbe, Part
+from ..measure.variates import random
 from .outcome import Findings, Outcome, relative
 from .report import Finding
-from .subject import Subject, hemisphere, interaction, numbers, on_side, random
+from .run import Run
+from .traversal import restored, set_value, value_of
 
 COUNT = 4000
 
 
-def textures(run) -> Findings:
-    """A parameter given as a texture acts as its value at the surface point does, wherever that is. All of them become
-    bitmaps, in each of which some columns have a pattern of the parameter's value and another one, where the others
-    have theirs only. At points all over them ``eval`` and ``eval_diffuse_reflectance`` are what they are with the
-    texel's value everywhere, and weights are eval/pdf, to float32's rounding. For this the BSDF must be given as a
-    dict."""
-    subject, part = run.subject, run.subject.whole
+def textures(run: Run) -> Findings:
+    """Check that a parameter given as a texture acts as its value at the surface point does, wherever that is. All of
+    them become bitmaps, in each of which some columns have a pattern of the parameter's value and another one, where
+    the others have theirs only. At points all over them ``eval`` and ``eval_diffuse_reflectance`` are what they are
+    with the texel's value everywhere, and weights are eval/pdf, to float32's rounding. For this the BSDF must be given
+    as a dict."""
+    probe, part = run.probe, run.probe.whole
     if run.given is None:
         yield Finding("textures", "whole", "skip", "To replace its parameters by textures, its dict is needed.")
         return
-    params = mi.traverse(subject.bsdf)
+    params = mi.traverse(probe.bsdf)
     originals = {
-        name: type(params[key])(params[key])
-        for key in constants(params)
+        name: value_of(params, key)
+        for key in params.keys()
         for name, _, rest in [key.partition(".")]
         if rest == "value" and not isinstance(run.given.get(name), dict)
     }
@@ -40,15 +44,15 @@ def textures(run) -> Findings:
     if not names:
         yield Finding("textures", "whole", "skip", "It has no parameters that are constant textures.")
         return
-    textured = Subject(mi.load_dict(given), subject.angles)
+    textured = BSDFProbe(mi.load_dict(given))
     uv, column = _points(len(originals))
     wi, variates = on_side(hemisphere(len(uv), 30), part.sides[0]), random(len(uv), 31)
     samples = textured.sample(part, wi, variates, uv)
     wo = np.where(np.arange(len(uv))[:, None] % 2, samples.wo, on_side(hemisphere(len(uv), 32), part.sides[0]))
     wo = wo.astype(np.float32)
     found = _numbers(textured, part, wi, wo, uv)
-    usual = _numbers(subject, part, wi, wo, uv)
-    tolerance = 3 * subject.rounding(part)
+    usual = _numbers(probe, part, wi, wo, uv)
+    tolerance = 3 * run.rounding(part)
     for k, parameter in enumerate(originals):
         if parameter in refused:
             continue
@@ -57,7 +61,7 @@ def textures(run) -> Findings:
         different = _is_changed(_bitmap(original, other_value, k, len(originals)), other_value, uv)
         with restored(params, key):
             set_value(params, key, other_value)
-            other = _numbers(subject, part, wi, wo, uv)
+            other = _numbers(probe, part, wi, wo, uv)
         wanted = {word: np.where(different[:, None], other[word], usual[word]) for word in usual}
         comparisons = [
             (word, found[word], wanted[word], "{} is {:.4g} where its texel is {}, but {:.4g} if it is that everywhere")
@@ -80,15 +84,10 @@ def textures(run) -> Findings:
         yield outcome.finding("As a texture it acts as its value at the point does.")
 
 
-def constants(params) -> list[str]:
-    """The keys of the values of textures that are the same everywhere."""
-    return [key for key in params.keys() if key.endswith(".value")]
-
-
-def _numbers(subject, part, wi, wo, uv) -> dict[str, np.ndarray]:
+def _numbers(probe: BSDFProbe, part: Part, wi: Array, wo: Array, uv: Array) -> dict[str, Array]:
     return {
-        "eval": subject.eval(part, wi, wo, uv),
-        "eval_diffuse_reflectance": subject.reflectance(wi, uv),
+        "eval": probe.eval(part, wi, wo, uv),
+        "eval_diffuse_reflectance": probe.diffuse_reflectance(wi, uv),
     }
 
 
@@ -96,8 +95,8 @@ PATTERN = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]], bool
 """In which texels of its columns a parameter differs: no turn, flip or shift of the square leaves it as it is."""
 
 
-def _points(count: int):
-    """``(uv, column)``: points in the texels of each parameter, at some distance from their edges."""
+def _points(count: int) -> tuple[Array, Array]:
+    """Return ``(uv, column)``: points in the texels of each parameter, at some distance from their edges."""
     rows, width = PATTERN.shape
     rng = np.random.default_rng(33)
     texel = np.arange(max(COUNT, 200 * count)) % (count * width * rows)
@@ -107,21 +106,23 @@ def _points(count: int):
     return np.stack([u, v], axis=-1).astype(np.float32), texel % (count * width) // width
 
 
-def _is_changed(bitmap: dict[str, Any], changed, uv) -> np.ndarray:
-    """Where a bitmap has the changed value, in the opinion of Mitsuba's texture itself."""
+def _is_changed(bitmap: dict[str, Any], changed: Any, uv: Array) -> Array:
+    """Return where a bitmap has the changed value, according to Mitsuba's texture itself."""
     texture, value = mi.load_dict(bitmap), numbers(changed, 1)[0]
-    si = interaction(np.float32([0, 0, 1]), uv)
+    si = interaction([0, 0, 1], uv)
     texels = numbers(texture.eval_1(si) if len(value) == 1 else texture.eval_3(si), len(uv))
     return (abs(texels - value) < 1e-5).all(axis=1)
 
 
-def _textured(given: dict[str, Any], originals: dict, changed: dict) -> tuple[dict[str, Any], list[str]]:
-    """``(dict, refused)``: the BSDF with bitmaps for its parameters, but for those that it refuses: some take none, and
-    of some pairs only one may be given."""
+def _textured(
+    given: dict[str, Any], originals: dict[str, Any], changed: dict[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return ``(dict, refused)``: the BSDF with bitmaps for its parameters, except those that it refuses: some take
+    none, and of some pairs only one may be given."""
     bitmaps = {name: _bitmap(originals[name], changed[name], k, len(originals)) for k, name in enumerate(originals)}
     if _loads(given | bitmaps):
         return given | bitmaps, []
-    refused = []
+    refused: list[str] = []
     for name, bitmap in bitmaps.items():
         if _loads(given | {name: bitmap}):
             given = given | {name: bitmap}
@@ -138,9 +139,9 @@ def _loads(given: dict[str, Any]) -> bool:
     return True
 
 
-def _bitmap(original, changed, k: int, count: int) -> dict[str, Any]:
-    """Texels without interpolation and conversion, in three columns for each of some parameters: the pattern in those
-    of parameter k."""
+def _bitmap(original: Any, changed: Any, k: int, count: int) -> dict[str, Any]:
+    """Return texels without interpolation and conversion, in three columns for each of some parameters: the pattern in
+    those of parameter k."""
     rows, width = PATTERN.shape
     data = np.tile(numbers(original, 1)[0], (rows, width * count, 1))
     data[:, width * k : width * (k + 1)][PATTERN] = numbers(changed, 1)[0]

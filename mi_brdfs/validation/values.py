@@ -2,37 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import mitsuba as mi
 import numpy as np
 
+from ..measure.arrays import Array
+from ..measure.directions import angles_of, direction, hemisphere, on_side
+from ..measure.probe import Part
+from ..measure.variates import random
+from .incidents import SCATTERED
 from .outcome import Findings, Outcome, relative
 from .report import Finding
-from .subject import SCATTERED, Part, angles_of, direction, hemisphere, on_side, random
+from .run import Run
 
 
-def _pairs(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Directions of incidence and of reflection where formulas break: normal, grazing, mirrored, equal, opposite."""
+def _pairs(part: Part) -> tuple[Array, Array]:
+    """Return pairs of directions where formulas break: normal, grazing, mirrored, equal, opposite."""
     thetas = [0, 1e-3, 0.1, 30, 60, 80, 89, 89.9, 89.99, 89.9999]
     edge = np.array([direction(theta, phi) for theta in thetas for phi in (0, 30, 90, 180, 210)])
     wi, wo = (w.reshape(-1, 3) for w in np.broadcast_arrays(edge[:, None], edge[None]))
     generic = hemisphere(4000, 1), hemisphere(4000, 2)
-    wi, wo = np.concatenate([wi, edge, generic[0]]), np.concatenate([wo, edge * np.float32([-1, -1, 1]), generic[1]])
+    mirrored = edge * np.array([-1, -1, 1], np.float32)
+    wi, wo = np.concatenate([wi, edge, generic[0]]), np.concatenate([wo, mirrored, generic[1]])
     sides = [(i, o) for i in part.sides for o in (1, -1)]
     wi, wo = (np.concatenate([on_side(w, side[which]) for side in sides]) for which, w in enumerate((wi, wo)))
     return np.ascontiguousarray(wi), np.ascontiguousarray(wo)
 
 
-def _bad(values: np.ndarray) -> np.ndarray:
-    return ~(np.isfinite(values) & (values >= 0)).reshape(len(values), -1).all(axis=1)
+def _bad(values: Array) -> Array:
+    """Return which rows have values that are negative or not finite."""
+    good = np.isfinite(values) & (values >= 0)
+    return np.logical_not(good.reshape(len(values), -1).all(axis=1))
 
 
-def finite(run) -> Findings:
-    """Values, densities and weights are finite and not negative: at normal incidence, at grazing, at the mirror
-    direction, towards the light, and for samples with variates of 0 and just below 1."""
-    for part in run.subject.parts:
+def finite(run: Run) -> Findings:
+    """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing, at the
+    mirror direction, towards the light, and for samples with variates of 0 and just below 1."""
+    for part in run.probe.parts:
         outcome = Outcome("finite", part.name)
         wi, wo = _pairs(part)
-        for name, values in (("eval", run.subject.eval(part, wi, wo)), ("pdf", run.subject.pdf(part, wi, wo))):
+        for name, values in (("eval", run.probe.eval(part, wi, wo)), ("pdf", run.probe.pdf(part, wi, wo))):
             bad = _bad(values)
             if bad.any():
                 k = int(np.argmax(bad))
@@ -41,12 +51,12 @@ def finite(run) -> Findings:
                     f"{bad.mean():.1%} of the pairs tried are negative or not finite",
                     bad.sum(),
                 )
-        corners = np.float32([0, 2**-24, 0.5, 1 - 2**-24])
+        corners = np.array([0, 2**-24, 0.5, 1 - 2**-24], np.float32)
         u = np.stack(np.meshgrid(corners, corners, corners), axis=-1).reshape(-1, 3)
         u = np.concatenate([u, random(2000, 4)])
         for side in part.sides:
             for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
-                samples = run.subject.sample(part, on_side(direction(theta, 30), side), u)
+                samples = run.probe.sample(part, on_side(direction(theta, 30), side), u)
                 length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
                 bad = _bad(samples.weight) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
                 if bad.any():
@@ -59,15 +69,17 @@ def finite(run) -> Findings:
         yield outcome.finding(f"{len(wi)} pairs of directions, to 0.0001° above the horizon.")
 
 
-def _shown(values) -> str:
+def _shown(values: Array) -> str:
+    """Return the first value that is negative or not finite, or else the first, in digits."""
     values = np.atleast_1d(values)
     return f"{next((v for v in values if not (np.isfinite(v) and v >= 0)), values[0]):.4g}"
 
 
-def horizon(run) -> Findings:
-    """A component is zero on the side that its flags exclude, and so is its density; and it sends no samples there."""
+def horizon(run: Run) -> Findings:
+    """Check that a component is zero on the side that its flags exclude, and so is its density; and it sends no samples
+    there."""
     flags = mi.BSDFFlags
-    for part in run.subject.parts:
+    for part in run.probe.parts:
         outcome = Outcome("horizon", part.name)
         wi, wo = _pairs(part)
         same = wi[:, 2] * wo[:, 2] > 0
@@ -75,8 +87,8 @@ def horizon(run) -> Findings:
             if part.has(flag):
                 continue
             for name, values in (
-                ("eval", run.subject.eval(part, wi[where], wo[where]).max(axis=1)),
-                ("pdf", run.subject.pdf(part, wi[where], wo[where])),
+                ("eval", run.probe.eval(part, wi[where], wo[where]).max(axis=1)),
+                ("pdf", run.probe.pdf(part, wi[where], wo[where])),
             ):
                 if (values != 0).any():
                     k = int(np.argmax(values != 0))
@@ -85,7 +97,7 @@ def horizon(run) -> Findings:
                         f"{angles_of(wo[where][k])}, {words} the horizon, where the flags allow nothing",
                         np.inf,
                     )
-            for incident in run.subject.views(part):
+            for incident in run.views(part):
                 samples = run.samples(part, incident)
                 there = (samples.wo[:, 2] * incident.wi[..., 2] > 0) == (words == "above")
                 lost = there & samples.lit
@@ -96,19 +108,19 @@ def horizon(run) -> Findings:
                         lost.sum(),
                     )
         for side in (1, -1):
-            if side not in run.subject.whole.sides:
+            if side not in run.probe.whole.sides:
                 _check_blind(run, outcome, part, side)
         yield outcome.finding("Nothing on the sides that the flags exclude.")
 
 
-def _check_blind(run, outcome, part: Part, side: int):
-    """Nothing may come of light from a side that the flags of all components exclude."""
-    wi, wo = (hemisphere(4000, seed) * np.float32([1, 1, side]) for seed in (2, 3))
+def _check_blind(run: Run, outcome: Outcome, part: Part, side: int) -> None:
+    """Check that nothing comes of light from a side that the flags of all components exclude."""
+    wi, wo = (on_side(hemisphere(4000, seed), side) for seed in (2, 3))
     wo[::2, 2] *= -1
-    samples = run.subject.sample(part, wi, random(4000, 4))
+    samples = run.probe.sample(part, wi, random(4000, 4))
     for name, values in (
-        ("eval", run.subject.eval(part, wi, wo).max(axis=1)),
-        ("pdf", run.subject.pdf(part, wi, wo)),
+        ("eval", run.probe.eval(part, wi, wo).max(axis=1)),
+        ("pdf", run.probe.pdf(part, wi, wo)),
         ("the weight of a sample", (samples.weight * samples.smooth[:, None]).max(axis=1)),
     ):
         if (values != 0).any():
@@ -121,21 +133,21 @@ def _check_blind(run, outcome, part: Part, side: int):
             )
 
 
-def support(run) -> Findings:
-    """Wherever there is light, it can be sampled: pdf > 0 where eval > 0. Values below 1e-9 of the largest do not
-    count."""
-    for part in run.subject.parts:
+def support(run: Run) -> Findings:
+    """Check that light can be sampled wherever there is some: pdf > 0 where eval > 0. Values below 1e-9 of the largest
+    do not count."""
+    for part in run.probe.parts:
         outcome, tried = Outcome("support", part.name), 0
-        for incident in run.subject.views(part):
+        for incident in run.views(part):
             lanes = np.arange(SCATTERED) % 2 == 0
-            own = np.sign(incident.wi[..., 2:]) * np.float32([0, 0, 1]) + np.float32([1, 1, 0])
-            wo = [np.where(lanes[:, None], hemisphere(SCATTERED, 3) * own, run.samples(part, incident).wo)]
+            own = hemisphere(SCATTERED, 3)
+            own[:, 2] *= np.sign(incident.wi[..., 2])
+            wo = np.where(lanes[:, None], own, run.samples(part, incident).wo)
             if part.has(mi.BSDFFlags.Transmission):
-                wo.append(on_side(wo[0], -1))
-            wo = np.concatenate(wo).astype(np.float32)
+                wo = np.concatenate([wo, on_side(wo, -1)])
             wi = incident.at(np.arange(len(wo)) % SCATTERED)
-            value = np.nan_to_num(run.subject.eval(part, wi, wo).max(axis=1))
-            pdf = run.subject.pdf(part, wi, wo)
+            value = np.nan_to_num(run.probe.eval(part, wi, wo).max(axis=1))
+            pdf = run.probe.pdf(part, wi, wo)
             missed = (value > 1e-9 * value.max()) & ~(pdf > 0)
             tried += len(wo)
             if missed.any():
@@ -149,18 +161,18 @@ def support(run) -> Findings:
         yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
 
 
-def eval_pdf(run) -> Findings:
-    """``eval_pdf`` says what ``eval`` and ``pdf`` say, and ``eval_pdf_sample`` what they and ``sample`` say, to
-    float32's rounding: some plugins compute a shared term differently."""
-    for part in run.subject.parts:
-        outcome, tolerance, worst = Outcome("eval_pdf", part.name), run.subject.rounding(part), 0.0
-        for incident in run.subject.views(part):
+def eval_pdf(run: Run) -> Findings:
+    """Check that ``eval_pdf`` says what ``eval`` and ``pdf`` say, and ``eval_pdf_sample`` what they and ``sample`` say,
+    to float32's rounding: some plugins compute a shared term differently."""
+    for part in run.probe.parts:
+        outcome, tolerance, worst = Outcome("eval_pdf", part.name), run.rounding(part), 0.0
+        for incident in run.views(part):
             lanes = np.arange(0, SCATTERED, 8)
             wi, u = incident.at(lanes), random(len(lanes), 6)
-            samples = run.subject.sample(part, wi, u)
+            samples = run.probe.sample(part, wi, u)
             wo = np.where(np.arange(len(u))[:, None] % 2, samples.wo, hemisphere(len(u), 7)).astype(np.float32)
-            value, density = run.subject.eval(part, wi, wo), run.subject.pdf(part, wi, wo)
-            pair, triple = run.subject.eval_pdf(part, wi, wo), run.subject.eval_pdf_sample(part, wi, wo, u)
+            value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
+            pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
             drawn, every = np.flatnonzero(samples.drawn), np.arange(len(u))
             comparisons = [
                 ("eval_pdf", "eval", pair[0], value, every),
@@ -186,22 +198,22 @@ def eval_pdf(run) -> Findings:
         yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
 
 
-def reciprocity(run) -> Findings:
-    """f(wi, wo) = f(wo, wi) for reflection, unless the component is flagged NonSymmetric: at generic pairs, and at
-    pairs that the sampler draws, where narrow lobes are."""
-    for part in run.subject.parts:
+def reciprocity(run: Run) -> Findings:
+    """Check that f(wi, wo) = f(wo, wi) for reflection, unless the component is flagged NonSymmetric: at generic pairs,
+    and at pairs that the sampler draws, where narrow lobes are."""
+    for part in run.probe.parts:
         if part.has(mi.BSDFFlags.NonSymmetric) or not part.has(mi.BSDFFlags.Reflection):
             reason = "is flagged NonSymmetric" if part.has(mi.BSDFFlags.NonSymmetric) else "does not reflect"
             yield Finding("reciprocity", part.name, "skip", f"Not checked, as it {reason}.")
             continue
-        outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.subject.rounding(part), 0.0
+        outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.rounding(part), 0.0
         for side in part.sides:
             wi, wo = on_side(hemisphere(8000, 8), side), on_side(hemisphere(8000, 9), side)
-            drawn = run.subject.sample(part, wi, random(8000, 10)).wo
+            drawn = run.probe.sample(part, wi, random(8000, 10)).wo
             near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * side > 0.01)
             wo[near] = drawn[near]
-            forth = run.subject.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
-            back = run.subject.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
+            forth = run.probe.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
+            back = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
             larger = np.nan_to_num(np.maximum(forth, back))
             scale = np.maximum(larger, 1e-6 * larger.max() + 1e-12)
             error = np.nan_to_num(abs(forth - back) / scale, nan=0).max(axis=1)
@@ -224,16 +236,16 @@ OCTAVES = 16, 8, 4, 2, 1, 0.5
 """The heights above the horizon that it looks at, in such steps."""
 
 
-def continuity(run) -> Findings:
-    """Values do not jump where formulas treat directions apart: at exactly normal incidence and reflection, and where
-    azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides (or, of narrow
-    lobes, a twentieth of their width), to float32's rounding and for all but one pair in a hundred; or it comes nearer
-    to that the smaller the angle is. And as the height above the horizon halves, from 0.5° to 0.01°, eval does not
-    change by more than a fifth power does, unless it does so before and after, too."""
-    for part in run.subject.parts:
+def continuity(run: Run) -> Findings:
+    """Check that values do not jump where formulas treat directions apart: at exactly normal incidence and reflection,
+    and where azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides (or,
+    of narrow lobes, a twentieth of their width), to float32's rounding and for all but one pair in a hundred; or it
+    comes nearer to that the smaller the angle is. And as the height above the horizon halves, from 0.5° to 0.01°, eval
+    does not change by more than a fifth power does, unless it does so before and after, too."""
+    for part in run.probe.parts:
         outcome, worst = Outcome("continuity", part.name), 0.0
-        step = min(STEP, run.subject.spread(part) / 20)
-        tolerance = 10 * run.subject.rounding(part)
+        step = min(STEP, run.spread(part) / 20)
+        tolerance = 10 * run.rounding(part)
         for side in part.sides:
             for where, crossing in _crossings(np.degrees(step)):
                 crossing = [on_side(w, side) for w in crossing]
@@ -258,8 +270,8 @@ def continuity(run) -> Findings:
         )
 
 
-def _check_octaves(outcome, word: str, values):
-    """Faults for values that change far more while the height above the horizon halves than while it halves before
+def _check_octaves(outcome: Outcome, word: str, values: Array) -> None:
+    """Add a fault for values that change far more while the height above the horizon halves than while it halves before
     and after: a power of the height changes alike."""
     high, low = np.maximum(values[:-1], values[1:]), np.minimum(values[:-1], values[1:])
     change = np.log(np.maximum(high, 1e-38) / np.maximum(low, 1e-38))
@@ -276,8 +288,8 @@ def _check_octaves(outcome, word: str, values):
         )
 
 
-def _crossings(step: float):
-    """``(name, directions)``: one where formulas may break, with its neighbours on both sides, near and farther."""
+def _crossings(step: float) -> Iterator[tuple[str, list[Array]]]:
+    """Yield ``(name, directions)``: one where formulas may break, with neighbours on both sides, near and farther."""
     turns = 0, -step, step, -4 * step, 4 * step
     for phi in (0, 90, 135):
         yield "the normal", [direction(turn, phi) for turn in turns]
@@ -285,18 +297,18 @@ def _crossings(step: float):
         yield f"θ = 50°, φ = {phi}°", [direction(50, phi + turn) for turn in turns]
 
 
-def _companions(run, part: Part, wi) -> np.ndarray:
-    """Directions to pair one of incidence with: uniform ones, and as they are drawn."""
+def _companions(run: Run, part: Part, wi: Array) -> Array:
+    """Return directions to pair one of incidence with: uniform ones, and as they are drawn."""
     side = np.sign(wi[2])
-    drawn = run.subject.sample(part, wi, random(2000, 21)).wo
+    drawn = run.probe.sample(part, wi, random(2000, 21)).wo
     return np.concatenate([on_side(hemisphere(2000, 22), side), drawn[drawn[:, 2] * side > 0.01]])
 
 
-def _both_ways(run, part: Part, directions, others):
-    """The values for light from each of some directions towards others, and from the others towards each."""
+def _both_ways(run: Run, part: Part, directions: list[Array], others: Array) -> Iterator[tuple[str, Array]]:
+    """Yield the values for light from each of some directions towards others, and from the others towards each."""
 
-    def values(wi, wo):
-        return run.subject.eval(part, *map(np.ascontiguousarray, np.broadcast_arrays(wi, wo))).max(axis=1)
+    def values(wi: Array, wo: Array) -> Array:
+        return run.probe.eval(part, *map(np.ascontiguousarray, np.broadcast_arrays(wi, wo))).max(axis=1)
 
     yield "from", np.array([values(w, others) for w in directions])
     yield "towards", np.array([values(others, w) for w in directions])

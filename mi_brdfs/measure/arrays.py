@@ -1,0 +1,78 @@
+"""NumPy arrays as arguments of a BSDF's methods, and what these return as arrays, in any variant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..variants import is_scalar
+
+Array = NDArray[Any]
+
+CENTRE = 0.4, 0.3
+"""The texture coordinates of what is measured where no others are given."""
+WAVELENGTHS = 450, 520, 580, 640
+"""Those of spectral variants, in nanometres."""
+
+
+def context(component: int | None = None, mask: int | None = None) -> mi.BSDFContext:
+    """Return a BSDF context, restricted to one component or to some types if they are given."""
+    result = mi.BSDFContext()
+    if component is not None:
+        result.component = component
+    if mask is not None:
+        result.type_mask = int(mask)
+    return result
+
+
+def interaction(wi: ArrayLike, uv: ArrayLike = CENTRE) -> mi.SurfaceInteraction3f:
+    """Return a surface interaction for directions ``wi`` of the local frame, shape (3,) or (N, 3), at texture
+    coordinates ``uv``, shape (2,) or (N, 2)."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = vectors(wi)
+    si.n = mi.Normal3f(0, 0, 1)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+    si.uv = mi.Point2f(uv) if np.ndim(uv) == 1 else mi.Point2f(_columns(uv))
+    if mi.is_spectral:
+        si.wavelengths = mi.UnpolarizedSpectrum(*WAVELENGTHS)
+    return si
+
+
+def vectors(w: ArrayLike) -> mi.Vector3f:
+    """Return directions of shape (3,) or (N, 3) as a vector that Dr.Jit compiles no new kernel for."""
+    result = mi.Vector3f(_columns(w))
+    if not is_scalar():
+        dr.make_opaque(result)
+    return result
+
+
+def sample_arguments(variates: Array) -> tuple[mi.Float, mi.Point2f]:
+    """Return rows of three uniform variates, shape (N, 3), as the two arguments of ``sample``. Vectorized variants
+    only."""
+    return mi.Float(variates[:, 0].copy()), mi.Point2f(_columns(variates[:, 1:]))
+
+
+def numbers(value: Any, count: int | None = None) -> Array:
+    """Return a float, vector, spectrum or Mueller matrix (of which the first entry counts) as float64 of shape
+    (count, channels), by default with as many rows as it has lanes."""
+    if mi.is_polarized and isinstance(value, mi.Spectrum):
+        value = value[0, 0]
+    array = np.array(value, np.float64)
+    if array.ndim < 2:
+        array = array.reshape((-1, 1) if is_scalar() else (1, -1))
+    return array.T if count is None else np.broadcast_to(array, (len(array), count)).T
+
+
+def luminance(colours: Array) -> Array:
+    """Return the luminance of rgb colours, shape (…, 3), and the mean of what has other channels."""
+    return colours @ [0.212671, 0.715160, 0.072169] if colours.shape[-1] == 3 else colours.mean(axis=-1)
+
+
+def _columns(rows: ArrayLike) -> Array:
+    """Return rows as the columns that Dr.Jit's arrays are made of."""
+    return np.ascontiguousarray(np.asarray(rows, np.float32).T)

@@ -1,0 +1,168 @@
+"""A BSDF as arrays: its methods called part by part, with directions and variates of NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import CENTRE, Array, context, interaction, numbers, sample_arguments, vectors
+
+
+class Part(NamedTuple):
+    """The whole BSDF (whose delta functions are not evaluated) or one of its components."""
+
+    name: str
+    context: mi.BSDFContext
+    component: int | None
+    flags: int
+    sides: tuple[int, ...]
+    """The sides that it is seen from: 1 for the front, -1 for the back."""
+
+    def has(self, flag: int) -> bool:
+        """Return whether a flag is among those of the part."""
+        return bool(self.flags & int(flag))
+
+
+class Samples(NamedTuple):
+    """What ``sample`` returned, and ``eval`` and ``pdf`` of the same directions: a row for each row of variates."""
+
+    wo: Array
+    weight: Array
+    density: Array
+    """The density that ``sample`` states."""
+    component: Array
+    kind: Array
+    eta: Array
+    value: Array
+    pdf: Array
+    smooth: Array
+    """Which of them are not of a delta function."""
+
+    @property
+    def lit(self) -> Array:
+        """Which of them carry light, and not that of a delta function."""
+        return self.weight.any(axis=1) & self.smooth
+
+    @property
+    def drawn(self) -> Array:
+        """Which of them carry light or may be black ones, drawn where f = 0.
+
+        A sampler may also reject a direction by a weight of zero, and leave anything in the other fields: so a black
+        sample must have f = 0 and the density that ``pdf`` states.
+        """
+        black = ~self.value.any(axis=1) & (self.pdf > 0) & self.smooth
+        return self.lit | (black & (abs(self.density - self.pdf) < 0.01 * self.pdf))
+
+
+@dataclass
+class BSDFProbe:
+    """A BSDF of the active variant, which must be vectorized and unpolarized, with its parts.
+
+    Directions are float32 arrays: ``wo`` and variates of shape (N, 3), ``wi`` of shape (3,) or (N, 3). Texture
+    coordinates ``uv`` have the shape (2,) or (N, 2). Values and weights have the shape (N, channels), densities (N,).
+    """
+
+    bsdf: mi.BSDF
+
+    @cached_property
+    def components(self) -> list[Part]:
+        """The components that are not delta functions."""
+        count, parts = self.bsdf.component_count(), []
+        for k in range(count):
+            flags = int(self.bsdf.flags(k))
+            if flags & int(mi.BSDFFlags.Smooth):
+                name = f"component {k}" if count > 1 else "whole"
+                parts.append(Part(name, context(component=k), k, flags, _sides(flags)))
+        return parts
+
+    @cached_property
+    def deltas(self) -> list[int]:
+        """The components that are delta functions."""
+        smooth = [part.component for part in self.components]
+        return [k for k in range(self.bsdf.component_count()) if k not in smooth]
+
+    @cached_property
+    def whole(self) -> Part:
+        """All that is not a delta function, seen from wherever a component is, even one that is a delta function."""
+        flags = 0
+        for part in self.components:
+            flags |= part.flags
+        return Part("whole", context(), None, flags, _sides(int(self.bsdf.flags())))
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """The whole, and each component if there are several."""
+        if not self.components:
+            return []
+        return [self.whole, *(self.components if self.bsdf.component_count() > 1 else [])]
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether the plugin is one of a model, of this pack or registered with it."""
+        return hasattr(self.bsdf, "model")
+
+    # --- Calls ------------------------------------------------------------------------------------------------------
+
+    def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
+        """Return f |cosθ_o|."""
+        return numbers(self.bsdf.eval(part.context, interaction(wi, uv), vectors(wo), True), len(wo))
+
+    def pdf(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
+        """Return the density of ``wo``."""
+        return numbers(self.bsdf.pdf(part.context, interaction(wi, uv), vectors(wo), True), len(wo))[:, 0]
+
+    def eval_pdf(self, part: Part, wi: Array, wo: Array) -> tuple[Array, Array]:
+        """Return ``(value, pdf)``."""
+        value, pdf = self.bsdf.eval_pdf(part.context, interaction(wi), vectors(wo), True)
+        return numbers(value, len(wo)), numbers(pdf, len(wo))[:, 0]
+
+    def eval_pdf_sample(self, part: Part, wi: Array, wo: Array, variates: Array) -> tuple[Array, ...]:
+        """Return ``(value, pdf, wo, density, weight)``, the last three of the sample."""
+        u, v = sample_arguments(variates)
+        value, pdf, bs, weight = self.bsdf.eval_pdf_sample(part.context, interaction(wi), vectors(wo), u, v, True)
+        count = len(variates)
+        value, pdf, sampled, density, weight = (numbers(x, count) for x in (value, pdf, bs.wo, bs.pdf, weight))
+        return value, pdf[:, 0], sampled, density[:, 0], weight
+
+    def sample(self, part: Part, wi: Array, variates: Array, uv: ArrayLike = CENTRE) -> Samples:
+        """Draw samples, and evaluate the part for their directions."""
+        si, (u, v), count = interaction(wi, uv), sample_arguments(variates), len(variates)
+        bs, weight = self.bsdf.sample(part.context, si, u, v, True)
+        drawn = bs.pdf > 0
+        wo = dr.select(drawn, bs.wo, mi.Vector3f(0, 0, 1))
+        value, pdf = self.bsdf.eval(part.context, si, wo, True), self.bsdf.pdf(part.context, si, wo, True)
+        scalars = bs.pdf, bs.sampled_component, bs.sampled_type, bs.eta, dr.select(drawn, pdf, 0), self.is_smooth(bs)
+        fields = (wo, weight, value, *scalars)
+        dr.eval(fields)
+        wo, weight, value, *columns = (numbers(field, count) for field in fields)
+        density, component, kind, eta, pdf, smooth = (column[:, 0] for column in columns)
+        return Samples(wo.astype(np.float32), weight, density, component, kind, eta, value, pdf, smooth > 0)
+
+    def weights(self, part: Part, wi: Array, variates: Array) -> Array:
+        """Return the weights that ``sample`` returns for each of some directions by the same variates, shape
+        (len(wi), len(variates), channels)."""
+        si = interaction(np.repeat(wi, len(variates), axis=0))
+        _, weight = self.bsdf.sample(part.context, si, *sample_arguments(np.tile(variates, (len(wi), 1))), True)
+        return numbers(weight, len(wi) * len(variates)).reshape(len(wi), len(variates), -1)
+
+    def diffuse_reflectance(self, wi: Array, uv: ArrayLike = CENTRE) -> Array:
+        """Return ``eval_diffuse_reflectance``, shape (len(wi), channels); black if it is not implemented."""
+        try:
+            return numbers(self.bsdf.eval_diffuse_reflectance(interaction(wi, uv), True), len(wi))
+        except RuntimeError:
+            return np.zeros((len(wi), 1))
+
+    def is_smooth(self, bs: mi.BSDFSample3f) -> mi.Bool:
+        """Return whether samples are not of a delta function."""
+        return (bs.sampled_type & int(mi.BSDFFlags.Smooth)) != 0 if self.deltas else mi.Bool(True)
+
+
+def _sides(flags: int) -> tuple[int, ...]:
+    front, back = (bool(flags & int(flag)) for flag in (mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide))
+    return tuple(side for side, seen in ((1, front or not back), (-1, back)) if seen)

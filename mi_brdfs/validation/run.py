@@ -1,0 +1,99 @@
+"""One call of ``check``: what its checks share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..measure.directions import direction, on_side
+from ..measure.probe import BSDFProbe, Part, Samples
+from ..measure.variates import random
+from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents
+from .trial import Trial, Trials, trials_of
+
+
+@dataclass
+class Run:
+    """The BSDF, what was asked of it, and what several checks look at: samples, and histograms of them."""
+
+    probe: BSDFProbe
+    angles: tuple[float, ...]
+    """Of incidence, in degrees."""
+    significance: float
+    """The probability that a BSDF without faults fails one of all statistical tests."""
+    conserves: bool | None
+    """Whether the whole is judged to conserve energy; None if its manual page says so or not."""
+    given: dict[str, Any] | None
+    """The dict that the BSDF was given as, if it was."""
+    _samples: dict[tuple[str, str], Samples] = field(default_factory=dict)
+    _trials: dict[str, Trials] = field(default_factory=dict)
+    _spreads: dict[str, float] = field(default_factory=dict)
+
+    def incidents(self, part: Part) -> list[Incident]:
+        """Return the directions of incidence that were asked for."""
+        return incidents(part, self.angles)
+
+    def views(self, part: Part) -> list[Incident]:
+        """Return these, and directions all over the sides that the part is seen from."""
+        return [*self.incidents(part), all_over(part)]
+
+    def samples(self, part: Part, incident: Incident) -> Samples:
+        """Return samples for a direction of incidence, the same for every check."""
+        key = part.name, incident.name
+        if key not in self._samples:
+            self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, 11))
+        return self._samples[key]
+
+    # --- Statistical tests ------------------------------------------------------------------------------------------
+
+    def trials(self, part: Part) -> list[Trial]:
+        """Return the trials of a part, the same for every check."""
+        if part.name not in self._trials:
+            self._trials[part.name] = trials_of(self.probe, part, self.incidents(part))
+        asked, at_random = self._trials[part.name]
+        return asked + at_random
+
+    def shown_trials(self) -> Iterator[Trial]:
+        """Yield the trials for a report, if they were made: those for the directions that were asked for, and the worst
+        of the others if it fails."""
+        for asked, at_random in self._trials.values():
+            yield from asked
+            worst = min(at_random, key=lambda trial: trial.test.p_value)
+            if worst.test.p_value < self.level:
+                yield worst
+
+    @property
+    def level(self) -> float:
+        """The significance of each of the statistical tests, two for each trial, after Šidák."""
+        tests = 2 * sum((len(self.angles) + RANDOM) * len(part.sides) for part in self.probe.parts)
+        return 1 - (1 - self.significance) ** (1 / max(tests, 1))
+
+    # --- The width of a part ----------------------------------------------------------------------------------------
+
+    def spread(self, part: Part) -> float:
+        """Return how narrow a part is, in radians: half of the samples for light from 30° lie within this angle of
+        another sample's direction, the one that has most of them around it. Half, that is, of a lobe without long
+        tails: it is four times the angle for a twentieth of them. Of the whole, that of its narrowest component counts.
+        """
+        if part.component is None and len(self.probe.components) > 1:
+            return min(self.spread(each) for each in self.probe.components)
+        if part.name not in self._spreads:
+            samples = self.probe.sample(part, on_side(direction(30), part.sides[0]), random(1 << 12, 1))
+            wo = samples.wo[samples.drawn].astype(np.float64)
+            if len(wo) < 64:
+                return np.pi
+            apart = np.linalg.norm(wo[:64, None] - wo[None], axis=-1)
+            near = np.quantile(apart, 0.05, axis=1).min()
+            self._spreads[part.name] = float(4 * 2 * np.arcsin(min(near / 2, 1)))
+        return self._spreads[part.name]
+
+    def rounding(self, part: Part) -> float:
+        """Return the relative error that float32 may make in f and in the density.
+
+        A direction is known to 6e-8, a half vector to about 1e-7, and a lobe of the width σ changes by some of them
+        over σ: in its tails by ten.
+        """
+        return 1e-4 + 3e-6 / max(self.spread(part), 1e-6)

@@ -1,0 +1,136 @@
+"""Histograms of samples against the integrals of the density, which the statistical tests are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..measure.arrays import Array
+from ..measure.chi_square import ChiSquare, chi_square
+from ..measure.directions import angles_of, azimuth_axis
+from ..measure.partition import Partition, partitions
+from ..measure.probe import BSDFProbe, Part, Samples
+from ..measure.variates import random
+from .incidents import Incident, random_incidents
+
+COUNT = 1 << 18
+"""Samples for a direction that was asked for."""
+CELLS, GROUPS = 1024, 64
+PILOT = 1 / 8
+"""Samples that the cells are made by, for each that is counted."""
+RANDOM_COUNT, RANDOM_CELLS = 1 << 14, 128
+"""Those of a direction at random."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A histogram of samples against the integrals of the density."""
+
+    part: str
+    incident: Incident
+    partition: Partition
+    counts: Array
+    """How many of the samples are drawn in each cell."""
+    count: int = COUNT
+    """How many samples there are."""
+
+    @property
+    def axis(self) -> Array:
+        """The azimuth of the plane of incidence, as a unit vector (cosφ, sinφ)."""
+        return azimuth_axis(self.incident.wi)
+
+    @property
+    def share(self) -> float:
+        """The part of the samples that is drawn."""
+        return float(self.counts.sum()) / self.count
+
+    @property
+    def integral(self) -> float:
+        """The integral of the density over the sphere."""
+        return float(self.partition.integrals.sum())
+
+    @cached_property
+    def expected(self) -> Array:
+        """The counts that the density expects."""
+        return self.count * np.maximum(self.partition.integrals, 0)
+
+    @cached_property
+    def test(self) -> ChiSquare:
+        """The graver of two tests: of the cells, which see what is wrong in few of them, and of groups of neighbours,
+        which see what is slightly wrong in many."""
+        fine = chi_square(self.counts, self.expected)
+        share = np.cumsum(np.fmin(self.expected, self.count))  # a density may be infinite
+        share = share / max(share[-1], 1e-30)
+        groups = np.minimum(share * GROUPS, GROUPS - 1).astype(int)
+        counts, expected = (np.bincount(groups, each, GROUPS) for each in (self.counts, self.expected))
+        graver = min(fine, chi_square(counts, expected), key=lambda test: test.p_value)
+        return replace(graver, p_value=min(2 * graver.p_value, 1), worst=fine.worst)
+
+    @property
+    def is_suspect(self) -> bool:
+        """Whether it may fail, though perhaps by chance or for want of precision."""
+        return not (self.test.p_value > 1e-3 and abs(self.integral - self.share) < 5e-4)
+
+    @property
+    def deviation(self) -> str:
+        """Where the two deviate most."""
+        worst = self.test.worst
+        return (
+            f"at {angles_of(self.partition.centres[worst])}, {self.counts[worst]} of {self.count} samples fall where "
+            f"pdf expects {self.expected[worst]:.1f}"
+        )
+
+
+class Trials(NamedTuple):
+    """The trials of a part."""
+
+    asked: list[Trial]
+    """Those for the directions of incidence that were asked for."""
+    at_random: list[Trial]
+    """Those for some at random."""
+
+
+def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident]) -> Trials:
+    """Make a trial of a part for each direction of incidence, those that were asked for and some at random."""
+    found = _trials(probe, part, random_incidents(part), RANDOM_COUNT, RANDOM_CELLS)
+    # They are many, and a jump of the density close to a line of their cells escapes the quadrature: a lone suspect
+    # gets as many samples and cells as the others, across that line.
+    suspects = [k for k, trial in enumerate(found) if trial.is_suspect]
+    for k in suspects if len(suspects) <= 2 else []:
+        (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, turn=0.6)
+    return Trials(_trials(probe, part, asked, COUNT, CELLS), found)
+
+
+def _trials(
+    probe: BSDFProbe, part: Part, incidents: Sequence[Incident], count: int, cells: int, turn: float = 0
+) -> list[Trial]:
+    """Make the trials of several directions together: a kernel has the work of many of them. The cells are turned about
+    the normal by an angle, in radians."""
+    wis = np.array([incident.wi for incident in incidents])
+
+    def drawn(count: int, seed: int) -> Iterator[Samples]:
+        at_once = max(1, COUNT // count)
+        for first in range(0, len(wis), at_once):
+            some = wis[first : first + at_once]
+            samples = probe.sample(part, np.repeat(some, count, axis=0), random(count * len(some), seed + 2 * first))
+            for fields in zip(*(np.split(field, len(some)) for field in samples), strict=True):
+                yield Samples(*fields)
+
+    def density(of: Array, wo: Array) -> Array:
+        return np.nan_to_num(probe.pdf(part, wis[of], wo))
+
+    pilots = [pilot.wo[pilot.drawn] for pilot in drawn(int(count * PILOT), 0)]
+    # The quadrature is as precise as for the larger count, for the sake of the sum.
+    cos, sin = np.cos(turn), np.sin(turn)
+    made = partitions(density, pilots, list(wis @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]), COUNT, cells)
+    found = []
+    for incident, partition, samples in zip(incidents, made, drawn(count, 1), strict=True):
+        # What is rejected may look as if it were drawn: let the integral decide whether black samples count.
+        integral = partition.integrals.sum()
+        counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
+        found.append(Trial(part.name, incident, partition, partition.histogram(samples.wo[counted]), count))
+    return found

@@ -1,0 +1,72 @@
+"""The ground floor of all measurements: directions, variates, partitions of the sphere, chi²."""
+
+import numpy as np
+import pytest
+
+from mi_brdfs.measure.chi_square import chi_square
+from mi_brdfs.measure.directions import direction, from_plane, on_side, to_plane
+from mi_brdfs.measure.partition import partition
+from mi_brdfs.measure.variates import lattice, sampling_efficiency
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_plane_seen_from_the_normal(side):
+    """Seen from above, the light to the left: its mirror direction is on the right, and what is to the right of
+    somebody who looks along the light is further down. Distances from the centre are angles."""
+    wi = direction(40, 70).astype(np.float64)
+    axis = wi[:2] / np.hypot(*wi[:2])
+    right = np.cross(wi * [-1, -1, 0], [0, 0, 1])
+    w = np.stack([wi, wi * [-1, -1, 1], right / np.linalg.norm(right) * np.sin(0.3) + [0, 0, np.cos(0.3)]])
+    x, y = to_plane(on_side(w, side), axis)
+    np.testing.assert_allclose([x, y], [[-40, 40, 0], [0, 0, -np.degrees(0.3)]], atol=1e-5)
+    np.testing.assert_allclose(from_plane(x, y, side, axis), on_side(w, side), atol=1e-6)
+
+
+@pytest.mark.parametrize("width", [1e-3, 0.03, 1])
+def test_partitions_integrate_densities_of_any_width(width):
+    """Here a von Mises-Fisher density about a direction at 60°, cut off at the horizon, to 1e-4 of its integral on a
+    fine grid in its own angles; and its cells hold what they should of its own samples."""
+    axis, count = direction(60, 20).astype(np.float64), 200_000
+    kappa = 1 / width**2
+    rng = np.random.default_rng(1)
+    versine = -np.log1p(-rng.random(2 * count) * -np.expm1(-2 * kappa)) / kappa
+    phi, sin = rng.uniform(0, 2 * np.pi, 2 * count), np.sqrt(versine * (2 - versine))
+    side = np.cross(axis, [0, 0, 1])
+    side /= np.linalg.norm(side)
+    frame = np.stack([side, np.cross(axis, side), axis])
+    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), 1 - versine], axis=-1) @ frame
+    pilot, samples = w[:count], w[count:]
+
+    def pdf(wo):
+        versine = 0.5 * ((wo - axis) ** 2).sum(axis=1)
+        return np.where(wo[:, 2] > 0, np.exp(-kappa * versine) * kappa / (2 * np.pi * -np.expm1(-2 * kappa)), 0)
+
+    cells = partition(pdf, pilot[pilot[:, 2] > 0], axis, count)
+    above = samples[samples[:, 2] > 0]
+    share = (w[:, 2] > 0).mean()
+    assert cells.integrals.sum() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / len(w)) + 1e-4)
+    test = chi_square(cells.histogram(above), count * cells.integrals)
+    assert test.p_value > 1e-3 and test.degrees > 500
+    shifted = chi_square(cells.histogram(above + 0.1 * width * side), count * cells.integrals)
+    assert shifted.p_value < 1e-6
+
+
+def test_chi_square_has_its_distribution():
+    """Of 500 tests, 5 % have a p-value below 0.05, whether cells are pooled or not."""
+    rng = np.random.default_rng(2)
+    for expected in (np.full(300, 50.0), np.geomspace(0.01, 200, 300)):
+        p = [chi_square(rng.poisson(expected), expected).p_value for _ in range(500)]
+        assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.035)
+
+
+def test_lattices_fill_the_cube():
+    points = lattice(12, 1).astype(np.float64)
+    assert points.shape[1] == 3 and points.min() >= 0 and points.max() < 1
+    product = np.prod(points, axis=1).reshape(16, -1).mean(axis=1)
+    assert abs(product - 1 / 8).max() < 2e-3
+
+
+def test_efficiency():
+    """1 for equal weights, the part of the samples that are not black for equal and black ones, and 0 for none."""
+    weights = np.array([[0.7, 0.7, 0.7, 0.7], [0.7, 0, 0, 0.7], [0, 0, 0, 0], [1, 2, 3, 4]])
+    np.testing.assert_allclose(sampling_efficiency(weights), [1, 0.5, 0, 2.5**2 / 7.5])
