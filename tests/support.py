@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -11,17 +9,22 @@ import numpy as np
 from mi_brdfs.measure import directions
 from mi_brdfs.measure.arrays import context as context
 from mi_brdfs.measure.arrays import interaction as interaction
+from mi_brdfs.measure.arrays import luminance
 from mi_brdfs.measure.arrays import numbers as numbers
 from mi_brdfs.measure.directions import direction as direction
+from mi_brdfs.measure.probe import BSDFProbe
+from mi_brdfs.measure.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
 
-hemisphere = partial(directions.hemisphere, lowest=0.02)
-"""Uniform directions above the horizon, shape (count, 3), float32."""
+
+def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
+    """Uniform directions with cosines of at least ``lowest``, shape (count, 3), float32."""
+    return directions.hemisphere(count, seed, lowest)
 
 
-def sphere(count: int, seed: int) -> np.ndarray:
+def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     """The same, every other one below the horizon."""
-    w = hemisphere(count, seed)
+    w = hemisphere(count, seed, lowest)
     w[::2, 2] *= -1
     return w
 
@@ -62,3 +65,10 @@ def call(method, ctx, wi, *arrays):
     types[1] = lambda value: float(value[0])
     rows = [once(w, [array[k] for array in arrays]) for k, w in enumerate(wi)]
     return [np.concatenate(column) for column in zip(*rows, strict=True)]
+
+
+def efficiencies(bsdf: dict, angles) -> np.ndarray:
+    """η = E[w]²/E[w²] of the luminance of the sampling weight at each angle of incidence, good to 0.001."""
+    probe = BSDFProbe(mi.load_dict(bsdf))
+    wi = np.array([direction(theta) for theta in angles])
+    return sampling_efficiency(luminance(probe.weights(probe.whole, wi, lattice(13, 1))))

@@ -14,7 +14,7 @@ from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, ph
 from rich.console import Console
 
 import mi_brdfs
-from mi_brdfs.bench import SECTIONS, Figure, Results, Target, bench, process, renders, resources, sizes, timing
+from mi_brdfs.bench import SECTIONS, Figure, Results, Target, bench, process, renders, resources, runner, sizes, timing
 from mi_brdfs.bench import run as bench_run
 from mi_brdfs.bench.cases import BUILT_INS, TABLE, Case, all_cases, built_ins, defaults
 from mi_brdfs.bench.efficiency import Sampling, _mean, efficiency, sampling
