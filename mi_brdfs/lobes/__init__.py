@@ -1,7 +1,7 @@
 """What can be evaluated, sampled and mixed."""
 
 from .diffuse import LambertLobe, over_diffuse
-from .lobe import Lobe
+from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
 from .mirror import PowerLobe, PowerResponseLobe
 from .mixture import Mixture
@@ -13,5 +13,6 @@ __all__ = [
     "Mixture",
     "PowerLobe",
     "PowerResponseLobe",
+    "WeightedLobe",
     "over_diffuse",
 ]

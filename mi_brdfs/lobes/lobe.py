@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
@@ -79,3 +82,26 @@ class AdjointLobe(Lobe):
 
     def _mirrored(self, w):
         return mi.Vector3f(w.x, w.y, -w.z) if self.transmits else w
+
+
+class WeightedLobe(Lobe):
+    """g(wi, wo) = g(wo, wi) times a lobe, sampled like the lobe: the weight is g times that of the lobe. ``mean`` is
+    about the mean of g over the directions ``wo``."""
+
+    def __init__(self, lobe: Lobe, g: Callable[[Any, Any], Any], mean: Callable[[Any], Any]):
+        self.lobe, self.g, self.mean = lobe, g, mean
+        self.glossy, self.reciprocal = lobe.glossy, lobe.reciprocal
+        self.anisotropic, self.transmits = lobe.anisotropic, lobe.transmits
+
+    def estimated_albedo(self, wi):
+        return self.lobe.estimated_albedo(wi) * self.mean(wi)
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = self.lobe.eval_pdf(wi, wo)
+        return value * self.g(wi, wo), pdf
+
+    def sample(self, wi, u, v):
+        return self.lobe.sample(wi, u, v)
+
+    def mirror_reflectance(self, wi):
+        return self.lobe.mirror_reflectance(wi) * self.mean(wi)

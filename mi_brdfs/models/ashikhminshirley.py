@@ -1,6 +1,6 @@
 import mitsuba as mi
 
-from ..lobes import LambertLobe, MicrofacetLobe
+from ..lobes import LambertLobe, MicrofacetLobe, WeightedLobe
 from ..microfacet.distributions import AshikhminShirleyNormals
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import AshikhminShirleyShadowing
@@ -55,21 +55,16 @@ class AshikhminShirley(Model):
             AshikhminShirleyShadowing(),
             Schlick(p.specular_reflectance),
         )
-        return CoupledDiffuseLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)), specular
+        diffuse = WeightedLobe(
+            LambertLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)),
+            lambda wi, wo: 28 / 23 * darkening(wi.z) * darkening(wo.z),
+            lambda wi: darkening(wi.z),  # which is exact
+        )
+        return diffuse, specular
 
 
-class CoupledDiffuseLobe(LambertLobe):
-    """f = 28/(23π) ρ g(cosθ_i) g(cosθ_o) with g(μ) = 1-(1-μ/2)⁵; its albedo is ρ g(cosθ_i). Cosine-sampled."""
-
-    @staticmethod
-    def _g(cos):
-        m = 1 - 0.5 * cos
-        m2 = m * m
-        return 1 - m2 * m2 * m
-
-    def estimated_albedo(self, wi):
-        return self.reflectance * self._g(wi.z)
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (28 / 23 * self._g(wi.z) * self._g(wo.z)), pdf
+def darkening(cos):
+    """1-(1-cosθ/2)⁵."""
+    m = 1 - 0.5 * cos
+    m2 = m * m
+    return 1 - m2 * m2 * m

@@ -1,6 +1,6 @@
 import drjit as dr
 
-from ..lobes import LambertLobe, MicrofacetLobe
+from ..lobes import LambertLobe, MicrofacetLobe, WeightedLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
@@ -69,21 +69,9 @@ class MetallicRoughness(Model):
             shadowing = SmithGGX(alpha, alpha, correlated=False)
         else:
             shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
-        diffuse = FresnelDiffuseLobe((1 - p.metallic) * p.base_color, fresnel)
+        diffuse = WeightedLobe(
+            LambertLobe((1 - p.metallic) * p.base_color),
+            lambda wi, wo: 1 - fresnel(Facet.between(wi, wo).cos_d),
+            lambda wi: 1 - fresnel(1),  # few pairs of directions graze their half vector
+        )
         return diffuse, MicrofacetLobe(1, GGX(alpha, alpha), shadowing, fresnel)
-
-
-class FresnelDiffuseLobe(LambertLobe):
-    """f = ρ/π (1 - F(cosθ_d)), cosine-sampled: Lambert's lobe, less the light that facets half-way would reflect."""
-
-    def __init__(self, reflectance, fresnel):
-        super().__init__(reflectance)
-        self.fresnel = fresnel
-
-    def estimated_albedo(self, wi):
-        # At any incidence: few pairs of directions graze their half vector.
-        return self.reflectance * (1 - self.fresnel(1))
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (1 - self.fresnel(Facet.between(wi, wo).cos_d)), pdf

@@ -1,7 +1,7 @@
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import LambertLobe, Lobe, MicrofacetLobe
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
 from ..math import clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
 from ..microfacet.distributions import Distribution
 from ..microfacet.facet import Facet
@@ -88,7 +88,15 @@ class Schlick94(Model):
         if self.variant == "interreflection":
             lobes.append(InterreflectionLobe(p.roughness, fresnel))
         if p.diffuse_reflectance is not None:
-            lobes.append(LowerLayerLobe(p.diffuse_reflectance, fresnel))
+            lower = Schlick(p.diffuse_reflectance)
+
+            def passed(cos_d):
+                return (1 - fresnel(cos_d)) * lower(cos_d)
+
+            weighted = WeightedLobe(
+                LambertLobe(1), lambda wi, wo: passed(Facet.between(wi, wo).cos_d), lambda wi: passed(TYPICAL)
+            )
+            lobes.append(weighted)
         return tuple(lobes)
 
 
@@ -109,17 +117,17 @@ class SchlickNormals(Distribution):
     long_tailed = True
 
     def __init__(self, roughness, isotropy):
-        self.roughness, self.isotropy = roughness, isotropy
+        self.r, self.isotropy = roughness, isotropy
         stretch = dr.sqrt(dr.sqrt(isotropy))
         alpha = dr.sqrt(roughness)
         super().__init__(alpha * stretch, alpha / stretch)
 
     def mean_square_slope(self):
-        return self.roughness
+        return self.r
 
     def mean_square_slope_along(self, v):
         u, v2 = dr.square(v.x) * self.alpha_u, dr.square(v.y) * self.alpha_v
-        return 2 * self.roughness * (u + v2) / (self.alpha_u + self.alpha_v)
+        return 2 * self.r * (u + v2) / (self.alpha_u + self.alpha_v)
 
     def estimated_albedo(self, cos):
         root = dr.sqrt(self.isotropy)
@@ -128,7 +136,7 @@ class SchlickNormals(Distribution):
 
     def _zenith(self, facet):
         """Z."""
-        return self.roughness / dr.square(facet.sin2_h + self.roughness * dr.square(facet.cos_h))
+        return self.r / dr.square(facet.sin2_h + self.r * dr.square(facet.cos_h))
 
     def eval(self, facet):
         w, _ = normalize_or(facet.h.x, facet.h.y, (1, 0))
@@ -136,14 +144,14 @@ class SchlickNormals(Distribution):
         return dr.inv_pi * self._zenith(facet) * dr.sqrt(self.isotropy / (p2 + (1 - p2) * w * w))
 
     def density(self, facet, g):
-        return dr.inv_pi * self._zenith(facet) * facet.cos_h / (self.roughness * g)
+        return dr.inv_pi * self._zenith(facet) * facet.cos_h / (self.r * g)
 
     def cdf(self, tan2, g):
-        x = dr.minimum(tan2 / self.roughness, 1e30)
+        x = dr.minimum(tan2 / self.r, 1e30)
         return x / (1 + x), 1 / (1 + x)
 
     def inverse_cdf(self, c, complement, g):
-        return dr.minimum(c / dr.maximum(complement, 1e-30) * self.roughness, 1e30)
+        return dr.minimum(c / dr.maximum(complement, 1e-30) * self.r, 1e30)
 
 
 class InterreflectionLobe(Lobe):
@@ -194,17 +202,3 @@ class InterreflectionLobe(Lobe):
         sin, cos = dr.sincos(dr.two_pi * v.y)
         r = safe_sqrt(1 - z * z)
         return mi.Vector3f(r * cos, r * sin, z)
-
-
-class LowerLayerLobe(LambertLobe):
-    """f = (1 - S(u)) S'(u)/π, cosine-sampled."""
-
-    def __init__(self, reflectance, upper):
-        self.upper, self.lower = upper, Schlick(reflectance)
-
-    def estimated_albedo(self, wi):
-        return (1 - self.upper(TYPICAL)) * self.lower(TYPICAL)
-
-    def eval_pdf(self, wi, wo):
-        cos_d, pdf = Facet.between(wi, wo).cos_d, wo.z * dr.inv_pi
-        return (1 - self.upper(cos_d)) * (self.lower(cos_d) * pdf), pdf
