@@ -32,16 +32,11 @@ def drawn(options, rng):
             values[quantity.name] = rng.uniform(low, high, shape)
         else:
             values[quantity.name] = magnitudes(low or 1e-3, high, rng, shape)
-    # What dielectrics of nearly the same index on both sides reflect has a peak at grazing that no sampler knows; and
-    # exponential distributions with the longest tails are approximated too coarsely for it.
+    # Dielectrics of nearly the same index on both sides have a peak at grazing that samplers know too little of.
     if "ext_ior" in values:
         inside = values.get("int_ior", 1.333)
-        outside, alike = values["ext_ior"], abs(np.log(inside / values["ext_ior"])) < 0.3
+        outside, alike = values["ext_ior"], abs(np.log(inside / values["ext_ior"])) < 0.1
         values["ext_ior"] = np.where(alike, inside * np.where(outside > 1, 0.7, 1.4), outside)
-    if options.words.get("distribution") == "epd":
-        values["gamma"] = np.maximum(values["gamma"], 0.5)
-    if {"exponent", "beta"} <= values.keys():
-        values["exponent"] = np.maximum(values["exponent"], 1)  # twice that gamma
     return {name: np.float32(value) for name, value in values.items()}
 
 

@@ -4,6 +4,7 @@ together."""
 from __future__ import annotations
 
 from .distributions import GGX, Distribution
+from .forward import WithForwardShare
 from .fresnel import Dielectric, Fresnel, Schlick
 from .sampling import AntitheticNormals, AntitheticNormalsTowardViewer, Sampler
 from .shadowing import SchlickSmith, Shadowing, SmithGGX
@@ -12,6 +13,11 @@ from .visible import AntitheticVisibleNormals, BoundedVisibleNormals
 
 def sampler_of(distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel) -> Sampler:
     """The sampler of a lobe of these terms; chosen by measurement, as are how far shadowing terms lean."""
+    sampler = _sampler_of_facets(distribution, shadowing, fresnel)
+    return WithForwardShare(sampler) if isinstance(fresnel, Dielectric) else sampler
+
+
+def _sampler_of_facets(distribution, shadowing, fresnel):
     rises = isinstance(fresnel, Dielectric | Schlick)  # at grazing, from a few percent to one
     if isinstance(distribution, GGX) and isinstance(shadowing, SmithGGX):
         if not shadowing.correlated:

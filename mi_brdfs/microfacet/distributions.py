@@ -414,30 +414,46 @@ class Steps:
             value = dr.select(c * len(self.heights) < k, value, height)
         return value * len(self.heights) / self.total
 
-    def cdf(self, c, complement):
-        """``(C, 1 - C)`` of c, which comes with its complement."""
-        return self._mass(self.heights, c), self._mass(self.heights[::-1], complement)
+    def cdf(self, c):
+        c = c * len(self.heights)
+        return sum(height * dr.clip(c - k, 0, 1) for k, height in enumerate(self.heights)) / self.total
 
-    def inverse_cdf(self, c, complement):
-        return self._quantile(self.heights, c), self._quantile(self.heights[::-1], complement)
-
-    def _mass(self, heights, c):
-        c = c * len(heights)
-        return sum(height * dr.clip(c - k, 0, 1) for k, height in enumerate(heights)) / self.total
-
-    def _quantile(self, heights, mass):
+    def inverse_cdf(self, mass):
         left, c = mass * self.total, 0
-        for height in heights:
+        for height in self.heights:
             c += dr.clip(left / height, 0, 1)
             left -= height
-        return c / len(heights)
+        return c / len(self.heights)
+
+
+class RootLaw:
+    """The cumulative distribution ∝ √r - √(near/far), r = (t + near)/(t + far), of t >= 0. The density falls like 1/√t
+    from ``near`` to ``far``, and beyond like 1/t². A t up to infinity is given as a ratio x/y."""
+
+    def __init__(self, near, far):
+        self.near, self.far = near, far
+        self.lowest = dr.sqrt(near / far)
+
+    def eval(self, x, y=1):
+        """The density over y²."""
+        outer = x + self.far * y
+        return 0.5 * (1 + self.lowest) * self.far / (dr.square(outer) * dr.sqrt((x + self.near * y) / outer))
+
+    def cdf(self, x, y=1):
+        return (dr.sqrt((x + self.near * y) / (x + self.far * y)) - self.lowest) / (1 - self.lowest)
+
+    def inverse_cdf(self, c):
+        """The t, up to 1e30."""
+        root = self.lowest + c * (1 - self.lowest)
+        return dr.minimum(self.far * (c * (root + self.lowest) / dr.maximum((1 - c) * (1 + root), 1e-18)), 1e30)
 
 
 class EPD(Isotropic):
     """D = exp(-(tan²θ_h/α²)ᵞ) / (π α² Γ(1 + 1/γ) cos⁴θ_h), the exponential power distribution of slopes, of which γ = 1
     is Beckmann's (Holzschuch and Pacanowski 2017, doi:10.1145/3072959.3073621).
 
-    q follows D cosθ_h, by steps over a distribution with a heavy tail: x/(1+x) for x = tan²θ_h/width.
+    q follows D cosθ_h, by steps over a law that has a peak within tan²θ_h = α², as D has, and falls from where most
+    facets are: the lower γ, the further is one from the other.
     """
 
     long_tailed = True
@@ -447,18 +463,18 @@ class EPD(Isotropic):
         super().__init__()
         self.alpha, self.alpha2, self.gamma = alpha, dr.square(alpha), gamma
         # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3.
-        median = self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma)
-        self.width = self._width(dr.minimum(median, 1e12))
+        self.median = self._limited(self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma))
         self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
 
-        borders = [k / (self.STEPS - k) for k in range(self.STEPS)]
-        power = -dr.power(self.width / self.alpha2, gamma)
-        falls = [1, *(dr.exp(power * dr.exp(gamma * math.log(x))) for x in borders[1:])]
-        at = [fall * self._rest(x * self.width) * (1 + x) ** 2 for fall, x in zip(falls, borders, strict=True)]
+        far = self._limited(self.alpha2 * dr.exp(dr.log(1.5 / gamma) / gamma))
+        self.law = RootLaw(dr.minimum(self.alpha2, 0.5 * far), far)
+        borders = [0, *(self.law.inverse_cdf(k / self.STEPS) for k in range(1, self.STEPS))]
+        falls = [1, *(dr.exp(-dr.exp(gamma * dr.log(t / self.alpha2))) for t in borders[1:])]
+        at = [fall * self._rest(t) / self.law.eval(t) for fall, t in zip(falls, borders, strict=True)]
         self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
 
-    def _width(self, median):
-        return median
+    def _limited(self, tan2):
+        return dr.minimum(tan2, 1e16)
 
     def _power(self, tan2):
         """(tan²θ/α²)ᵞ"""
@@ -472,7 +488,7 @@ class EPD(Isotropic):
         return 1
 
     def mean_square_slope(self):
-        return dr.minimum(self.width, 1)
+        return dr.minimum(self.median, 1)
 
     def roughness(self):
         return self.alpha
@@ -483,17 +499,15 @@ class EPD(Isotropic):
         return self.scale * dr.exp(-2 * dr.log(cos2) - self._power(facet.sin2_h / cos2))
 
     def density(self, facet, g):
-        sin2 = facet.sin2_h
-        scale = dr.rcp(self.width * dr.square(facet.cos_h) + sin2)
-        return dr.inv_pi * self.width * facet.cos_h * dr.square(scale) * self.steps.eval(sin2 * scale)
+        slope = facet.sin2_h, dr.square(facet.cos_h)
+        return dr.inv_pi * facet.cos_h * self.law.eval(*slope) * self.steps.eval(self.law.cdf(*slope))
 
     def cdf(self, tan2, g):
-        x = dr.minimum(tan2 / self.width, 1e30)
-        return self.steps.cdf(x / (1 + x), 1 / (1 + x))
+        c = dr.minimum(self.steps.cdf(self.law.cdf(dr.minimum(tan2, 1e30))), 1)
+        return c, 1 - c
 
     def inverse_cdf(self, c, complement, g):
-        inner, outer = self.steps.inverse_cdf(c, complement)
-        return dr.minimum(inner / dr.maximum(outer, 1e-30) * self.width, 1e30)
+        return self.law.inverse_cdf(self.steps.inverse_cdf(c))
 
 
 def versine(cos, sin2):

@@ -43,9 +43,9 @@ class AntitheticNormals(Sampler):
         return dr.minimum(0.75 * shadowed + 0.35 * (1 - self._brighter(lobe, wi)), 0.9)
 
     @staticmethod
-    def _brighter(lobe, wi):
-        """How much brighter the reflectance is at normal incidence."""
-        return dr.minimum(lobe.fresnel.brightness(1) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9), 1)
+    def _brighter(lobe, wi, cos=1):
+        """How much brighter the reflectance is at a cosine, by default that of normal incidence."""
+        return dr.minimum(lobe.fresnel.brightness(cos) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9), 1)
 
     def _azimuth(self, lobe, wi, u, v):
         """``(u, cosψ, sinψ, which)``, with what is left of ``u``, and the choices made, for :meth:`_tan2`."""
@@ -135,9 +135,12 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         if not distribution.long_tailed:
             return x, y, leaning, 0
         _, steep = distribution.cdf(self.STEEP2, (1 - cos2) / dr.maximum(slope2, 1e-20))
-        steep = 0.5 * dr.square(dr.square(1 - wi.z)) * brighter * steep
-        # The implicit term is ∝ both cosines: it takes as much again from the facets that are not steep.
-        steep = steep / (steep + (seen + cos2 if self.lean >= 4 else dr.sqrt(seen + cos2)))
+        steep = 0.5 * dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep
+        if self.lean >= 4:
+            # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
+            steep = 0.8 * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), 1e-12))
+        else:
+            steep = steep / (steep + dr.sqrt(seen + cos2))
         return x, y, leaning + (1 - leaning) * steep, steep
 
     def _azimuth(self, lobe, wi, u, v):

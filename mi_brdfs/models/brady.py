@@ -75,8 +75,8 @@ class Exponential(EPD):
         if not unit:
             self.scale = 1
 
-    def _width(self, median):
-        return median / (1 + median)
+    def _limited(self, tan2):
+        return tan2 / (1 + tan2)
 
     def _rest(self, tan2):
         return 1 / dr.square(1 + tan2)
@@ -86,4 +86,4 @@ class Exponential(EPD):
 
     def estimated_albedo(self, cos):
         """∫ D cosθ_h dω_h, as the steps have it."""
-        return self.scale * dr.pi * self.width * self.steps.total / self.STEPS
+        return self.scale * dr.pi * self.steps.total / self.STEPS

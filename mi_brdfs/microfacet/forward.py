@@ -1,0 +1,68 @@
+"""Forward reflection at grazing, for the dielectrics that hardly reflect elsewhere."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import choose, normalize_or, safe_sqrt, select
+from .sampling import Sampler
+
+
+class WithForwardShare(Sampler):
+    """Another sampler for a dielectric, with a share of directions about the horizon opposite to ``wi``: there a
+    dielectric of nearly the same index on both sides reflects by far the most.
+
+    Where both directions are low, cosθ_d² is about ((z + z')² + δ²)/4, with their cosines z and z' and the azimuth δ
+    from the plane of incidence. z' has the density ∝ z'/(z + z')³, and t = tan(δ/2) ∝ (w² + t²)^(-3/2), with w =
+    (z + z')/2.
+    """
+
+    INDISTINCT = 0.008
+    """The reflectance at normal incidence, that of η = 1.2, below which dielectrics need it."""
+
+    def __init__(self, sampler):
+        self.sampler = sampler
+
+    def _share(self, lobe, wi):
+        distribution, fresnel, z = lobe.distribution, lobe.fresnel, self._cosine(wi)
+        # From a facet in the plane of incidence that is steeper than three of four.
+        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
+        slope2 = distribution.inverse_cdf(0.75, 0.25, g)
+        cos2 = z * z + slope2 / (1 + slope2)
+        low = z * z / cos2
+        brighter = low * (1 - low) * fresnel(z) / dr.maximum(fresnel(dr.minimum(dr.sqrt(cos2), 1)), 1e-12)
+        distinct = dr.square(dr.square(dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) / self.INDISTINCT))
+        return 0.8 * brighter / ((1 + brighter) * (1 + distinct))
+
+    @staticmethod
+    def _cosine(wi):
+        """The z of above, not too small for what divides by it."""
+        return dr.maximum(wi.z, 1e-3)
+
+    def sample(self, lobe, wi, u, v):
+        forward, u = choose(u, self._share(lobe, wi))
+        return select(forward, self._draw(wi, v), self.sampler.sample(lobe, wi, u, v))
+
+    def _draw(self, wi, v):
+        z = self._cosine(wi)
+        ratio = dr.sqrt(v.x) / (1 + z)  # z'/(z + z')
+        cos = z * ratio / (1 - ratio)
+        uniform = 2 * v.y - 1
+        sin_half, cos_half = normalize_or(0.5 * (z + cos) * uniform, safe_sqrt(1 - uniform * uniform), (0, 1))  # of δ/2
+        sin_delta, cos_delta = 2 * sin_half * cos_half, (cos_half - sin_half) * (cos_half + sin_half)
+        x, y = normalize_or(-wi.x, -wi.y, (1, 0))
+        sin = safe_sqrt(1 - cos * cos)
+        return mi.Vector3f(sin * (x * cos_delta - y * sin_delta), sin * (y * cos_delta + x * sin_delta), cos)
+
+    def pdf(self, lobe, facet):
+        wi, wo, z, cos = facet.wi, facet.wo, self._cosine(facet.wi), dr.maximum(facet.cos_o, 0)
+        x_i, y_i = normalize_or(-wi.x, -wi.y, (1, 0))
+        x_o, y_o = normalize_or(wo.x, wo.y, (1, 0))
+        sin2_half = 0.25 * (dr.square(x_o - x_i) + dr.square(y_o - y_i))
+        width2, scale = 0.25 * dr.square(z + cos), 1 / (z + cos)
+        inverse = dr.rsqrt(dr.lerp(width2, 1, sin2_half))
+        azimuth = 0.25 * width2 * safe_sqrt(1 - sin2_half) * inverse * dr.square(inverse)
+        forward = 2 * (z * scale) * (cos * scale) * dr.square(1 + z) * scale * azimuth
+        return dr.lerp(self.sampler.pdf(lobe, facet), forward, self._share(lobe, wi))
