@@ -457,7 +457,7 @@ class EPD(Isotropic):
     """
 
     long_tailed = True
-    STEPS = 16
+    STEPS = 18
 
     def __init__(self, alpha, gamma):
         super().__init__()
