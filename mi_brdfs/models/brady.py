@@ -1,9 +1,9 @@
 import drjit as dr
 
 from ..lobes import LambertLobe, MicrofacetLobe
-from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing
+from ..microfacet.tails import EPD
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 

@@ -4,10 +4,11 @@ import mitsuba as mi
 from ..lobes import Lobe, MicrofacetLobe
 from ..lobes.mirror import AxisFrame
 from ..math import choose, clamp, luminance, safe_sqrt, square
-from ..microfacet.distributions import GGX, Berry
+from ..microfacet.distributions import GGX
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing, SmithGGX
+from ..microfacet.tails import Berry
 from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
 

@@ -3,9 +3,10 @@ import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import clamp, luminance, normalize_or, safe_sqrt
-from ..microfacet.distributions import ABC, PowerLaw
 from ..microfacet.fresnel import Dielectric
+from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
+from ..microfacet.tails import ABC
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, OneOf, Reflectance
 

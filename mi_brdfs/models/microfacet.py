@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from ..lobes import MicrofacetLobe, over_diffuse
-from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, Distribution, HemiEPD
+from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import (
     AshikhminPremoze,
@@ -17,6 +17,7 @@ from ..microfacet.shadowing import (
     Shadowing,
     VCavity,
 )
+from ..microfacet.tails import ABC, EPD, GTR, HemiEPD
 from ..microfacet.term import Term
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation

@@ -1,7 +1,7 @@
 from ..lobes import MicrofacetLobe, over_diffuse
-from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, VCavity
+from ..microfacet.tails import HemiEPD
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
 

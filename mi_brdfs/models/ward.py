@@ -2,8 +2,9 @@ import drjit as dr
 
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..math import expm1
-from ..microfacet.distributions import Beckmann, Distribution, log_complement, tan2_of_versine, versine_of_tan2
+from ..microfacet.distributions import Beckmann, Distribution
 from ..microfacet.fresnel import Unit
+from ..microfacet.laws import log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.shadowing import Kelemen, Shadowing
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation

@@ -1,0 +1,149 @@
+"""Laws of one variable that can be inverted, of which the densities of half vectors are made."""
+
+from __future__ import annotations
+
+import functools
+
+import drjit as dr
+
+from ..math import clamp, expm1, expm1_ratio, log1p, log1p_ratio
+
+
+class PowerLaw:
+    """The density ∝ (1 + k s)^-γ for s >= 0 (to 1, where k < 0): with x = 1-γ and L = log(1 + k s), its integral is
+    (exp(x L) - 1)/(x k), where every ratio has its limit at x = 0 and k = 0. ``norm`` is the integral to 1."""
+
+    def __init__(self, k, gamma):
+        self.k, self.gamma, self.x = k, gamma, 1 - gamma
+        self.norm = self.mass(1)
+
+    def eval(self, s):
+        return dr.exp(-self.gamma * log1p(self.k * s))
+
+    def mass(self, s):
+        """∫ (1 + k s)^-γ from 0 to s."""
+        logarithm = s * log1p_ratio(self.k * s)
+        return logarithm * expm1_ratio(self.x * self.k * logarithm)
+
+    def inverse(self, mass):
+        """The s of a ``mass``."""
+        z = self.x * self.k * mass
+        logarithm = mass * log1p_ratio(dr.maximum(z, -1 + 1e-7))
+        return logarithm * expm1_ratio(self.k * logarithm)
+
+
+class BentLaw:
+    """A density on [0, 1] that can be inverted: ∝ exp(κ s) for κ >= 0, and ∝ 1/(1 - κ s) for κ < 0. Its cumulative
+    distribution begins at s = 1, and s comes with its complement m = 1 - s. Of a number and its complement the smaller
+    one is computed, by the formula that keeps its digits."""
+
+    def __init__(self, kappa):
+        self.rises = kappa >= 0
+        self.kappa, self.k = dr.select(self.rises, kappa, 0), dr.select(self.rises, 0, -kappa)
+        # Of exp(-κ m): exp(κ s) leaves the range of float32, or its derivative does.
+        self.norm = dr.select(self.rises, expm1_ratio(-self.kappa), log1p_ratio(self.k))
+
+    def eval(self, m, s):
+        return dr.select(self.rises, dr.exp(-self.kappa * m), 1 / (1 + self.k * s)) / self.norm
+
+    def cdf(self, m, s):
+        """``(c, 1 - c)``, where c is the mass above s."""
+        above = (m < 0.5) & (self.kappa * m < 0.7)
+        up, down = m / (1 + self.k), s
+        weight = dr.select(above, m, s * dr.exp(-self.kappa * m))
+        exponential = expm1_ratio(-self.kappa * dr.select(above, m, s)) * weight
+        rational = log1p_ratio(dr.select(above, -up, down) * self.k) * dr.select(above, up, down)
+        mass = dr.select(self.rises, exponential, rational) / self.norm
+        return dr.select(above, mass, 1 - mass), dr.select(above, 1 - mass, mass)
+
+    def inverse_cdf(self, c, complement):
+        """The s of a ``cdf`` value."""
+        above = c < 0.5
+        mass = dr.select(above, c, complement)
+        y = mass * self.norm * dr.select(above, 1, dr.exp(self.kappa))
+        sign = dr.select(above, -1, 1)
+        exponential = log1p_ratio(sign * self.kappa * y)
+        rational = expm1_ratio(sign * self.k * y) * dr.select(above, 1 + self.k, 1)
+        value = y * dr.select(self.rises, exponential, rational)
+        return dr.select(above, 1 - value, value)
+
+
+class Steps:
+    """A density on [0, 1], constant on each of equal steps, of which the ``heights`` are given up to a factor."""
+
+    def __init__(self, heights):
+        highest = functools.reduce(dr.maximum, heights)
+        self.heights = [dr.maximum(height, 1e-9 * highest) for height in heights]  # it must not vanish
+        self.total = sum(self.heights)
+
+    def eval(self, c):
+        value = self.heights[0]
+        for k, height in enumerate(self.heights[1:], start=1):
+            value = dr.select(c * len(self.heights) < k, value, height)
+        return value * len(self.heights) / self.total
+
+    def cdf(self, c):
+        c = c * len(self.heights)
+        return sum(height * dr.clip(c - k, 0, 1) for k, height in enumerate(self.heights)) / self.total
+
+    def inverse_cdf(self, mass):
+        left, c = mass * self.total, 0
+        for height in self.heights:
+            c += dr.clip(left / height, 0, 1)
+            left -= height
+        return c / len(self.heights)
+
+
+class RootLaw:
+    """The cumulative distribution ∝ √r - √(near/far), r = (t + near)/(t + far), of t >= 0. The density falls like 1/√t
+    from ``near`` to ``far``, and beyond like 1/t². A t up to infinity is given as a ratio x/y."""
+
+    def __init__(self, near, far):
+        self.near, self.far = near, far
+        self.lowest = dr.sqrt(near / far)
+
+    def eval(self, x, y=1):
+        """The density over y²."""
+        outer = x + self.far * y
+        return 0.5 * (1 + self.lowest) * self.far / (dr.square(outer) * dr.sqrt((x + self.near * y) / outer))
+
+    def cdf(self, x, y=1):
+        return (dr.sqrt((x + self.near * y) / (x + self.far * y)) - self.lowest) / (1 - self.lowest)
+
+    def inverse_cdf(self, c):
+        """The t, up to 1e30."""
+        root = self.lowest + c * (1 - self.lowest)
+        return dr.minimum(self.far * (c * (root + self.lowest) / dr.maximum((1 - c) * (1 + root), 1e-18)), 1e30)
+
+
+def versine(cos, sin2):
+    """1 - cosθ."""
+    return sin2 / (1 + cos)
+
+
+def versine_of_tan2(tan2):
+    """1 - cosθ of tan²θ, for tan²θ up to infinity."""
+    cos = dr.rsqrt(1 + tan2)
+    return dr.select(tan2 < 1, dr.minimum(tan2, 1) * cos * cos / (1 + cos), 1 - cos)
+
+
+def tan2_of_versine(v):
+    """tan²θ of 1 - cosθ, limited at the horizon."""
+    v = clamp(v, 0, 1 - 1e-7)
+    return v * (2 - v) / dr.square(1 - v)
+
+
+def cosine_power_cdf(tan2, power):
+    """``(C, 1 - C)`` for 1 - C = cosθ^power."""
+    complement = dr.exp(-0.5 * power * log1p(dr.minimum(tan2, 1e30)))
+    return 1 - complement, complement
+
+
+def inverse_cosine_power_cdf(complement, power):
+    """The tan²θ of the complement of a ``cosine_power_cdf`` value."""
+    return dr.minimum(expm1(log_complement(complement) * (-2 / power)), 1e30)
+
+
+def log_complement(complement):
+    """log(1 - c) of the complement 1 - c. Where c has more digits it is 1e-7 off: so little that no sample shows it."""
+    return dr.log(dr.maximum(complement, 1e-37))

@@ -1,0 +1,234 @@
+"""Distributions of facets with a parameter for their tails."""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+
+from ..math import clamp, expm1_ratio, gauss_legendre, log_cos
+from .distributions import Isotropic
+from .laws import (
+    BentLaw,
+    PowerLaw,
+    RootLaw,
+    Steps,
+    cosine_power_cdf,
+    inverse_cosine_power_cdf,
+    tan2_of_versine,
+    versine,
+    versine_of_tan2,
+)
+
+
+class GTR(Isotropic):
+    """D ∝ (1 + (α²-1) cos²θ_h)^-γ, generalised Trowbridge-Reitz (Burley 2012, Physically based shading at Disney).
+    GGX is γ = 2; γ = 1 has the tail of a clear coat."""
+
+    long_tailed = True
+
+    def __init__(self, alpha, gamma):
+        super().__init__()
+        self.alpha, self.alpha2 = alpha, dr.square(alpha)
+        # In s = sin²θ: 1 + (α²-1) cos²θ = α² (1 + k s)
+        self.law = PowerLaw((1 - self.alpha2) / self.alpha2, gamma)
+
+    def mean_square_slope(self):
+        return self.alpha2
+
+    def roughness(self):
+        return self.alpha
+
+    def eval(self, facet):
+        return self.law.eval(facet.sin2_h) * dr.inv_pi / self.law.norm
+
+    def cdf(self, tan2, g):
+        tan2 = dr.minimum(tan2, 1e30)
+        c = clamp(self.law.mass(tan2 / (1 + tan2)) / self.law.norm, 0, 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        s = clamp(self.law.inverse(c * self.law.norm), 0, 1 - 1e-7)
+        return s / (1 - s)
+
+
+class Berry(Isotropic):
+    """D = k/(π log(1+k) (1 + k sin²θ_h)), k = 1/α² - 1 (Berry 1923): GTR of γ = 1."""
+
+    def __init__(self, alpha):
+        super().__init__()
+        self.alpha2 = dr.square(alpha)
+        self.k = (1 - self.alpha2) / self.alpha2
+        self.range = dr.log(1 + self.k)
+
+    def mean_square_slope(self):
+        return self.alpha2
+
+    def eval(self, facet):
+        return self.k / (dr.pi * self.range * (1 + self.k * facet.sin2_h))
+
+    def cdf(self, tan2, g):
+        tan2 = dr.minimum(tan2, 1e30)
+        c = dr.minimum(dr.log(1 + self.k * (tan2 / (1 + tan2))) / self.range, 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        s = clamp((dr.exp(c * self.range) - 1) / self.k, 0, 1 - 1e-7)
+        return s / (1 - s)
+
+
+class ABC(Isotropic):
+    """D = scale·(1 + B (1 - cosθ_h))^-C (Church and Takacs 1991; Löw et al. 2012, doi:10.1145/2077341.2077350).
+    ``scale`` None stands for the one with ∫ D cosθ_h dω_h = 1. Here q ∝ D, without the cosine."""
+
+    long_tailed = True
+
+    def __init__(self, b, c, scale=None):
+        super().__init__()
+        self.law = PowerLaw(b, c)
+        cosine_mass = self._cosine_mass()
+        self.scale = dr.inv_two_pi / cosine_mass if scale is None else scale
+        self.total = self.scale * dr.two_pi * cosine_mass
+
+    def _cosine_mass(self):
+        """∫ (1 - y)(1 + B y)^-C over 0 <= y <= 1."""
+        b = self.law.k
+        broad = b < 0.5
+        # Gauss-Legendre where the closed form, (∫ (1 + B y)^(1-C) - ∫ (1 + B y)^-C)/B, would cancel.
+        quadrature = sum(w * y * self.law.eval(y) for y, w in gauss_legendre(4))
+        closed = (PowerLaw(b, self.law.gamma - 1).norm - self.law.norm) / dr.select(broad, 1, b)
+        return self.law.norm - dr.select(broad, quadrature, closed)
+
+    def mean_square_slope(self):
+        return dr.minimum(2 / (1 + self.law.k * self.law.gamma), 1)
+
+    def estimated_albedo(self, cos):
+        return super().estimated_albedo(cos) * self.total
+
+    def eval(self, facet):
+        return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
+
+    def density(self, facet, g):
+        return self.law.eval(versine(facet.cos_h, facet.sin2_h)) * dr.inv_two_pi / self.law.norm
+
+    def cdf(self, tan2, g):
+        c = clamp(self.law.mass(versine_of_tan2(tan2)) / self.law.norm, 0, 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        return tan2_of_versine(self.law.inverse(c * self.law.norm))
+
+
+class HemiEPD(Isotropic):
+    """D = (γ+2)/(2π J) cosᵞθ_h e(κ cosᵞθ_h), e(x) = (exp(x) - 1)/x: the hemispherical exponential power distribution
+    ∝ |exp(κ cosᵞθ_h) - 1| (Nishino and Lombardi 2011, doi:10.1364/JOSAA.28.000008). J = ∫ e(κ s^p) ds over 0 <= s <= 1,
+    p = γ/(γ+2).
+
+    With s = cosθ_h^(γ+2), D cosθ_h dω_h is e(κ s^p)/J ds. q takes the place of that by a law that falls as steeply at
+    s = 1; their ratio is bounded.
+    """
+
+    def __init__(self, kappa, gamma):
+        super().__init__()
+        self.kappa, self.gamma, self.power = kappa, gamma, gamma / (gamma + 2)
+        self.law = BentLaw(kappa * self.power)
+        # Take exp(shift) out of J and e: the derivatives of exp(κ), and of 1/J, are no float32.
+        large = kappa > 40
+        self.scaled = dr.select(large, 46, 0), dr.select(large, math.exp(-46), 1)
+        self.integral = self._integral()
+
+    def _integral(self):
+        """J, good to 5e-6: by quadrature in a variable that spreads what happens at the end of [0, 1] at which the
+        integrand is largest, for κ < 0 that at 0, and squeezes the other one."""
+        falls = self.kappa < 0
+        k = dr.maximum(0.2 * abs(self.kappa) * self.power, 0.05)
+        log_k, integral = dr.log(1 + k), 0
+        for x, weight in gauss_legendre(12):
+            growth = dr.exp(log_k * dr.select(falls, x**3, x * (2 - x)))
+            t = dr.maximum((growth - 1) / k, 1e-6)
+            value = expm1_ratio(self.kappa * dr.power(dr.select(falls, t, 1 - t), self.power), *self.scaled)
+            integral += dr.select(falls, 3 * x * x, 2 - 2 * x) * weight * growth * value
+        return integral * log_k / k
+
+    def mean_square_slope(self):
+        # That of Blinn's distribution with about the same mean of log(cosθ).
+        up, down = dr.maximum(self.kappa, 0), dr.maximum(-self.kappa, 0)
+        narrower = dr.select(self.kappa > 0, 1 + up * up / (up + 7), 1 / (1 + 0.35 * dr.log(1 + 0.5 * down)))
+        return 2 / (2 + self.gamma * narrower)
+
+    def eval(self, facet):
+        power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
+        bent = expm1_ratio(self.kappa * power, *self.scaled) / self.integral
+        return (self.gamma + 2) * dr.inv_two_pi * power * bent
+
+    def density(self, facet, g):
+        m, s = cosine_power_cdf(facet.tan2_h, self.gamma + 2)
+        return (self.gamma + 2) * dr.inv_two_pi * s / facet.cos_h * self.law.eval(m, s)
+
+    def cdf(self, tan2, g):
+        return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
+
+    def inverse_cdf(self, c, complement, g):
+        return inverse_cosine_power_cdf(self.law.inverse_cdf(c, complement), self.gamma + 2)
+
+
+class EPD(Isotropic):
+    """D = exp(-(tan²θ_h/α²)ᵞ) / (π α² Γ(1 + 1/γ) cos⁴θ_h), the exponential power distribution of slopes, of which γ = 1
+    is Beckmann's (Holzschuch and Pacanowski 2017, doi:10.1145/3072959.3073621).
+
+    q follows D cosθ_h, by steps over a law that has a peak within tan²θ_h = α², as D has, and falls from where most
+    facets are: the lower γ, the further is one from the other.
+    """
+
+    long_tailed = True
+    STEPS = 18
+
+    def __init__(self, alpha, gamma):
+        super().__init__()
+        self.alpha, self.alpha2, self.gamma = alpha, dr.square(alpha), gamma
+        # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3.
+        self.median = self._limited(self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma))
+        self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
+
+        far = self._limited(self.alpha2 * dr.exp(dr.log(1.5 / gamma) / gamma))
+        self.law = RootLaw(dr.minimum(self.alpha2, 0.5 * far), far)
+        borders = [0, *(self.law.inverse_cdf(k / self.STEPS) for k in range(1, self.STEPS))]
+        falls = [1, *(dr.exp(-dr.exp(gamma * dr.log(t / self.alpha2))) for t in borders[1:])]
+        at = [fall * self._rest(t) / self.law.eval(t) for fall, t in zip(falls, borders, strict=True)]
+        self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
+
+    def _limited(self, tan2):
+        return dr.minimum(tan2, 1e16)
+
+    def _power(self, tan2):
+        """(tan²θ/α²)ᵞ"""
+        x = tan2 / self.alpha2
+        # At the normal the derivative of a low power has no end; and exp(-exp(5)) is no float32.
+        power = dr.exp(dr.minimum(self.gamma * dr.log(dr.maximum(x, 1e-24)), 5))
+        return dr.select(x > 1e-24, power, 0)
+
+    def _rest(self, tan2):
+        """What D cosθ dω is proportional to, per tan²θ, but for that power."""
+        return 1
+
+    def mean_square_slope(self):
+        return dr.minimum(self.median, 1)
+
+    def roughness(self):
+        return self.alpha
+
+    def eval(self, facet):
+        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)
+        # 1/cos⁴ as a part of the exponent: its adjoint would overflow where the power makes up for it.
+        return self.scale * dr.exp(-2 * dr.log(cos2) - self._power(facet.sin2_h / cos2))
+
+    def density(self, facet, g):
+        slope = facet.sin2_h, dr.square(facet.cos_h)
+        return dr.inv_pi * facet.cos_h * self.law.eval(*slope) * self.steps.eval(self.law.cdf(*slope))
+
+    def cdf(self, tan2, g):
+        c = dr.minimum(self.steps.cdf(self.law.cdf(dr.minimum(tan2, 1e30))), 1)
+        return c, 1 - c
+
+    def inverse_cdf(self, c, complement, g):
+        return self.law.inverse_cdf(self.steps.inverse_cdf(c))
