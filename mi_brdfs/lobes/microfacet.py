@@ -16,6 +16,19 @@ class MicrofacetLobe(Lobe):
     (:mod:`mi_brdfs.microfacet.choice`).
     """
 
+    # Of the estimated albedo; tests/calibration/estimated_albedo.py fits them.
+    TYPICAL = 0.57
+    """The squared slope of the typical facet, in units of the mean square slope of narrow lobes."""
+    LOST = 1.7
+    """How fast the loss of a shadowing term that conserves energy vanishes from the normal on, where another term has
+    it at the typical facet."""
+    NEARER = 0.25
+    """How much nearer to the normal facets are seen at grazing than at the mirror's cosine,"""
+    NEARER_LONG_TAILED = 0.43
+    """of a long tail under a shadowing term that conserves energy,"""
+    NEARER_UPRIGHT = 0.08
+    """and under a shadowing term that does not lean."""
+
     def __init__(self, colour, distribution, shadowing, fresnel, scale=1):
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
@@ -28,7 +41,6 @@ class MicrofacetLobe(Lobe):
         At grazing the facets seen lean towards the viewer: F is that of a larger cosine than cosθ_i, and a shadowing
         term that does not conserve energy is evaluated at such a facet in the plane of incidence. That and its image
         about the normal have cosθ_d that add up to 2 cosθ_h cosθ_i, until at grazing only the first one is seen.
-        ``tests/calibration/estimated_albedo.py`` fits the constants.
         """
         cos, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
         sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12)
@@ -36,16 +48,19 @@ class MicrofacetLobe(Lobe):
         if self.shadowing.conserving:
             seen = self.distribution.estimated_albedo(wi.z)
         else:
-            typical2 = 0.57 * slope2 / (1 + 0.18 * slope2)
+            # The 0.18 keeps what it reflects above the horizon up to a mean square slope of 4.
+            typical2 = self.TYPICAL * slope2 / (1 + 0.18 * slope2)
             slope = typical2 * dr.rsqrt(typical2 + cos * cos)  # the mirror is typical of what is narrow
             facet = Cosines.leaning(cos, dr.sqrt(sin2), slope)
             seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / cos, facet.cos_h)
-            seen *= self.distribution.estimated_albedo(1.7 * wi.z - 0.7)  # G has the loss at grazing
+            seen *= self.distribution.estimated_albedo(1 - self.LOST * versine)
         if not self.shadowing.lean:
-            nearer = 0.08
+            nearer = self.NEARER_UPRIGHT
+        elif self.shadowing.conserving and self.distribution.long_tailed:
+            nearer = self.NEARER_LONG_TAILED
         else:
-            nearer = 0.43 if self.shadowing.conserving and self.distribution.long_tailed else 0.25
-        nearer *= versine * safe_sqrt(versine * slope2)
+            nearer = self.NEARER
+        nearer = nearer * versine * safe_sqrt(versine * slope2)
         # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
         return self.reflectance * (self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9)) * seen)
 

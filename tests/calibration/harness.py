@@ -1,0 +1,194 @@
+"""What the calibrations share: constants of the code, what they minimise, and where the minimum is.
+
+A script lists its fits and calls :func:`main`, which prints the best constants that it finds beside those in the code.
+With ``--check`` it exits with 1 unless those in the code are as good as the best, within each fit's tolerance: minima
+are flat, so constants are round numbers near them, and what a fit declares is a fair share of all uses, not all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support import direction
+
+from mi_brdfs.lobes import LambertLobe, Lobe
+from mi_brdfs.lobes.mixture import Mixture
+from mi_brdfs.validation.sampling import variates
+
+import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
+import mitsuba as mi  # isort: skip
+
+LOG2_POINTS = 7
+"""Of the points of a direction, in each of their shifted copies."""
+
+
+class Fit(NamedTuple):
+    """Some constants, ``code`` as they stand, and a ``loss`` that is called with others in their place."""
+
+    name: str
+    code: Sequence[float]
+    loss: Callable[..., float]
+    tolerance: float = 0.02
+    """By which fraction the loss of the code's constants may exceed the least."""
+    step: float = 0.15
+    """Of the search's first steps, as a fraction of each constant."""
+
+
+def attributes(owner: Any, names: str | Sequence[str], loss: Callable[[], float], **options: Any) -> Fit:
+    """Fit attributes of a class or a module, numbers or tuples of them, which ``loss`` uses through the code."""
+    names = names.split()
+    shapes = [np.shape(getattr(owner, name)) for name in names]
+    code = [float(x) for name in names for x in np.ravel(getattr(owner, name))]
+
+    def with_values(*values: float) -> float:
+        left, new = iter(values), {}
+        for name, shape in zip(names, shapes, strict=True):
+            new[name] = tuple(number(next(left)) for _ in range(shape[0])) if shape else number(next(left))
+        with replaced(owner, new):
+            return loss()
+
+    label = ", ".join(f"{owner.__name__.rpartition('.')[2]}.{name}" for name in names)
+    return Fit(label, code, with_values, **options)
+
+
+@contextmanager
+def replaced(owner: Any, values: dict[str, Any]) -> Iterator[None]:
+    """Give attributes that ``owner`` itself has other values for a while."""
+    old = {name: vars(owner)[name] for name in values}
+    try:
+        for name, value in values.items():
+            setattr(owner, name, value)
+        yield
+    finally:
+        for name, value in old.items():
+            setattr(owner, name, value)
+
+
+def number(value: float) -> Any:
+    """A number that kernels do not hold as a literal: another one needs no other kernel."""
+    return dr.opaque(mi.Float, float(value))
+
+
+def best(fit: Fit) -> tuple[np.ndarray, float]:
+    """The constants of least loss, and the loss."""
+    code = np.array(fit.code, float)
+    simplex = np.stack([code, *(code + np.diag(np.where(code, fit.step * code, fit.step)))])
+    options = {"initial_simplex": simplex, "xatol": 2e-3 * abs(code).max(), "fatol": 0, "maxfev": 40 * (len(code) + 1)}
+    result = minimize(lambda values: fit.loss(*values), code, method="Nelder-Mead", options=options)
+    return result.x, float(result.fun)
+
+
+def main(doc: str, fits: Callable[[], Iterable[Fit]]) -> None:
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="only fits whose names contain one of these")
+    parser.add_argument("--check", action="store_true", help="exit with 1 unless the code's constants are as good")
+    arguments = parser.parse_args()
+    mi.set_variant("llvm_ad_rgb")
+    missed = False
+    for fit in fits():
+        if arguments.names and not any(name in fit.name for name in arguments.names):
+            continue
+        start = time.perf_counter()
+        now = float(fit.loss(*fit.code))
+        constants, least = best(fit)
+        excess = now / least - 1
+        good = excess <= fit.tolerance
+        missed |= not good
+        print(
+            f"{fit.name}\n    in the code {shown(fit.code)}: {now:.4g}, best {shown(constants)}: {least:.4g}; "
+            f"{excess:.1%} above it, {'within' if good else 'NOT within'} {fit.tolerance:.0%} "
+            f"({time.perf_counter() - start:.0f} s)",
+            flush=True,
+        )
+    sys.exit(arguments.check and missed)
+
+
+def shown(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.4g}" for value in values)
+
+
+# --- Lobes ----------------------------------------------------------------------------------------------------------
+
+
+def directions(angles: Sequence[float], azimuths: Sequence[float] = (0,)) -> np.ndarray:
+    """Directions at angles in degrees."""
+    return np.array([direction(theta, phi) for theta in angles for phi in azimuths])
+
+
+def vectors(array: np.ndarray) -> Any:
+    return mi.Vector3f(np.ascontiguousarray(array.T))
+
+
+def brightness(value: Any) -> Any:
+    return mi.luminance(mi.Color3f(value))
+
+
+class OverDiffuse:
+    """A lobe over a diffuse one, sampled as a mixture."""
+
+    def __init__(self, lobe: Lobe, reflectance: float = 0.3):
+        self.lobes = LambertLobe(number(reflectance)), lobe
+
+    def sample(self, wi, u, v):
+        return Mixture(self.lobes, wi).sample(u, v)[0]
+
+    def eval_pdf(self, wi, wo):
+        return Mixture(self.lobes, wi).eval_pdf(wo, transmitted=False)
+
+
+def weights(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
+    """The weights of samples at some directions for the same variates, shape (lobes, directions, samples)."""
+    points = variates(LOG2_POINTS, 1)
+    incident = vectors(np.repeat(wi, len(points), axis=0))
+    repeated = np.tile(points, (len(wi), 1))
+    u, v = mi.Float(repeated[:, 0].copy()), mi.Point2f(np.ascontiguousarray(repeated[:, 1:].T))
+    dr.make_opaque(incident, u, v)
+
+    def of(lobe):
+        wo = lobe.sample(incident, u, v)
+        valid = wo.z > 0
+        value, pdf = lobe.eval_pdf(incident, dr.select(valid, wo, mi.Vector3f(0, 0, 1)))
+        valid &= pdf > 0
+        return dr.select(valid, brightness(value) / dr.select(valid, pdf, 1), 0)
+
+    of_all = [of(lobe) for lobe in lobes]
+    dr.eval(*of_all)
+    return np.array([np.array(w, np.float64).reshape(len(wi), -1) for w in of_all])
+
+
+def relative_variance(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
+    """1/η - 1 of one sample under uniform light, shape (lobes, directions)."""
+    w = weights(lobes, wi)
+    return (w**2).mean(axis=-1) / w.mean(axis=-1) ** 2 - 1
+
+
+def variance_loss(lobes: Sequence[Lobe], angles: Sequence[float]) -> Callable[[], float]:
+    """The mean of 1/η - 1 over lobes and angles."""
+    wi = directions(angles)
+    return lambda: float(np.mean(relative_variance(lobes, wi)))
+
+
+def estimate_loss(lobes: Sequence[Lobe], angles: Sequence[float]) -> Callable[[], float]:
+    """The mean square log ratio of the estimated albedo to the measured one, over lobes and angles."""
+    wi = directions(angles)
+    measured = weights(lobes, wi).mean(axis=-1)
+    incident = vectors(wi)
+    dr.make_opaque(incident)
+
+    def loss():
+        of_all = [brightness(lobe.estimated_albedo(incident)) + dr.zeros(mi.Float, len(wi)) for lobe in lobes]
+        dr.eval(*of_all)
+        estimated = np.array([np.array(estimate, np.float64) for estimate in of_all])
+        return float(np.mean(np.log(np.maximum(estimated, 1e-12) / measured) ** 2))
+
+    return loss
