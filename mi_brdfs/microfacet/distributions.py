@@ -21,7 +21,7 @@ class Distribution(Term):
     """A distribution of two roughnesses, αu along dp_du and αv across: anisotropic, unless both are the same object."""
 
     LOSS = 1.7
-    """How much light is lost to multiple reflections: the constant of :meth:`estimated_albedo`, fitted."""
+    """How much light is lost to multiple reflections, which tests/calibration/estimated_albedo.py fits."""
     long_tailed = False
     """Whether there are many more steep facets than a Gaussian distribution of slopes has."""
 

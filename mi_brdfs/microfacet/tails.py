@@ -128,6 +128,12 @@ class HemiEPD(Isotropic):
     s = 1; their ratio is bounded.
     """
 
+    # tests/calibration/hemi_epd.py fits these.
+    SPREAD = 0.2
+    """How far the quadrature's variable spreads what happens at the end."""
+    NARROWER, BROADER = 6.5, (0.6, 0.28)
+    """Of the exponent that Blinn's distribution would have, for κ > 0 and for κ < 0."""
+
     def __init__(self, kappa, gamma):
         super().__init__()
         self.kappa, self.gamma, self.power = kappa, gamma, gamma / (gamma + 2)
@@ -138,10 +144,10 @@ class HemiEPD(Isotropic):
         self.integral = self._integral()
 
     def _integral(self):
-        """J, good to 5e-6: by quadrature in a variable that spreads what happens at the end of [0, 1] at which the
+        """J, good to 1e-5: by quadrature in a variable that spreads what happens at the end of [0, 1] at which the
         integrand is largest, for κ < 0 that at 0, and squeezes the other one."""
         falls = self.kappa < 0
-        k = dr.maximum(0.2 * abs(self.kappa) * self.power, 0.05)
+        k = dr.maximum(self.SPREAD * abs(self.kappa) * self.power, 0.05)  # it divides
         log_k, integral = dr.log(1 + k), 0
         for x, weight in gauss_legendre(12):
             growth = dr.exp(log_k * dr.select(falls, x**3, x * (2 - x)))
@@ -152,8 +158,9 @@ class HemiEPD(Isotropic):
 
     def mean_square_slope(self):
         # That of Blinn's distribution with about the same mean of log(cosθ).
+        a, (b, c) = self.NARROWER, self.BROADER
         up, down = dr.maximum(self.kappa, 0), dr.maximum(-self.kappa, 0)
-        narrower = dr.select(self.kappa > 0, 1 + up * up / (up + 7), 1 / (1 + 0.35 * dr.log(1 + 0.5 * down)))
+        narrower = dr.select(self.kappa > 0, 1 + up * up / (up + a), 1 / (1 + b * dr.log(1 + c * down)))
         return 2 / (2 + self.gamma * narrower)
 
     def eval(self, facet):

@@ -141,18 +141,23 @@ class BaseLobe(Lobe):
     """
 
     glossy = False
+    # tests/calibration/burley.py fits these.
+    UNIFORM = 0.1, 0.3
+    """The shares of uniform directions for the one and the other."""
+    SUBSURFACE = 1.43, 0.68
+    """a and b of the albedo of subsurface scattering, about a - b cosθ_i."""
 
     def __init__(self, reflectance, roughness, subsurface):
         self.reflectance, self.roughness, self.subsurface = reflectance, roughness, subsurface
 
     def estimated_albedo(self, wi):
-        # To some 10 %.
+        # To some 10 %. cos²θ_d is a half on average, for which d - 1 is roughness - 0.5.
         retro = 1 + (self.roughness - 0.5) * schlick_weight(wi.z)
-        return self.reflectance * dr.lerp(retro, 1.35 - 0.6 * wi.z, self.subsurface)
+        return self.reflectance * dr.lerp(retro, self.SUBSURFACE[0] - self.SUBSURFACE[1] * wi.z, self.subsurface)
 
     def _uniform(self, wi):
         """The share of the uniform directions."""
-        return 0.1 * self.roughness + 0.3 * self.subsurface * dr.square(1 - wi.z)
+        return self.UNIFORM[0] * self.roughness + self.UNIFORM[1] * self.subsurface * dr.square(1 - wi.z)
 
     def eval_pdf(self, wi, wo):
         weight_i, weight_o = schlick_weight(wi.z), schlick_weight(wo.z)
@@ -179,19 +184,21 @@ class SheenLobe(Lobe):
     r"""f = ρ (1 - cosθ_d)⁵, which is bright where wo is far from wi.
 
     Drawn about the axis -wi: m = 1 - cosθ_d from the density ∝ t^3.5 (1 - t^4.5)² of its share t in what it can be
-    (Kumaraswamy's; the exponents are fitted), and then the azimuth ψ nearly ∝ cosθ_o = A + B cosψ: exactly, by a choice
+    (Kumaraswamy's; tests/calibration/burley.py fits the exponents), and then the azimuth ψ nearly ∝ cosθ_o = A + B cosψ: exactly, by a choice
     among ψ and ψ + π, if all of the circle lies above the horizon, and else by a density ¾ (1-s²) of
     s = sin(ψ/2)/sin(ψ₀/2), with ψ₀ where the circle meets the horizon.
     """
 
     glossy, seldom = False, True
+    ALBEDO = 3e-4, 0.06, 0.02
+    """a, b and c of the albedo, about a + b x² + c x³ with x = 1 - cosθ_i; fitted, too."""
 
     def __init__(self, reflectance):
         self.reflectance = reflectance
 
     def estimated_albedo(self, wi):
-        x = 1 - wi.z
-        return self.reflectance * (5e-4 + x * x * (0.05 + 0.037 * x))
+        x, (a, b, c) = 1 - wi.z, self.ALBEDO
+        return self.reflectance * (a + x * x * (b + c * x))
 
     @staticmethod
     def _largest(sin):

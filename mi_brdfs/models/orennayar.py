@@ -95,7 +95,7 @@ class RoughDiffuse(Model):
 class QualitativeLobe(RoughDiffuseLobe):
     """f = ρ/π (C1 + B max(0, cosφ) sinα tanβ)."""
 
-    RETRO = 0.7  # of B/C1; this and that of the full form were chosen by measurement
+    RETRO = 0.7  # of B/C1; tests/calibration/orennayar.py fits this and that of the full form
 
     def __init__(self, reflectance, sigma):
         self.sigma2 = square(sigma)

@@ -3,15 +3,16 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
 from ..math import clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
-from ..microfacet.distributions import Distribution
+from ..microfacet.distributions import GGX, Distribution
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import SchlickSmith, Shadowing
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
 
-TYPICAL = 0.7
-"""The cosine that estimates take for u, of directions that are no mirror images."""
+TYPICAL = 0.58
+"""The cosine that estimates take for u, of directions that are no mirror images; tests/calibration/schlick.py fits
+it."""
 
 
 class Schlick94(Model):
@@ -113,7 +114,7 @@ class SchlickNormals(Distribution):
     """D = Z A/π. q has the Z of D, and in place of A the azimuths of an ellipse with axes ∝ √p and 1, whose densities
     have the same ratio. Of all ellipses it is the best, with an efficiency of 0.96 for p = 0.1 and 0.73 for 0.01."""
 
-    LOSS = 2.3
+    LOSS = GGX.LOSS
     long_tailed = True
 
     def __init__(self, roughness, isotropy):

@@ -91,6 +91,9 @@ class Step:
     it deals in the *excess*, by which a cosine exceeds the threshold.
     """
 
+    START = 0.1, 0.28
+    """Of the search for a quantile; tests/calibration/toon.py fits it."""
+
     def __init__(self, threshold, smooth):
         self.threshold, self.smooth = threshold, smooth
         self.start = self._integral(-threshold)
@@ -117,7 +120,7 @@ class Step:
         # x³ (1 - x/2) = y: a fit good to 1 %, and two steps of Newton's method, after which it is good to 1e-9.
         y = dr.select(ramp, integral / (2 * dr.maximum(self.smooth, 1e-30)), 0.5)
         root = dr.cbrt(y)
-        x = root * (1 + root * (0.1 + 0.28 * root))
+        x = root * (1 + root * (self.START[0] + self.START[1] * root))
         for _ in range(2):
             x2 = dr.maximum(x * x, 1e-20)
             x = x - (x * x2 * (1 - 0.5 * x) - y) / (x2 * (3 - 2 * x))
