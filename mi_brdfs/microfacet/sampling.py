@@ -37,10 +37,17 @@ class AntitheticNormals(Sampler):
     grazing: m has the density 1 + τ - 2 τ m.
     """
 
+    # Of τ; tests/calibration/half_vectors.py fits them.
+    SHADOWED, BROAD = 0.85, 1.4
+    """How much rough lobes are shadowed at most, and how soon."""
+    RISING = 0.35
+    """How much less the reflectance rises than it seems."""
+
     def _bias(self, lobe, wi):
-        """τ, chosen by measurement."""
-        shadowed = wi.z * dr.minimum(1.5 * lobe.distribution.mean_square_slope(), 1)
-        return dr.minimum(0.75 * shadowed + 0.35 * (1 - self._brighter(lobe, wi)), 0.9)
+        """τ."""
+        shadowed = wi.z * dr.minimum(self.BROAD * lobe.distribution.mean_square_slope(), 1)
+        bias = self.SHADOWED * shadowed + self.RISING * (1 - self._brighter(lobe, wi))
+        return dr.minimum(bias, 0.9)  # at 1 the ends of the line would have no samples
 
     @staticmethod
     def _brighter(lobe, wi, cos=1):
@@ -115,10 +122,12 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     a part δ of the leaning lines the half vectors are uniform, whatever the distribution: that bounds their weights.
     """
 
-    OUTWARD = -0.6
-    """Chosen by measurement, as are the lean and δ."""
-    STEEP2 = 0.25
-    """The tan²θ_h from which on facets are steep."""
+    # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
+    OUTWARD = -0.75
+    STEEP = 0.5
+    """How many of the steep facets δ counts: those whose slope is at least a half."""
+    STEEP_IMPLICIT = 0.8
+    """The largest δ under the implicit term."""
 
     def __init__(self, lean: float):
         self.lean = lean
@@ -131,14 +140,14 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
         cos2 = dr.square(dr.maximum(wi.z, 1e-15))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
-        leaning = dr.minimum(seen / (seen + cos2), 0.95)
+        leaning = dr.minimum(seen / (seen + cos2), 0.95)  # others lie across the plane of incidence
         if not distribution.long_tailed:
             return x, y, leaning, 0
-        _, steep = distribution.cdf(self.STEEP2, (1 - cos2) / dr.maximum(slope2, 1e-20))
-        steep = 0.5 * dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep
+        _, steep = distribution.cdf(0.25, (1 - cos2) / dr.maximum(slope2, 1e-20))
+        steep = self.STEEP * dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep
         if self.lean >= 4:
             # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
-            steep = 0.8 * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), 1e-12))
+            steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), 1e-12))
         else:
             steep = steep / (steep + dr.sqrt(seen + cos2))
         return x, y, leaning + (1 - leaning) * steep, steep

@@ -16,7 +16,7 @@ class Shadowing(Term):
     the attributes (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
 
     lean: ClassVar[float] = 0
-    """How far the facets seen at grazing lean towards the viewer; chosen by measurement."""
+    """How far the facets seen at grazing lean towards the viewer, which tests/calibration/half_vectors.py fits."""
     reciprocal: ClassVar[bool] = True
     """Whether G stays the same as wi and wo are exchanged."""
     conserving: ClassVar[bool] = False

@@ -16,10 +16,11 @@ class BoundedVisibleNormals(Sampler):
 
     In the space stretched to α = 1 a normal is the half vector of wi and a point of a spherical cap -b <= z <= 1.
     Uniform points leave the weight rising with z, as grazing reflections are shadowed; a density ∝ 1 - l + 2 l v in
-    the height v = (z + b)/(1 + b) makes up for it. l = ¾ min(1, α) was chosen by measurement.
+    the height v = (z + b)/(1 + b) makes up for it, with l = ¾ min(1, α).
     """
 
     BIAS = 0.75
+    """l/α, which tests/calibration/visible_normals.py fits."""
 
     def _cap(self, distribution, wi):
         """``(stretched wi, its unit vector, k, b, l)``"""

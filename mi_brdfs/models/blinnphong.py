@@ -81,7 +81,7 @@ class BlinnPhong(Model):
 class ResponseShadowing(Shadowing):
     """The shadowing term for which f cosθ_o is D/4."""
 
-    lean = 4
+    lean = 0.7
     reciprocal = False
 
     def __call__(self, facet):

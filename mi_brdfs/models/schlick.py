@@ -104,7 +104,7 @@ class Schlick94(Model):
 class Unshadowed(Shadowing):
     """G = 1."""
 
-    lean = 1
+    lean = 0.7
 
     def __call__(self, facet):
         return 1.0

@@ -38,8 +38,9 @@ class Fit(NamedTuple):
     name: str
     code: Sequence[float]
     loss: Callable[..., float]
-    tolerance: float = 0.03
-    """By which fraction the loss of the code's constants may exceed the least."""
+    tolerance: float = 0.05
+    """By which fraction the loss of the code's constants may exceed the least. Of a variance of 0.04, which is typical, the
+    twentieth is a difference in efficiency of 0.002."""
     step: float = 0.15
     """Of the search's first steps, as a fraction of each constant."""
     search: Callable[[], Sequence[float]] | None = None
@@ -93,11 +94,16 @@ def best(fit: Fit) -> tuple[np.ndarray, float]:
     return result.x, float(result.fun)
 
 
+def parser(doc: str) -> argparse.ArgumentParser:
+    result = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--check", action="store_true", help="exit with 1 unless the code's choice is as good")
+    return result
+
+
 def main(doc: str, fits: Callable[[], Iterable[Fit]]) -> None:
-    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="only fits whose names contain one of these")
-    parser.add_argument("--check", action="store_true", help="exit with 1 unless the code's constants are as good")
-    arguments = parser.parse_args()
+    options = parser(doc)
+    options.add_argument("names", nargs="*", metavar="NAME", help="only fits whose names contain one of these")
+    arguments = options.parse_args()
     mi.set_variant("llvm_ad_rgb")
     missed = False
     for fit in fits():

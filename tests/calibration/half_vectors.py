@@ -1,0 +1,96 @@
+"""Pairs of half vectors: the constants of their density, and how far those lean that count at grazing, for each
+shadowing term, which have the least mean relative variance.
+
+    python tests/calibration/half_vectors.py [--check] [NAME ...]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+from harness import Fit, attributes, main, number, variance_loss
+
+from mi_brdfs.lobes import MicrofacetLobe
+from mi_brdfs.microfacet import shadowing
+from mi_brdfs.microfacet.distributions import GGX, GTR, Beckmann, Blinn
+from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
+from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
+from mi_brdfs.models.blinnphong import ResponseShadowing
+from mi_brdfs.models.brady import Projected
+from mi_brdfs.models.schlick import Unshadowed
+
+ANGLES = 5, 30, 60, 80
+GRAZING = 60, 75, 85
+ALPHAS = 0.1, 0.25, 0.5, 1
+
+
+def of_alpha(kind):
+    return [kind(alpha, alpha) for alpha in map(number, ALPHAS)]
+
+
+def blinn():
+    return [Blinn(number(exponent)) for exponent in (1, 10, 100)]
+
+
+def lobes(facets, terms, reflectances):
+    """Of all distributions with all shadowing terms, which are given or made of the distribution."""
+    return [
+        MicrofacetLobe(1, it, g(it) if isinstance(g, type(smith)) else g, f)
+        for it, g, f in product(facets, terms, reflectances)
+    ]
+
+
+def smith(distribution):
+    return distribution.smith(correlated=True)
+
+
+def schlick(distribution):
+    return shadowing.SchlickSmith(0.8 * distribution.roughness())
+
+
+def fits() -> Iterator[Fit]:
+    unit, rising = [Unit()], [Schlick(number(0.04)), Dielectric(number(1.5))]
+    upright = [shadowing.VCavity(), shadowing.AshikhminShirleyShadowing()]
+    everything = [*of_alpha(Beckmann), *of_alpha(GGX), *blinn()]
+
+    yield attributes(AntitheticNormals, "SHADOWED BROAD", variance_loss(lobes(everything, upright, unit), ANGLES))
+    yield attributes(AntitheticNormals, "RISING", variance_loss(lobes(everything, upright, rising), ANGLES))
+
+    short_tailed = [*of_alpha(Beckmann), *blinn()]
+    leaning = [smith, shadowing.Implicit(), shadowing.Neumann(), shadowing.AshikhminPremoze()]
+    yield attributes(
+        AntitheticNormalsTowardViewer, "OUTWARD", variance_loss(lobes(short_tailed, leaning, unit), GRAZING)
+    )
+    long_tailed = [*of_alpha(GGX), *(GTR(alpha, number(1.5)) for alpha in map(number, ALPHAS))]
+    yield attributes(
+        AntitheticNormalsTowardViewer, "STEEP", variance_loss(lobes(long_tailed, leaning[1:], unit), GRAZING)
+    )
+
+    for name, term in {
+        "Smith": smith,
+        "SchlickSmith": schlick,
+        "Implicit": shadowing.Implicit(),
+        "Neumann": shadowing.Neumann(),
+        "AshikhminPremoze": shadowing.AshikhminPremoze(),
+        "KurtShadowing": shadowing.KurtShadowing(number(0.25)),
+        "Projected": Projected(),
+        "ResponseShadowing": ResponseShadowing(),
+        "Unshadowed": Unshadowed(),
+    }.items():
+        yield of_lean(name, lobes(short_tailed, [term], unit))
+
+
+def of_lean(name, of_term) -> Fit:
+    measured = variance_loss(of_term, GRAZING)
+
+    def loss(lean):
+        for lobe in of_term:
+            lobe.sampler = AntitheticNormalsTowardViewer(number(lean))
+        return measured()
+
+    return Fit(f"{name}.lean", [of_term[0].shadowing.lean], loss)
+
+
+if __name__ == "__main__":
+    main(__doc__, fits)
