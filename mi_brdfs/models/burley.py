@@ -184,9 +184,9 @@ class SheenLobe(Lobe):
     r"""f = ρ (1 - cosθ_d)⁵, which is bright where wo is far from wi.
 
     Drawn about the axis -wi: m = 1 - cosθ_d from the density ∝ t^3.5 (1 - t^4.5)² of its share t in what it can be
-    (Kumaraswamy's; tests/calibration/burley.py fits the exponents), and then the azimuth ψ nearly ∝ cosθ_o = A + B cosψ: exactly, by a choice
-    among ψ and ψ + π, if all of the circle lies above the horizon, and else by a density ¾ (1-s²) of
-    s = sin(ψ/2)/sin(ψ₀/2), with ψ₀ where the circle meets the horizon.
+    (Kumaraswamy's; tests/calibration/burley.py fits the exponents), and then the azimuth ψ nearly ∝ cosθ_o, which is
+    A + B cosψ: exactly, by a choice among ψ and ψ + π, if all of the circle lies above the horizon, and else by a
+    density ¾ (1-s²) of s = sin(ψ/2)/sin(ψ₀/2), with ψ₀ where the circle meets the horizon.
     """
 
     glossy, seldom = False, True

@@ -78,7 +78,8 @@ def fits() -> Iterator[Fit]:
     def of(owner, names, *lobes_of, **options):
         return attributes(owner, names, variance_loss(lobes_of, ANGLES), **options)
 
-    yield of(Distribution, "LOSS", *lobes([*beckmann(), *blinn()], conserving, Unit()), *lobes(others(), cavities, Unit()))
+    short_tailed = [*beckmann(), *blinn()]
+    yield of(Distribution, "LOSS", *lobes(short_tailed, conserving, Unit()), *lobes(others(), cavities, Unit()))
     yield of(GGX, "LOSS", *lobes(ggx(), conserving, Unit()), tolerance=0.1)
     both = *lobes(everything, leaning, Unit()), *lobes(everything, upright, Unit())
     yield of(MicrofacetLobe, "TYPICAL LOST", *both)

@@ -39,8 +39,8 @@ class Fit(NamedTuple):
     code: Sequence[float]
     loss: Callable[..., float]
     tolerance: float = 0.05
-    """By which fraction the loss of the code's constants may exceed the least. Of a variance of 0.04, which is typical, the
-    twentieth is a difference in efficiency of 0.002."""
+    """By which fraction the loss of the code's constants may exceed the least. Of a relative variance of 0.04, which is
+    typical, the twentieth is a difference in efficiency of 0.002."""
     step: float = 0.15
     """Of the search's first steps, as a fraction of each constant."""
     search: Callable[[], Sequence[float]] | None = None

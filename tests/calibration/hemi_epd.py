@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from harness import Fit, attributes, main, number
@@ -33,7 +34,7 @@ def exact(kappa: float, gamma: float) -> tuple[float, float]:
     def integral(f):
         # In s = t³, and with a border where the end at 1 begins.
         ends = 0, (1 - min(1, 20 / abs(kappa)) / 2) ** (1 / 3), 1
-        return sum(quad(lambda t: 3 * t * t * f(t**3), *it, epsrel=1e-11, limit=200)[0] for it in zip(ends, ends[1:]))
+        return sum(quad(lambda t: 3 * t * t * f(t**3), *it, epsrel=1e-11, limit=200)[0] for it in pairwise(ends))
 
     total = integral(bent)
     return total, integral(lambda s: np.log(s) * bent(s)) / (gamma + 2) / total
