@@ -20,6 +20,8 @@ class WithForwardShare(Sampler):
 
     INDISTINCT = 0.008
     """The reflectance at normal incidence, that of η = 1.2, below which dielectrics need it."""
+    LARGEST = 0.8
+    """The share where it needs it most. tests/calibration/forward.py fits both."""
 
     def __init__(self, sampler):
         self.sampler = sampler
@@ -34,7 +36,7 @@ class WithForwardShare(Sampler):
         low = z * z / cos2
         brighter = low * (1 - low) * fresnel(z) / dr.maximum(fresnel(dr.minimum(dr.sqrt(cos2), 1)), 1e-12)
         distinct = dr.square(dr.square(dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) / self.INDISTINCT))
-        return 0.8 * brighter / ((1 + brighter) * (1 + distinct))
+        return self.LARGEST * brighter / ((1 + brighter) * (1 + distinct))
 
     @staticmethod
     def _cosine(wi):

@@ -126,7 +126,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     OUTWARD = -0.75
     STEEP = 0.5
     """How many of the steep facets δ counts: those whose slope is at least a half."""
-    STEEP_IMPLICIT = 0.8
+    STEEP_IMPLICIT = 0.7
     """The largest δ under the implicit term."""
 
     def __init__(self, lean: float):

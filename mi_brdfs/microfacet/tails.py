@@ -189,15 +189,19 @@ class EPD(Isotropic):
 
     long_tailed = True
     STEPS = 18
+    """For which it is sampled as well as Beckmann's distribution where it is that."""
+    FAR = 1.5
+    """How far the law reaches; tests/calibration/epd.py fits it."""
 
     def __init__(self, alpha, gamma):
         super().__init__()
         self.alpha, self.alpha2, self.gamma = alpha, dr.square(alpha), gamma
-        # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3.
+        # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3
+        # (Chen and Rubin 1986, doi:10.1016/0167-7152(86)90044-1), nearly.
         self.median = self._limited(self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma))
         self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
 
-        far = self._limited(self.alpha2 * dr.exp(dr.log(1.5 / gamma) / gamma))
+        far = self._limited(self.alpha2 * dr.exp(dr.log(self.FAR / gamma) / gamma))
         self.law = RootLaw(dr.minimum(self.alpha2, 0.5 * far), far)
         borders = [0, *(self.law.inverse_cdf(k / self.STEPS) for k in range(1, self.STEPS))]
         falls = [1, *(dr.exp(-dr.exp(gamma * dr.log(t / self.alpha2))) for t in borders[1:])]

@@ -11,8 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from harness import Fit, attributes, directions, estimate_loss, main, number, variance_loss, vectors
+from harness import Fit, attributes, directions, estimate_loss, main, number, variance_loss
 
+from mi_brdfs.measure.arrays import vectors
 from mi_brdfs.models.burley import BaseLobe, SheenLobe
 
 import mitsuba as mi  # isort: skip

@@ -13,15 +13,17 @@ from harness import Fit, attributes, main, number, variance_loss
 
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet import shadowing
-from mi_brdfs.microfacet.distributions import GGX, GTR, Beckmann, Blinn
+from mi_brdfs.microfacet.distributions import GGX, Beckmann, Blinn
 from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
 from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
+from mi_brdfs.microfacet.tails import ABC, EPD, GTR
 from mi_brdfs.models.blinnphong import ResponseShadowing
 from mi_brdfs.models.brady import Projected
 from mi_brdfs.models.schlick import Unshadowed
 
 ANGLES = 5, 30, 60, 80
 GRAZING = 60, 75, 85
+STEEPEST = 80, 85, 88
 ALPHAS = 0.1, 0.25, 0.5, 1
 
 
@@ -66,6 +68,12 @@ def fits() -> Iterator[Fit]:
     yield attributes(
         AntitheticNormalsTowardViewer, "STEEP", variance_loss(lobes(long_tailed, leaning[1:], unit), GRAZING)
     )
+    longer_tailed = [
+        kind(*map(number, values))
+        for kind, *values in [(GTR, 0.1, 1), (ABC, 1e4, 0.8), (ABC, 100, 1), (EPD, 0.05, 0.3), (EPD, 0.2, 0.5)]
+    ]
+    implicit = lobes([*long_tailed, *longer_tailed], [shadowing.Implicit()], unit)
+    yield attributes(AntitheticNormalsTowardViewer, "STEEP_IMPLICIT", variance_loss(implicit, STEEPEST))
 
     for name, term in {
         "Smith": smith,

@@ -12,18 +12,16 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from support import direction
-
 from mi_brdfs.lobes import LambertLobe, Lobe
 from mi_brdfs.lobes.mixture import Mixture
-from mi_brdfs.validation.sampling import variates
+from mi_brdfs.measure.arrays import sample_arguments, vectors
+from mi_brdfs.measure.directions import direction
+from mi_brdfs.measure.variates import lattice, sampling_efficiency
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip
@@ -136,10 +134,6 @@ def directions(angles: Sequence[float], azimuths: Sequence[float] = (0,)) -> np.
     return np.array([direction(theta, phi) for theta in angles for phi in azimuths])
 
 
-def vectors(array: np.ndarray) -> Any:
-    return mi.Vector3f(np.ascontiguousarray(array.T))
-
-
 def brightness(value: Any) -> Any:
     return mi.luminance(mi.Color3f(value))
 
@@ -159,11 +153,9 @@ class OverDiffuse:
 
 def weights(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
     """The weights of samples at some directions for the same variates, shape (lobes, directions, samples)."""
-    points = variates(LOG2_POINTS, 1)
+    points = lattice(LOG2_POINTS, 1)
     incident = vectors(np.repeat(wi, len(points), axis=0))
-    repeated = np.tile(points, (len(wi), 1))
-    u, v = mi.Float(repeated[:, 0].copy()), mi.Point2f(np.ascontiguousarray(repeated[:, 1:].T))
-    dr.make_opaque(incident, u, v)
+    u, v = sample_arguments(np.tile(points, (len(wi), 1)))
 
     def of(lobe):
         wo = lobe.sample(incident, u, v)
@@ -179,8 +171,7 @@ def weights(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
 
 def relative_variance(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
     """1/η - 1 of one sample under uniform light, shape (lobes, directions)."""
-    w = weights(lobes, wi)
-    return (w**2).mean(axis=-1) / w.mean(axis=-1) ** 2 - 1
+    return 1 / sampling_efficiency(weights(lobes, wi)) - 1
 
 
 def variance_loss(lobes: Sequence[Lobe], angles: Sequence[float]) -> Callable[[], float]:
@@ -194,7 +185,6 @@ def estimate_loss(lobes: Sequence[Lobe], angles: Sequence[float]) -> Callable[[]
     wi = directions(angles)
     measured = weights(lobes, wi).mean(axis=-1)
     incident = vectors(wi)
-    dr.make_opaque(incident)
 
     def loss():
         of_all = [brightness(lobe.estimated_albedo(incident)) + dr.zeros(mi.Float, len(wi)) for lobe in lobes]

@@ -15,6 +15,7 @@ from harness import directions, number, parser, relative_variance
 
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet.distributions import GGX
+from mi_brdfs.microfacet.forward import WithForwardShare
 from mi_brdfs.microfacet.fresnel import Conductor, Dielectric, Schlick, Unit
 from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
 from mi_brdfs.microfacet.shadowing import SchlickSmith
@@ -52,7 +53,9 @@ def main():
         for f, fresnel in reflectances.items():
             facets = [GGX(alpha, alpha) for alpha in map(number, ALPHAS)]
             lobes = [MicrofacetLobe(1, it, make(it), fresnel) for it in facets]
-            chosen, losses = type(lobes[0].sampler), {}
+            chosen = lobes[0].sampler
+            # A dielectric's has a share of its own besides.
+            chosen, losses = type(chosen.sampler if isinstance(chosen, WithForwardShare) else chosen), {}
             leaning = AntitheticNormalsTowardViewer(lobes[0].shadowing.lean)
             for sampler in BoundedVisibleNormals(), AntitheticVisibleNormals(), AntitheticNormals(), leaning:
                 for lobe in lobes:

@@ -6,21 +6,34 @@ least mean square log ratio of the estimated albedo to the measured one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import product
 
-from harness import Fit, attributes, estimate_loss, main, number
+from harness import Fit, attributes, estimate_loss, main
 
-from mi_brdfs.microfacet.fresnel import Schlick
+from mi_brdfs.lobes import Lobe
+from mi_brdfs.measure.arrays import interaction
 from mi_brdfs.models import schlick
+
+import mitsuba as mi  # isort: skip
 
 ANGLES = 5, 30, 60, 80
 
 
+def lobes(roughness: float, upper: float, lower: float) -> Sequence[Lobe]:
+    """The interreflection and the lower layer."""
+    given = {"roughness": roughness, "specular_reflectance": upper, "diffuse_reflectance": lower}
+    model = mi.load_dict({"type": "schlick", "variant": "interreflection", **given}).model
+    return model.lobes(model.evaluate(interaction([0, 0, 1]), True))[1:]
+
+
 def fits() -> Iterator[Fit]:
-    layers = [Schlick(number(f0)) for f0 in (0.04, 0.3)]
-    lobes = [schlick.InterreflectionLobe(number(roughness), it) for roughness in (0.01, 0.1, 0.5, 1) for it in layers]
-    lobes += [schlick.LowerLayerLobe(number(reflectance), it) for reflectance in (0.2, 0.8) for it in layers]
-    yield attributes(schlick, "TYPICAL", estimate_loss(lobes, ANGLES), tolerance=0.1)
+    settings = list(product((0.01, 0.1, 1), (0.04, 0.3), (0.2, 0.8)))
+
+    def loss():
+        return estimate_loss([lobe for setting in settings for lobe in lobes(*setting)], ANGLES)()
+
+    yield attributes(schlick, "TYPICAL", loss, tolerance=0.1)
 
 
 if __name__ == "__main__":
