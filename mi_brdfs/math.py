@@ -2,8 +2,8 @@
 
 Narrow lobes live in the last bits of a cosine: (N·H)^n at n = 1e5, or a GGX peak at alpha = 1e-3, lose all their digits
 when computed from N·H itself. The functions below take what does keep its digits, such as sin²θ or |i - R|².
-They work on every variant's floats and spectra, and their derivatives are finite wherever their values are.
-Keep divisors above 1e-18: the derivative of a quotient divides by their square, which below that is no float32.
+They work on every variant's floats and spectra, and their derivatives are finite wherever their values are. To that
+end nothing that divides falls below one of three values, of which a power is still a float32.
 """
 
 from __future__ import annotations
@@ -16,6 +16,12 @@ import numpy as np
 
 ONE_MINUS_EPSILON = 1 - 2**-24
 """The largest float32 below one: uniform variates are clamped to it."""
+TINY = 1e-30
+"""The least of squares, of arguments of logarithms and powers, and of what only draws divide by."""
+EPSILON = 1e-15
+"""The least divisor, such as a cosine or a density: the derivative of a quotient divides by its square."""
+SMALL = 1e-9
+"""The least length, and other divisors of which derivatives take up to the fourth power."""
 
 
 def select(mask, a, b):
@@ -110,7 +116,7 @@ def log_cos(cos, sin2):
     """log(cosθ), from sin²θ where the cosine has lost its digits."""
     near = sin2 < 0.5
     x = dr.select(near, -sin2, 0)
-    return dr.select(near, 0.5 * x * _log1p_series(x), dr.log(dr.select(near, 1, dr.maximum(cos, 1e-30))))
+    return dr.select(near, 0.5 * x * _log1p_series(x), dr.log(dr.select(near, 1, dr.maximum(cos, TINY))))
 
 
 def safe_sqrt(x):
@@ -120,15 +126,15 @@ def safe_sqrt(x):
 
 
 def sin_theta(w):
-    """sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least 1e-15, where its derivative
+    """sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least EPSILON, where its derivative
     is 0."""
-    return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, 1e-30))
+    return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, TINY))
 
 
 def normalize_or(x, y, fallback: tuple[float, float]):
     """The 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
     length2 = x * x + y * y
-    valid = length2 > 1e-24  # the derivative has length⁻³
+    valid = length2 > 1e-24  # of which the derivative takes the power -3/2
     scale = dr.rsqrt(dr.select(valid, length2, 1))
     return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
 
@@ -138,7 +144,7 @@ def choose(u, probability):
     the fresh uniform variate that is left of it."""
     chosen = u < probability
     left = dr.select(chosen, u, u - probability)
-    left = left / dr.maximum(dr.select(chosen, probability, 1 - probability), 1e-30)
+    left = left / dr.maximum(dr.select(chosen, probability, 1 - probability), TINY)
     return chosen, dr.minimum(left, ONE_MINUS_EPSILON)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, normalize_or, safe_sqrt
+from ..math import EPSILON, TINY, choose, normalize_or, safe_sqrt
 from .lobe import AdjointLobe, Lobe
 
 
@@ -66,7 +66,7 @@ class AdjointZonalLobe(AdjointLobe):
 
     def _radiance(self, wi):
         """What a lobe of an albedo of 1 makes of light from ``wi``, times π."""
-        return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, 1e-15)
+        return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, EPSILON)
 
     def estimated_albedo(self, wi):
         return self.lobe.estimated_albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)
@@ -103,7 +103,7 @@ class RoughDiffuseLobe(Lobe):
         """The probability of the uniform directions."""
         mu, r = wi.z, self.retro
         share = 0.162925 + mu * (-0.372058 + mu * (0.538233 - 0.290822 * mu))
-        return dr.select(r > 0, dr.power(dr.maximum(r, 1e-30), 0.1), 0) * share
+        return dr.select(r > 0, dr.power(dr.maximum(r, TINY), 0.1), 0) * share
 
     def _matrix(self, wi):
         """``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of wi."""

@@ -8,6 +8,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ..math import EPSILON
+
 
 class Lobe:
     """One additive part of a BRDF, holding its parameters evaluated at a surface point.
@@ -75,7 +77,7 @@ class AdjointLobe(Lobe):
     def eval_pdf(self, wi, wo):
         value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))
         _, pdf = self.lobe.eval_pdf(wi, wo)
-        return value * (abs(wo.z) / dr.maximum(wi.z, 1e-15)), pdf
+        return value * (abs(wo.z) / dr.maximum(wi.z, EPSILON)), pdf
 
     def sample(self, wi, u, v):
         return self.lobe.sample(wi, u, v)

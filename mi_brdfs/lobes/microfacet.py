@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import drjit as dr
 
-from ..math import safe_sqrt
+from ..math import EPSILON, safe_sqrt
 from ..microfacet.choice import sampler_of
 from ..microfacet.facet import Cosines, Facet
 from .lobe import Lobe
@@ -43,7 +43,7 @@ class MicrofacetLobe(Lobe):
         about the normal have cosθ_d that add up to 2 cosθ_h cosθ_i, until at grazing only the first one is seen.
         """
         cos, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
-        sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, 1e-12)
+        sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, EPSILON)
         slope2 = self.distribution.mean_square_slope_along(wi) / sin2
         if self.shadowing.conserving:
             seen = self.distribution.estimated_albedo(wi.z)

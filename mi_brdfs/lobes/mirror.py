@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
+from ..math import EPSILON, TINY, choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
 from .lobe import Lobe
 
 
@@ -78,7 +78,7 @@ class PowerLobe(MirrorLobe):
 
     def _share(self, frame):
         axial, lateral = self._masses(frame)
-        return axial / dr.maximum(axial + lateral, 1e-15)  # an axis straight below the surface has neither
+        return axial / dr.maximum(axial + lateral, EPSILON)  # an axis straight below the surface has neither
 
     def estimated_albedo(self, wi):
         # Exact where the axis lies along the normal or in the horizon.
@@ -90,13 +90,13 @@ class PowerLobe(MirrorLobe):
         n, frame = self.exponent, self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(n * log_a), 0)
-        sin = dr.sqrt(dr.maximum(versine * (2 - versine), 1e-30))
+        sin = dr.sqrt(dr.maximum(versine * (2 - versine), TINY))
         cos_phi = dr.minimum(abs(dr.dot(wo - frame.axis, frame.up)) / sin, 1)
         return (
             self.reflectance * (self.peak(wi) * power * wo.z),
             self._pair(frame, log_a, versine, power, cos_phi)
             * wo.z
-            / dr.maximum(wo.z + frame.mirrored_z(wo, versine), 1e-15),
+            / dr.maximum(wo.z + frame.mirrored_z(wo, versine), EPSILON),
         )
 
     def sample(self, wi, u, v):
@@ -119,7 +119,7 @@ class PowerLobe(MirrorLobe):
         """The density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
         n = self.exponent
         axial = (n + 2) * (1 - versine)
-        lateral = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), 1e-30)) * cos_phi
+        lateral = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), TINY)) * cos_phi
         share = self._share(frame)
         return power * dr.inv_pi * (share * axial + (1 - share) * lateral)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import ONE_MINUS_EPSILON, clamp, luminance, select
+from ..math import ONE_MINUS_EPSILON, SMALL, TINY, clamp, luminance, select
 
 
 class Mixture:
@@ -24,7 +24,7 @@ class Mixture:
             counts = [select(mirrored, 1.0, 0.0) if it.transmits else select(mirrored, 0.0, 1.0) for it in lobes]
         energies = [count * luminance(lobe.estimated_albedo(wi)) for count, lobe in zip(counts, lobes, strict=True)]
         total = sum(energies)
-        black = total < 1e-9  # derivatives divide by its square
+        black = total < SMALL
         scale = dr.rcp(dr.select(black, sum(counts), total))
         self.probabilities = [
             dr.select(black, count, energy) * scale for count, energy in zip(counts, energies, strict=True)
@@ -50,7 +50,7 @@ class Mixture:
             index = dr.select(passed, k, index)
             start, share = dr.select(passed, end, start), dr.select(passed, probability, share)
             end = end + probability
-        u = clamp((u - start) / dr.maximum(share, 1e-30), 0, ONE_MINUS_EPSILON)
+        u = clamp((u - start) / dr.maximum(share, TINY), 0, ONE_MINUS_EPSILON)
 
         wo = self.lobes[0].sample(self.wi, u, v)
         for k, lobe in enumerate(self.lobes[1:], start=1):

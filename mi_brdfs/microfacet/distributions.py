@@ -11,8 +11,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import log1p_ratio, log_cos
-from .laws import cosine_power_cdf, inverse_cosine_power_cdf, log_complement
+from ..math import TINY, log1p_ratio, log_cos
+from .laws import LARGEST_TAN2, cosine_power_cdf, inverse_cosine_power_cdf, log_complement
 from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
 from .term import Term
 
@@ -115,11 +115,11 @@ class GGX(Distribution):
         return 1 / (dr.pi * self.alpha_u * self.alpha_v * dr.square(self.steepness(facet) + dr.square(facet.cos_h)))
 
     def cdf(self, tan2, g):
-        x = dr.minimum(g * tan2, 1e30)
+        x = dr.minimum(g * tan2, LARGEST_TAN2)
         return x / (1 + x), 1 / (1 + x)
 
     def inverse_cdf(self, c, complement, g):
-        return c / (dr.maximum(complement, 1e-30) * g)
+        return c / (dr.maximum(complement, TINY) * g)
 
     def roughness(self):
         return dr.sqrt(self.alpha_u * self.alpha_v)

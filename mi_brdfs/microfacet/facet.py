@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
+from ..math import SMALL
+
 
 class Cosines(NamedTuple):
     """The cosines of a facet alone, as estimates need them."""
@@ -39,7 +41,7 @@ class Facet:
     def between(cls, wi, wo) -> Facet:
         """The facet that reflects ``wi`` into ``wo``, both above the horizon."""
         # Opposite directions within the horizon have none; derivatives divide by the length, up to its fourth power.
-        h = mi.Vector3f(wi.x + wo.x, wi.y + wo.y, dr.maximum(wi.z + wo.z, 1e-8))
+        h = mi.Vector3f(wi.x + wo.x, wi.y + wo.y, dr.maximum(wi.z + wo.z, SMALL))
         length2 = dr.dot(h, h)
         inv_length = dr.rsqrt(length2)
         return cls(wi, wo, h * inv_length, 0.5 * length2 * inv_length)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, normalize_or, safe_sqrt, select
+from ..math import EPSILON, choose, normalize_or, safe_sqrt, select
 from .sampling import Sampler
 
 
@@ -34,7 +34,7 @@ class WithForwardShare(Sampler):
         slope2 = distribution.inverse_cdf(0.75, 0.25, g)
         cos2 = z * z + slope2 / (1 + slope2)
         low = z * z / cos2
-        brighter = low * (1 - low) * fresnel(z) / dr.maximum(fresnel(dr.minimum(dr.sqrt(cos2), 1)), 1e-12)
+        brighter = low * (1 - low) * fresnel(z) / dr.maximum(fresnel(dr.minimum(dr.sqrt(cos2), 1)), EPSILON)
         distinct = dr.square(dr.square(dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) / self.INDISTINCT))
         return self.LARGEST * brighter / ((1 + brighter) * (1 + distinct))
 

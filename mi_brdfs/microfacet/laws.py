@@ -6,7 +6,10 @@ import functools
 
 import drjit as dr
 
-from ..math import clamp, expm1, expm1_ratio, log1p, log1p_ratio
+from ..math import EPSILON, ONE_MINUS_EPSILON, SMALL, clamp, expm1, expm1_ratio, log1p, log1p_ratio
+
+LARGEST_TAN2 = 1e30
+"""tan²θ at the horizon: infinity would leave NaN."""
 
 
 class PowerLaw:
@@ -28,7 +31,7 @@ class PowerLaw:
     def inverse(self, mass):
         """The s of a ``mass``."""
         z = self.x * self.k * mass
-        logarithm = mass * log1p_ratio(dr.maximum(z, -1 + 1e-7))
+        logarithm = mass * log1p_ratio(dr.maximum(z, -ONE_MINUS_EPSILON))
         return logarithm * expm1_ratio(self.k * logarithm)
 
 
@@ -73,7 +76,7 @@ class Steps:
 
     def __init__(self, heights):
         highest = functools.reduce(dr.maximum, heights)
-        self.heights = [dr.maximum(height, 1e-9 * highest) for height in heights]  # it must not vanish
+        self.heights = [dr.maximum(height, SMALL * highest) for height in heights]  # it must not vanish
         self.total = sum(self.heights)
 
     def eval(self, c):
@@ -111,9 +114,11 @@ class RootLaw:
         return (dr.sqrt((x + self.near * y) / (x + self.far * y)) - self.lowest) / (1 - self.lowest)
 
     def inverse_cdf(self, c):
-        """The t, up to 1e30."""
+        """The t."""
         root = self.lowest + c * (1 - self.lowest)
-        return dr.minimum(self.far * (c * (root + self.lowest) / dr.maximum((1 - c) * (1 + root), 1e-18)), 1e30)
+        return dr.minimum(
+            self.far * (c * (root + self.lowest) / dr.maximum((1 - c) * (1 + root), EPSILON)), LARGEST_TAN2
+        )
 
 
 def versine(cos, sin2):
@@ -129,21 +134,21 @@ def versine_of_tan2(tan2):
 
 def tan2_of_versine(v):
     """tan²θ of 1 - cosθ, limited at the horizon."""
-    v = clamp(v, 0, 1 - 1e-7)
+    v = clamp(v, 0, ONE_MINUS_EPSILON)
     return v * (2 - v) / dr.square(1 - v)
 
 
 def cosine_power_cdf(tan2, power):
     """``(C, 1 - C)`` for 1 - C = cosθ^power."""
-    complement = dr.exp(-0.5 * power * log1p(dr.minimum(tan2, 1e30)))
+    complement = dr.exp(-0.5 * power * log1p(dr.minimum(tan2, LARGEST_TAN2)))
     return 1 - complement, complement
 
 
 def inverse_cosine_power_cdf(complement, power):
     """The tan²θ of the complement of a ``cosine_power_cdf`` value."""
-    return dr.minimum(expm1(log_complement(complement) * (-2 / power)), 1e30)
+    return dr.minimum(expm1(log_complement(complement) * (-2 / power)), LARGEST_TAN2)
 
 
 def log_complement(complement):
     """log(1 - c) of the complement 1 - c. Where c has more digits it is 1e-7 off: so little that no sample shows it."""
-    return dr.log(dr.maximum(complement, 1e-37))
+    return dr.log(dr.maximum(complement, 1e-37))  # about the least float32

@@ -6,7 +6,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import choose, clamp, normalize_or, safe_sqrt, select
+from ..math import EPSILON, SMALL, choose, clamp, normalize_or, safe_sqrt, select
 from .facet import Facet
 
 
@@ -52,7 +52,7 @@ class AntitheticNormals(Sampler):
     @staticmethod
     def _brighter(lobe, wi, cos=1):
         """How much brighter the reflectance is at a cosine, by default that of normal incidence."""
-        return dr.minimum(lobe.fresnel.brightness(cos) / dr.maximum(lobe.fresnel.brightness(wi.z), 1e-9), 1)
+        return dr.minimum(lobe.fresnel.brightness(cos) / dr.maximum(lobe.fresnel.brightness(wi.z), SMALL), 1)
 
     def _azimuth(self, lobe, wi, u, v):
         """``(u, cosψ, sinψ, which)``, with what is left of ``u``, and the choices made, for :meth:`_tan2`."""
@@ -84,7 +84,7 @@ class AntitheticNormals(Sampler):
         cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
 
         # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
-        weight, other = dr.maximum(lobe.weight_over_ndf(facet), 1e-17), reflected(lobe, facet.image())
+        weight, other = dr.maximum(lobe.weight_over_ndf(facet), EPSILON), reflected(lobe, facet.image())
         density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
         return density / (2 * facet.cos_d) * (weight / (weight + other))
 
@@ -94,7 +94,7 @@ class Line:
 
     def __init__(self, distribution, wi, x, y):
         self.distribution = distribution
-        along, z = abs(x * wi.x + y * wi.y), dr.maximum(wi.z, 1e-15)  # of which the square is not 0
+        along, z = abs(x * wi.x + y * wi.y), dr.maximum(wi.z, EPSILON)  # of which the square is not 0
         limit2 = dr.square((along + dr.sqrt(along * along + z * z)) / z)
         self.lowest = dr.rsqrt(1 + limit2)
         """cosθ_h where tanθ_h is R."""
@@ -138,16 +138,16 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
-        cos2 = dr.square(dr.maximum(wi.z, 1e-15))  # which is not 0
+        cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), 0.95)  # others lie across the plane of incidence
         if not distribution.long_tailed:
             return x, y, leaning, 0
-        _, steep = distribution.cdf(0.25, (1 - cos2) / dr.maximum(slope2, 1e-20))
+        _, steep = distribution.cdf(0.25, (1 - cos2) / dr.maximum(slope2, EPSILON))
         steep = self.STEEP * dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep
         if self.lean >= 4:
             # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
-            steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), 1e-12))
+            steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), EPSILON))
         else:
             steep = steep / (steep + dr.sqrt(seen + cos2))
         return x, y, leaning + (1 - leaning) * steep, steep
@@ -194,8 +194,8 @@ def draw_linear(bias, u):
 def reflected(lobe, facet):
     """What a facet reflects, ``lobe.weight_over_ndf``, or next to nothing if that leads below the horizon. It is never
     zero: the derivative of a share in what a pair reflects divides by the square of that."""
-    valid = (facet.cos_d > 1e-9) & (facet.cos_o > 0)
+    valid = (facet.cos_d > SMALL) & (facet.cos_o > 0)
     # Elsewhere the formulas need not make sense, but must be finite.
-    wo = mi.Vector3f(facet.wo.x, facet.wo.y, dr.maximum(facet.wo.z, 1e-9))
-    safe = Facet(facet.wi, wo, facet.h, dr.maximum(facet.cos_d, 1e-9))
-    return dr.maximum(select(valid, lobe.weight_over_ndf(safe), 0), 1e-17)
+    wo = mi.Vector3f(facet.wo.x, facet.wo.y, dr.maximum(facet.wo.z, SMALL))
+    safe = Facet(facet.wi, wo, facet.h, dr.maximum(facet.cos_d, SMALL))
+    return dr.maximum(select(valid, lobe.weight_over_ndf(safe), 0), EPSILON)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import drjit as dr
 
+from ..math import TINY
 from .facet import Facet
 from .term import Term
 
@@ -77,7 +78,7 @@ class SmithBeckmann(Smith):
            4.20437499e-5)  # fmt: skip
 
     def stretched(self, v):
-        slope = dr.sqrt(dr.maximum(self.slope2(v), 1e-30))
+        slope = dr.sqrt(dr.maximum(self.slope2(v), TINY))
         a = dr.minimum(v.z / slope, 10)
         root = dr.rcp(functools.reduce(lambda sum, factor: sum * a + factor, reversed(self.FIT)))
         return v.z + slope * dr.inv_sqrt_pi * dr.square(dr.square(dr.square(root)))
@@ -92,7 +93,7 @@ class SmithBlinn(Smith):
         super().__init__(alpha, alpha, correlated)
 
     def stretched(self, v):
-        slope = dr.sqrt(dr.maximum(self.slope2(v), 1e-30))
+        slope = dr.sqrt(dr.maximum(self.slope2(v), TINY))
         a = dr.minimum(v.z / slope, 1.6)
         rational = 2 * slope * (1 - 1.259 * a + 0.396 * a * a) / (3.535 + 2.181 * a)
         return v.z + dr.select(a < 1.6, rational, 0)

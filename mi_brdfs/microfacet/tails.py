@@ -6,9 +6,10 @@ import math
 
 import drjit as dr
 
-from ..math import clamp, expm1_ratio, gauss_legendre, log_cos
+from ..math import ONE_MINUS_EPSILON, clamp, expm1_ratio, gauss_legendre, log_cos
 from .distributions import Isotropic
 from .laws import (
+    LARGEST_TAN2,
     BentLaw,
     PowerLaw,
     RootLaw,
@@ -43,12 +44,12 @@ class GTR(Isotropic):
         return self.law.eval(facet.sin2_h) * dr.inv_pi / self.law.norm
 
     def cdf(self, tan2, g):
-        tan2 = dr.minimum(tan2, 1e30)
+        tan2 = dr.minimum(tan2, LARGEST_TAN2)
         c = clamp(self.law.mass(tan2 / (1 + tan2)) / self.law.norm, 0, 1)
         return c, 1 - c
 
     def inverse_cdf(self, c, complement, g):
-        s = clamp(self.law.inverse(c * self.law.norm), 0, 1 - 1e-7)
+        s = clamp(self.law.inverse(c * self.law.norm), 0, ONE_MINUS_EPSILON)
         return s / (1 - s)
 
 
@@ -68,12 +69,12 @@ class Berry(Isotropic):
         return self.k / (dr.pi * self.range * (1 + self.k * facet.sin2_h))
 
     def cdf(self, tan2, g):
-        tan2 = dr.minimum(tan2, 1e30)
+        tan2 = dr.minimum(tan2, LARGEST_TAN2)
         c = dr.minimum(dr.log(1 + self.k * (tan2 / (1 + tan2))) / self.range, 1)
         return c, 1 - c
 
     def inverse_cdf(self, c, complement, g):
-        s = clamp((dr.exp(c * self.range) - 1) / self.k, 0, 1 - 1e-7)
+        s = clamp((dr.exp(c * self.range) - 1) / self.k, 0, ONE_MINUS_EPSILON)
         return s / (1 - s)
 
 
@@ -151,7 +152,7 @@ class HemiEPD(Isotropic):
         log_k, integral = dr.log(1 + k), 0
         for x, weight in gauss_legendre(12):
             growth = dr.exp(log_k * dr.select(falls, x**3, x * (2 - x)))
-            t = dr.maximum((growth - 1) / k, 1e-6)
+            t = dr.maximum((growth - 1) / k, 1e-6)  # where a power below one has a derivative
             value = expm1_ratio(self.kappa * dr.power(dr.select(falls, t, 1 - t), self.power), *self.scaled)
             integral += dr.select(falls, 3 * x * x, 2 - 2 * x) * weight * growth * value
         return integral * log_k / k
@@ -209,7 +210,7 @@ class EPD(Isotropic):
         self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
 
     def _limited(self, tan2):
-        return dr.minimum(tan2, 1e16)
+        return dr.minimum(tan2, 1e16)  # of which derivatives take the square
 
     def _power(self, tan2):
         """(tan²θ/α²)ᵞ"""
@@ -229,7 +230,7 @@ class EPD(Isotropic):
         return self.alpha
 
     def eval(self, facet):
-        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)
+        cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)  # the square of 1/cos², times 1/α², is a float32
         # 1/cos⁴ as a part of the exponent: its adjoint would overflow where the power makes up for it.
         return self.scale * dr.exp(-2 * dr.log(cos2) - self._power(facet.sin2_h / cos2))
 
@@ -238,7 +239,7 @@ class EPD(Isotropic):
         return dr.inv_pi * facet.cos_h * self.law.eval(*slope) * self.steps.eval(self.law.cdf(*slope))
 
     def cdf(self, tan2, g):
-        c = dr.minimum(self.steps.cdf(self.law.cdf(dr.minimum(tan2, 1e30))), 1)
+        c = dr.minimum(self.steps.cdf(self.law.cdf(dr.minimum(tan2, LARGEST_TAN2))), 1)
         return c, 1 - c
 
     def inverse_cdf(self, c, complement, g):

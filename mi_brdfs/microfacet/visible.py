@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import safe_sqrt, select, sin_theta
+from ..math import EPSILON, SMALL, safe_sqrt, select, sin_theta
 from .facet import Facet
 from .sampling import Sampler, reflected
 
@@ -47,7 +47,7 @@ class BoundedVisibleNormals(Sampler):
     def _facet(distribution, wi, unit, point):
         """The facet whose stretched normal is the half vector of the unit vector and a point."""
         normal = unit + point
-        z = dr.maximum(normal.z, 1e-9)  # a cap that is nearly the whole sphere ends where the normal vanishes
+        z = dr.maximum(normal.z, SMALL)  # a cap that is nearly the whole sphere ends where the normal vanishes
         h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
         return Facet.reflecting(wi, h * dr.rsqrt(dr.dot(h, h)))
 
@@ -81,7 +81,7 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
         density, unit, point = self._density(lobe.distribution, facet)
         image = self._facet(lobe.distribution, facet.wi, unit, self._image(point))
         # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
-        weight = dr.maximum(lobe.weight_over_ndf(facet), 1e-17) / dr.maximum(facet.cos_d, 1e-9)
+        weight = dr.maximum(lobe.weight_over_ndf(facet), EPSILON) / dr.maximum(facet.cos_d, SMALL)
         return 2 * density * (weight / (weight + self._weight(lobe, image)))
 
     @staticmethod
@@ -91,4 +91,4 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
     @staticmethod
     def _weight(lobe, facet):
         """f cosθ_o over the density, but for what is the same for both."""
-        return reflected(lobe, facet) / dr.maximum(facet.cos_d, 1e-9)
+        return reflected(lobe, facet) / dr.maximum(facet.cos_d, SMALL)

@@ -1,6 +1,7 @@
 import drjit as dr
 
 from ..lobes import LambertLobe, MicrofacetLobe
+from ..math import EPSILON
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing
 from ..microfacet.tails import EPD
@@ -82,7 +83,7 @@ class Exponential(EPD):
         return 1 / dr.square(1 + tan2)
 
     def eval(self, facet):
-        return self.scale * dr.exp(-self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), 1e-14)))
+        return self.scale * dr.exp(-self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), EPSILON)))
 
     def estimated_albedo(self, cos):
         """∫ D cosθ_h dω_h, as the steps have it."""

@@ -3,7 +3,7 @@ import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe
 from ..lobes.mirror import AxisFrame
-from ..math import choose, clamp, luminance, safe_sqrt, square
+from ..math import EPSILON, SMALL, TINY, choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
@@ -87,7 +87,7 @@ class Burley(Model):
 
     def lobes(self, p):
         brightness = luminance(p.base_color)
-        black = brightness < 1e-15
+        black = brightness < EPSILON
         tint = dr.select(black, 1, p.base_color / dr.select(black, 1, brightness))
         dielectric = 1 - p.metallic
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)
@@ -204,26 +204,26 @@ class SheenLobe(Lobe):
     def _largest(sin):
         """The largest m there is: of the direction in the horizon opposite to wi."""
         cos_d2 = 0.5 * (1 - sin)
-        return (1 - cos_d2) / (1 + dr.sqrt(dr.maximum(cos_d2, 1e-12)))
+        return (1 - cos_d2) / (1 + dr.sqrt(dr.maximum(cos_d2, EPSILON)))
 
     def eval_pdf(self, wi, wo):
         frame = AxisFrame(-wi)
         cos = dr.dot(frame.axis, wo)
         sin_d2 = dr.minimum(0.25 * dr.squared_norm(wo - wi), 1)
-        cos_d = dr.sqrt(dr.maximum(1 - sin_d2, 1e-12))
+        cos_d = dr.sqrt(dr.maximum(1 - sin_d2, 1e-12))  # it divides the density
         m = sin_d2 / (1 + cos_d)
         m2 = m * m
         value = m2 * m2 * m * wo.z
 
         largest = self._largest(frame.sin)
-        t = dr.clip(m / largest, 1e-9, 1 - 1e-6)
+        t = dr.clip(m / largest, SMALL, 1 - 1e-6)  # rounding must not leave a density of 0
         t_3_5 = t * t * t * dr.sqrt(t)
         density = 13.5 * t_3_5 * dr.square(1 - t_3_5 * t) / (4 * cos_d * largest)  # dcos = 4 cosθ_d dm
 
         axial, lateral = -wi.z * cos, frame.sin * safe_sqrt(1 - cos * cos)
         highest = dr.maximum(axial + lateral, wo.z)
         whole = axial >= lateral
-        circle = wo.z * dr.inv_two_pi / dr.select(whole, dr.maximum(axial, 1e-30), 1)
+        circle = wo.z * dr.inv_two_pi / dr.select(whole, dr.maximum(axial, EPSILON), 1)
         arc = 0.375 * wo.z / highest * safe_sqrt((lateral + wo.z - axial) / highest)
         return self.reflectance * value, density * dr.select(whole, circle, arc)
 
@@ -237,7 +237,7 @@ class SheenLobe(Lobe):
         whole = axial >= lateral
         sin_a, cos_a = dr.sincos(dr.select(whole, dr.two_pi * v.y, dr.asin(2 * v.y - 1) / 3))
         flip = dr.select(2 * u * axial > axial + lateral * cos_a, -1, 1)
-        half = safe_sqrt(0.5 * (axial + lateral) / dr.select(whole, 1, dr.maximum(lateral, 1e-30)))
+        half = safe_sqrt(0.5 * (axial + lateral) / dr.select(whole, 1, dr.maximum(lateral, TINY)))
         s = 2 * sin_a * dr.minimum(half, 1)
         sin_psi = dr.select(whole, flip * sin_a, 2 * s * safe_sqrt(1 - s * s))
         cos_psi = dr.select(whole, flip * cos_a, 1 - 2 * s * s)

@@ -3,7 +3,7 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, PowerLobe
 from ..lobes.mirror import AxisFrame
-from ..math import clamp, log1p, safe_sqrt
+from ..math import EPSILON, SMALL, TINY, clamp, log1p, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
@@ -65,6 +65,7 @@ class Lafortune(Model):
         glossy = []
         for lobe in p.specular:
             n, c = lobe.exponent, (lobe.cx, lobe.cy, lobe.cz)
+            # The 1e-6 is for factors that are all zero.
             largest = dr.maximum(dr.maximum(abs(c[0]), abs(c[1])), dr.maximum(abs(c[2]), 1e-6)) if energy else 1
             scale = (n + 2) * dr.inv_two_pi if energy else 1
             glossy.append(LafortuneLobe(lobe.specular_reflectance, n, scale, c, largest))
@@ -83,11 +84,11 @@ class LafortuneLobe(PowerLobe):
     def _stretched(self, wi):
         """``(C∘wi, its length)``, the length relative to that of wi, which may be off one by a rounding error."""
         v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
-        return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), 1e-20))
+        return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), TINY))
 
     def frame(self, wi) -> AxisFrame:
         v, length = self._stretched(wi)
-        return AxisFrame(dr.select(length > 1e-8, v / length, mi.Vector3f(0, 0, 1)))
+        return AxisFrame(dr.select(length > SMALL, v / length, mi.Vector3f(0, 0, 1)))
 
     def peak(self, wi):
         _, length = self._stretched(wi)
@@ -105,7 +106,7 @@ class LafortuneLobe(PowerLobe):
     def _buried(self, frame):
         """``(whether it does, log s, c² (n+1))``, where c is the cosine."""
         cos2 = dr.square(frame.axis.z)
-        sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), 1e-12)  # for which 1 - c² has no digits
+        sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # for which 1 - c² has no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
         return depth > sin2, 0.5 * dr.log(sin2), depth
 
@@ -125,7 +126,7 @@ class LafortuneLobe(PowerLobe):
     def _draw(self, frame, u, v):
         left, log_a, b, c = super()._draw(frame, u, v)
         buried, log_s, _ = self._buried(frame)
-        t = -dr.log(dr.maximum((1 - u) * (1 - v.x), 1e-37)) / (self.exponent + 1)
+        t = -dr.log(dr.maximum((1 - u) * (1 - v.x), TINY)) / (self.exponent + 1)
         across = (2 * v.y - 1) * self._arc(frame, t)
         log_a, b, c = (
             dr.select(buried, own, usual)

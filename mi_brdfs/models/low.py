@@ -2,7 +2,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
-from ..math import clamp, luminance, normalize_or, safe_sqrt
+from ..math import EPSILON, SMALL, clamp, luminance, normalize_or, safe_sqrt
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
@@ -100,7 +100,7 @@ class SmoothLobe(Lobe):
         """The power law's mass on the way from -wi_xy in the direction (x, y) to the edge of the disc."""
         along = x * wi.x + y * wi.y
         reach = along + dr.sqrt(along * along + wi.z * wi.z)
-        return dr.maximum(self.law.mass(reach * reach), 1e-15)  # at grazing, rounding may leave nothing of the way
+        return dr.maximum(self.law.mass(reach * reach), EPSILON)  # at grazing, rounding may leave nothing of the way
 
     def _reflectance(self, wi, x, y):
         """F for the projected direction (x, y)."""
@@ -108,7 +108,7 @@ class SmoothLobe(Lobe):
 
     def _brightness(self, wi, x, y):
         """What the choice of an end goes by, which must not vanish."""
-        return dr.maximum(luminance(self._reflectance(wi, x, y)), 1e-8)
+        return dr.maximum(luminance(self._reflectance(wi, x, y)), SMALL)
 
     def _end(self, wi, x, y, u):
         """``(point, W)``: the point at the fraction ``u`` of one end of a chord, and the end's mass times F."""

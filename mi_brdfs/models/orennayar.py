@@ -3,7 +3,7 @@ import math
 import drjit as dr
 
 from ..lobes.diffuse import RoughDiffuseLobe
-from ..math import sin_theta, square
+from ..math import EPSILON, sin_theta, square
 from ..model import Energy, Model
 from ..parameters import Choice, Flag, Number, Reflectance, Spelling
 
@@ -130,8 +130,9 @@ class FullLobe(QualitativeLobe):
         sin_a, sin_b = dr.select(flatter, sin_i, sin_o), dr.select(flatter, sin_o, sin_i)
         # Complements of the angles, in units of a right one: at grazing they keep digits that the angles lose.
         a, b = (dr.atan2(cos, sin) * (2 * dr.inv_pi) for cos, sin in ((cos_a, sin_a), (cos_b, sin_b)))
-        tan_mean = (sin_a + sin_b) / dr.maximum(cos_a + cos_b, 1e-15)
-        # cosφ sinβ and 2β/(π sinβ): at the normal, where φ is nothing, these have derivatives.
+        tan_mean = (sin_a + sin_b) / dr.maximum(cos_a + cos_b, EPSILON)
+        # cosφ sinβ and 2β/(π sinβ): at the normal, where φ is nothing, these have derivatives. Up to sinβ = 1e-3
+        # the second one is its limit, to float32.
         along = (wi.x * wo.x + wi.y * wo.y) / sin_a
         ratio = dr.select(sin_b > 1e-3, (1 - b) / dr.maximum(sin_b, 1e-3), 2 * dr.inv_pi)
         ratio2 = dr.square(ratio)
@@ -139,7 +140,7 @@ class FullLobe(QualitativeLobe):
         forward = b * (3 - b * (3 - b)) - cos_a * cos_a / (1 + sin_a)  # sinα - (2β/π)³
         c2 = self.b * dr.select(along >= 0, sin_a, forward)
         c3 = 0.125 * self.sigma2 / (self.sigma2 + 0.09) * dr.square(1 - a) * ratio2 * sin_b
-        once = self.c1 + c2 * along / dr.maximum(cos_b, 1e-15) + c3 * (sin_b - abs(along)) * tan_mean
+        once = self.c1 + c2 * along / dr.maximum(cos_b, EPSILON) + c3 * (sin_b - abs(along)) * tan_mean
         twice = self._twice() * (1 - along * sin_b * ratio2)
         rho = self.reflectance
         return dr.maximum(rho * dr.inv_pi * (once + rho * twice), 0)

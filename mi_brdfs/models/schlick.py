@@ -2,10 +2,11 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
-from ..math import clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
+from ..math import EPSILON, TINY, clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
 from ..microfacet.distributions import GGX, Distribution
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
+from ..microfacet.laws import LARGEST_TAN2
 from ..microfacet.shadowing import SchlickSmith, Shadowing
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
@@ -148,11 +149,11 @@ class SchlickNormals(Distribution):
         return dr.inv_pi * self._zenith(facet) * facet.cos_h / (self.r * g)
 
     def cdf(self, tan2, g):
-        x = dr.minimum(tan2 / self.r, 1e30)
+        x = dr.minimum(tan2 / self.r, LARGEST_TAN2)
         return x / (1 + x), 1 / (1 + x)
 
     def inverse_cdf(self, c, complement, g):
-        return dr.minimum(c / dr.maximum(complement, 1e-30) * self.r, 1e30)
+        return dr.minimum(c / dr.maximum(complement, TINY) * self.r, LARGEST_TAN2)
 
 
 class InterreflectionLobe(Lobe):
@@ -183,16 +184,17 @@ class InterreflectionLobe(Lobe):
         return lost, lost + (1 - lost) * self.integral
 
     def estimated_albedo(self, wi):
-        return self.fresnel(TYPICAL) * (0.5 * self._constant(wi)[1] / dr.maximum(wi.z, 1e-15))
+        return self.fresnel(TYPICAL) * (0.5 * self._constant(wi)[1] / dr.maximum(wi.z, EPSILON))
 
     def eval_pdf(self, wi, wo):
         lost, integral = self._constant(wi)
         x, k = wo.z, self.k
         gone = x * log1p_ratio(k * x) / self.scale
+        # The 1e-7 is what rounding leaves of 1 - gone: a power below one has a derivative there.
         law = (1 + self.power) * dr.power(dr.maximum(1 - gone, 1e-7), self.power) / ((1 + k * x) * self.scale)
         shadowed = lost + (1 - lost) * (1 - x) / (1 + k * x)
         facet = Facet.between(wi, wo)
-        value = self.fresnel(facet.cos_d) * (shadowed / (4 * dr.pi * dr.maximum(wi.z, 1e-15)))
+        value = self.fresnel(facet.cos_d) * (shadowed / (4 * dr.pi * dr.maximum(wi.z, EPSILON)))
         return value, dr.inv_two_pi * (lost + (1 - lost) * self.integral * law) / integral
 
     def sample(self, wi, u, v):

@@ -4,7 +4,7 @@ import mitsuba as mi
 from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
 from ..lobes.mirror import AxisFrame
-from ..math import choose, safe_sqrt
+from ..math import EPSILON, TINY, choose, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
@@ -83,7 +83,7 @@ class Toon(Model):
 
 
 EMPTY = 1e-12
-"""The integral up to which a band counts as empty."""
+"""The integral up to which a band counts as empty; the narrowest one that float32 resolves has more."""
 
 
 class Step:
@@ -101,7 +101,7 @@ class Step:
 
     def _x(self, excess):
         # The floor makes a jump of an edge of width 0.
-        smooth = dr.maximum(self.smooth, 1e-12)
+        smooth = dr.maximum(self.smooth, EPSILON)
         return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
 
     def _integral(self, excess):
@@ -118,11 +118,11 @@ class Step:
         integral = self.start + u * self.mass
         ramp = integral < self.smooth
         # x³ (1 - x/2) = y: a fit good to 1 %, and two steps of Newton's method, after which it is good to 1e-9.
-        y = dr.select(ramp, integral / (2 * dr.maximum(self.smooth, 1e-30)), 0.5)
+        y = dr.select(ramp, integral / (2 * dr.maximum(self.smooth, TINY)), 0.5)
         root = dr.cbrt(y)
         x = root * (1 + root * (self.START[0] + self.START[1] * root))
         for _ in range(2):
-            x2 = dr.maximum(x * x, 1e-20)
+            x2 = dr.maximum(x * x, TINY)
             x = x - (x * x2 * (1 - 0.5 * x) - y) / (x2 * (3 - 2 * x))
         return dr.select(ramp, self.smooth * (2 * x - 1), integral)
 
@@ -195,7 +195,7 @@ class HighlightLobe(Lobe):
         _, visible = self._ring(frame, dr.minimum(versine, 2 - versine))
         front, back = self._pair(nearer, visible)
         value = self.step.eval(excess) / (dr.two_pi * self.mass)
-        return self.reflected * value, value * self.step.eval(nearer) / dr.maximum(front + back, 1e-15)
+        return self.reflected * value, value * self.step.eval(nearer) / dr.maximum(front + back, EPSILON)
 
     def sample(self, wi, u, v):
         frame, excess = self._frame(wi), self.step.sample(v.x)

@@ -1,6 +1,7 @@
 import drjit as dr
 
 from ..lobes.diffuse import ZonalLobe
+from ..math import TINY
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
@@ -78,7 +79,7 @@ class Wrap(Model):
 
 def _power(x, exponent):
     """x^exponent for x >= 0, with a derivative at 0."""
-    return dr.power(x + 1e-30, exponent)
+    return dr.power(x + TINY, exponent)
 
 
 class WrapLobe(ZonalLobe):
@@ -113,7 +114,7 @@ class BackLobe(WrapLobe):
     transmits = True
 
     def density(self, cos):
-        w, n = dr.maximum(self.wrap, 1e-6), self.exponent
+        w, n = dr.maximum(self.wrap, 1e-6), self.exponent  # without one there is no such light
         x = 1 + cos / w
         return dr.select(x > 0, (n + 1) / w * _power(dr.maximum(x, 0), n), 0)
 
