@@ -23,6 +23,8 @@ if _version < _TESTED:
 if _version > _TESTED:
     warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
 
+llvm.check(mi.variant())
+
 from . import lobes, microfacet, parameters  # noqa: E402
 from .mitsuba.guests import register_installed  # noqa: E402
 from .mitsuba.registry import info, install, list_models, register  # noqa: E402

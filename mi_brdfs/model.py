@@ -65,12 +65,10 @@ class Plugin:
     def __init__(self, props: mi.Properties):
         reader = PropertyReader(self.plugins[0], props)
         declared = self.declared()
-        reader.reject_unknown([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
+        reader.take([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
         self.parameters = BoundParameters(declared, reader)
         self.textures, self.ranges = self.parameters.textures, self.parameters.ranges
         vars(self).update(self.parameters.chosen)
-        for name in props.keys():
-            props.mark_queried(name)
 
     @classmethod
     def declared(cls) -> list[Parameter]:

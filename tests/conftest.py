@@ -1,9 +1,10 @@
 import signal
 
-import mitsuba as mi
 import pytest
 
 from mi_brdfs.mitsuba.registry import MODELS
+
+import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
 mi.set_variant("scalar_rgb")  # variant_context needs one to return to
 

@@ -33,22 +33,94 @@ def python(code: str, library: str | None = None) -> subprocess.CompletedProcess
     return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=120)
 
 
+ABSENT = """
+import os
+os.environ["DRJIT_LIBLLVM_PATH"] = "/nowhere/libLLVM.so"
+import drjit
+drjit.detail.llvm_version()  # it looks now
+del os.environ["DRJIT_LIBLLVM_PATH"]
+"""
+"""Dr.Jit was imported before us, on a machine without LLVM."""
+BROKEN = """
+import drjit
+if drjit.detail.llvm_version()[0] not in (15, 16):
+    raise SystemExit("skip: the system's own LLVM is not one that aborts")
+"""
+"""The same, on one with an LLVM that aborts."""
+too_late = pytest.mark.parametrize("before", [ABSENT, pytest.param(BROKEN, marks=needs_bad)], ids=["absent", "broken"])
+RESTART = "restart Python and import mi_brdfs first, before mitsuba."
+SAY = "print('in', mi.variant())"
+TRY = f"""
+try:
+    mi.set_variant("llvm_ad_rgb")
+except ImportError as error:
+    print(error)
+{SAY}
+"""
+
+
+def late(before: str, code: str) -> subprocess.CompletedProcess:
+    """Run ``code`` after Dr.Jit has found what ``before`` says. Standard error is what comes after that."""
+    run = python(f"{before}\nimport sys; print('---', file=sys.stderr, flush=True)\nimport mitsuba as mi\n{code}")
+    before_that, _, run.stderr = run.stderr.partition("---\n")
+    if before_that.startswith("skip: "):
+        pytest.skip(before_that[6:].strip())
+    return run
+
+
 @needs_extra
-@pytest.mark.parametrize(
-    "imports",
-    [
-        "import mi_brdfs, mitsuba as mi",
-        "import mitsuba as mi, mi_brdfs",
-        "import mitsuba as mi; mi.set_variant('scalar_rgb'); import mi_brdfs",
-    ],
-)
-def test_a_safe_llvm_is_used_in_every_order_of_imports(imports):
+def test_the_extra_is_used():
     says = "print(mi_brdfs.mitsuba.llvm.version()[0], mi_brdfs.mitsuba.llvm.problem())"
-    run = python(f"{imports}\nmi.set_variant('llvm_ad_rgb')\n{RENDER}\n{says}")
+    run = python(f"import mi_brdfs, mitsuba as mi\nmi.set_variant('llvm_ad_rgb')\n{RENDER}\n{says}")
     assert run.returncode == 0, run.stderr[-500:]
     major, problem = run.stdout.split()[-2:]
     assert int(major) >= 17 and problem == "None"
     assert run.stderr == ""
+
+
+@needs_extra
+@too_late
+@pytest.mark.parametrize(
+    "imports", ["import mi_brdfs; mi.set_variant('scalar_rgb')", "mi.set_variant('scalar_rgb'); import mi_brdfs"]
+)
+def test_scalar_variants_work_after_a_late_import(before, imports):
+    """Without a word."""
+    run = late(before, f"{imports}\n{RENDER}\nprint(mi.load_dict({{'type': 'ward'}}))")
+    assert run.returncode == 0 and "Ward[" in run.stdout
+    assert run.stderr == ""
+
+
+@needs_extra
+@too_late
+def test_llvm_variants_are_refused_after_a_late_import(before):
+    """And Mitsuba stays where it is, or takes the next best."""
+    run = late(
+        before,
+        f"import mi_brdfs\n{TRY}\nmi.set_variant('llvm_ad_rgb', 'scalar_rgb'); {SAY}\n"
+        f"mi.set_variant('scalar_spectral')\n{TRY}\nprint(mi.load_dict({{'type': 'ward'}}))",
+    )
+    assert run.returncode == 0, run.stderr
+    told = run.stdout.splitlines()
+    assert told[0].endswith(RESTART) and told[3] == told[0]
+    assert [told[k] for k in (1, 2, 4)] == ["in None", "in scalar_rgb", "in scalar_spectral"]
+    assert told[5] == "Ward[" and run.stderr == ""
+
+
+@needs_extra
+@needs_bad
+def test_an_active_llvm_variant_refuses_the_import():
+    """Nothing is left behind: in another variant the import works, and Mitsuba returns to it from LLVM."""
+    run = late(
+        BROKEN,
+        "mi.set_variant('llvm_ad_rgb')\ntry:\n    import mi_brdfs\nexcept ImportError as error:\n    print(error)\n"
+        f"{SAY}\nmi.set_variant('scalar_rgb')\nimport mi_brdfs, mi_brdfs.validation\n{TRY}\n"
+        "with mi.variant_context('scalar_spectral'):\n    print(mi.load_dict({'type': 'ward'}))\n",
+    )
+    assert run.returncode == 0, run.stderr
+    told = run.stdout.splitlines()
+    assert told[0].endswith(RESTART) and told[1] == "in llvm_ad_rgb"
+    assert told[2] == told[0] and told[3] == "in scalar_rgb"
+    assert "Ward[" in run.stdout and run.stderr == ""
 
 
 @needs_bad
@@ -65,21 +137,13 @@ def test_no_warning_in_scalar_variants():
 
 
 @needs_bad
-def test_an_active_variant_is_left_alone_but_warned_of():
-    if python("import drjit as dr; assert dr.detail.llvm_version()[0] in (15, 16)").returncode:
-        pytest.skip("the system's own LLVM is not one that aborts")
-    run = python(
-        "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); from mi_brdfs.mitsuba import llvm\n"
-        "print(llvm.version()[0])"
+def test_without_the_extra_it_is_warned_of():
+    """As there is nothing better to be had."""
+    run = late(
+        BROKEN, f"{NO_EXTRA}\nmi.set_variant('llvm_ad_rgb'); import mi_brdfs; print(mi.load_dict({{'type': 'ward'}}))"
     )
-    assert run.stdout.strip() in ("15", "16")
-    assert "import mi_brdfs first" in run.stderr or "pip install karellen-llvm-core" in run.stderr
-
-
-@needs_bad
-def test_arrays_that_exist_already_survive_the_import():
-    run = python("from drjit.llvm import Float; a = Float(1, 2, 3); import mi_brdfs; print(a + 1)")
-    assert run.returncode == 0 and run.stdout.strip() == "[2, 3, 4]", run.stderr
+    assert run.returncode == 0 and "Ward[" in run.stdout
+    assert run.stderr.count("UserWarning") == run.stderr.count("pip install karellen-llvm-core") == 1
 
 
 @needs_bad

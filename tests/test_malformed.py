@@ -199,6 +199,26 @@ def test_unknown_names(model):
     fuzz()
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("level", [mi.LogLevel.Error, mi.LogLevel.Warn, mi.LogLevel.Debug])
+def test_mitsuba_judges_unknown_names(level, capfd):
+    """As its parser is told to, and with our sentence."""
+    config = mi.parser.ParserConfig(mi.variant())
+    config.unused_properties = level
+    wrong = {"type": "ward", "alpha": 0.3, "diffuse": 0.1, "aniso": {"type": "checkerboard"}}
+    state = mi.parser.parse_dict(config, {"type": "sphere", "bsdf": wrong})
+    sentences = ["ward: unknown parameter diffuse; did you mean diffuse_reflectance?", "ward: unknown parameter aniso;"]
+    if level == mi.LogLevel.Error:
+        with pytest.raises(RuntimeError) as caught:
+            mi.parser.instantiate(config, state)
+        told = str(caught.value)
+        assert "Traceback" not in told
+    else:
+        assert str(mi.parser.instantiate(config, state).bsdf()).startswith("Ward[")
+        told = "".join(capfd.readouterr())
+    assert [sentence in told for sentence in sentences] == [level != mi.LogLevel.Debug] * 2, told
+
+
 # --- Scene files ----------------------------------------------------------------------------------------------------
 
 VALID = """<bsdf type="twosided" version="3.0.0"><bsdf type="ward" id="paint">

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from support import call, direction
 
+from mi_brdfs.cli.errors import one_line
+
 NAN, INF = float("nan"), float("inf")
 RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
 SPECTRUM = {"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}
@@ -75,9 +77,9 @@ REJECTED = [
 def test_rejected(plugin, given, message, variant):
     with mi.variant_context(variant), pytest.raises(RuntimeError) as caught:
         mi.load_dict({"type": plugin, **given})
-    sentence = str(caught.value).strip().splitlines()[-1]
-    assert message in sentence
-    assert sentence.split(": ")[1] == plugin and sentence.endswith(".")
+    sentence = one_line(caught.value)
+    assert message in sentence and sentence in str(caught.value)
+    assert sentence.startswith(f"{plugin}: ") and sentence.endswith(".")
 
 
 @pytest.mark.usefixtures("llvm_rgb")

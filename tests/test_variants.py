@@ -208,7 +208,7 @@ def test_loading_in_threads(variant):
     with ThreadPoolExecutor(8) as pool:
         futures = [[pool.submit(mi.load_dict, bsdf) for bsdf in (row.bsdf, row.bsdf | {"alfa": 1})] for row in ROWS]
     for row, (_, bad) in zip(ROWS, futures, strict=True):
-        assert f"ParameterError: {row.bsdf['type']}: unknown parameter alfa" in str(bad.exception())
+        assert f"{row.bsdf['type']}: unknown parameter alfa" in str(bad.exception())
     check_loaded([good.result() for good, _ in futures])
 
 
@@ -218,7 +218,7 @@ def test_loading_a_scene_of_many(variant, loader, tmp_path):
     """Mitsuba's loaders instantiate the plugins of a scene in parallel, and name the one that is wrong."""
     given = [row.bsdf for row in ROWS]
     check_loaded(load(loader, given, tmp_path))
-    with pytest.raises(RuntimeError, match="ParameterError: ward: unknown parameter alfa"):
+    with pytest.raises(RuntimeError, match="ward: unknown parameter alfa"):
         load(loader, [*given, {"type": "ward", "alfa": 1}, *given], tmp_path)
 
 

@@ -19,8 +19,15 @@ def one_line(error: BaseException) -> str:
         return f"{broken[1]}: line {broken[3]}: {broken[2]}"
     if unused:
         return f"-D {', '.join(unused)}: the scene has no <default> parameter of this name"
-    sentence = _last_of_traceback(rest if place else text)
+    sentence = _hint(text) or _last_of_traceback(rest if place else text)
     return f"{place[1]}: line {place[2]}: {sentence}" if place else sentence
+
+
+def _hint(text: str) -> str | None:
+    """What one of our plugins says of the first property that it does not know."""
+    pattern = r'unreferenced propert.+? plugin of type "(\w+)":\n  - string ".*?": "(\1: .+?)"$'
+    found = re.search(pattern, text, re.DOTALL | re.MULTILINE)
+    return found and found[2]
 
 
 def _last_of_traceback(text: str) -> str:

@@ -19,23 +19,46 @@ ABORTING_MAJORS = (15, 16)
 
 
 def point_to_extra() -> None:
-    """Make Dr.Jit use the library of the ``llvm`` extra.
+    """Make Dr.Jit use the library of the ``llvm`` extra, if it has not looked for LLVM yet.
 
-    Call it before ``import mitsuba``. Where Mitsuba was imported first and found no LLVM or one that aborts, Dr.Jit's
-    backends are restarted, provided that nothing uses them yet. A ``DRJIT_LIBLLVM_PATH`` set by the user, and a
-    missing extra, leave everything as it is.
+    Call it before ``import mitsuba``. A ``DRJIT_LIBLLVM_PATH`` set by the user, and a missing extra, leave everything
+    as it is. Where Dr.Jit was imported first and found no LLVM or one that aborts, it stays with that; then ``llvm_*``
+    variants are refused from here on (:class:`TooLate`).
     """
     if os.environ.get(VARIABLE):
         return
     started = "drjit" in sys.modules
-    if started and (_is_safe() or _backends_in_use()):
+    if started and _is_safe():
         return
     library = extra_library()
     if library is None:
         return
-    os.environ[VARIABLE] = library
-    if started:
-        _restart_backends()
+    if not started:
+        os.environ[VARIABLE] = library
+    elif TooLate not in sys.meta_path:
+        sys.meta_path.insert(0, TooLate)
+
+
+class TooLate:
+    """An import hook that refuses the modules of ``llvm_*`` variants, which ``mi.set_variant`` imports, with a sentence
+    that says how to get them. Mitsuba then stays in the variant that it is in, or takes the next one of several."""
+
+    @staticmethod
+    def find_spec(name: str, path=None, target=None) -> None:
+        if name.startswith("mitsuba.llvm"):
+            raise ImportError(problem() or f"Dr.Jit found no LLVM: {cure()}.")
+
+
+def check(variant: str | None) -> None:
+    """Refuse a variant in which rendering would abort the process, if a restart cures that, and else warn once.
+
+    Raises:
+        ImportError: if Dr.Jit was imported before it could take the library of the ``llvm`` extra.
+    """
+    if variant and variant.startswith("llvm") and (text := problem()):
+        if TooLate in sys.meta_path:
+            raise ImportError(text)
+        _warn_once(text)
 
 
 def version() -> tuple[int, int, int] | None:
@@ -80,14 +103,8 @@ def cure() -> str:
     if chosen and (library is None or not _same_file(chosen, library)):
         return f"unset {VARIABLE} (it names {chosen})" + ("" if library else f", then {install_advice()}")
     if library:
-        return "restart Python and import mi_brdfs first, before mi.set_variant('llvm_…')"
+        return "restart Python and import mi_brdfs first, before mitsuba"
     return install_advice()
-
-
-def warn_if_unsafe(variant: str | None) -> None:
-    """Warn, once, if rendering in ``variant`` would abort the process."""
-    if variant and variant.startswith("llvm") and (text := problem()):
-        _warn_once(text)
 
 
 def install_advice(system: str = sys.platform, machine: str = platform.machine()) -> str:
@@ -127,33 +144,6 @@ def _has_avx512() -> bool:
 
 def _same_file(a: str, b: str) -> bool:
     return os.path.realpath(a) == os.path.realpath(b)
-
-
-def _backends_in_use() -> bool:
-    import drjit as dr
-
-    mitsuba = sys.modules.get("mitsuba")
-    variant = mitsuba.variant() if mitsuba else None
-    vectorized = variant is not None and not variant.startswith("scalar")
-    return vectorized or "No variables registered" not in dr.whos(as_string=True)
-
-
-def _restart_backends() -> None:
-    """Let Dr.Jit look for LLVM again: ``jit_shutdown(light=0)``, then ``jit_init()``, as its jit.h describes.
-
-    Python has no binding for the two; where they are not found under these (C++) names, ``problem`` still warns.
-    """
-    import ctypes
-
-    import drjit as dr
-
-    try:
-        core = ctypes.CDLL(os.path.join(dr.__path__[0], "libdrjit-core.so"))
-        shutdown, init = core["_Z12jit_shutdowni"], core["_Z8jit_initj"]
-    except (OSError, AttributeError):
-        return
-    shutdown(0)
-    init(1 << dr.JitBackend.CUDA.value | 1 << dr.JitBackend.LLVM.value)
 
 
 @cache

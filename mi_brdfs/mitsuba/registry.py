@@ -181,7 +181,7 @@ def install():
     """Register the plugins in the active variant, if there is one, and in every variant that becomes active."""
     _follow_variants()
     if mi.variant() is not None:
-        _on_variant(None, mi.variant())
+        _register_for(mi.variant())
 
 
 @functools.cache  # Mitsuba may import a package of plugins anew after each change of variant
@@ -192,9 +192,18 @@ def _follow_variants():
 def _on_variant(old: str | None, new: str | None):
     if new is None:
         return
-    llvm.warn_if_unsafe(new)
+    try:
+        llvm.check(new)
+    except ImportError:
+        if old is not None:  # as where Mitsuba itself refuses a variant, which it does before it changes
+            mi.set_variant(old)
+        raise
+    _register_for(new)
+
+
+def _register_for(active: str):
     # Mitsuba asks scalar_rgb what kind of plugin a name stands for, whatever the active variant.
-    for variant in {new, "scalar_rgb"}:
+    for variant in {active, "scalar_rgb"}:
         _register_in(variant)
 
 

@@ -36,22 +36,26 @@ class PropertyReader:
     def error(self, name: str, problem: str) -> ParameterError:
         return ParameterError(f"{self.plugin}: {name} {problem}.")
 
-    def reject_unknown(self, known: list[str], shown: list[str]) -> None:
-        """Raise if there is a property that is not ``known``. The message lists the names in ``shown``."""
+    def take(self, known: list[str], shown: list[str]) -> None:
+        """Mark the properties that are ``known`` as queried, and leave the others to Mitsuba, which refuses them after
+        the constructor, or warns, as ``ParserConfig.unused_properties`` says. Its message shows their values, so give
+        them one that says what would be right; it lists the names in ``shown``."""
         for name in self.props.keys():
             if name in known:
-                continue
-            if name.startswith("_arg_") and shown:
-                raise ParameterError(
-                    f"{self.plugin}: {kind_of(self.props[name])} is nested without a name; "
-                    f"give it the name of the parameter it is meant for, {listed(shown)}."
-                )
-            if not known:
-                raise ParameterError(f"{self.plugin}: unknown parameter {brief(name)}; it has no parameters.")
-            closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
-            raise ParameterError(
-                f"{self.plugin}: unknown parameter {brief(name)}; did you mean {closest}? Known are {', '.join(shown)}."
+                self.props.mark_queried(name)
+            else:
+                self.props[name] = self._unknown(name, known, shown)
+
+    def _unknown(self, name: str, known: list[str], shown: list[str]) -> str:
+        if name.startswith("_arg_") and shown:
+            return (
+                f"{self.plugin}: {kind_of(self.props[name])} is nested without a name; "
+                f"give it the name of the parameter it is meant for, {listed(shown)}."
             )
+        if not known:
+            return f"{self.plugin}: unknown parameter {brief(name)}; it has no parameters."
+        closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+        return f"{self.plugin}: unknown parameter {brief(name)}; did you mean {closest}? Known are {', '.join(shown)}."
 
     def number(self, name: str, default: float, limits: Range) -> mi.Texture:
         """Return the texture of a number."""
