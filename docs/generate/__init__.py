@@ -1,1 +1,1 @@
-"""Pages and pictures that are generated; ``python docs/generate --help``."""
+"""Generated pages and pictures; see ``python docs/generate --help``."""

@@ -1,4 +1,4 @@
-"""The command: ``python docs/generate``."""
+"""The command ``python docs/generate``."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 
 
 def everything() -> list[Page | Picture]:
-    """All that is generated, each after what it is made from."""
+    """Return all generated files, each after its sources."""
     pages = [*scenes.pages(), *models.pages(), readme.page()]
     return [*pages, *models.pictures(), *scenes.pictures(), *shading.pictures()]
 
 
 def main(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="NAME…", help="Of models and scenes, to be made if current, too.")
+        list[str] | None, typer.Argument(metavar="NAME…", help="Models and scenes to make even if current.")
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Make everything, stale or not.")] = False,
-    check: Annotated[bool, typer.Option("--check", help="Say what is stale, and exit with 1 if something is.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="List what is stale; exit with 1 if anything is.")] = False,
 ) -> None:
-    """Make the pages and pictures that are stale: the reference of the models, the tables in README.md, the page of the
-    scenes and the scene with all models; thumbnails, sweeps, pictures of scenes."""
+    """Make stale pages and pictures: the models' reference, the tables in README.md, the scenes' page and the scene
+    with all models; thumbnails, sweeps, pictures of scenes."""
     mi.set_variant("llvm_ad_rgb")
     made, wanted = everything(), set(names or ())
     if unknown := wanted - {each.path.stem for each in made}:

@@ -13,16 +13,16 @@ from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 DIGESTS = ROOT / "docs" / "digests.txt"
-"""What each picture was made from."""
+"""The digest of each picture's sources."""
 
 
 @dataclass(frozen=True)
 class Page:
-    """A file of text that says what others say already."""
+    """A text file generated from other sources."""
 
     path: Path
     text: Callable[[], str]
-    """What it should say now."""
+    """Its current text."""
 
     def is_stale(self) -> bool:
         return not self.path.is_file() or self.path.read_text(encoding="utf-8") != self.text()
@@ -33,14 +33,14 @@ class Page:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, which is stale once it would be made from something else. The code of models and integrators is not
-    looked at: tests render pictures anew and compare."""
+    """A picture, stale once its sources have changed. Sources exclude the code of models and integrators: tests render
+    the pictures anew and compare."""
 
     path: Path
     sources: Callable[[], Iterable[str | bytes]]
     """What it is made from."""
     draw: Callable[[Path], None]
-    """Writes it."""
+    """Draws it into a file."""
 
     def is_stale(self) -> bool:
         return not self.path.is_file() or read_digests().get(_name(self.path)) != self._digest()
@@ -61,19 +61,19 @@ def _name(path: Path) -> str:
 
 
 def read_digests() -> dict[str, str]:
-    """The digests of the sources by picture."""
+    """Return the digests of the sources by picture."""
     lines = DIGESTS.read_text(encoding="utf-8").splitlines() if DIGESTS.is_file() else []
     return {name: digest for digest, name in map(str.split, lines)}
 
 
 def write_digests(digests: dict[str, str]) -> None:
-    """Write them, less those of pictures that are no more."""
+    """Write the digests, except for pictures that no longer exist."""
     lines = [f"{digests[name]}  {name}\n" for name in sorted(digests) if (ROOT / name).is_file()]
     DIGESTS.write_text("".join(lines), encoding="utf-8")
 
 
 def code(module: ModuleType) -> str:
-    """The code of a module, without what only readers see of it."""
+    """Return the code of a module without comments, docstrings and blank space."""
     tokens = tokenize.generate_tokens(io.StringIO(inspect.getsource(module)).readline)
     return "".join(
         token.string

@@ -1,4 +1,4 @@
-"""README.md: the table of models, and what ``mi-brdfs bench --json docs/bench.json`` measured."""
+"""Generate README.md's table of models, and its results of ``mi-brdfs bench --json docs/bench.json``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def page() -> Page:
 
 
 def text() -> str:
-    """The text of README.md, with its generated parts anew."""
+    """Return the text of README.md with its generated parts renewed."""
     results = Results.from_dict(json.loads(MEASURED.read_text(encoding="utf-8")))
     readme = README.read_text(encoding="utf-8")
     for name, part in (("models", model_table()), ("bench", results.markdown())):

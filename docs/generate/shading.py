@@ -1,4 +1,4 @@
-"""The pictures of scenes/shading/README.md: each scene shaded, and below it path-traced."""
+"""Generate the pictures of scenes/shading/README.md: each scene shaded, and path-traced below."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ FINER, SAMPLES, QUALITY = 3, 1024, 88
 
 
 def picture(path: Path, spp: int = SAMPLES) -> mi.Bitmap:
-    """The scene shaded, in three times as many pixels a side and made smaller for smooth edges, over the same scene
-    traced."""
+    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one."""
     scene = mi.load_file(str(path))
     width, height = scene.sensors()[0].film().size()
     fine = mi.load_file(str(path), width=str(FINER * width), height=str(FINER * height))
