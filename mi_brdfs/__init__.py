@@ -1,8 +1,8 @@
 """Every classical BRDF as a Mitsuba 3 plugin.
 
 ``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
-dict scenes. :func:`list_models` names them, :func:`info` is the manual page of one, :func:`preview_scene` a scene to
-look at one in. :func:`ranges` and :func:`project` keep optimised parameters where models have a meaning.
+dict scenes. :func:`list_models` names them, :func:`info` returns a manual page, :func:`preview_scene` a scene that
+shows a material. :func:`ranges` and :func:`project` keep optimised parameters valid.
 """
 
 import re

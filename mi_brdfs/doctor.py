@@ -1,4 +1,4 @@
-"""What works on this machine: a small render per backend, each in a process of its own, as a bad LLVM ends it."""
+"""Find what works on this machine: a small render per backend, each in its own process, as a bad LLVM ends it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .mitsuba import llvm
 BACKENDS = ("scalar", "llvm", "cuda", "metal")
 TIMEOUT = 180  # seconds; the first CUDA render on a machine compiles for a while
 
-MISSING = 3  # exit status of a probe whose backend is not there
+MISSING = 3  # exit status of a probe whose backend is missing
 WHY_MISSING = {
     "llvm": "no LLVM library found",
     "cuda": "no NVIDIA GPU, or no driver for it",
@@ -45,18 +45,18 @@ if not 0.1 < mean < 2:
 
 @dataclass(frozen=True)
 class BackendStatus:
-    """What became of one backend's test render."""
+    """The outcome of one backend's test render."""
 
     backend: str
     variants: tuple[str, ...]
     state: str
     """``works``, ``missing`` (no library or device), ``aborts`` (the process dies) or ``fails``."""
     detail: str = ""
-    """The reason of a failure, or the library that works."""
+    """The reason for a failure, or the library that works."""
 
 
 def examine() -> list[BackendStatus]:
-    """Try every backend that this build of Mitsuba has."""
+    """Try every backend of this build of Mitsuba."""
     import mitsuba as mi
 
     findings = []
@@ -68,21 +68,21 @@ def examine() -> list[BackendStatus]:
 
 
 def next_step(findings: list[BackendStatus]) -> str:
-    """The next thing to do, or that there is nothing to do."""
+    """Return a sentence that says what to do next."""
     if any(it.backend == "llvm" and it.state == "aborts" for it in findings):
         return f"Next: {llvm.cure()}"
     if any_fast(findings):
         return "Everything works. Next: mi-brdfs render SCENE.xml"
-    return f"Nothing but scalar variants works, and they are slow. Next: {llvm.cure()}"
+    return f"Only scalar variants work, and they are slow. Next: {llvm.cure()}"
 
 
 def any_fast(findings: list[BackendStatus]) -> bool:
-    """Whether at least one vectorized backend works."""
+    """Return whether at least one vectorized backend works."""
     return any(it.state == "works" and it.backend != "scalar" for it in findings)
 
 
 def versions() -> dict[str, str]:
-    """Versions of the software that matters here."""
+    """Return the versions of the software that matters here."""
     packages = {name: installed_version(name) for name in ("mi_brdfs", "mitsuba", "drjit")}
     return {**packages, "python": platform.python_version(), "system": platform.platform(terse=True)}
 

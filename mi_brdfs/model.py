@@ -1,4 +1,4 @@
-"""The contract of a plugin, its declared parameters; and that of a model, with the lobes that they make."""
+"""The contract of a plugin, with its declared parameters, and of a model, with its lobes."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from .parameters.parameter import BoundParameters
 
 class Energy(NamedTuple):
     """The largest directional albedos of a model, at angles up to 89.9°, rounded up
-    (``tests/calibration/largest_albedo.py``). Rounding to float32 may exceed them by 1e-4, and by 2 % at 89.9° where
+    (``tests/calibration/largest_albedo.py``). Float32 rounding may exceed them by 1e-4, and by 2 % at 89.9° where
     narrow lobes have steep flanks (``epd`` with α < 0.003)."""
 
     default: float
     """With the default parameters."""
     largest: list[tuple[dict[str, Any], float]]
-    """In white, for some choices by name (a tuple stands for each of its words), over all values of the other
-    parameters: at most 1 if the model conserves energy, infinite beyond about 100. White means that every colour is 1,
-    and so is the Fresnel reflectance, but that a diffuse lobe beside others is black."""
+    """In white, for some choices by name (a tuple stands for each of its words), the maximum over all values of the
+    other parameters: at most 1 if the model conserves energy, infinite beyond about 100. White means that every colour
+    and the Fresnel reflectance are 1, except that a diffuse lobe beside others is black."""
 
     NOTE = """\
-At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, but a diffuse lobe beside others
-is 0; what is not named takes all values in its range."""
+At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
+others is 0; parameters not named take all values in their range."""
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """``(configuration, largest albedo, class)`` for the manual page."""
+        """Return ``(configuration, largest albedo, class)`` for the manual page."""
         rows = [("configuration", "albedo", "energy"), ("defaults", f"{self.default:.2f}", "")]
         for given, albedo in self.largest:
             words = [f"{name}={' | '.join(v) if isinstance(v, tuple) else v}" for name, v in given.items()]
@@ -42,10 +42,10 @@ is 0; what is not named takes all values in its range."""
 
 
 class Plugin:
-    """What a plugin is by its declarations. A subclass's docstring is its manual page, and its class attributes declare
-    the parameters (:mod:`mi_brdfs.parameters`).
+    """A plugin defined by declarations: a subclass's docstring is its manual page, and its class attributes declare the
+    parameters (:mod:`mi_brdfs.parameters`).
 
-    An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, with all their
+    An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, and all their
     ``textures`` and ``ranges`` by property name; choices are attributes under their declared names.
     """
 
@@ -60,7 +60,9 @@ class Plugin:
         for parameter in cls.declared():
             for name in {parameter.name, *parameter.names}:
                 if hasattr(Model, name) or name in ("parameters", "textures", "ranges"):
-                    raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, as every model has that.")
+                    raise TypeError(
+                        f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model."
+                    )
 
     def __init__(self, props: mi.Properties):
         reader = PropertyReader(self.plugins[0], props)
@@ -72,7 +74,7 @@ class Plugin:
 
     @classmethod
     def declared(cls) -> list[Parameter]:
-        """The declared parameters, in the order of declaration."""
+        """Return the declared parameters, in the order of declaration."""
         members = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
         return [value for value in members.values() if isinstance(value, Parameter)]
 
@@ -81,30 +83,30 @@ class Plugin:
         return SimpleNamespace(**self.parameters.evaluate(si, active))
 
     def described(self) -> str:
-        """The class and the parameters, as Mitsuba's plugins show themselves."""
+        """Return the class and the parameters, in the style of Mitsuba's plugins."""
         lines = [f"  {name} = {value}" for name, value in (self.parameters.chosen | self.textures).items()]
         return type(self).__name__ + "[\n" + ",\n".join(line.replace("\n", "\n  ") for line in lines) + "\n]"
 
     @classmethod
     def summary(cls) -> str:
-        """The first line of the manual page."""
+        """Return the first line of the manual page."""
         return inspect.cleandoc(cls.__doc__).splitlines()[0]
 
     @classmethod
     def example(cls) -> dict[str, Any]:
-        """The plugin dict at the end of the manual page, or else the defaults."""
+        """Return the plugin dict at the end of the manual page, or else the defaults."""
         last = inspect.cleandoc(cls.__doc__).rpartition("\n\n")[2]
         return ast.literal_eval(last) if last.startswith("{") else {"type": cls.plugins[0]}
 
     @classmethod
     def parameter_rows(cls) -> list[ParameterRow]:
-        """The table of parameters, with its heading."""
+        """Return the table of parameters, with its heading."""
         rows = [row for parameter in cls.declared() for row in parameter.rows()]
         return [ParameterRow("parameter", "type", "default", "range", "meaning"), *rows]
 
     @classmethod
     def manual(cls) -> str:
-        """The manual page: the docstring and the table of parameters."""
+        """Return the manual page: the docstring and the table of parameters."""
         rows = [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]
         return "\n".join([inspect.cleandoc(cls.__doc__), "", *_section("Parameters", rows), ""])
 
@@ -114,20 +116,20 @@ class Model(Plugin):
     declare the parameters, and :meth:`lobes` says what they mean."""
 
     energy: ClassVar[Energy | None] = None
-    """How much light the model reflects at most; None if that was not measured."""
+    """The largest albedos; None if they were not measured."""
 
     def lobes(self, p) -> tuple[Lobe, ...]:
-        """The lobes of the model at a surface point, where ``p`` holds the values of the declared parameters. Their
-        number and kinds depend on nothing but the model's choices."""
+        """Return the model's lobes at a surface point, where ``p`` holds the values of the declared parameters. Their
+        number and kinds depend only on the model's choices and on which parameters are given."""
         raise NotImplementedError(f"{type(self).__name__} does not define lobes.")
 
     def placeholders(self) -> SimpleNamespace:
-        """Stand-ins for these values, to learn of which lobes the model consists."""
+        """Return stand-ins for these values, to find out which lobes the model has."""
         return SimpleNamespace(**self.parameters.placeholders())
 
     @classmethod
     def manual(cls) -> str:
-        """The manual page, with the table of the largest albedos."""
+        """Return the manual page, with the table of the largest albedos."""
         if cls.energy is None:
             return "\n".join([super().manual(), *_heading("Largest albedo"), "Not measured.", ""])
         rows = [list(row) for row in cls.energy.rows()]
@@ -135,7 +137,7 @@ class Model(Plugin):
 
 
 def _section(title: str, table: list[list[str]]) -> list[str]:
-    """A table under a heading, with its columns aligned."""
+    """Return a table under a heading, with its columns aligned."""
     widths = [max(len(row[column]) for row in table) for column in range(len(table[0]) - 1)]
     rows = ("  ".join([*map(str.ljust, row, widths), row[-1]]).rstrip() for row in table)
     return [*_heading(title), *rows]

@@ -1,4 +1,4 @@
-"""A scene to look at a material in."""
+"""A scene that shows a material."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ OUTLINE = [
     (0.96, 1.45), (0.66, 1.80), (0.38, 1.92), (0.30, 2.04), (0.34, 2.14), (0.20, 2.26), (0.00, 2.28),
 ]  # fmt: skip
 
-# The room around it, from its rim to the middle of its floor: a round cove, open above.
+# The surroundings, from the rim to the middle of the floor: a round cove, open above.
 COVE = [(9, 7), (9, 4), (8.6, 1.4), (7, 0.2), (5, 0), (2, 0), (0, 0)]
 
 
 def preview_scene(bsdf: dict | mi.BSDF) -> dict:
-    """The dict of a scene that shows a material: ``mi.render(mi.load_dict(preview_scene({"type": "ward"})))``.
+    """Return the dict of a scene that shows a material: ``mi.render(mi.load_dict(preview_scene({"type": "ward"})))``.
 
     A turned body, whose curves show highlight, grazing reflection and anisotropy (dp_du runs around its axis), stands
     in a round cove under a soft key light from the left, a rim light from behind on the right and a dim sky. The
@@ -26,7 +26,7 @@ def preview_scene(bsdf: dict | mi.BSDF) -> dict:
         bsdf: the material, a plugin dict or a loaded BSDF.
 
     Returns:
-        A dict for ``mi.load_dict``, to be changed before at will; it belongs to the active variant.
+        A dict for ``mi.load_dict``, to be changed at will before loading; it belongs to the active variant.
     """
     T = mi.ScalarTransform4f
     return {
@@ -56,7 +56,7 @@ def preview_scene(bsdf: dict | mi.BSDF) -> dict:
 
 
 def _smooth(points, count: int) -> np.ndarray:
-    """``count`` points on the Catmull-Rom curve through ``points``, shape (count, 2)."""
+    """Return ``count`` points on the Catmull-Rom curve through ``points``, shape (count, 2)."""
     p = np.array([points[0], *points, points[-1]])
     t = np.linspace(0, len(points) - 1, count)
     k = np.minimum(t.astype(int), len(points) - 2)
@@ -69,7 +69,7 @@ def _smooth(points, count: int) -> np.ndarray:
 
 
 def _revolve(outline: np.ndarray, segments: int, bsdf: dict | mi.BSDF) -> mi.Mesh:
-    """The surface that an outline of (radius, height) sweeps around the z axis, with u around and v along it."""
+    """Return the surface that an outline of (radius, height) sweeps around the z axis, with u around and v along it."""
     rings = len(outline)
     radius, height = outline.T
     d_radius, d_height = np.gradient(outline, axis=0).T

@@ -1,4 +1,4 @@
-"""The ranges of traversed parameters, for whoever optimises them."""
+"""The ranges of traversed parameters, for optimisation."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import mitsuba as mi
 from .parameters import Range
 
 VALUES = ("value", "values", "data")
-"""The names under which Mitsuba's textures show their values."""
+"""The names of the values of Mitsuba's textures in ``mi.traverse``."""
 
 
 def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
-    """The ``(low, high)`` that the parameters of one of our BSDFs are limited to, by key in ``mi.traverse(bsdf)``.
+    """Return the range ``(low, high)`` of each parameter of a BSDF of this package, by key in ``mi.traverse(bsdf)``.
 
-    A value beyond is evaluated as the nearer limit; ``high`` may be infinite. In spectral variants, what was given as
-    rgb is left out: Mitsuba shows the coefficients of a spectrum there, which have no range.
+    A value outside is evaluated as the nearer limit; ``high`` may be infinite. Spectral variants leave out parameters
+    given as rgb: Mitsuba stores the coefficients of a spectrum there, which have no range.
 
     Raises:
-        ValueError: for a BSDF that is not one of ours.
+        ValueError: if the BSDF is not from this package.
     """
     if not _is_ours(bsdf):
         raise ValueError(f"{bsdf.class_name()} declares no ranges: it is not a BSDF of mi_brdfs.")
@@ -29,9 +29,9 @@ def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
 
 
 def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | None = None) -> None:
-    """Put the parameters of all our BSDFs in a scene into their ranges, each at the nearest value there.
+    """Clamp the parameters of all BSDFs of this package in a scene to their ranges.
 
-    In an optimisation, call it after each step, with the optimizer, whose variables are put there, too::
+    In an optimisation, call it after each step with the optimizer, whose variables are clamped, too::
 
         optimizer.step()
         params.update(optimizer)
@@ -51,13 +51,13 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
 
 
 def _ranges(params) -> Iterator[tuple[str, Range]]:
-    """``(key, range)`` of the traversed parameters of our BSDFs."""
+    """Yield ``(key, range)`` of the traversed parameters of our BSDFs."""
     for key in params.keys():
         node = params.properties[key][2]
         *path, word = key.split(".")
         if word not in VALUES or _holds_coefficients(node, params[key]):
             continue
-        # A key is the path from the root, so that as many words lie below the BSDF as there are nodes.
+        # A key is the path from the root: it has as many words below the BSDF as there are nodes.
         levels = 0
         while node is not None and not _is_ours(node):
             node, levels = params.hierarchy[node][0], levels + 1
@@ -70,7 +70,7 @@ def _is_ours(node) -> bool:
 
 
 def _holds_coefficients(node, value) -> bool:
-    """Whether a texture holds the coefficients of spectra in place of rgb colours."""
+    """Return whether a texture holds the coefficients of spectra instead of rgb colours."""
     kind = node.class_name()
     upsampled = kind == "SRGBReflectanceSpectrum" or (kind.startswith("BitmapTexture") and value.shape[-1] == 3)
     return mi.is_spectral and upsampled

@@ -31,16 +31,16 @@ SHOULDER = 0.8
 
 @dataclass(frozen=True)
 class Picture:
-    """What ``render`` returns."""
+    """The result of ``render``."""
 
     image: mi.TensorXf
     """The developed image as ``film.develop()`` returns it, in the film's pixel format and with all AOVs."""
     bitmap: mi.Bitmap
-    """The same with channel names, ready to be written as an EXR."""
+    """The same image with channel names, ready to be written as an EXR."""
     spp: int
-    """Samples per pixel that are in it."""
+    """Samples per pixel finished."""
     total: int
-    """Samples per pixel that were asked for, rounded up as the sampler needs."""
+    """Samples per pixel requested, rounded up as the sampler needs."""
 
 
 def render(
@@ -52,14 +52,14 @@ def render(
 ) -> Picture:
     """Render ``scene`` in passes of about a second and combine them without bias.
 
-    What is summed over the passes is the film's raw data, numerators and filter weights apart; one division at the
-    end develops it. (A mean of developed passes would be biased: each is a ratio of two random sums.) An integrator
-    that makes something of the mean of a pixel's samples, as ``shading`` does, has methods ``sums`` and ``put`` like
-    those of :class:`FilmPasses`: its passes add up before that.
+    The passes sum the film's raw data, numerators and filter weights apart; one division at the end develops it. (A
+    mean of developed passes would be biased: each is a ratio of two random sums.) An integrator that post-processes the
+    mean of a pixel's samples, as ``shading`` does, has methods ``sums`` and ``put`` like those of :class:`FilmPasses`,
+    so that its passes add up first.
 
     ``spp`` defaults to the scene's own number. ``on_pass(done, total)`` is called after each pass. The first Ctrl-C
-    lets the running pass end (scalar variants may drop it) and returns what is there
-    (``picture.spp < picture.total``). A second one, or one before anything is there, raises KeyboardInterrupt.
+    lets the running pass end (scalar variants may drop it) and returns the finished passes
+    (``picture.spp < picture.total``). A second one, or one before any pass has finished, raises KeyboardInterrupt.
 
     The result depends on scene, variant, ``spp``, ``seed`` and, in LLVM variants, the number of threads, but never on
     timing: the size of a pass follows from the size of the image, and pass ``k`` uses a seed computed from ``seed``
@@ -96,34 +96,34 @@ def render(
 
 
 class FilmPasses:
-    """Mitsuba's integrators, of whose passes the film's raw data add up."""
+    """The passes of Mitsuba's integrators: the film's raw data add up."""
 
     def __init__(self, integrator: mi.Integrator):
         self.integrator = integrator
-        # A particle tracer's film holds a finished estimate per pass, with weight 0: it is to be averaged.
+        # A particle tracer's film holds a finished estimate per pass, with weight 0: average these.
         self.averaged = isinstance(integrator, mi.AdjointIntegrator)
 
     def sums(self, scene: mi.Scene, sensor: mi.Sensor, seed: int, spp: int) -> mi.TensorXf:
-        """What the film holds after a pass, to be added to that of others."""
+        """Return the film's content after a pass, to be added to that of other passes."""
         self.integrator.render(scene, sensor, seed=seed, spp=spp, evaluate=False)
         return sensor.film().develop(raw=True) * (spp if self.averaged else 1)
 
     def put(self, film: mi.Film, sums: mi.TensorXf, count: int) -> None:
-        """Fill a film with what ``count`` samples per pixel add up to."""
+        """Fill a film with the sums over ``count`` samples per pixel."""
         film.clear()
         film.put_block(mi.ImageBlock(sums / count if self.averaged else sums, film.crop_offset(), border=False))
 
 
 def tonemap(image: np.ndarray) -> np.ndarray:
-    """Bring linear RGB of any range into [0, 1], still linear, without flat highlights or shifts of hue.
+    """Map linear RGB of any range to [0, 1], still linear, without flat highlights or hue shifts.
 
     With ``m`` the largest of a pixel's channels and ``p`` the 99.9th percentile of ``m``, a pixel is multiplied by
     ``f(m) / m``. Up to 0.8, and everywhere if ``p <= 1``, ``f(m) = m``: a well exposed picture stays as it is. Above,
 
         f(m) = 0.8 + 0.2 t (1 + t/T²) / (1 + t),    t = (m - 0.8) / 0.2,    T = (p - 0.8) / 0.2,
 
-    which continues with slope 1 and reaches 1 at ``m = p``. What is brighter still is scaled to 1, and what is
-    negative or not a number is black.
+    which continues with slope 1 and reaches 1 at ``m = p``. Brighter pixels are scaled to 1; negative values and NaNs
+    become 0.
     """
     image = np.nan_to_num(np.maximum(image, 0), nan=0.0, posinf=np.finfo(np.float32).max)
     m = image.max(axis=-1, keepdims=True)
@@ -134,7 +134,8 @@ def tonemap(image: np.ndarray) -> np.ndarray:
 
 
 def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
-    """The tone-mapped 8-bit sRGB image of a developed film, alpha and AOVs left out; None if it holds no colours."""
+    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None if it has no
+    colours."""
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
     colours = next((it for it in formats if names.startswith(it.name)), None)
@@ -158,7 +159,7 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
 
 
 def _samples_per_pass() -> int:
-    """About a second's worth on an ordinary scene: fixed numbers, so that results do not depend on timing."""
+    """Return about a second's worth on an ordinary scene: fixed numbers, so that results do not depend on timing."""
     if is_scalar():
         return 1 << 14
     if mi.variant().startswith("llvm"):
@@ -167,14 +168,15 @@ def _samples_per_pass() -> int:
 
 
 def _pixel_count(film: mi.Film, particles: bool) -> int:
-    if particles:  # as many particles as the uncropped film has pixels
+    if particles:  # one particle per pixel of the uncropped film
         return int(np.prod(film.size()))
     border = 2 * film.rfilter().border_size() if film.sample_border() else 0
     return int(np.prod(np.array(film.crop_size()) + border))
 
 
 def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> list[int]:
-    """Samples per pixel of each pass: powers of two up to ``limit`` and a rest, rounded as the sampler does."""
+    """Return the samples per pixel of each pass: powers of two up to ``limit`` and a rest, rounded as the sampler
+    does."""
 
     def rounded(count: int) -> int:
         sampler.set_sample_count(count)
@@ -187,16 +189,17 @@ def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> list[int]:
 
 
 def _pass_seed(seed: int, index: int) -> int:
-    """Consecutive within a render, as scalar variants tell only a few thousand seeds of a large film apart.
+    """Return consecutive seeds within a render, as scalar variants distinguish only a few thousand seeds of a large
+    film.
 
-    The golden ratio keeps the sequences of different ``seed`` far from each other.
+    The golden ratio keeps the sequences of different ``seed`` far apart.
     """
     return (seed * 0x9E3779B1 + index) % (1 << 32)
 
 
 @contextmanager
 def ctrl_c() -> Iterator[SimpleNamespace]:
-    """Count the first Ctrl-C instead of raising; only the main thread can, others leave it to their caller."""
+    """Note the first Ctrl-C instead of raising; only the main thread can do so, others leave it to their caller."""
     interrupt = SimpleNamespace(pressed=False)
 
     def note(signum: int, frame: object) -> None:

@@ -1,4 +1,4 @@
-"""What a variant of Mitsuba can do, by its name."""
+"""Predicates of Mitsuba's variants."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import mitsuba as mi
 
 
 def is_scalar() -> bool:
-    """Whether the active variant computes one sample at a time, without Dr.Jit's arrays."""
+    """Return whether the active variant computes one sample at a time, without Dr.Jit's arrays."""
     return (mi.variant() or "").startswith("scalar")
 
 
 def is_measurable(variant: str | None) -> bool:
-    """Whether a BSDF can be measured in a variant: a vectorized, unpolarized one."""
+    """Return whether a BSDF can be measured in a variant: a vectorized, unpolarized one."""
     return variant is not None and not variant.startswith("scalar") and "polarized" not in variant

@@ -153,7 +153,7 @@ def test_a_lobe_without_an_albedo_is_named():
 
 @pytest.mark.parametrize("name", ["lobes", "evaluate", "parameters", "textures", "energy", "plugins"])
 def test_a_parameter_is_not_called_like_what_models_have(name):
-    with pytest.raises(TypeError, match=f"Slip: a parameter cannot be called {name}, as every model has that."):
+    with pytest.raises(TypeError, match=f"Slip: a parameter cannot be called {name}, an attribute of every model."):
         model(**({"lobes": matte} | {name: Number(1, (0, 1), "number")}))
 
 

@@ -447,7 +447,7 @@ WRONG = {
     "angle": (["ward", "--angles", "95"], 2, "degrees, not 95"),
     "one angle": (["ward", "--kind", "sphere", "--angles", "1,2"], 2, "sphere shows one angle"),
     "scale": (["ward", "--scale", "cubic"], 2, "no scale 'cubic'"),
-    "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale says nothing about albedo"),
+    "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale does not apply to albedo"),
     "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),
     "page": (["ward", "--kind", "sphere", "-o", "ward.png"], 2, "ward.png: sphere is written as .html"),
     "folder": (["ward", "-o", "gone/ward.png"], 2, "there is no folder gone"),

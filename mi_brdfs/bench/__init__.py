@@ -1,7 +1,7 @@
-"""How little noise a BSDF makes, and what it costs, beside Mitsuba's own: ``bench()``, or ``bench(["efficiency"])``.
+"""Compare the noise and cost of BSDFs with those of Mitsuba's own: ``bench()``, or ``bench(["efficiency"])``.
 
-:func:`bench` returns :class:`Results`: figures with the targets that they have to reach. :data:`SECTIONS` lists what is
-measured by name; their docstrings say how.
+:func:`bench` returns :class:`Results`: figures with their targets. :data:`SECTIONS` lists the measurements by name;
+their docstrings say how they work.
 """
 
 from .figure import Figure, Target

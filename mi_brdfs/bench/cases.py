@@ -1,4 +1,4 @@
-"""What is measured: each model with some sets of parameters, beside the built-in that matches it."""
+"""The cases to measure: each model with some sets of parameters, and the built-in that matches it."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ class Case:
     """A model with a set of parameters."""
 
     name: str
-    """The plugin, and words for the parameters; none for the defaults."""
+    """The plugin, followed by words for the parameters, none for the defaults."""
     bsdf: Plugin
     builtin: Plugin | None = None
-    """The built-in to put beside it, if there is one."""
+    """The built-in to compare it with, if there is one."""
     same: bool = False
-    """Whether that is the same model, at least nearly; else it is one of the same kind, whose time alone compares."""
+    """Whether the built-in is the same model, at least nearly; otherwise it is one of the same kind, and only times are
+    comparable."""
 
     @property
     def beside(self) -> str:
-        """Both, in words."""
+        """Return the names of both."""
         return f"{self.name} / {self.builtin['type']}" + ("" if self.same else ", another model")
 
 
@@ -49,13 +50,13 @@ def conductor(distribution: str, **given) -> Plugin:
 
 
 def principled(**given) -> Plugin:
-    """Mitsuba's, with the defaults of Burley's."""
+    """Return Mitsuba's ``principled`` with the defaults of ``burley``."""
     given.setdefault("spec_tint", 0.0)
     return {"type": "principled", "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0, **given}
 
 
 def plastic(alpha: float) -> Plugin:
-    """A glossy lobe over a diffuse one, as wide as ours beside it."""
+    """Return a glossy lobe over a diffuse one, as wide as that of the model compared with it."""
     return {"type": "roughplastic", "alpha": alpha}
 
 
@@ -137,12 +138,12 @@ TABLE = [
     case("wrap sphere", wrap=0.5, domain="sphere"),
 ]  # fmt: skip
 
-"""Of models of the pack, the defaults first."""
+"""The cases of the pack's models, each model's defaults first."""
 
 
 def all_cases() -> list[Case]:
-    """Of every model that is registered: those of the table, or else its defaults and the example of its manual
-    page."""
+    """Return the cases of every registered model: those of the table, or else its defaults and the example on its
+    manual page."""
     table: dict[str, list[Case]] = {}
     for each in TABLE:
         table.setdefault(each.bsdf["type"], []).append(each)
@@ -159,19 +160,19 @@ def all_cases() -> list[Case]:
 
 
 def pairs(cases: Sequence[Case]) -> list[Case]:
-    """Of each model, the first case with a built-in beside it."""
+    """Return the first case of each model that has a built-in."""
     return list({case.bsdf["type"]: case for case in reversed(cases) if case.builtin}.values())[::-1]
 
 
 def defaults(cases: Sequence[Case]) -> list[Plugin]:
-    """The first case of each model that a new process can know: not of a notebook's."""
+    """Return the first case of each model that a new process can import, which excludes those defined in notebooks."""
     names = dict.fromkeys(case.bsdf["type"] for case in cases)
     first = {name: next(case.bsdf for case in cases if case.bsdf["type"] == name) for name in names}
     return [bsdf for name, bsdf in first.items() if source(find_model(name))]
 
 
 def built_ins(count: int) -> list[Plugin]:
-    """So many built-ins, of different code as far as there are."""
+    """Return this many built-ins, with different code as far as possible."""
     return list(islice(cycle(BUILT_INS), count))
 
 
@@ -198,4 +199,4 @@ BUILT_INS = [
     {"type": "principledthin"},
     {"type": "hair"},
 ]
-"""No two of the same code."""
+"""Built-ins, no two with the same code."""

@@ -1,4 +1,4 @@
-"""Efficiency: how much of a sample's work is not lost to noise."""
+"""The efficiency of samplers."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from .run import BenchRun
 
 WHOLE, GAIN = "whole", "gain"
 UP_TO_60 = {"walter alpha 0.5": 0.91, "walter alpha 1": 0.97}
-"""What is asked of ``walter`` beyond the targets of all."""
+"""Targets of ``walter`` beyond those of all models."""
 
 
 class Sampling(NamedTuple):
-    """What the samples of a part say: arrays over the angles and azimuths."""
+    """The statistics of a part's samples: arrays over the angles and azimuths."""
 
     albedo: Array
     eta: Array
@@ -35,12 +35,12 @@ class Sampling(NamedTuple):
 
 
 def efficiency(run: BenchRun) -> Iterator[Figure]:
-    """η = E[w]²/E[w²] of the luminance w of the weights that ``sample`` returns, those of zero counted: 1 is perfect,
-    and 1/η - 1 the relative variance of one sample under uniform light. Of anisotropic parts it is the least over three
-    azimuths. From points that fill the space of the variates evenly: good to 0.001.
+    """Measure η = E[w]²/E[w²], w being the luminance of the weights that ``sample`` returns, zeros included: 1 is
+    perfect, and 1/η - 1 is the relative variance of one sample under uniform light. Anisotropic parts count with the
+    least η over three azimuths. The points fill the space of the variates evenly, so that η is accurate to 0.001.
 
     Targets: 0.95 for each lobe up to 60° and 0.85 beyond; for the mixture of several lobes 0.9 of their mean, weighted
-    by what they reflect; no less than the built-in's; for ``walter`` 0.91 and 0.97 up to 60°; and for ``burley``, on
+    by their albedos; no less than the built-in's; for ``walter`` 0.91 and 0.97 up to 60°; and for ``burley``, on
     average over all its sets and angles, 1.1 of ``principled``.
     """
     gains: dict[str, list[float]] = {}
@@ -74,15 +74,15 @@ def efficiency(run: BenchRun) -> Iterator[Figure]:
 
 
 def _mean(whole: Sampling, lobes: Iterable[Sampling], k: int) -> float:
-    """Return the mean efficiency of the lobes, weighted by what they reflect, at an angle and at the whole's worst
-    azimuth there."""
+    """Return the mean efficiency of the lobes, weighted by their albedos, at an angle and at the whole's worst azimuth
+    there."""
     worst = int(np.argmin(whole.eta[k]))
     albedo, eta = np.array([(lobe.albedo[k, worst], lobe.eta[k, worst]) for lobe in lobes]).T
     return float(albedo @ eta / albedo.sum())
 
 
 def sampling(bsdf: Plugin) -> dict[str, Sampling]:
-    """Return what samples say of the whole BSDF, and of each component if there are several."""
+    """Return the statistics of the samples of the whole BSDF, and of each component if there are several."""
     probe = BSDFProbe(mi.load_dict(bsdf))
     return {part.name: _sampling(probe, part) for part in probe.parts}
 

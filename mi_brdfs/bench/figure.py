@@ -1,4 +1,4 @@
-"""A number that was measured, and what it has to reach."""
+"""A measured number, and its targets."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 MISSED = " !"
-"""Marks a figure that misses a target."""
+"""The mark of a figure that misses a target."""
 
 
 class Target(NamedTuple):
-    """What a figure has to reach, and whose demand that is."""
+    """A bound that a figure has to meet, and where it comes from."""
 
     relation: Literal["≥", "≤"]
     bound: float
@@ -19,31 +19,31 @@ class Target(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """One number that was measured. It is judged as it is shown, with so many digits after the point."""
+    """A measured number. It is judged as displayed, rounded to ``digits`` decimals."""
 
     section: str
     """The name of a section, one of ``mi_brdfs.bench.SECTIONS``."""
     subject: str
-    """What it is a number of: its row in the section's table."""
+    """The subject measured: its row in the section's table."""
     name: str
-    """Which number it is: its column."""
+    """The quantity measured: its column."""
     value: float
     digits: int = 3
     unit: str = ""
     interval: tuple[float, float] | None = None
-    """That of 95 % confidence, where there is one."""
+    """The 95 % confidence interval, if there is one."""
     targets: tuple[Target, ...] = ()
 
     @property
     def missed(self) -> list[Target]:
-        """The targets that it does not reach."""
+        """Return the targets that it misses."""
         value = round(self.value, self.digits)
         reached = {"≥": lambda bound: value >= bound, "≤": lambda bound: value <= bound}
         return [t for t in self.targets if not reached[t.relation](round(t.bound, self.digits))]
 
     @property
     def marked(self) -> str:
-        """The number with its unit, and a mark if it misses a target."""
+        """Return the number with its unit, and a mark if it misses a target."""
         return f"{self._shown(self.value)}{self.unit}{MISSED if self.missed else ''}"
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""The first picture of a process: tracing and compiling."""
+"""The time to the first picture of a process: tracing and compiling."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ SIZE = 16
 
 
 def first(run: BenchRun) -> Iterator[Figure]:
-    """The time from loading a scene to its first, small picture, traced and compiled, over that with the built-in: in
-    fresh processes that find no compiled kernels, in turn, the median of the pairs. One sphere with the default
-    parameters of a model; and one sphere for each model, beside as many built-ins.
+    """Measure the time from loading a scene to its first, small picture, traced and compiled, over that with the
+    built-in: the median of pairs of fresh processes, alternating, without cached kernels. The scenes are one sphere
+    with the default parameters of a model, and one sphere for each model, compared with as many built-ins.
 
     Targets: 1.15 for one model, 1.5 for all of them.
     """
@@ -48,7 +48,8 @@ def _pair(ours: list[Plugin], theirs: list[Plugin], ours_first: bool) -> tuple[f
 
 
 def first_picture(bsdfs: list[Plugin]) -> float:
-    """The seconds from loading a scene with some BSDFs to its picture, in a process that has rendered nothing."""
+    """Return the seconds from loading a scene with some BSDFs to its picture, in a process that has rendered
+    nothing."""
     scene = spheres(bsdfs, SIZE) if len(bsdfs) > 1 else sphere(bsdfs[0], PATH, SIZE)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         start = perf_counter()
@@ -57,5 +58,5 @@ def first_picture(bsdfs: list[Plugin]) -> float:
         seconds = perf_counter() - start
         kernels = dr.kernel_history([dr.KernelType.JIT])
     if any(kernel["cache_disk"] for kernel in kernels):
-        raise RuntimeError("kernels that earlier runs compiled were found")
+        raise RuntimeError("kernels compiled by earlier runs were found")
     return seconds

@@ -1,4 +1,4 @@
-"""Functions in processes of their own."""
+"""Function calls in new processes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ..mitsuba import guests
 
 
 def in_new_process(function: Callable, *arguments) -> Any:
-    """What a function returns in a process that knows the same models (:func:`mi_brdfs.mitsuba.guests.source`), but no
-    kernels of earlier runs: these lie in the user's folder, so it gets an empty one. Arguments and result are of the
-    types that JSON has."""
+    """Return a function's result from a process that knows the same models (:func:`mi_brdfs.mitsuba.guests.source`),
+    but no kernels of earlier runs: these are cached in the user's home folder, so the process gets an empty one.
+    Arguments and result must be of JSON's types."""
     call = json.dumps([sys.path, guests.sources(), mi.variant(), function.__module__, function.__name__, arguments])
     with TemporaryDirectory() as folder:
         done = subprocess.run(
@@ -27,12 +27,12 @@ def in_new_process(function: Callable, *arguments) -> Any:
             capture_output=True, text=True, env=os.environ | {"HOME": folder, "TMP": folder},
         )  # fmt: skip
     if done.returncode:
-        raise RuntimeError(f"{function.__name__} failed in a process of its own:\n{done.stderr.strip()}")
+        raise RuntimeError(f"{function.__name__} failed in its process:\n{done.stderr.strip()}")
     return json.loads(done.stdout.splitlines()[-1])
 
 
 def answer():
-    """What the new process does: the call that is its argument."""
+    """Carry out the call given as the argument of the new process."""
     sys.path[:], sources, variant, module, name, arguments = json.loads(sys.argv[1])
     for source in sources:
         guests.import_models(source)

@@ -1,4 +1,4 @@
-"""Pictures by ours and by the built-in in turn."""
+"""Pictures of our BSDF and of the built-in, alternating."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ class Renders(NamedTuple):
     """Pictures of two BSDFs, one for each seed."""
 
     seconds: Array
-    """Of shape (2, seeds)."""
+    """The render times, of shape (2, seeds)."""
     pictures: Array
     """The luminance of the pixels, of shape (2, seeds, pixels)."""
 
     @property
     def slower(self) -> Array:
-        """How much longer the first takes, for each pair."""
+        """Return the time of the first over that of the second, for each pair."""
         return self.seconds[0] / self.seconds[1]
 
 
 def alternate(ours: Plugin, theirs: Plugin, scene: str) -> Renders:
-    """Render both in a scene in turn, now one first, now the other. Only one of the two is loaded at a time: the
-    kernel of a render has the code of every BSDF that is alive."""
+    """Render both in a scene, alternating which comes first. Only one of the two is loaded at a time: a render's kernel
+    contains the code of every live BSDF."""
     seconds = np.zeros((2, sizes.PAIRS))
     pictures: tuple[list[Array], list[Array]] = [], []
     dicts = [scene_of(bsdf, scene) for bsdf in (ours, theirs)]
@@ -45,7 +45,7 @@ def alternate(ours: Plugin, theirs: Plugin, scene: str) -> Renders:
 
 
 def render(scene: dict[str, Any], seed: int) -> tuple[float, Array]:
-    """Return ``(seconds, picture)`` of a scene that is loaded before and discarded afterwards."""
+    """Return ``(seconds, picture)`` of a scene, loaded before and discarded afterwards."""
     loaded = mi.load_dict(scene)
     dr.sync_thread()
     start = perf_counter()

@@ -1,4 +1,4 @@
-"""What was measured, as figures with their targets: as tables, in JSON, and as the README's summary."""
+"""The results, figures with their targets: as tables, as JSON, and as the README's summary."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from .summary import summary
 
 @dataclass(frozen=True)
 class Results:
-    """All figures of one call, and what they were measured with."""
+    """All figures of one call, and the setup they were measured with."""
 
     figures: list[Figure]
     setup: dict[str, str]
-    """Versions, the variant, the number of threads."""
+    """The versions, the variant and the number of threads."""
     cases: dict[str, dict[str, Any]]
-    """The fields of the cases that subjects name."""
+    """The fields of the cases, by subject."""
 
     @property
     def missed(self) -> list[str]:
-        """A sentence for each target that was missed."""
+        """Return a sentence for each missed target."""
         return [sentence for figure in self.figures for sentence in figure.sentences()]
 
     @property
     def sections(self) -> list[str]:
-        """The names of what was measured."""
+        """Return the names of the sections measured."""
         return list(dict.fromkeys(figure.section for figure in self.figures))
 
     def of(self, section: str) -> list[Figure]:
@@ -38,7 +38,7 @@ class Results:
         return [figure for figure in self.figures if figure.section == section]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the results in types that JSON has."""
+        """Return the results in JSON's types."""
         figures = [asdict(figure) | {"missed": bool(figure.missed)} for figure in self.figures]
         for figure in figures:
             figure["targets"] = [target._asdict() for target in figure["targets"]]
@@ -46,7 +46,7 @@ class Results:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Results:
-        """Return the results that :meth:`to_dict` made this of."""
+        """Return the results from the output of :meth:`to_dict`."""
         figures = []
         for fields in data["figures"]:
             fields = {key: value for key, value in fields.items() if key != "missed"}
@@ -56,7 +56,8 @@ class Results:
         return cls(figures, data["setup"], data["cases"])
 
     def tables(self) -> list[Table]:
-        """Return a table for each section, with a row for each subject. What misses a target is red and marked."""
+        """Return a table for each section, with a row for each subject. Figures that miss a target are red and
+        marked."""
         return [_table(section, self.of(section)) for section in self.sections]
 
     def markdown(self) -> str:

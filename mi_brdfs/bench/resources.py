@@ -1,4 +1,4 @@
-"""What BSDFs cost over time: kernels compiled for changes, time and memory lost on loading."""
+"""The cost of BSDFs over time: kernels compiled after changes, time and memory lost to loading."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ SIZE = 16
 
 
 def recompiles(run: BenchRun) -> Iterator[Figure]:
-    """The kernels compiled for a new value of a parameter, each in turn, and for loading the same scene again after it
-    was discarded; of all sets of parameters of a model together. Whether one is compiled depends on what earlier runs
-    left on the disk, so they are told by their hashes: what counts are those that the first picture did not need.
+    """Count the kernels compiled for a new value of each parameter in turn, and for loading the same scene again after
+    discarding it, summed over all cases of a model. As compilation depends on what earlier runs cached on disk, kernels
+    are identified by their hashes: those count that the first picture did not need.
 
     Target: 0.
     """
@@ -44,8 +44,8 @@ def recompiles(run: BenchRun) -> Iterator[Figure]:
 
 
 def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
-    """``(parameters, changed, loaded)``: how many parameters were changed, and how many kernels were compiled for that
-    and for loading the scene again."""
+    """Return ``(parameters, changed, loaded)``: the number of parameters changed, and of kernels compiled for that and
+    for loading the scene again."""
     scene = sphere(bsdf, PATH, SIZE)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         loaded = mi.load_dict(scene)
@@ -64,7 +64,7 @@ def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
 
 
 def _launched(scene: mi.Scene) -> set[int]:
-    """The kernels of a picture."""
+    """Return the hashes of a picture's kernels."""
     return launched_kernels(lambda: dr.eval(mi.render(scene, spp=1)))
 
 
@@ -72,10 +72,10 @@ def _launched(scene: mi.Scene) -> set[int]:
 
 
 def cycles(run: BenchRun) -> Iterator[Figure]:
-    """Loading, rendering and discarding scenes in a process of its own, each with one model, round after round over all
-    of them: how long the last rounds take over the first after a warm-up, and how much the memory grows. The time is
-    that of the thread that loads and traces, the best of a model in each part, which other processes disturb least,
-    and the median over the models. Memory is measured on Linux.
+    """Load, render and discard scenes with one model each in a new process, in rounds over all models, and measure the
+    time of the last rounds over that of the first after a warm-up, and the growth in memory. The time is that of the
+    thread that loads and traces: each model's best, which other processes disturb least, then the median over the
+    models. Memory is measured on Linux only.
 
     Targets: within 1.1 of the first rounds, and below 5 MB.
     """
@@ -92,8 +92,8 @@ def cycles(run: BenchRun) -> Iterator[Figure]:
 
 
 def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[float]], list[float]]:
-    """``(seconds, memory)``: the time of each BSDF in each round after the first, which compiles, and the megabytes
-    that the process holds after each of these rounds, and before the first of them."""
+    """Return ``(seconds, memory)``: the time of each BSDF in each round after the first, which compiles, and the
+    megabytes that the process holds before the first and after each of these rounds."""
     seconds, memory = [], []
     for seed in range(rounds + 1):
         seconds.append([])
@@ -107,13 +107,13 @@ def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[flo
 
 
 def slowdown(seconds: list[list[float]], edge: int) -> float:
-    """How much longer the last rounds take than the first."""
+    """Return the time of the last rounds over that of the first."""
     early, late = (np.min(part, axis=0) for part in (seconds[:edge], seconds[-edge:]))
     return float(median(late / early))
 
 
 def _resident() -> list[float]:
-    """The megabytes that the process holds, where that can be told."""
+    """Return the megabytes that the process holds, if known."""
     if sys.platform != "linux":
         return []
     return [float(line.split()[1]) / 1024 for line in Path("/proc/self/status").read_text().splitlines()

@@ -1,4 +1,4 @@
-"""One call of ``bench``: what its sections share."""
+"""The state that the sections of one call of ``bench`` share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 @dataclass
 class BenchRun:
-    """How far the call has come, and the pictures that several sections look at."""
+    """The progress of the call, and the pictures that several sections use."""
 
     on_progress: Callable[[str, int, int], None]
     cases: list[Case]
@@ -23,17 +23,17 @@ class BenchRun:
 
     @property
     def beside(self) -> list[Case]:
-        """The cases with a built-in beside them."""
+        """Return the cases that have a built-in."""
         return [case for case in self.cases if case.builtin]
 
     def steps(self, items: Sequence[T]) -> Iterator[T]:
-        """Yield the items, telling how many are done."""
+        """Yield the items, reporting progress."""
         for done, item in enumerate(items):
             self.on_progress(self.section, done, len(items))
             yield item
 
     def renders(self, case: Case, scene: str) -> Renders:
-        """Return the pictures of a case beside its built-in in one of the scenes; rendered once for all sections."""
+        """Return the pictures of a case and its built-in in one of the scenes, rendered once for all sections."""
         key = case.name, scene
         if key not in self._renders:
             self._renders[key] = alternate(case.bsdf, case.builtin, scene)

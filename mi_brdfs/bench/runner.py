@@ -1,4 +1,4 @@
-"""Running what is asked for, section by section."""
+"""The runner of the sections."""
 
 from __future__ import annotations
 
@@ -24,22 +24,21 @@ from .timing import time, variance
 SECTIONS: dict[str, Callable[[BenchRun], Iterator[Figure]]] = {
     section.__name__: section for section in (efficiency, time, variance, first, recompiles, cycles, scalar)
 }
-"""What is measured by name, in the order in which it is; the docstring of each says how, and what the targets are."""
+"""The measurements by name, in order; the docstring of each has the method and the targets."""
 
 
 def bench(
     only: Iterable[str] | None = None, on_progress: Callable[[str, int, int], None] = lambda section, done, of: None
 ) -> Results:
-    """Measure all models, also those that were registered by others, beside Mitsuba's own in the active variant;
-    except ``scalar``, which is measured in ``scalar_rgb``. Times mean something only while the machine does nothing
-    else.
+    """Measure all models, including those registered by others, against Mitsuba's own in the active variant; ``scalar``
+    is measured in ``scalar_rgb``. Times are meaningful only on an otherwise idle machine.
 
     Args:
         only: the names of the sections to run, by default all of :data:`SECTIONS`.
-        on_progress: called with the name of the section, the steps done, and how many it has.
+        on_progress: called with the name of the section, the steps done, and their total number.
 
     Raises:
-        ValueError: for an unknown name of a section, or a variant that is not vectorized and unpolarized.
+        ValueError: if a section is unknown, or the variant is not vectorized and unpolarized.
     """
     wanted = set(SECTIONS if only is None else only)
     if unknown := sorted(wanted - set(SECTIONS)):

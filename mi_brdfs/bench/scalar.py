@@ -1,4 +1,4 @@
-"""Scalar variants, where a BSDF in Python is called sample by sample."""
+"""The time in scalar variants, where a BSDF in Python is called sample by sample."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ AT_MOST = {"lambert": 12, "walter": 40}
 
 
 def scalar(run: BenchRun) -> Iterator[Figure]:
-    """The time of a small picture of a sphere in ``scalar_rgb`` with one thread, over that with the built-in: the
-    median of pairs in turn. Almost all of it is calls of the BSDF.
+    """Measure the time of a small picture of a sphere in ``scalar_rgb`` with one thread, over that with the built-in:
+    the median of alternating pairs. Almost all of it is spent in calls of the BSDF.
 
     Targets: 12 for ``lambert``, 40 for ``walter``.
     """

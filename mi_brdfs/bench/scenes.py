@@ -1,4 +1,4 @@
-"""The scenes that BSDFs are rendered in."""
+"""The scenes in which BSDFs are rendered."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from . import sizes
 from .cases import Plugin
 
 DISTANCE = 4
-"""Of the camera from the centre of a sphere of radius 1."""
+"""The distance of the camera from the centre of a sphere of radius 1."""
 LIMB = 85
-"""The angle, in degrees, at which the sphere is seen in the corners of the picture: it fills the picture, so that all
-noise there is the BSDF's, and none is of the sphere's edge."""
+"""The angle, in degrees, at which the sphere is seen in the corners of the picture. The sphere fills the picture, so
+that all noise comes from the BSDF and none from the sphere's edge."""
 
 
 def sphere(bsdf: Plugin, integrator: Plugin, size: int) -> dict[str, Any]:
-    """A sphere under a constant environment."""
+    """Return a sphere under a constant environment."""
     corner = asin(sin(radians(LIMB)) / DISTANCE)
     return {
         "type": "scene",
@@ -30,7 +30,7 @@ def sphere(bsdf: Plugin, integrator: Plugin, size: int) -> dict[str, Any]:
 
 
 def spheres(bsdfs: list[Plugin], size: int) -> dict[str, Any]:
-    """A sphere for each BSDF."""
+    """Return a scene with a sphere for each BSDF."""
     balls = {
         f"sphere_{k}": {"type": "sphere", "center": [2 * k - len(bsdfs) + 1, 0, 0], "bsdf": bsdf}
         for k, bsdf in enumerate(bsdfs)
@@ -40,7 +40,7 @@ def spheres(bsdfs: list[Plugin], size: int) -> dict[str, Any]:
 
 
 def cornell_box(bsdf: Plugin, size: int) -> dict[str, Any]:
-    """The Cornell box, in which all that is white has the BSDF."""
+    """Return the Cornell box, in which the BSDF replaces white."""
     box = mi.cornell_box()
     box["sensor"]["film"] |= {"width": size, "height": size, "rfilter": {"type": "box"}}
     return box | {"white": bsdf}
@@ -62,7 +62,7 @@ ALONE, SPHERE, BOX = "BSDF samples alone", "sphere", "Cornell box"
 
 
 def scene_of(bsdf: Plugin, name: str) -> dict[str, Any]:
-    """The scene of one of the three names above."""
+    """Return the scene of one of the three names above."""
     if name == BOX:
         return cornell_box(bsdf, sizes.PICTURE // 2)
     return sphere(bsdf, BSDF_SAMPLES if name == ALONE else PATH, sizes.PICTURE)

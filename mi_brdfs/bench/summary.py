@@ -1,4 +1,4 @@
-"""The README's summary of what was measured, in Markdown."""
+"""The README's summary of the results, in Markdown."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Sections = dict[str, list[Figure]]
 
 
 def summary(figures: Sequence[Figure], setup: dict[str, str], cases: dict[str, dict[str, Any]]) -> str:
-    """Return the cases beside the same model of Mitsuba's in a table, and the rest in a list; what was not measured is
-    left out. The arguments are those of :class:`~mi_brdfs.bench.Results`."""
+    """Return a table of the cases that are the same model as a built-in, and a list of the rest, without what was not
+    measured. The arguments are those of :class:`~mi_brdfs.bench.Results`."""
     sections: Sections = {}
     for figure in figures:
         sections.setdefault(figure.section, []).append(figure)

@@ -1,4 +1,4 @@
-"""How long pictures by ours take beside those by the built-in, and how noisy they are."""
+"""The render time and noise of our BSDFs relative to the built-ins."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ ALONE_AT_MOST = {"walter alpha 0.5": 0.5, "walter alpha 1": 0.3}
 
 
 def time(run: BenchRun) -> Iterator[Figure]:
-    """The time of rendering a sphere and the Cornell box, over that with the built-in: the median of pairs rendered in
-    turn, in one process, with its interval. Compiling is not part of it, tracing is.
+    """Measure the time of rendering a sphere and the Cornell box, over that with the built-in: the median of
+    alternating pairs, in one process, with its interval. It includes tracing, but not compiling.
 
     Target: 1.05.
     """
@@ -33,12 +33,12 @@ def time(run: BenchRun) -> Iterator[Figure]:
 
 
 def variance(run: BenchRun) -> Iterator[Figure]:
-    """Time × variance at equal numbers of samples, over that of the built-in: how much longer it takes to get a picture
-    of the same noise. The variance is that of a pixel's luminance among pictures of different seeds, the same for both,
-    relative to its mean squared, and averaged over the pixels; the interval is a bootstrap over the seeds. The scenes
+    """Measure time × variance at equal numbers of samples, over that of the built-in: the relative time to a picture
+    with the same noise. The variance is that of a pixel's luminance among pictures of different seeds, the same for
+    both, relative to its squared mean, averaged over the pixels; the interval is a bootstrap over the seeds. The scenes
     are a sphere under a constant environment and the Cornell box, by ``path``; and the sphere with BSDF samples alone,
-    where all noise is the sampler's. Where the built-in is another model of the same kind, only ``path`` is measured,
-    and nothing judged.
+    where all noise comes from the sampler. If the built-in is another model of the same kind, only ``path`` is
+    measured, and nothing is judged.
 
     Targets: 1 by ``path``; and for ``walter`` with BSDF samples alone 0.5 at α = 0.5 and 0.3 at α = 1.
     """
@@ -60,9 +60,9 @@ def variance(run: BenchRun) -> Iterator[Figure]:
 
 
 def median_interval(values: Array) -> tuple[float, tuple[float, float]]:
-    """Return the median and its interval of 95 % confidence, of any distribution: the k-th smallest and the k-th
-    largest value, as each lies beyond the true median with the probability that fewer than k of n coins fall heads. Of
-    fewer than six values it is their range, of less confidence."""
+    """Return the median and its 95 % confidence interval, for any distribution: the k-th smallest and the k-th largest
+    value, as each lies beyond the true median with the probability that fewer than k of n coins fall heads. For fewer
+    than six values it is their range, at lower confidence."""
     ordered = np.sort(values)
     n, k, beyond = len(ordered), 0, 0.0
     while (beyond := beyond + comb(n, k) / 2**n) <= 0.025:
@@ -72,8 +72,8 @@ def median_interval(values: Array) -> tuple[float, tuple[float, float]]:
 
 
 def deviations(pictures: Array) -> Array:
-    """Return how far the picture of each seed is from the mean of the seeds: the squared difference of a pixel over its
-    mean squared, averaged over the pixels that are brighter than a thousandth of the picture: one in a shadow may be
+    """Return the deviation of each seed's picture from the mean over the seeds: the squared difference of a pixel over
+    its squared mean, averaged over the pixels brighter than a thousandth of the picture, as a pixel in a shadow may be
     black except in a seed or two. The mean over the seeds is the relative variance. Shape (2, seeds), for pictures of
     shape (2, seeds, pixels)."""
     mean, seeds = pictures.mean(axis=1, keepdims=True), pictures.shape[1]
@@ -83,7 +83,7 @@ def deviations(pictures: Array) -> Array:
 
 
 def time_variance(slower: Array, noise: Array) -> tuple[float, tuple[float, float]]:
-    """Return time × variance of the first over that of the second, and its interval of 95 % confidence."""
+    """Return time × variance of the first over that of the second, and its 95 % confidence interval."""
 
     def ratio(seeds: Array) -> Array:
         ours, theirs = noise[:, seeds].mean(axis=-1)

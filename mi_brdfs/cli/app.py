@@ -1,4 +1,4 @@
-"""The command line as a whole, and what all of its commands have in common."""
+"""The command-line application, and what all commands share."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_
 
 
 def main() -> None:
-    """The entry point of the command ``mi-brdfs``."""
+    """Run the command ``mi-brdfs``."""
     app()
 
 
 @app.callback()
 def _describe() -> None:
-    """Classical BRDFs for Mitsuba 3: what there is, what works here, and rendering scenes that use them."""
+    """Classical BRDFs for Mitsuba 3: list and check them, see what works on this machine, render scenes."""
 
 
 def _import(names: list[str] | None) -> None:
@@ -38,13 +38,13 @@ Imports = Annotated[
     typer.Option(
         "--import",
         metavar="FILE.py|MODULE",
-        help="Take in the models that this file or module defines; may be repeated.",
+        help="Register the models that this file or module defines; may be repeated.",
     ),
 ]
 
 
 def command(name: str | None = None) -> Callable:
-    """Add a function to the commands, with the option --import."""
+    """Register a function as a command, with the option --import."""
 
     def add(function: Callable) -> Callable:
         @functools.wraps(function)

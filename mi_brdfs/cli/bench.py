@@ -19,16 +19,16 @@ from .variants import set_tracing_variant
 @command()
 def bench(
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="SECTION", help="Measure this alone; may be repeated.")
+        list[str] | None, typer.Option("--only", metavar="SECTION", help="Measure only this section; may be repeated.")
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all figures to this file, too.")
+        Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures to this file.")
     ] = None,
     variant: Annotated[
         str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
     ] = None,
 ) -> None:
-    """Measure efficiency, time and noise beside Mitsuba's BSDFs, some ten minutes on a machine that is not busy."""
+    """Measure efficiency, time and noise against Mitsuba's BSDFs: about ten minutes on an idle machine."""
     from ..bench import SECTIONS
     from ..bench import bench as measure
 

@@ -34,24 +34,24 @@ if TYPE_CHECKING:
 def check(
     targets: Annotated[
         list[str] | None,
-        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins, of the pack or not; files with a scene or BSDF."),
+        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins of the pack or others; files with a scene or BSDF."),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
     html_file: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write a report with pictures to this file, too.")
+        Path | None, typer.Option("--html", metavar="FILE", help="Also write a report with pictures to this file.")
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write all findings to this file, too.")
+        Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
     ] = None,
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help="Run this check alone; may be repeated.")
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Run only this check; may be repeated.")
     ] = None,
-    jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check so many BSDFs at the same time.")] = 1,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check this many BSDFs in parallel.")] = 1,
     variant: Annotated[
         str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
     ] = None,
 ) -> None:
-    """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit status 1 if one
+    """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit with 1 if any
     fails."""
     from ..measure.sources import find_sources
     from ..validation import CHECKS
@@ -85,7 +85,7 @@ def check(
 
 
 def _check_all(sources: list[BSDFSource], only: list[str] | None, variant: str, jobs: int) -> list[Report]:
-    """Return the reports on all BSDFs, from processes of their own if there are several jobs."""
+    """Return the reports on all BSDFs, made in separate processes if there are several jobs."""
     from ..validation import CHECKS
 
     subject = TextColumn("Checking {task.description}", markup=False)
@@ -99,7 +99,7 @@ def _check_all(sources: list[BSDFSource], only: list[str] | None, variant: str, 
                 progress.update(task, description=source.name)
                 reports.append(_check_one(source, only, on_progress=partial(progress.advance, task)))
             return reports
-        # Started anew: a process with Dr.Jit's threads must not be forked.
+        # Spawned: a process with Dr.Jit's threads must not be forked.
         known = variant, guests.sources()
         pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known)
         with pool, ending_processes():
@@ -110,14 +110,14 @@ def _check_all(sources: list[BSDFSource], only: list[str] | None, variant: str, 
 
 
 def _check_one(source: BSDFSource, only: list[str] | None, **given: Any) -> Report:
-    """Return the report on a BSDF, in the active variant."""
+    """Return the report on a BSDF in the active variant."""
     from ..validation import check
 
     return check(source.load(), name=source.name, only=only, **given)
 
 
 def _start_job(variant: str, sources: list[str]) -> None:
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as it is for a shell's job in the background
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as for a shell's background job
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
     for source in sources:
         guests.import_models(source)
@@ -125,7 +125,7 @@ def _start_job(variant: str, sources: list[str]) -> None:
 
 
 def _print_reports(reports: list[Report]) -> None:
-    """A row for each report, and below what failed."""
+    """Print a row for each report, and below them what failed."""
     words = {"fail": ("FAIL", "red"), "pass": ("pass", "green"), "skip": ("skip", "yellow"), None: ("-", "dim")}
     checks = list(dict.fromkeys(finding.check for report in reports for finding in report.findings))
     table = Table("type", *checks, box=None, pad_edge=False)

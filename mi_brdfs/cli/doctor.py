@@ -13,7 +13,7 @@ from .terminal import Exit, out, print_table
 
 @command()
 def doctor() -> None:
-    """Say which variants work here, which LLVM is used, and what to do about the others."""
+    """Show which variants work on this machine, which LLVM is used, and how to enable the others."""
     findings = doctor_module.examine()
     table = Table("backend", "state", "", box=None, pad_edge=False)
     colours = {"works": "green", "missing": "yellow"}

@@ -1,4 +1,4 @@
-"""Exceptions as one line each."""
+"""Exceptions, reduced to one line each."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 
 
 def one_line(error: BaseException) -> str:
-    """Reduce an exception of Mitsuba to its cause, in one line, with the place in the scene file if it is known."""
+    """Reduce a Mitsuba exception to one line: its cause, with the place in the scene file if known."""
     while error.__cause__:  # render-time errors keep their cause there
         error = error.__cause__
     text = re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)) or type(error).__name__
@@ -31,9 +31,9 @@ def _hint(text: str) -> str | None:
 
 
 def _last_of_traceback(text: str) -> str:
-    """The exception's message if ``text`` holds a Python traceback, else ``text``, in one line."""
+    """Return the exception's message if ``text`` holds a Python traceback, else ``text``, in one line."""
     _, traceback, tail = text.partition("Traceback (most recent call last):")
     if traceback:
         text = re.split(r"^[\w.]+(?:Error|Exception|Warning): ", tail, flags=re.MULTILINE)[-1]
-    # Nothing that a scene file says may command the terminal.
+    # Text from a scene file must not control the terminal.
     return "".join(character for character in " ".join(text.split()) if character.isprintable())

@@ -18,13 +18,13 @@ from .variants import set_variant
 @command()
 def gallery(
     types: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases that `list` shows. Default: all.")
+        list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases, as `list` shows them. Default: all.")
     ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="It is made if it does not exist.")
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Created if it does not exist.")
     ] = Path("gallery"),
     spp: Annotated[
-        int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; pictures are denoised.")
+        int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; the pictures are denoised.")
     ] = 16,
     size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 192,
     variant: Annotated[
@@ -32,8 +32,8 @@ def gallery(
         typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
     ] = None,
 ) -> None:
-    """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps what is
-    finished."""
+    """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps the
+    finished pictures."""
     try:
         from ..gallery import gallery as render_gallery
     except ImportError as error:

@@ -15,7 +15,7 @@ from .terminal import fail, out
 
 
 @command()
-def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or alias that `list` shows.")]) -> None:
+def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or alias, as `list` shows it.")]) -> None:
     """Show the manual page of a BRDF."""
     try:
         page = manual(type)
@@ -25,7 +25,7 @@ def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or ali
 
 
 def _styled(page: str) -> Text:
-    """A manual page for the terminal: literals and headings by style instead of by reStructuredText's marks."""
+    """Return a manual page for the terminal: literals and headings styled instead of in reStructuredText markup."""
     lines = re.sub(r":\w+:`([^`]+)`", r"\1", page).splitlines()
     text = Text()
     for line, following in zip(lines, [*lines[1:], ""], strict=True):

@@ -1,4 +1,4 @@
-"""What Ctrl-C does."""
+"""Handling of Ctrl-C."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def interruptible() -> Iterator[None]:
 
 @contextmanager
 def ending_processes() -> Iterator[None]:
-    """Let the processes end at once after an error or Ctrl-C."""
+    """End the child processes at once after an error or Ctrl-C."""
     try:
         yield
     except BaseException:
@@ -37,7 +37,8 @@ def ending_processes() -> Iterator[None]:
 
 @contextmanager
 def answer_ctrl_c(announce: Callable[[], None]) -> Iterator[None]:
-    """Answer Ctrl-C at once, where Python's own handlers wait for the pass to end; the second ends the process."""
+    """Call ``announce`` as soon as Ctrl-C is pressed, where Python's own handlers wait for the pass to end; a second
+    Ctrl-C ends the process."""
     ours, written_by_python = socket.socketpair()
     written_by_python.setblocking(False)
 

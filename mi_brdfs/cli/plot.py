@@ -19,39 +19,39 @@ from .variants import set_tracing_variant
 def plot(
     targets: Annotated[
         list[str],
-        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins, of the pack or not; files with a scene or BSDF."),
+        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins of the pack or others; files with a scene or BSDF."),
     ],
     parameters: Annotated[
         list[str] | None,
         typer.Option(
             "--param",
             metavar="name=value",
-            help="Set a parameter of each TYPE, to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws "
-            "each of the values.",
+            help="Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws "
+            "each value.",
         ),
     ] = None,
     kind: Annotated[
         str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere, albedo or sphere.")
     ] = "polar",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A .png, .svg, .pdf or .jpg; of sphere .html.")
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A .png, .svg, .pdf, .jpg; .html for sphere.")
     ] = None,
     angles: Annotated[
-        str | None, typer.Option(metavar="DEGREES", help="Of incidence. Default: 10,40,70; of sphere 45.")
+        str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 10,40,70; 45 for sphere.")
     ] = None,
     azimuth: Annotated[
-        float | None, typer.Option(metavar="DEGREES", help="Of incidence, from dp_du. Default: 0.")
+        float | None, typer.Option(metavar="DEGREES", help="Azimuth of incidence, from dp_du. Default: 0.")
     ] = None,
     scale: Annotated[
         str | None,
-        typer.Option(metavar="SCALE", help="linear, log or both, of polar, cartesian, sphere. Default: both."),
+        typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian, sphere. Default: both."),
     ] = None,
     variant: Annotated[
         str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
     ] = None,
 ) -> None:
-    """Draw the lobes of BSDFs, one or several to compare: in the plane of incidence (polar, cartesian), over the
-    hemisphere, their albedos, or as bodies to turn in a browser (sphere)."""
+    """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
+    hemisphere, as albedo curves, or as bodies to turn in a browser (sphere)."""
     try:
         from ..plot import command as asked
     except ImportError as error:
@@ -71,7 +71,7 @@ def plot(
             figure = asked.KINDS[kind](*bsdfs, **options)
         except ImportError as error:
             fail(str(error))
-        except (ValueError, RuntimeError) as error:  # Mitsuba's are of both kinds
+        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
             fail(one_line(error), Exit.USAGE)
         try:
             asked.write(figure, file)

@@ -20,7 +20,7 @@ from .variants import set_variant
 if TYPE_CHECKING:
     from ..render import Picture
 
-LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: no -D parameter can have these names
+LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: a -D parameter cannot have these names
 DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -30,7 +30,7 @@ def render(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="out.exr, .png or .jpg; the EXR and a display image are always both written."
+            "-o", "--output", help="An .exr, .png or .jpg; the EXR and a display image are always both written."
         ),
     ] = None,
     variant: Annotated[
@@ -41,9 +41,9 @@ def render(
     define: Annotated[
         list[str] | None, typer.Option("-D", metavar="name=value", help="Set a <default> parameter of the scene.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Another seed gives another noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="A different seed gives different noise.")] = 0,
 ) -> None:
-    """Render a scene, progressively; Ctrl-C keeps what is finished."""
+    """Render a scene progressively; Ctrl-C keeps the finished passes."""
     parameters = _parameters(define or [])
     exr, display = _output_files(output or Path(scene.stem + ".exr"))
     chosen = set_variant(variant)
@@ -71,13 +71,13 @@ def _parameters(definitions: list[str]) -> dict[str, str]:
         if not equals or not name:
             fail(f"-D {definition}: write -Dname=value", Exit.USAGE)
         if name in LOAD_FILE_ARGUMENTS:
-            fail(f"-D {name}: Mitsuba keeps this name for itself; rename the parameter in the scene", Exit.USAGE)
+            fail(f"-D {name}: Mitsuba reserves this name; rename the parameter in the scene", Exit.USAGE)
         parameters[name] = value
     return parameters
 
 
 def _output_files(output: Path) -> tuple[Path, Path]:
-    """The EXR and the display image that ``output`` asks for, if they can be written."""
+    """Return the paths of the EXR and the display image for ``output``, if they can be written."""
     suffix = output.suffix.lower()
     if suffix != ".exr" and suffix not in DISPLAY_SUFFIXES:
         fail(f"{output}: unknown image format; use .exr, .png or .jpg", Exit.USAGE)

@@ -1,4 +1,4 @@
-"""What is said, and where: results go to stdout, errors and progress to stderr."""
+"""Terminal output: results go to stdout, errors and progress to stderr."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Exit(IntEnum):
 
 
 def print_table(table: Table) -> None:
-    """One line a row where another program reads it."""
+    """Print a table, with each row on one line where another program reads it."""
     console = Console(markup=False, highlight=False, width=None if out.is_terminal else 400)
     console.print(table)
 
@@ -38,9 +38,9 @@ def fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:
 
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
-    """Send to stderr what Mitsuba prints to stdout, its warnings.
+    """Send what Mitsuba prints to stdout, its warnings, to stderr.
 
-    At the level of the operating system: its log may speak inside a signal handler, where no Python may run.
+    Redirect file descriptors, as its log may write inside a signal handler, where no Python may run.
     """
     sys.stdout.flush()
     stdout = os.dup(1)

@@ -1,4 +1,4 @@
-"""The variant that a command works in."""
+"""The variant that a command uses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .terminal import Exit, err, fail
 
 
 def set_variant(wanted: str | None) -> str:
-    """Activate the variant asked for, or the fastest that works."""
+    """Activate the requested variant, or the fastest that works, and return its name."""
     if wanted:
         _refuse(wanted)
         try:
@@ -34,7 +34,7 @@ def set_variant(wanted: str | None) -> str:
 
 
 def set_tracing_variant(wanted: str | None) -> str:
-    """The same, of those that check and bench work in."""
+    """Do the same among the variants that check, plot and bench can use."""
     chosen = set_variant(wanted)
     if not is_measurable(chosen):
         fail(f"this needs a vectorized and unpolarized variant, not {chosen}", Exit.USAGE if wanted else Exit.ERROR)

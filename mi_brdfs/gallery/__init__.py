@@ -1,4 +1,4 @@
-"""Pictures of what the models look like, and of what their parameters do.
+"""Pictures of the models, and of the effect of their parameters.
 
 From Python::
 
@@ -47,11 +47,11 @@ def gallery(
     on_picture: Callable[[str, int, int], None] = lambda type, done, total: None,
 ) -> Path:
     """Render models in the preview scene, each with sweeps of its main parameters, and write an HTML page that shows
-    them, with an overview and a contact sheet of each model. Ctrl-C ends it with what is finished, and is raised.
+    them, with an overview and a contact sheet of each model. Ctrl-C keeps the finished pictures, and is raised.
 
     Args:
-        types: the models, by type or alias; all of them if there are none.
-        folder: where ``index.html``, ``overview.png`` and ``TYPE.png`` go; it is made if it does not exist.
+        types: the models, by type or alias; all if empty.
+        folder: where ``index.html``, ``overview.png`` and ``TYPE.png`` go; created if it does not exist.
         spp: samples per pixel, rounded up to a power of 4; the pictures are denoised.
         size: width and height of a picture, in pixels.
         on_picture: called as ``on_picture(type, done, total)`` after each picture.
@@ -60,8 +60,8 @@ def gallery(
         The path of the page.
 
     Raises:
-        ValueError: if there is no such model, with the closest name there is.
-        OSError: if the folder cannot be made or written to.
+        ValueError: if there is no such model; the message has the closest name.
+        OSError: if the folder cannot be created or written to.
     """
     models = list(dict.fromkeys(map(find_model, types))) or all_models()
     entries = [Entry(model) for model in models]
@@ -71,7 +71,7 @@ def gallery(
     try:
         for entry in entries:
             for bsdf in entry.bsdfs:
-                with ctrl_c() as interrupt:  # Mitsuba cannot be interrupted in the middle
+                with ctrl_c() as interrupt:  # a render cannot be interrupted
                     image = picture(bsdf, size, spp)
                 if interrupt.pressed:
                     raise KeyboardInterrupt
@@ -90,9 +90,9 @@ def gallery(
 
 
 def picture(bsdf: dict, size: int = SIZE, spp: int = SPP, seed: int = 0) -> Image.Image:
-    """A material in the preview scene, denoised and tone-mapped; a square of ``size`` pixels."""
+    """Return a material in the preview scene, denoised and tone-mapped; a square of ``size`` pixels."""
     scene = preview_scene(bsdf)
-    # The denoiser expects pixels that do not share samples, and this sampler takes powers of 4.
+    # The denoiser expects pixels that do not share samples; this sampler takes powers of 4.
     scene["sensor"]["film"] |= {"width": size, "height": size, "rfilter": {"type": "box"}}
     scene["sensor"]["sampler"] = {"type": "ldsampler", "sample_count": power_of_4(spp)}
     image = np.array(mi.render(mi.load_dict(scene), seed=seed))
@@ -100,12 +100,12 @@ def picture(bsdf: dict, size: int = SIZE, spp: int = SPP, seed: int = 0) -> Imag
 
 
 def power_of_4(spp: int) -> int:
-    """The next one that is not smaller, and at least 4, as the sampler asks."""
+    """Return the smallest power of 4 that is at least ``spp`` and at least 4, as the sampler requires."""
     return 4 ** max(((spp - 1).bit_length() + 1) // 2, 1)
 
 
 def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
-    """Models with their names and years, in rows of the same length but for the last."""
+    """Return an image of models with their names and years, in rows of the same length except for the last."""
     rows, lines = [], -(-len(portraits) // PER_ROW)
     length = -(-len(portraits) // lines)
     for first in range(0, len(portraits), length):
@@ -115,13 +115,13 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
 
 
 def year(model: type[Model]) -> str:
-    """When a model was published: the first year on its manual page, if there is one."""
+    """Return a model's year of publication: the first year on its manual page, if there is one."""
     found = re.search(r"\b(1[789]|20)\d\d\b", model.__doc__)
     return found[0] if found else ""
 
 
 class Entry:
-    """A model with the plugin dicts to be shown, the example and then the sweeps, and pictures of the first of them."""
+    """A model with the plugin dicts to show, its example and then its sweeps, and the pictures finished so far."""
 
     def __init__(self, model: type[Model]):
         self.model, self.type = model, model.plugins[0]
@@ -130,7 +130,7 @@ class Entry:
         self.pictures: list[Image.Image] = []
 
     def rows(self) -> list[Row]:
-        """A row for each sweep, as far as there are pictures."""
+        """Return a row for each sweep, as far as there are pictures."""
         pictures = iter(self.pictures[1:])
         rows = []
         for sweep in self.sweeps:
@@ -139,7 +139,7 @@ class Entry:
         return [row for row in rows if row.pictures]
 
     def write(self, folder: Path) -> None:
-        """Write the contact sheet, if there is something on it."""
+        """Write the contact sheet unless it is empty."""
         if rows := self.rows():
             _save(sheet(rows), folder / f"{self.type}.png")
 

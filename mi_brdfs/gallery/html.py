@@ -1,4 +1,4 @@
-"""The gallery as a page of HTML beside its pictures."""
+"""The gallery as an HTML page beside its pictures."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Section(NamedTuple):
 
 
 def page(sections: list[Section], quality: str) -> str:
-    """The page, as text; ``quality`` says how the pictures were made."""
+    """Return the page as text; ``quality`` says how the pictures were made."""
     links = "\n".join(f'<a href="#{name}">{name}</a>' for name in (section.model.plugins[0] for section in sections))
     parts = "\n".join(map(_section, sections))
     return f"""<!doctype html>
@@ -75,7 +75,7 @@ def _section(section: Section) -> str:
 <h2>{name} <span>{section.year}{also}</span></h2>
 <p>{_code(section.model.summary())}</p>
 {image}
-<p>The picture in the overview is</p>
+<p>The picture in the overview shows</p>
 <pre>{escape(str(section.example))}</pre>
 <details><summary>Reference</summary>
 <pre>{escape(section.model.manual())}</pre>
@@ -84,5 +84,5 @@ def _section(section: Section) -> str:
 
 
 def _code(text: str) -> str:
-    """HTML of a text that has reStructuredText's marks of code."""
+    """Return the HTML of a text with reStructuredText literals."""
     return "".join(f"<code>{escape(p)}</code>" if k % 2 else escape(p) for k, p in enumerate(text.split("``")))

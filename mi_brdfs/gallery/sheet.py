@@ -14,14 +14,14 @@ class Row(NamedTuple):
     """Pictures of the same size, side by side."""
 
     heading: str
-    """Above them; may be empty."""
+    """The heading above them; may be empty."""
     pictures: list[Image.Image]
     captions: list[str]
-    """One below each picture; a second line is fainter."""
+    """A caption below each picture; its second line is fainter."""
 
 
 def sheet(rows: list[Row]) -> Image.Image:
-    """The rows below each other. Columns are as wide as the pictures, or as captions need."""
+    """Return the rows as one image. Columns are as wide as the pictures, or as the captions need."""
     size = rows[0].pictures[0].width
     font = ImageFont.load_default(max(11, size // 11))
     line = sum(font.getmetrics())

@@ -1,4 +1,4 @@
-"""Which parameters the gallery shows of each model, at which values. The first sweep of a model is its main one."""
+"""The parameters and values that the gallery shows of each model. The first sweep of a model is its main one."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from ..parameters import Choice, Number, Parameter, Reflectance
 
 @dataclass(frozen=True)
 class Sweep:
-    """A parameter at several values, with the others as ``given``. Several parameters, separated by commas, have the
-    same value each."""
+    """A parameter at several values, with the others as ``given``. Several parameters, separated by commas, share each
+    value."""
 
     parameter: str
     values: tuple
     given: dict[str, Any]
 
     def bsdfs(self, type: str) -> list[dict]:
-        """The plugin dicts."""
+        """Return the plugin dicts."""
         names = self.parameter.split(", ")
         return [{"type": type, **self.given, **dict.fromkeys(names, value)} for value in self.values]
 
     def heading(self, type: str) -> str:
-        """The model, the parameter, and what is given."""
+        """Return the heading: the model, the parameter, and what is given."""
         given = ", ".join(f"{name} = {shown(value)}" for name, value in self.given.items())
         return f"{type}: {self.parameter}" + (f", with {given}" if given else "")
 
 
 def shown(value) -> str:
-    """A value as a label has it."""
+    """Return a value as a label."""
     if isinstance(value, dict):
         return "(" + ", ".join(f"{channel:g}" for channel in value["value"]) + ")"
     return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
@@ -163,9 +163,9 @@ SWEEPS: dict[str, list[Sweep]] = {
 
 
 def sweeps_of(model: type[Model]) -> list[Sweep]:
-    """The sweeps that show a model: those above, or of a model that is not among them, each number over its range (or
-    about its default, if that has orders of magnitude) and each choice, with what else the example on its manual page
-    gives. If it has neither, its reflectances take their place."""
+    """Return the sweeps that show a model: those above or, for other models, each number over its range (or about its
+    default, if the range spans orders of magnitude) and each choice, with the other parameters as in the example on the
+    manual page. A model with neither sweeps its reflectances."""
     name = model.plugins[0]
     if is_own(model) and name in SWEEPS:
         return SWEEPS[name]
@@ -180,7 +180,7 @@ def sweeps_of(model: type[Model]) -> list[Sweep]:
 
 
 def _values(parameter: Parameter) -> tuple:
-    """What to show of a parameter; nothing of one that may be missing, or of another kind."""
+    """Return the values to show of a parameter; none if it is optional, or of another kind."""
     if isinstance(parameter, Choice):
         return parameter.choices
     if not isinstance(parameter, Number | Reflectance) or parameter.default is None:

@@ -1,4 +1,4 @@
-"""What the words of the command line ask for: ``mi-brdfs plot ward --param alpha=0.1,0.2,0.4``."""
+"""The arguments of the command line: ``mi-brdfs plot ward --param alpha=0.1,0.2,0.4``."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from ..parameters.messages import listed
 from . import albedo, cartesian, hemisphere, polar, sphere
 
 KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo, sphere)}
-"""The functions by the name that ``--kind`` takes."""
+"""The functions by the value of ``--kind``."""
 PICTURES, PAGES = (".png", ".svg", ".pdf", ".jpg"), (".html",)
 DPI = 200
 
 
 def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | dict]:
-    """The BSDFs that words and ``--param`` options stand for: each word, as a plugin dict for each of the values of a
+    """Return the BSDFs that words and ``--param`` options stand for: each word, as a plugin dict for each value of a
     swept parameter.
 
     Raises:
-        ValueError: for an option that is malformed or fits no word.
+        ValueError: if an option is malformed or fits no word.
     """
     values: dict[str, list[Any]] = {}
     for option in parameters:
         name, _, given = option.partition("=")
         if not name or not given or "" in given.split(","):
-            raise ValueError(f"--param {option}: write name=value, or name=a,b,c to draw each of several values")
+            raise ValueError(f"--param {option}: write name=value, or name=a,b,c to draw each value")
         if name in values:
-            raise ValueError(f"--param {name} is given twice; write {name}=a,b,c to draw each of several values")
+            raise ValueError(f"--param {name} is given twice; write {name}=a,b,c to draw each value")
         values[name] = [_value(text) for text in given.split(",")]
     sweeps = [name for name, choices in values.items() if len(choices) > 1]
     if len(sweeps) > 1:
@@ -39,9 +39,7 @@ def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | d
         return list(targets)
     for word in targets:
         if word.startswith("<") or word.endswith(".xml"):
-            raise ValueError(
-                f"--param sets parameters of plugins that are given by type; those of {word} are in its XML"
-            )
+            raise ValueError(f"--param sets parameters of plugins given by type; those of {word} are in its XML")
     dicts: list[str | dict] = []
     for word in targets:
         fixed = {"type": word} | {name: choices[0] for name, choices in values.items()}
@@ -50,15 +48,15 @@ def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | d
 
 
 def options_of(kind: str, angles: str | None, azimuth: float | None, scale: str | None) -> dict[str, Any]:
-    """The arguments that a kind of figure gets from the options that were given.
+    """Return the arguments of a kind of figure from the options given.
 
     Raises:
-        ValueError: for one that it does not take.
+        ValueError: if it does not take one of them.
     """
     try:
         numbers = None if angles is None else [float(text) for text in angles.split(",")]
     except ValueError:
-        raise ValueError(f"--angles {angles}: write degrees, as 10,40,70") from None
+        raise ValueError(f"--angles {angles}: write degrees, such as 10,40,70") from None
     options: dict[str, Any] = {"angles": numbers, "azimuth": azimuth, "scale": scale}
     taken = inspect.signature(KINDS[kind]).parameters
     if numbers and "angle" in taken:
@@ -68,12 +66,12 @@ def options_of(kind: str, angles: str | None, azimuth: float | None, scale: str 
     options = {name: value for name, value in options.items() if value is not None}
     for name in options:
         if name not in taken:
-            raise ValueError(f"--{name} says nothing about {kind}")
+            raise ValueError(f"--{name} does not apply to {kind}")
     return options
 
 
 def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
-    """The file to write, by default one here that is named after what it shows.
+    """Return the file to write, by default one in the working directory, named after its content.
 
     Raises:
         ValueError: if this kind of figure cannot be written in the format of the name.
@@ -88,7 +86,7 @@ def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
 
 
 def write(figure, path: Path) -> None:
-    """Write a figure; one of Plotly as a page that needs no network."""
+    """Write a figure; a Plotly figure as a page that needs no network."""
     if path.suffix.lower() in PAGES:
         figure.write_html(path, include_plotlyjs=True)
     else:
@@ -96,7 +94,7 @@ def write(figure, path: Path) -> None:
 
 
 def _value(text: str) -> Any:
-    """A number, true or false, a colour as #rrggbb (sRGB) or r;g;b (linear), or else a word."""
+    """Return a number, true or false, a colour given as #rrggbb (sRGB) or r;g;b (linear), or else a word."""
     if text in ("true", "false"):
         return text == "true"
     for number in (int, float):

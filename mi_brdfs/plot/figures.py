@@ -1,4 +1,4 @@
-"""Figures of Matplotlib."""
+"""Matplotlib figures."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ try:
 except ImportError:
     raise ImportError("plots need Matplotlib: pip install 'mi_brdfs[plot]'") from None
 
-# Okabe and Ito's colours, which the colour-blind tell apart, without the yellow that is too pale for lines.
+# Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow, too pale for lines.
 COLOURS = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"
-# Styles too, so that curves that coincide are both seen; as many as have no common factor with the colours.
+# Styles too, so that coinciding curves are both visible; their number is coprime to that of the colours.
 STYLES = "-", (0, (4, 2)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5))
 INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
 TEXT, SMALL = 9, 8
 LETTERS = 12
-"""About as many of them go into an inch."""
+"""The approximate number of letters per inch."""
 WIDTH = 8
 DOTTED = 0, (1, 2)
 QUANTITY = r"$f\,\cos\theta_o$"
-# Hollow, so that a narrow lobe can be seen inside.
+# Hollow, so that a narrow lobe is visible inside.
 RING = {"marker": "o", "fillstyle": "none", "markersize": 7, "markeredgewidth": 1.2}
 DIAMOND = RING | {"marker": "D"}
 
@@ -50,28 +50,28 @@ def polar(
     scale: str = "both",
     labels: Sequence[str] | None = None,
 ) -> Figure:
-    """The lobes in the plane of incidence, as the radius over the angle to the normal, which points up.
+    """Draw the lobes in the plane of incidence, as the radius over the angle to the normal, which points up.
 
     The radius is the luminance of f cosθ_o. wi is an arrow, on the left; dotted lines are the mirror directions. One
-    BSDF has one panel, with a colour for each angle; several have a row for each angle, and a colour each. Below the
-    surface is what is transmitted, if something is. Delta functions are left out.
+    BSDF gets one panel, with a colour for each angle; several get a row for each angle, and a colour each.
+    Transmission, if any, is below the surface. Delta functions are left out.
 
     Args:
-        bsdfs: plugin names, plugin dicts, loaded BSDFs of the active variant, XML texts, or the paths of XML files,
-            whose materials count once each.
+        bsdfs: plugin names, plugin dicts, loaded BSDFs of the active variant, XML texts, or paths of XML files, each of
+            whose materials counts once.
         angles: of incidence, in degrees, in [0, 90).
         azimuth: of incidence, in degrees from dp_du.
         scale: of the radius, "linear", "log" or "both" side by side.
-        labels: the names in the legend. By default the type of a dict with the parameters that tell it from the
-            others, and the id or class of a loaded BSDF.
+        labels: the names in the legend. By default the type of a dict with the parameters that distinguish it, and the
+            id or class of a loaded BSDF.
 
     Returns:
-        A figure that notebooks show, and that pyplot does not know: ``figure.savefig(path)`` writes it.
+        A figure that notebooks show and pyplot does not manage: ``figure.savefig(path)`` writes it.
 
     Raises:
-        ValueError: for what is not a BSDF or has delta functions only, wrong angles or scales, or a scalar or polarized
-            variant.
-        Exception: what Mitsuba raises where a BSDF cannot be loaded.
+        ValueError: if something is not a BSDF or has delta functions only, if angles or scale are wrong, or if the
+            variant is scalar or polarized.
+        Exception: whatever Mitsuba raises if a BSDF cannot be loaded.
     """
     return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, azimuth, scale, labels)
 
@@ -83,9 +83,8 @@ def cartesian(
     scale: str = "both",
     labels: Sequence[str] | None = None,
 ) -> Figure:
-    """The luminance of f cosθ_o in the plane of incidence over the signed angle θ_o, which is negative on the side of
-    wi; beyond ±90° lies what is transmitted. Dotted lines are the mirror directions. Everything else is as in
-    :func:`polar`."""
+    """Draw the luminance of f cosθ_o in the plane of incidence over the signed angle θ_o, negative on the side of wi;
+    transmission lies beyond ±90°. Dotted lines are the mirror directions. Everything else is as in :func:`polar`."""
     return _planar(_draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels)
 
 
@@ -96,12 +95,12 @@ def hemisphere(
     labels: Sequence[str] | None = None,
     resolution: int = 320,
 ) -> Figure:
-    """The luminance of f cosθ_o for all wo, in false colours on a logarithmic scale of at most five decades.
+    """Draw the luminance of f cosθ_o for all wo, in false colours on a logarithmic scale of at most five decades.
 
     The distance from the middle of a disc is the angle θ_o. wi, a ring, is on the left at any azimuth; the mirror
-    direction, a diamond, on the right. There is a column for each angle of incidence and a row for each BSDF, and one
-    more for what it transmits. A pixel is the mean over it, so that a lobe that is narrower is as bright as it is in
-    total. ``resolution`` is the number of pixels across a disc; everything else is as in :func:`polar`.
+    direction, a diamond, on the right. There is a column for each angle of incidence and a row for each BSDF, and
+    another for its transmission. Each pixel is the mean over its area, so that narrower lobes keep their total
+    brightness. ``resolution`` is the number of pixels across a disc; everything else is as in :func:`polar`.
     """
     check_angles(angles)
     found = with_smooth_part(named(bsdfs, labels))
@@ -138,9 +137,9 @@ def albedo(
     azimuth: float = 0,
     labels: Sequence[str] | None = None,
 ) -> Figure:
-    """The directional albedo over the angle of incidence: what is reflected and transmitted in all, delta functions
-    included, in luminance. It is the mean weight of 8192 samples of the BSDF's own sampler, the same at each angle.
-    Everything else is as in :func:`polar`."""
+    """Draw the directional albedo over the angle of incidence: the luminance of all reflected and transmitted light,
+    delta functions included. It is the mean weight of 8192 samples of the BSDF's own sampler, with the same variates at
+    each angle. Everything else is as in :func:`polar`."""
     found = named(bsdfs, labels)
     figure = _figure(6, 3.8)
     ax = figure.subplots()
@@ -171,8 +170,8 @@ class LabelledCurve(NamedTuple):
 
 
 def _planar(draw: Callable, heights: tuple[float, float], bsdfs, angles, azimuth, scale, labels) -> Figure:
-    """A row of panels for the BSDF or for each angle, and a column for each scale. ``heights`` are those of a panel of
-    width 1, without transmission and with it."""
+    """Draw a row of panels for the BSDF or for each angle, and a column for each scale. ``heights`` are those of a
+    panel of width 1, without and with transmission."""
     check_angles(angles)
     scales = scales_of(scale)
     found = with_smooth_part(named(bsdfs, labels))
@@ -243,7 +242,7 @@ def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool) ->
 
 
 def _at(theta, radius) -> tuple[np.ndarray, np.ndarray]:
-    """The point at an angle to the vertical, in degrees, and a distance."""
+    """Return the point at an angle to the vertical, in degrees, and a distance."""
     return radius * np.sin(np.radians(theta)), radius * np.cos(np.radians(theta))
 
 
@@ -266,7 +265,7 @@ def _draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool
 
 
 def _shade(line: LabelledCurve, lines: list[LabelledCurve]) -> str:
-    """The colour of what belongs to an angle of incidence: the curve's, unless all curves share the angle."""
+    """Return the colour of the marks of an angle of incidence: the curve's, unless all curves share the angle."""
     return FAINT if all(line.theta_i == other.theta_i for other in lines) else line.look["color"]
 
 
@@ -309,7 +308,7 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def _calm(ax: Axes) -> None:
-    """Thin, grey and small what is not data."""
+    """Make everything except the data thin, grey and small."""
     ax.set_axisbelow(True)
     ax.grid(color=GRID, linewidth=0.6)
     ax.tick_params(which="both", labelsize=SMALL, labelcolor=INK, color=FAINT, length=0)
@@ -332,7 +331,7 @@ def _legend(figure: Figure, handles: list, labels: list[str]) -> None:
 
 
 def _look(k: int) -> dict[str, Any]:
-    """The colour and style of the k-th curve."""
+    """Return the colour and style of the k-th curve."""
     return {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[k % len(STYLES)], "linewidth": 1.6}
 
 

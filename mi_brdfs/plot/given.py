@@ -1,4 +1,4 @@
-"""The BSDFs that a figure is asked for, and what it calls them."""
+"""The BSDFs that a figure shows, and their labels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
     """Return the BSDFs loaded, with the labels given or found.
 
     Raises:
-        ValueError: if there are none, one is no BSDF, or the active variant cannot evaluate arrays of directions.
+        ValueError: if there are none, one is not a BSDF, or the active variant cannot evaluate arrays of directions.
     """
     if not is_measurable(mi.variant()):
         raise ValueError(
@@ -34,19 +34,19 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
             'mi.set_variant("llvm_ad_rgb") first'
         )
     if not bsdfs:
-        raise ValueError('there is no BSDF to plot; give one, as {"type": "ward"}')
+        raise ValueError('there is no BSDF to plot; give one, such as {"type": "ward"}')
     own = _labels_of_dicts(bsdfs)
     found = [pair for given in bsdfs for pair in _loaded(given, own)]
     if labels is not None:
         if len(labels) != len(found):
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
         found = [(label, bsdf) for label, (_, bsdf) in zip(labels, found, strict=True)]
-    # Legends leave out what begins with an underscore.
+    # Legends leave out labels that begin with an underscore.
     return [Named(label.lstrip("_"), BSDFProbe(bsdf)) for label, bsdf in found]
 
 
 def check_angles(angles: Sequence[float]) -> None:
-    """Raise a ValueError unless these are angles of incidence, in degrees."""
+    """Raise ValueError unless these are angles of incidence, in degrees."""
     if not len(angles):
         raise ValueError("there is no angle of incidence; give one or more, in degrees")
     for angle in angles:
@@ -55,14 +55,14 @@ def check_angles(angles: Sequence[float]) -> None:
 
 
 def scales_of(scale: str) -> tuple[str, ...]:
-    """Return the scales that are drawn: linear, log, or both."""
+    """Return the scales to draw: linear, log, or both."""
     if scale not in SCALES:
         raise ValueError(f"there is no scale {scale!r}; there are {', '.join(SCALES)}")
     return SCALES[scale]
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:
-    """Return the same, if each has more than delta functions, and with a label that says so if it has them, too.
+    """Return the BSDFs, with a label that mentions delta lobes left out, if any.
 
     Raises:
         ValueError: if one has delta functions only.
@@ -74,7 +74,7 @@ def with_smooth_part(found: list[Named]) -> list[Named]:
 
 
 def quantity(name: str) -> str:
-    """Return the label of what is plotted, which says what becomes of colours."""
+    """Return the label of the quantity plotted, with how colours are reduced to it."""
     return name + (", luminance" if mi.is_rgb else ", mean of the spectrum" if mi.is_spectral else "")
 
 
@@ -92,7 +92,7 @@ def _loaded(given, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
 
 
 def _labels_of_dicts(bsdfs) -> dict[int, str]:
-    """Return a label for each dict, by its identity: the type, and the parameters that the others of this type do not
+    """Return a label for each dict, by its identity: the type, and the parameters that not all dicts of this type
     share. The only one of its type shows them all."""
     told = [
         (given, {name: _shown(value) for name, value in given.items() if name != "type"})

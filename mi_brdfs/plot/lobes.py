@@ -1,8 +1,8 @@
-"""What the figures show, as numbers: curves in the plane of incidence, maps of the hemisphere, meshes of the sphere.
+"""The figures' data: curves in the plane of incidence, maps of the hemisphere, meshes of the sphere.
 
 Angles are in degrees. In the plane of incidence θ is signed: 0 is the normal, wi is at -θ_i and its mirror image at
-θ_i; beyond ±90 lies what is transmitted. Values are the luminance of f |cosθ_o|, as ``eval`` returns it. Where it is
-narrow, it is known from directions that the sampler draws: no lobe is too narrow to be found.
+θ_i; transmission lies beyond ±90. Values are the luminance of f |cosθ_o|, as ``eval`` returns it. Directions drawn by
+the sampler locate narrow lobes: none is too narrow to be found.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ..measure.probe import BSDFProbe, Part
 from ..measure.variates import lattice, random
 
 GRAZING = 89.99
-"""The last angle above the horizon that is drawn."""
+"""The last angle drawn above the horizon."""
 MOST_POINTS = 20_000
 
 
 class Curve(NamedTuple):
-    """Values over the signed angle, in its order."""
+    """Values over the signed angle, in increasing order."""
 
     theta: Array
     value: Array
@@ -39,7 +39,7 @@ class Mesh(NamedTuple):
 
 
 def transmits(probe: BSDFProbe) -> bool:
-    """Return whether a part that is no delta function sends light through."""
+    """Return whether a part that is not a delta function transmits light."""
     return probe.whole.has(mi.BSDFFlags.Transmission)
 
 
@@ -54,26 +54,26 @@ def value(probe: BSDFProbe, wi: Array, wo: Array) -> Array:
 
 
 def drawn(probe: BSDFProbe, wi: Array, count: int) -> Array:
-    """Return directions as the sampler draws them, those of black samples left out, shape (at most count, 3)."""
+    """Return directions drawn by the sampler, without those of black samples, shape (at most count, 3)."""
     samples = probe.sample(probe.whole, wi, random(count, 1))
     return samples.wo[samples.lit]
 
 
 def largest(values: Iterable[Array]) -> float:
-    """Return the largest of the finite values in some arrays, or 1 if none is above 0."""
+    """Return the largest finite value in some arrays, or 1 if none is above 0."""
     found = max(float(np.max(each, where=np.isfinite(each), initial=0)) for each in values)
     return found if found > 0 else 1.0
 
 
 def decades(values: Iterable[Array], peak: float) -> tuple[int, float]:
-    """Return the decade where a logarithmic scale begins, and the logarithm of its largest value: it shows nine tenths
-    of what is not black in each of some arrays, but at least two decades and at most six."""
+    """Return the decade where a logarithmic scale begins, and the logarithm of its largest value. The scale shows nine
+    tenths of the values above 0 in each array, but at least two decades and at most six."""
     high = float(np.log10(peak))
     return int(np.floor(np.clip(np.log10(dim(values)), high - 6, high - 2))), high
 
 
 def dim(values: Iterable[Array]) -> float:
-    """Return what nine tenths of the positive values are above, in that of some arrays where it is least."""
+    """Return the least tenth percentile of the positive values of some arrays."""
     return min((np.quantile(each[each > 0], 0.1) for each in values if (each > 0).any()), default=1.0)
 
 
@@ -81,8 +81,8 @@ def dim(values: Iterable[Array]) -> float:
 
 
 def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float) -> Curve:
-    """Return the lobe in the plane of incidence, in both half-spaces if the BSDF transmits: finest where it bends most,
-    so that straight lines between its points stay within 0.2 % of the peak and 2 % of the value."""
+    """Return the lobe in the plane of incidence, in both half-spaces if the BSDF transmits, with the finest steps where
+    it bends most: straight lines between its points stay within 0.2 % of the peak and 2 % of the value."""
     wi = direction(theta_i, azimuth)
     wo = drawn(probe, wi, 4096)
     along = -(wo[:, 0] * np.cos(np.radians(azimuth)) + wo[:, 1] * np.sin(np.radians(azimuth)))
@@ -101,7 +101,7 @@ def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float) -> C
 
 
 def _refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
-    """Return a curve through points at these angles, and between them wherever it leaves the chord."""
+    """Return a curve through points at these angles, and between them wherever it departs from the chord."""
     points, values = [theta], [evaluate(theta)]
     left, right = (theta[:-1], values[0][:-1]), (theta[1:], values[0][1:])
     while len(left[0]) and sum(map(len, points)) < MOST_POINTS:
@@ -125,16 +125,17 @@ def _refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
 
 
 def albedo(probe: BSDFProbe, azimuth: float) -> Curve:
-    """Return the part of the light that is reflected or transmitted over the angle of incidence; delta functions count.
+    """Return the fraction of light reflected or transmitted over the angle of incidence, delta functions included.
 
-    It is the mean weight of samples of the BSDF's own sampler, the same at each angle, so that the curve is smooth.
+    It is the mean weight of samples of the BSDF's own sampler, with the same variates at each angle, so that the curve
+    is smooth.
     """
     theta = np.concatenate([np.arange(0, 87, 3), [87, 88, 88.5, 89, 89.5, 89.9]])
     points = lattice(9, 5)
     part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
     samples = probe.sample(part, wi, np.tile(points, (len(theta), 1)))
-    weight = luminance(samples.weight) * samples.eta**2  # radiance is compressed where it is refracted, energy is not
+    weight = luminance(samples.weight) * samples.eta**2  # refraction compresses radiance, but not energy
     return Curve(theta, weight.reshape(len(theta), -1).mean(axis=1))
 
 
@@ -144,8 +145,8 @@ def albedo(probe: BSDFProbe, azimuth: float) -> Curve:
 def disc(probe: BSDFProbe, theta_i: float, azimuth: float, side: int, resolution: int) -> Array:
     """Return a picture of the hemisphere above (1) or below (-1), in rows from the bottom, each pixel the mean over it.
 
-    It is the disc of :func:`~mi_brdfs.measure.directions.to_plane` with wi on the left; what lies outside of it is as
-    its rim. Pixels in which many samples fall are divided more finely.
+    It is the disc of :func:`~mi_brdfs.measure.directions.to_plane` with wi on the left; pixels outside repeat its rim.
+    Pixels with many samples are divided more finely.
     """
     wi, n = direction(theta_i, azimuth), resolution
     axis = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
@@ -167,7 +168,8 @@ def disc(probe: BSDFProbe, theta_i: float, azimuth: float, side: int, resolution
 
 def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int) -> list[Mesh]:
     """Return the lobe over all directions, one mesh for each half-space into which it reflects or transmits. Their
-    lines are ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws."""
+    lines are ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws
+    directions."""
     wi = direction(theta_i, azimuth)
     wo = drawn(probe, wi, 4096)
     found = []

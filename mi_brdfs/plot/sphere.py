@@ -1,4 +1,4 @@
-"""The figure of Plotly."""
+"""The Plotly figure."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ def sphere(
     resolution: int = 60,
     samples: int = 400,
 ) -> Figure:
-    """The lobe as a body to turn with the mouse: the radius is the luminance of f cosθ_o, or its logarithm.
+    """Draw the lobe as a body to turn with the mouse: the radius is the luminance of f cosθ_o, or its logarithm.
 
-    Points are directions that the BSDF's sampler draws; the line with a ball at its end is wi, the dotted one the
-    mirror direction, the circle the surface. With the scale "both" buttons change between the two.
+    Points are directions drawn by the BSDF's sampler; the line with a ball at its end is wi, the dotted line the mirror
+    direction, the circle the surface. With the scale "both", buttons switch between the two.
 
     Args:
         angle: of incidence, in degrees, in [0, 90).
-        resolution: the number of parallels from the normal to the horizon; there are more where the lobe is narrow.
-        samples: how many directions are drawn.
+        resolution: the number of parallels from the normal to the horizon; more where the lobe is narrow.
+        samples: the number of directions drawn.
 
-    Everything else is as in :func:`polar`. ``figure.write_html(path)`` writes a page that needs nothing else.
+    Everything else is as in :func:`polar`. ``figure.write_html(path)`` writes a self-contained page.
 
     Raises:
         ImportError: without Plotly.
@@ -52,7 +52,7 @@ def sphere(
     wi = direction(angle, azimuth)
     bodies = [lobes.meshes(it.probe, angle, azimuth, resolution) for it in found]
     drawn = [lobes.drawn(it.probe, wi, samples) for it in found]
-    # A little outside of the body, which would hide half of each.
+    # A little outside the body, which would hide half of each.
     points = [lobes.Mesh(1.005 * wo, lobes.value(it.probe, wi, wo)) for it, wo in zip(found, drawn, strict=True)]
     values = [mesh.value for body in bodies for mesh in body]
     peak = lobes.largest(values)
@@ -92,7 +92,7 @@ def sphere(
 
 
 def _at(mesh: lobes.Mesh, low: int | None) -> dict[str, np.ndarray]:
-    """The coordinates at which values are drawn; ``low`` is the decade in the middle of a logarithmic radius."""
+    """Return the coordinates of values; ``low`` is the decade in the middle of a logarithmic radius."""
     with np.errstate(divide="ignore", invalid="ignore"):
         radius = mesh.value if low is None else np.maximum(np.log10(mesh.value) - low, 0)
     x, y, z = np.moveaxis((mesh.wo * radius[..., None]).astype(np.float32), -1, 0)
@@ -100,7 +100,7 @@ def _at(mesh: lobes.Mesh, low: int | None) -> dict[str, np.ndarray]:
 
 
 def _lines(wi: np.ndarray, reach: float) -> list[dict[str, Any]]:
-    """wi, its mirror image and the surface."""
+    """Return the traces of wi, its mirror image and the surface."""
     turn = np.linspace(0, 2 * np.pi, 181)
     circle = 0.7 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
     lines = []
@@ -116,6 +116,6 @@ def _lines(wi: np.ndarray, reach: float) -> list[dict[str, Any]]:
 
 
 def _eye(azimuth: float) -> dict[str, float]:
-    """The place of a camera that sees wi on the left."""
+    """Return the position of a camera that sees wi on the left."""
     x, y = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
     return {"x": -1.5 * y, "y": 1.5 * x, "z": 0.7}
