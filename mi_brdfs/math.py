@@ -25,15 +25,15 @@ SMALL = 1e-9
 
 
 def select(mask, a, b):
-    """``dr.select``, without the time that it takes with vectors where the mask is a bool, as in scalar variants."""
+    """Return ``dr.select``, without its cost for vectors if the mask is a bool, as in scalar variants."""
     if isinstance(mask, bool):
         return a if mask else b
     return dr.select(mask, a, b)
 
 
 def clamp(x, low: float, high: float):
-    """x limited to [low, high]. Unlike that of ``dr.clip``, its derivative keeps an optimised parameter from being
-    stuck: at a limit it is one, and a gradient descent from beyond a limit is led back.
+    """Return x limited to [low, high]. Unlike that of ``dr.clip``, its derivative keeps an optimised parameter from
+    getting stuck: at a limit it is one, and from beyond a limit gradient descent is led back.
 
     Backward derivatives beyond a limit pass if a step against them leads back, and vanish if it leads further out.
     Forward ones, which do not know where a loss falls, are those at the limit.
@@ -65,62 +65,62 @@ class _Clamp(dr.CustomOp):
 
 
 def square(x):
-    """x² of a parameter from 0 on. Its derivative at exactly 0, which is 0, is replaced by that at 0.03: else an
-    optimisation that a step too long has led to that limit would stay there."""
+    """Return x² of a parameter limited to x >= 0. Its derivative at exactly 0, which is 0, is replaced by that at 0.03:
+    otherwise an optimisation that reaches this limit by a long step would stay there."""
     if dr.is_diff_v(x) and dr.grad_enabled(x):
         return dr.replace_grad(dr.square(x), 2 * dr.select(x == 0, 0.03, dr.detach(x)) * x)
     return dr.square(x)
 
 
 def log1p(x):
-    """log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
+    """Return log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
     small = abs(x) < 0.5
     near = dr.select(small, x, 0)
     return dr.select(small, near * _log1p_series(near), dr.log(dr.select(small, 1, 1 + x)))
 
 
 def expm1(x):
-    """exp(x) - 1, accurate to a few ulp."""
+    """Return exp(x) - 1, accurate to a few ulp."""
     small = abs(x) < 0.5
     near = dr.select(small, x, 0)
     return dr.select(small, near * _expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
 
 
 def log1p_ratio(x):
-    """log(1 + x)/x, and its limit 1 at x = 0."""
+    """Return log(1 + x)/x, and its limit 1 at x = 0."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
     return dr.select(small, _log1p_series(near), dr.log(1 + far) / far)
 
 
 def expm1_ratio(x, shift=0, scale=1):
-    """(exp(x) - 1)/x, and its limit 1 at x = 0, times ``scale`` = exp(-``shift``)."""
+    """Return (exp(x) - 1)/x, and its limit 1 at x = 0, times ``scale`` = exp(-``shift``)."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
     return dr.select(small, _expm1_series(near) * scale, (dr.exp(far - shift) - scale) / far)
 
 
 def _log1p_series(x):
-    """log(1 + x)/x for |x| <= 0.5: log(1 + x) = 2 atanh(y) with |y| <= 1/3, so the next term is below 1e-8."""
+    """Return log(1 + x)/x for |x| <= 0.5: log(1 + x) = 2 atanh(y) with |y| <= 1/3, so the next term is below 1e-8."""
     half = 1 / (2 + x)
     y2 = dr.square(x * half)
     return 2 * half * (1 + y2 * (1 / 3 + y2 * (1 / 5 + y2 * (1 / 7 + y2 * (1 / 9 + y2 * (1 / 11 + y2 / 13))))))
 
 
 def _expm1_series(x):
-    """(exp(x) - 1)/x for |x| <= 0.5; the next term is below 1e-8."""
+    """Return (exp(x) - 1)/x for |x| <= 0.5; the next term is below 1e-8."""
     return 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8))))))
 
 
 def log_cos(cos, sin2):
-    """log(cosθ), from sin²θ where the cosine has lost its digits."""
+    """Return log(cosθ), from sin²θ where the cosine has lost its digits."""
     near = sin2 < 0.5
     x = dr.select(near, -sin2, 0)
     return dr.select(near, 0.5 * x * _log1p_series(x), dr.log(dr.select(near, 1, dr.maximum(cos, TINY))))
 
 
 def safe_sqrt(x):
-    """sqrt(x) with 0 for x <= 0, and derivative 0 there."""
+    """Return sqrt(x), and 0 for x <= 0, with derivative 0 there."""
     positive = x > 0
     return dr.select(positive, dr.sqrt(dr.select(positive, x, 1)), 0)
 
@@ -132,7 +132,7 @@ def sin_theta(w):
 
 
 def normalize_or(x, y, fallback: tuple[float, float]):
-    """The 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
+    """Return the 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
     length2 = x * x + y * y
     valid = length2 > 1e-24  # of which the derivative takes the power -3/2
     scale = dr.rsqrt(dr.select(valid, length2, 1))
@@ -140,8 +140,8 @@ def normalize_or(x, y, fallback: tuple[float, float]):
 
 
 def choose(u, probability):
-    """``(chosen, u')``: whether an event of the given probability happens, decided by the uniform variate ``u``, and
-    the fresh uniform variate that is left of it."""
+    """Return ``(chosen, u')``: whether an event of the given probability happens, decided by the uniform variate ``u``,
+    and a fresh uniform variate rescaled from it."""
     chosen = u < probability
     left = dr.select(chosen, u, u - probability)
     left = left / dr.maximum(dr.select(chosen, probability, 1 - probability), TINY)
@@ -150,13 +150,14 @@ def choose(u, probability):
 
 @functools.cache
 def gauss_legendre(count: int) -> list[tuple[float, float]]:
-    """The nodes and weights of Gauss-Legendre quadrature on [0, 1]."""
+    """Return the nodes and weights of Gauss-Legendre quadrature on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return [(float(0.5 * (1 + x)), float(0.5 * w)) for x, w in zip(nodes, weights, strict=True)]
 
 
 def luminance(colour):
-    """One number for how bright a reflectance is: its luminance in rgb variants, its mean over the wavelengths in the
-    others (with four wavelengths the CIE weight may vanish at all of them, and a zero here would starve a lobe)."""
+    """Return the brightness of a reflectance as one number: its luminance in rgb variants, its mean over the
+    wavelengths in the others (with four wavelengths the CIE weights may all vanish, and a zero here would starve a
+    lobe)."""
     colour = mi.UnpolarizedSpectrum(colour)
     return mi.luminance(colour) if mi.is_rgb else dr.mean(colour)

@@ -90,7 +90,7 @@ def test_a_name_can_be_taken_explicitly():
     [
         (int, TypeError, "register takes a subclass of mi_brdfs.Model, or of a term"),
         (matte(1, __doc__=None), ValueError, "Matte has no docstring: write its manual page there"),
-        (matte(1, plugins=("my matte",)), ValueError, "Matte: 'my matte' cannot be a plugin name; take letters"),
+        (matte(1, plugins=("my matte",)), ValueError, "Matte: 'my matte' cannot be a plugin name; use letters"),
     ],
 )
 def test_what_is_no_model_is_refused(model, error, message):
@@ -120,7 +120,7 @@ def test_a_plugin_of_somebody_else_is_replaced_with_a_warning():
         """
     )
     assert out == "Microfacet\n"
-    assert err.count("UserWarning") == 1 and 'replaces the BSDF "microfacet" that another package' in err
+    assert err.count("UserWarning") == 1 and 'replaces the BSDF "microfacet", registered by another package' in err
 
 
 def test_a_reload_changes_nothing():
@@ -160,7 +160,7 @@ class EntryPoint:
 def test_entry_points_bring_models_and_failures_stay_alone(monkeypatch):
     entries = [EntryPoint("broken", ImportError("No module named 'nowhere'")), EntryPoint("matte", matte(0.3))]
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: entries)
-    with pytest.warns(UserWarning, match="The entry point broken is left out: ImportError: No module named 'nowhere'"):
+    with pytest.warns(UserWarning, match="The entry point broken is skipped: ImportError: No module named 'nowhere'"):
         guests.register_installed()
     assert brightness("matte") == pytest.approx(0.15)
 

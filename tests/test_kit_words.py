@@ -98,8 +98,8 @@ def variation(base, /, **attributes):
 @pytest.mark.parametrize(
     "term, sentence",
     [
-        (variation(Dusk, word=None), "Dusk: word is None; it must be small letters, digits and -"),
-        (variation(Dusk, word="Dusk!"), "Dusk: word is 'Dusk!'; it must be small letters"),
+        (variation(Dusk, word=None), "Dusk: word is None; it must be lower-case letters, digits and -"),
+        (variation(Dusk, word="Dusk!"), "Dusk: word is 'Dusk!'; it must be lower-case letters"),
         (variation(Dusk, word="kelemen"), 'the word "kelemen" belongs to mi_brdfs; take another one'),
         (variation(Steep, parameters={"rotation": Number(1, (0, 2), "")}), "a parameter cannot be called rotation"),
         (variation(Dusk, parameters={"alpha": Number(1, (0, 2), "")}), "a parameter cannot be called alpha"),

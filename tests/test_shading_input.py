@@ -47,7 +47,7 @@ def test_films_without_colours_are_refused():
         band = {"type": "regular", "wavelength_min": 400, "wavelength_max": 700, "values": "0, 1, 0"}
         film = {"type": "specfilm", "width": 2, "height": 2, "band": band}
         sensor = mi.load_dict({"type": "orthographic", "film": film})
-        with pytest.raises(ValueError, match="shading: SpecFilm has no colours to finish; take an hdrfilm"):
+        with pytest.raises(ValueError, match="shading: SpecFilm has no colours to finish; use an hdrfilm"):
             mi.load_dict({"type": "shading"}).render(plate(WHITE, SUN), sensor)
 
 

@@ -60,7 +60,7 @@ def test_the_mirrored_environment_does_not_light_the_lobes_that_mirror_it():
 @pytest.mark.usefixtures("llvm_rgb")
 def test_foreign_bsdfs_are_not_mirrors_and_said_so_once():
     scene = plate({"type": "roughconductor"}, SKY, SUN, environment_reflection=True)
-    with pytest.warns(UserWarning, match="shading: RoughConductor cannot tell a mirror reflectance") as said:
+    with pytest.warns(UserWarning, match="shading: no mirror reflectance is known for RoughConductor") as said:
         shaded(scene, spp=1)
         shaded(scene, spp=1)
     assert len(said) == 1

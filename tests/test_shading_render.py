@@ -321,7 +321,7 @@ def test_instances_are_shaded_like_shapes(name):
 def test_the_warning_about_mirrors_looks_into_shape_groups():
     group = {"type": "shapegroup", "id": "group", "ball": {"type": "sphere", "bsdf": {"type": "roughconductor"}}}
     instance = {"type": "instance", "g": {"type": "ref", "id": "group"}}
-    with pytest.warns(UserWarning, match="shading: RoughConductor cannot tell a mirror reflectance"):
+    with pytest.warns(UserWarning, match="shading: no mirror reflectance is known for RoughConductor"):
         shaded(plate(WHITE, SKY, group, instance, environment_reflection=True), spp=1)
 
 

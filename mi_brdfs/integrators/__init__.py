@@ -1,1 +1,1 @@
-"""The integrators, one a file."""
+"""The integrators, one file each."""

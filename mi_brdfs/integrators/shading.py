@@ -1,4 +1,4 @@
-"""Local illumination, as the shading formulas of the textbooks mean it."""
+"""Local illumination, as in the textbooks' shading formulas."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Radiance(Colour):
     """A colour of light."""
 
     dark: bool
-    """Once bound, whether it is a literal zero."""
+    """Whether the bound value is a literal zero."""
 
     def bind(self, reader: PropertyReader) -> Radiance:
         texture = reader.colour(self.name, self.default, self.limits)
@@ -39,36 +39,37 @@ class Shading(Plugin):
 
         I = k_a I_a + Σ V π f cosθ_o L + ρ_m L_env(r),    summed over the lights
 
-    of what is seen first along a ray: nothing is reflected twice. f is the BRDF of the surface, ours or built-in; L is
-    the light's irradiance at normal incidence, the intensity over the squared distance for a point, and V whether it
-    reaches the surface. Lights that are seen show themselves.
+    at the first surface along a ray: nothing is reflected twice. f is the surface's BRDF, from this pack or built-in; L
+    is the light's irradiance at normal incidence, for a point the intensity over the squared distance, and V its
+    visibility. Lights are visible themselves.
 
     * π belongs to the light: a light of L = 1 straight above makes Lambert's surface as bright as its albedo. So the
       formulas that were never BRDFs come out as printed: ``original`` of ``phong`` and ``blinnphong``, ``none`` of
-      ``minnaert``, ``toon`` and ``wrap`` (whose light from behind wants ``domain`` = sphere, and no shadows). It
-      belongs to every light, so that what they do is π times what ``path`` makes of direct light; with ``pi_folded``
-      = false it is the same.
+      ``minnaert``, ``toon`` and ``wrap`` (whose light from behind needs ``domain`` = sphere, and no shadows). It
+      belongs to every light, so that the result is π times the direct light of ``path``; with ``pi_folded`` = false
+      both are the same.
     * k_a is the diffuse reflectance, π f of the diffuse lobes seen and lit along the normal: the scale ρ or ρd of the
-      formulas above. Built-in BSDFs answer by their own ``eval_diffuse_reflectance``.
-    * ``environment_reflection`` looks up the environment in the mirror direction r, whatever stands in between. ρ_m is
+      formulas above. Built-in BSDFs use their own ``eval_diffuse_reflectance``.
+    * ``environment_reflection`` looks up the environment in the mirror direction r, ignoring objects in between. ρ_m is
       the specular colour times the Fresnel reflectance at r. The environment then lights only the diffuse lobes: the
-      look-up stands for what the others reflect of it. Built-in BSDFs have no ρ_m, nor have ours within them but for
-      ``twosided``: they get no reflection, and a warning tells which.
-    * At the end, ``tonemap`` = reinhard makes x/(1+x) of each channel of a pixel, and ``clamp`` cuts off what is
-      above 1: nothing, then.
+      look-up replaces its reflection by the others. Built-in BSDFs have no ρ_m, nor have ours nested in them, except in
+      ``twosided``: they get no reflection, and a warning names them.
+    * At the end, ``tonemap`` = reinhard maps each channel x of a pixel to x/(1+x), and ``clamp`` cuts off values above
+      1, of which reinhard leaves none.
 
-    Rays go through the centres of the pixels, except that those of an ``irradiancemeter`` spread over it. So where all
-    lights are points, spots or directional, or area lights that shine from their centre (of a rectangle, disk or
-    sphere), a picture in rgb or mono is the same for any seed and number of samples; for smooth edges render larger and
-    scale down. Of other area lights and of environments, each sample draws one point, and spectral variants draw
-    wavelengths. What is finished at the end is the mean of all samples of a pixel, however many passes draw them.
-    Within ``aov`` the rays are that integrator's, and each sample is finished.
+    Rays go through pixel centres, except that those of an ``irradiancemeter`` spread over it. So if all lights are
+    points, spots or directional, or area lights that shine from their centre (rectangles, disks or spheres), a picture
+    in rgb or mono is the same for any seed and number of samples; for smooth edges, render larger and scale down. Each
+    sample draws one point of other area lights and of environments, and spectral variants draw wavelengths. The tone
+    map and the clamp apply to the mean of all samples of a pixel, however many passes draw them. Within ``aov`` the
+    rays are that integrator's, and they apply to each sample.
 
-    Light passes straight through surfaces as far as their BSDFs let it (``null``, ``mask``, ``thindielectric``, and
-    ``blendbsdf`` of them): what is behind is seen, and their shadows are lighter by as much. ``dielectric`` is opaque.
-    Participating media are left out: behind a boundary that is ``null``, space is empty.
+    Light passes straight through surfaces as far as their BSDFs allow (``null``, ``mask``, ``thindielectric``, and
+    ``blendbsdf`` of them): objects behind are visible, and shadows are lighter by as much. ``dielectric`` is opaque.
+    Participating media are ignored: behind a ``null`` boundary, space is empty.
 
-    Differentiable in the parameters of BSDFs and lights and in ``ambient``, by ``mi.render``; not in what moves edges.
+    Differentiable in the parameters of BSDFs and lights and in ``ambient``, by ``mi.render``; not in parameters that
+    move edges.
 
     Example
     -------
@@ -86,15 +87,15 @@ class Shading(Plugin):
     area_lights = Choice(("sample", "centre"), "whether area lights shine from a random point or from their centre")
     environment_reflection = Flag(False, "whether the environment is mirrored")
     clamp = Flag(True, "whether values above 1 are cut off")
-    tonemap = Choice(("none", "reinhard"), "what becomes of a pixel before the clamp")
+    tonemap = Choice(("none", "reinhard"), "tone mapping of a pixel, before the clamp")
 
     def __init__(self, props):
         super().__init__(props)
         self.warned = False
 
     def shade(self, scene, sampler, ray, active):
-        """``(radiance, opacity)`` along a ray: the formula above for what is seen first and for what is seen through
-        it, and how much it all hides of what is behind. An environment leaves nothing behind."""
+        """Return ``(radiance, opacity)`` along a ray: the formula above for the first surface and those seen through
+        it, and how much they hide of what is behind. An environment hides everything."""
         self._check(scene)
         spectrum, veils = mi.UnpolarizedSpectrum, may_pass(scene)
 
@@ -112,13 +113,13 @@ class Shading(Plugin):
         return radiance, mi.Float(1) if scene.environment() is not None else 1 - dr.max(through)
 
     def finish(self, colour):
-        """What becomes of a pixel at the end."""
+        """Return the final colour of a pixel."""
         if self.tonemap == "reinhard":
             colour = colour / (1 + colour)
         return clamp(colour, 0, 1) if self.clamp else colour
 
     def _check(self, scene):
-        """Raise if there is nothing to shade with, and warn once of what is not mirrored."""
+        """Raise if there is nothing to shade with, and warn once about BSDFs without mirror reflectance."""
         if not scene.emitters() and self.parameters["ambient"].dark:
             raise ParameterError("shading: the scene has no light; add an emitter to it, or give ambient.")
         if self.environment_reflection and scene.environment() is None:
@@ -129,18 +130,18 @@ class Shading(Plugin):
             dull = {it.class_name() for it in bsdfs_of(scene) if int(it.flags()) & shiny and not mirrors(it)}
             if dull:
                 warnings.warn(
-                    f"shading: {listed(sorted(dull), 'and')} cannot tell a mirror reflectance, so that "
-                    "environment_reflection leaves what is made of it without.",
+                    f"shading: no mirror reflectance is known for {listed(sorted(dull), 'and')}; "
+                    "environment_reflection has no effect there.",
                     stacklevel=2,
                 )
 
     def _seen(self, scene, sampler, si, hit, active, veils):
-        """The radiance of an intersection, or of the environment: what shines there, and what is reflected."""
+        """Return the radiance of an intersection, or of the environment: emitted and reflected."""
         colour = mi.UnpolarizedSpectrum(0)
         emitter = si.emitter(scene, active)
         if emitter is not None:
             colour += mi.unpolarized_spectrum(emitter.eval(si, active))
-        if hit is not False and scene.shape_types():  # else there is no BSDF to ask
+        if hit is not False and scene.shape_types():  # otherwise there is no BSDF to evaluate
             colour += select(hit, self._reflected(scene, sampler, si, hit, veils), 0)
         return colour
 
@@ -171,7 +172,7 @@ class Shading(Plugin):
         return colour
 
     def _place(self, light, sampler) -> mi.Point2f:
-        """The sample by which a light is asked for its direction."""
+        """Return the sample with which to sample a light's direction."""
         flags = mi.EmitterFlags
         if mi.has_flag(light.flags(), flags.DeltaPosition) or mi.has_flag(light.flags(), flags.DeltaDirection):
             return mi.Point2f(0.5)
@@ -180,29 +181,29 @@ class Shading(Plugin):
             if shape not in CENTRES:
                 raise ParameterError(
                     f'shading: area_lights = "centre" knows {listed(list(CENTRES), "and")}, but a light is a {shape}; '
-                    'replace it, or take area_lights = "sample".'
+                    'replace it, or use area_lights = "sample".'
                 )
             return mi.Point2f(*CENTRES[shape])
         return sampler.next_2d()
 
 
 CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
-"""The sample that stands for the centre of a shape; a sphere samples the cone about it that it fills."""
+"""The sample that yields the centre of a shape; a sphere samples the cone that it subtends."""
 
 
-# --- What is in between ---------------------------------------------------------------------------------------------
+# --- Occlusion ---------------------------------------------------------------------------------------------
 
 
 def ray_to(light, si, ds):
-    """The ray from a surface to a light, sampled as ``ds``."""
-    # Nothing lies beyond these; and where they are is unknown if Mitsuba lost the scene's bounds, as it does when it
-    # merges rectangles.
+    """Return the ray from a surface to a light, sampled as ``ds``."""
+    # Nothing lies beyond these; and their position is unknown if Mitsuba lost the scene's bounds, as when it merges
+    # rectangles.
     infinite = mi.has_flag(light.flags(), mi.EmitterFlags.Infinite)
     return si.spawn_ray(ds.d) if infinite else si.spawn_ray_to(ds.p)
 
 
 def straight_through(scene, si, ds, light, active):
-    """How much of a light the surfaces between it and ``si`` let straight through."""
+    """Return the fraction of a light that the surfaces between it and ``si`` let straight through."""
 
     def step(ray, through, active):
         met = scene.ray_intersect(ray, active)
@@ -221,33 +222,34 @@ def null_transmission(si, active):
 
 
 def may_pass(scene) -> bool:
-    """Whether light may pass straight through some surface; scalar variants, which can ask each, always look."""
+    """Return whether light may pass straight through some surface: always in scalar variants, which can ask each
+    surface."""
     if is_scalar():
         return True
     return any(mi.has_flag(it.flags(), mi.BSDFFlags.Null) for it in bsdfs_of(scene))
 
 
 def bsdfs_of(scene) -> list:
-    """The BSDFs of a scene's shapes, those within shape groups included."""
+    """Return the BSDFs of a scene's shapes, including those in shape groups."""
     shapes = [it for it in children(scene) if isinstance(it, mi.Shape)]
     grouped = [it for shape in shapes for it in children(shape) if isinstance(it, mi.Shape)]
     return [shape.bsdf() for shape in [*scene.shapes(), *grouped]]
 
 
-# --- What surfaces tell ---------------------------------------------------------------------------------------------
+# --- Reflectances ---------------------------------------------------------------------------------------------
 
 
 def of_each(function, bsdf, si, active):
-    """``function(bsdf, si, active)``, where vectorized variants have many BSDFs at once."""
+    """Return ``function(bsdf, si, active)``, where vectorized variants have many BSDFs at once."""
     return function(bsdf, si, active) if isinstance(bsdf, mi.BSDF) else dr.dispatch(bsdf, function, si, active)
 
 
 def diffuse_reflectance(bsdf, si, active):
-    """k_a. Ours, also within ``twosided``, are asked for their diffuse lobes, as what they answer to
-    ``eval_diffuse_reflectance`` has the others in it."""
+    """Return k_a: for our BSDFs, also in ``twosided``, from their diffuse lobes, as their ``eval_diffuse_reflectance``
+    includes the others."""
     if not mirrors(bsdf):
         k_a = mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
-        if bsdf.class_name() == "MaskBSDF":  # answers as if nothing were masked
+        if bsdf.class_name() == "MaskBSDF":  # its own ignores the mask
             k_a *= 1 - mi.unpolarized_spectrum(bsdf.eval_null_transmission(si, active))
         return k_a
     normal = mi.Vector3f(0, 0, dr.select(si.wi.z > 0, 1, -1))
@@ -257,7 +259,7 @@ def diffuse_reflectance(bsdf, si, active):
 
 
 def mirror_reflectance(bsdf, si, active):
-    """``(ρ_m, known)``: zero for a BSDF that does not know its own."""
+    """Return ``(ρ_m, known)``, zero for a BSDF that does not know its own."""
     total = mi.UnpolarizedSpectrum(0)
     inner = mirrors(bsdf)
     if not inner:
@@ -270,7 +272,7 @@ def mirror_reflectance(bsdf, si, active):
 
 
 def mirrors(bsdf) -> list:
-    """The BSDFs of ours that make up a BSDF, front side first: itself, or those within ``twosided``."""
+    """Return our BSDFs that make up a BSDF, front side first: itself, or those in ``twosided``."""
     inner = [bsdf]
     if bsdf.class_name() == "TwoSidedBRDF":
         inner = children(bsdf)
@@ -284,7 +286,7 @@ def only_diffuse():
 
 
 def children(parent) -> list:
-    """The objects within another."""
+    """Return the objects in another."""
 
     class Collector(mi.TraversalCallback):
         def __init__(self):

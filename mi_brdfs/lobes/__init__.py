@@ -1,4 +1,4 @@
-"""What can be evaluated, sampled and mixed."""
+"""The lobes of BRDFs, which can be evaluated, sampled and mixed."""
 
 from .diffuse import LambertLobe, over_diffuse
 from .lobe import Lobe, WeightedLobe

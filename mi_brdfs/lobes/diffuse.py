@@ -29,22 +29,22 @@ class LambertLobe(Lobe):
 
 
 def over_diffuse(reflectance, *lobes):
-    """Lobes over a diffuse one, if its reflectance was given."""
+    """Return lobes over a diffuse one, if its reflectance was given."""
     return lobes if reflectance is None else (LambertLobe(reflectance), *lobes)
 
 
 class ZonalLobe(Lobe):
-    """f |cosθ_o| = albedo(wi)·p(cosθ_o)/2π: wherever it is seen from, light comes from the same density p of the
-    cosine, by whose inverse it is sampled. The weight is the albedo."""
+    """f |cosθ_o| = albedo(wi)·p(cosθ_o)/2π, with a density p of the cosine that does not depend on ``wi``. As p is
+    drawn by its inverse cumulative distribution, and the azimuth uniformly, the weight is the albedo."""
 
     glossy = False
 
     def density(self, cos):
-        """p, of which the integral over the cosine is one."""
+        """Return p, whose integral over the cosine is one."""
         raise NotImplementedError
 
     def cosine(self, u):
-        """The cosine below which the fraction ``u`` of p lies."""
+        """Return the cosine below which the fraction ``u`` of p lies."""
         raise NotImplementedError
 
     def adjoint(self):
@@ -81,13 +81,14 @@ class AdjointZonalLobe(AdjointLobe):
 
 
 class RoughDiffuseLobe(Lobe):
-    r"""A diffuse lobe that is brighter towards ``wi``, as those of Oren and Nayar are: ``retro`` = 0 is Lambert's,
-    1 the roughest. Subclasses evaluate it.
+    r"""A diffuse lobe, brighter towards ``wi``, as Oren and Nayar's are: ``retro`` = 0 is Lambert's, 1 the roughest.
+    Subclasses evaluate it.
 
-    Sampled by a linearly transformed cosine, clipped to the horizon before the transform, in a mixture with uniform
-    directions; the matrix and the share of these are the polynomials that Portsmouth, Kutz and Hill fitted to their
-    model (EON, 2025, https://jcgt.org/published/0014/01/06/). No sample falls below the horizon, and ``retro`` = 0 is
-    the cosine itself.
+    Draw from a linearly transformed cosine, clipped to the horizon before the transform, in a mixture with uniform
+    directions. The matrix and the fraction of uniform directions are the polynomials that Portsmouth, Kutz and Hill
+    fitted to their model, whose paper derives the density: that of the cosine before the transform M, times the
+    Jacobian 1/(det M |M⁻¹wo|³) (EON, 2025, https://jcgt.org/published/0014/01/06/). No sample falls below the horizon,
+    and ``retro`` = 0 is the cosine itself.
     """
 
     glossy = False
@@ -96,23 +97,24 @@ class RoughDiffuseLobe(Lobe):
         self.reflectance, self.retro = reflectance, retro
 
     def eval(self, wi, wo):
-        """f."""
+        """Return f."""
         raise NotImplementedError
 
     def _uniform(self, wi):
-        """The probability of the uniform directions."""
+        """Return the probability of the uniform directions."""
         mu, r = wi.z, self.retro
         share = 0.162925 + mu * (-0.372058 + mu * (0.538233 - 0.290822 * mu))
         return dr.select(r > 0, dr.power(dr.maximum(r, TINY), 0.1), 0) * share
 
     def _matrix(self, wi):
-        """``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of wi."""
+        """Return ``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of
+        wi."""
         mu, r = wi.z, self.retro
         a = 1 + r * (0.303392 + mu * (-0.518982 + 0.111709 * mu) + r * (-0.276266 + 0.335918 * mu))
         b = r * (-1.16407 + 1.15859 * mu + r * (0.150815 - 0.150105 * mu)) / (mu * mu * mu - 1.43545)
         c = 1 + r * (0.20013 + mu * (-0.506373 + 0.261777 * mu))
         d = r * (0.540852 + mu * (-1.01625 + 0.475392 * mu)) / (-1.0743 + mu * (0.0725628 + mu))
-        # The clipping below wants d <= 0; the fit exceeds that by 0.003 near normal incidence.
+        # The clipping below needs d <= 0; the fit exceeds that by 0.003 near normal incidence.
         return a, b, c, dr.minimum(d, 0)
 
     def eval_pdf(self, wi, wo):
@@ -130,7 +132,7 @@ class RoughDiffuseLobe(Lobe):
     def sample(self, wi, u, v):
         is_uniform, _ = choose(u, self._uniform(wi))
         a, b, c, d = self._matrix(wi)
-        # Below the horizon, the transform takes what lies beyond half an ellipse in the disc: squeeze that out.
+        # The transform moves what lies beyond half an ellipse in the disc below the horizon: squeeze that out.
         disc = mi.warp.square_to_uniform_disk_concentric(v)
         visible = 0.5 + 0.5 * dr.rsqrt(d * d + 1)
         end = safe_sqrt(1 - disc.y * disc.y)

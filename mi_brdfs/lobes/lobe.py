@@ -14,57 +14,57 @@ from ..math import EPSILON
 class Lobe:
     """One additive part of a BRDF, holding its parameters evaluated at a surface point.
 
-    Directions are unit vectors of the local frame (n = z) that point away from the surface: ``wi`` is the known one
-    (towards the viewer, in Mitsuba's radiance transport), ``wo`` the sampled one. Whoever calls guarantees
-    wi.z > 0 and, in :meth:`eval_pdf`, wo.z > 0, or wo.z < 0 if the lobe transmits; so a lobe needs no masks. Colours
-    are ``mi.UnpolarizedSpectrum`` or floats, densities are per solid angle of ``wo``.
+    Directions are unit vectors of the local frame (n = z) that point away from the surface: ``wi`` is the given one
+    (towards the viewer, in Mitsuba's radiance transport), ``wo`` the sampled one. The caller guarantees wi.z > 0 and,
+    in :meth:`eval_pdf`, wo.z > 0, or wo.z < 0 if the lobe transmits, so a lobe needs no masks. Colours are
+    ``mi.UnpolarizedSpectrum`` or floats, densities are per solid angle of ``wo``.
     """
 
     glossy = True
-    """Glossy or diffuse, as Mitsuba's flags and type masks distinguish."""
+    """Whether the lobe is glossy or diffuse, for Mitsuba's flags and type masks."""
 
     reciprocal = True
     """Whether f(wi, wo) = f(wo, wi)."""
 
     anisotropic = False
-    """Whether f may change as both directions turn about the normal."""
+    """Whether f may change if both directions turn about the normal."""
 
     transmits = False
     """Whether the light comes from the other side of the surface."""
 
     seldom = False
-    """Whether it is drawn from so seldom, beside others, that it is faster to branch than to draw from it always."""
+    """Whether it is drawn from so rarely, beside others, that branching is faster than always drawing from it."""
 
     def estimated_albedo(self, wi):
-        """An estimate of ∫ f |cosθ_o| dω_o. It steers the choice among lobes and the albedo AOV, so it need not be
-        exact; but where the lobe reflects anything it must be positive."""
+        """Return an estimate of ∫ f |cosθ_o| dω_o. It decides the choice among lobes and the albedo AOV, so it need not
+        be exact, but it must be positive wherever the lobe reflects anything."""
         raise NotImplementedError(f"{type(self).__name__} does not define estimated_albedo.")
 
     def eval_pdf(self, wi, wo):
-        """``(value, pdf)``: f |cosθ_o|, and the density of ``wo`` in :meth:`sample`."""
+        """Return ``(value, pdf)``: f |cosθ_o|, and the density with which :meth:`sample` draws ``wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define eval_pdf.")
 
     def sample(self, wi, u, v):
-        """A direction ``wo`` for three uniform variates ``u`` and ``v = (v.x, v.y)``. It may lie beyond the horizon,
-        where the lobe is zero."""
+        """Draw a direction ``wo`` from three uniform variates, ``u`` and ``v = (v.x, v.y)``. It may lie beyond the
+        horizon, where the lobe is zero."""
         raise NotImplementedError(f"{type(self).__name__} does not define sample.")
 
     def adjoint(self) -> Lobe:
-        """The lobe for light that is traced from its source (``TransportMode.Importance``), where ``wi`` leads to the
-        light and ``wo`` to the viewer: its value is f(wo, wi) |cosθ_o|. Of a lobe that transmits, both are mirrored at
-        the surface: wi.z > 0 and wo.z < 0, as ever.
+        """Return the lobe for light tracing (``TransportMode.Importance``), where ``wi`` leads to the light and ``wo``
+        to the viewer: its value is f(wo, wi) |cosθ_o|. If the lobe transmits, both are mirrored at the surface:
+        wi.z > 0 and wo.z < 0, as always.
 
-        This one is sampled like the lobe itself; override it where that misses directions."""
+        The default is sampled like the lobe itself; override it if that misses directions."""
         return self if self.reciprocal else AdjointLobe(self)
 
     def mirror_reflectance(self, wi):
-        """The lobe's colour times its Fresnel reflectance at the direction that mirrors ``wi``, whatever its width and
-        scale: what it would reflect of there as a mirror. Diffuse lobes reflect nothing so."""
+        """Return the lobe's colour times its Fresnel reflectance for the mirror direction of ``wi``, regardless of its
+        width and scale: its reflectance as a mirror. It is 0 for diffuse lobes."""
         return 0
 
 
 class AdjointLobe(Lobe):
-    """f(wo, wi) of a lobe that is not reciprocal, sampled like the lobe."""
+    """f(wo, wi) of a non-reciprocal lobe, sampled like the lobe."""
 
     reciprocal = False
 
@@ -87,8 +87,8 @@ class AdjointLobe(Lobe):
 
 
 class WeightedLobe(Lobe):
-    """g(wi, wo) = g(wo, wi) times a lobe, sampled like the lobe: the weight is g times that of the lobe. ``mean`` is
-    about the mean of g over the directions ``wo``."""
+    """A lobe times g(wi, wo) = g(wo, wi), sampled like the lobe: the weight is g times the lobe's. ``mean(wi)``
+    approximates the mean of g over ``wo``."""
 
     def __init__(self, lobe: Lobe, g: Callable[[Any, Any], Any], mean: Callable[[Any], Any]):
         self.lobe, self.g, self.mean = lobe, g, mean

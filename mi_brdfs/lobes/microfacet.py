@@ -12,7 +12,7 @@ from .lobe import Lobe
 
 class MicrofacetLobe(Lobe):
     """f = ρ·F(cosθ_d)·D(h)·G / (4 cosθ_i cosθ_o), for any distribution, shadowing and Fresnel term of
-    :mod:`mi_brdfs.microfacet`. ρ is a ``colour`` times a ``scale``. The sampler is the one that suits the three terms
+    :mod:`mi_brdfs.microfacet`. ρ is a ``colour`` times a ``scale``. The three terms determine the sampler
     (:mod:`mi_brdfs.microfacet.choice`).
     """
 
@@ -36,7 +36,7 @@ class MicrofacetLobe(Lobe):
         self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
 
     def estimated_albedo(self, wi):
-        """F, D and G at a typical facet.
+        """Return an estimate from F, D and G at a typical facet.
 
         At grazing the facets seen lean towards the viewer: F is that of a larger cosine than cosθ_i, and a shadowing
         term that does not conserve energy is evaluated at such a facet in the plane of incidence. That and its image
@@ -76,6 +76,6 @@ class MicrofacetLobe(Lobe):
         return self.colour * self.fresnel(wi.z)
 
     def weight_over_ndf(self, facet):
-        """f cosθ_o·4cosθ_d/D for ρ = 1, as the one number that samplers go by: with D/q it makes the weight of a half
-        vector of the density q."""
+        """Return f cosθ_o·4cosθ_d/D for ρ = 1, as the one number that samplers use: times D/q it is the weight of a
+        half vector drawn with the density q."""
         return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet) * facet.cos_d / facet.cos_i

@@ -1,4 +1,4 @@
-"""Lobes that are a power of the cosine to an axis: the mirror direction, unless a lobe has its own."""
+"""Lobes that are a power of the cosine to an axis, by default the mirror direction."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .lobe import Lobe
 
 class AxisFrame:
     """Directions around a unit vector ``axis``, in the frame (side, up, axis) with ``up`` in the plane of the axis and
-    the normal. Mirroring a direction i in the plane that axis and side span keeps its cosine A = i·axis, and turns
-    B = i·up into -B. The cosines to the normal of the two are axis_z A ± sinθ_axis |B|: so samplers draw A and |B|
-    first, and then one of the pair.
+    the normal. Mirroring a direction i in the plane of axis and side keeps its cosine A = i·axis, and turns B = i·up
+    into -B. The cosines of the two to the normal are axis_z A ± sinθ_axis |B|: samplers draw A and |B| first, and then
+    one of the pair.
     """
 
     def __init__(self, axis):
@@ -24,19 +24,19 @@ class AxisFrame:
         self.side = mi.Vector3f(-y, x, 0)
 
     def cosine(self, w):
-        """``(log A, 1 - A, inside)`` of the direction ``w``, where ``inside`` says whether A > 0."""
+        """Return ``(log A, 1 - A, inside)`` of the direction ``w``, where ``inside`` says whether A > 0."""
         versine = 0.5 * dr.squared_norm(w - self.axis)
         inside = versine < 1
         versine = dr.select(inside, versine, 0)
         return log1p(-versine), versine, inside
 
     def direction(self, log_a, b, c):
-        """The direction of cosine A whose rest points along ``b up + c side``, with b² + c² = 1."""
+        """Return the direction of cosine A whose remainder points along ``b up + c side``, with b² + c² = 1."""
         sin = dr.sqrt(dr.maximum(-expm1(2 * log_a), 0))
         return self.axis * dr.exp(log_a) + self.up * (sin * b) + self.side * (sin * c)
 
     def mirrored_z(self, w, versine):
-        """The cosine to the normal of the mirror image of ``w``, or 0 below the horizon."""
+        """Return the cosine to the normal of the mirror image of ``w``, or 0 below the horizon."""
         return dr.maximum(2 * self.axis.z * (1 - versine) - w.z, 0)
 
 
@@ -50,7 +50,7 @@ class MirrorLobe(Lobe):
         return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
 
     def peak(self, wi):
-        """The scale for ``wi``."""
+        """Return the scale for ``wi``."""
         return self.scale
 
     def mirror_reflectance(self, wi):
@@ -66,9 +66,10 @@ class PowerLobe(MirrorLobe):
 
         P (n+2)/π Aⁿ⁺¹  +  (1-P) ¾(n+1) Aⁿ √(1-Aⁿ⁺¹) cosφ,
 
-    where the second stands for AⁿB; with √(1-Aⁿ⁺¹) in place of √(1-A²) its radial part can be inverted. The shares
-    are those of the terms' integrals. One of the pair is then chosen with probability ∝ cosθ⁺, so none lies below the
-    horizon: the weight is constant where both lie well above it, and below three times its mean everywhere.
+    where the second stands for AⁿB: with √(1-Aⁿ⁺¹) instead of √(1-A²) its radial part can be inverted. P is the first
+    term's share of the integrals. Then choose one of the pair with probability ∝ cosθ⁺, so that none lies below the
+    horizon. While both cosines are positive they add up to 2 axis_z A, as in the first term: so the weight is constant
+    where both lie well above the horizon, and below three times its mean everywhere.
     """
 
     def _masses(self, frame):
@@ -81,7 +82,7 @@ class PowerLobe(MirrorLobe):
         return axial / dr.maximum(axial + lateral, EPSILON)  # an axis straight below the surface has neither
 
     def estimated_albedo(self, wi):
-        # Exact where the axis lies along the normal or in the horizon.
+        # Exact for an axis along the normal or in the horizon.
         axial, lateral = self._masses(self.frame(wi))
         mass = dr.sqrt(axial * axial + lateral * lateral)
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 2) * mass)
@@ -107,7 +108,7 @@ class PowerLobe(MirrorLobe):
         return dr.select(u * (z + mirrored_z) < z, wo, mirrored)
 
     def _draw(self, frame, u, v):
-        """``(u, log A, |B|/√(1-A²), …)`` of the mixture, with what is left of ``u``."""
+        """Return ``(u, log A, |B|/√(1-A²), …)`` of the mixture, with the remaining variate ``u``."""
         n = self.exponent
         is_axial, u = choose(u, self._share(frame))
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
@@ -116,7 +117,7 @@ class PowerLobe(MirrorLobe):
         return u, dr.select(is_axial, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1)), b, c
 
     def _pair(self, frame, log_a, versine, power, cos_phi):
-        """The density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
+        """Return the density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
         n = self.exponent
         axial = (n + 2) * (1 - versine)
         lateral = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), TINY)) * cos_phi
@@ -128,7 +129,8 @@ class PowerResponseLobe(MirrorLobe):
     """f cosθ = ρ·scale·max(0, A)ⁿ above the horizon: a power that stands for the whole response to light, cosine
     included, as in the shading formulas of the 1970s. Neither reciprocal nor bounded as a BRDF.
 
-    A is drawn ∝ Aⁿ, and then one of the pair that lies above the horizon: the weight takes two values only.
+    Draw A ∝ Aⁿ, and then one of the pair that lies above the horizon. The density is (n+1)/π Aⁿ if only one does, and
+    half of that if both do: the weight takes two values only.
     """
 
     reciprocal = False
@@ -151,5 +153,5 @@ class PowerResponseLobe(MirrorLobe):
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         log_a = log1p(-v.x) / (self.exponent + 1)
         wo, mirrored = frame.direction(log_a, cos_phi, sin_phi), frame.direction(log_a, -cos_phi, sin_phi)
-        # The azimuth already chose one of the two at random; the other replaces it only where it cannot be seen.
+        # The azimuth has chosen one of the two at random; the other replaces it only if it lies below the horizon.
         return dr.select(wo.z > 0, wo, mirrored)

@@ -1,4 +1,4 @@
-"""The choice among lobes, and the density that results."""
+"""The choice among lobes, and the resulting density."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ..math import ONE_MINUS_EPSILON, SMALL, TINY, clamp, luminance, select
 
 
 class Mixture:
-    """Several lobes sampled as one: lobe k with probability ∝ the luminance of its albedo at ``wi``.
+    """Several lobes sampled as one: lobe k with probability ∝ the luminance of its estimated albedo at ``wi``.
 
-    In lanes that are ``mirrored`` (a mask, or None) light comes from behind: there only lobes that transmit count,
-    and elsewhere only the others."""
+    In ``mirrored`` lanes (a mask, or None) light comes from behind: there only transmitting lobes count, and elsewhere
+    only the others."""
 
     def __init__(self, lobes, wi, mirrored=None):
         self.lobes, self.wi = lobes, wi
@@ -31,7 +31,7 @@ class Mixture:
         ]
 
     def eval_pdf(self, wo, transmitted):
-        """``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
+        """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
         total, density = 0, 0
         for probability, lobe in zip(self.probabilities, self.lobes, strict=True):
             if lobe.transmits == transmitted:
@@ -40,7 +40,7 @@ class Mixture:
         return mi.UnpolarizedSpectrum(total), density
 
     def sample(self, u, v):
-        """``(wo, k)``: a direction and the index of the lobe that it was drawn from."""
+        """Return ``(wo, k)``: a direction and the index of the lobe that it was drawn from."""
         if len(self.lobes) == 1:
             return self.lobes[0].sample(self.wi, u, v), 0
         index, start, share = mi.UInt32(0), mi.Float(0), self.probabilities[0]

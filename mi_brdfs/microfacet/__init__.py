@@ -1,5 +1,5 @@
-"""The parts of a microfacet model: distributions (D), shadowing (G), Fresnel reflectance (F), and how their product
-is sampled."""
+"""The parts of a microfacet model: distributions (D), shadowing terms (G), Fresnel reflectances (F), and the samplers
+of their product."""
 
 from .distributions import Distribution, Isotropic
 from .facet import Facet

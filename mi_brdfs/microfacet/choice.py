@@ -1,5 +1,5 @@
-"""Which sampler suits a distribution, a shadowing and a Fresnel term: the same one, whatever model puts them
-together."""
+"""The choice of a sampler for a distribution, a shadowing and a Fresnel term: the same for every model that combines
+them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def sampler_of(distribution: Distribution, shadowing: Shadowing, fresnel: Fresne
 
 
 def _sampler_of_facets(distribution, shadowing, fresnel):
-    rises = isinstance(fresnel, Dielectric | Schlick)  # at grazing, from a few percent to one
+    rises = isinstance(fresnel, Dielectric | Schlick)  # towards grazing angles, from a few percent to one
     if isinstance(distribution, GGX) and isinstance(shadowing, SmithGGX):
         if not shadowing.correlated:
             # A pair takes longer, which is worth it only where the reflectance rises.

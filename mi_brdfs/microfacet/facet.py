@@ -12,7 +12,7 @@ from ..math import SMALL
 
 
 class Cosines(NamedTuple):
-    """The cosines of a facet alone, as estimates need them."""
+    """The cosines of a facet, without directions, for estimates."""
 
     cos_i: Any
     cos_o: Any
@@ -21,7 +21,7 @@ class Cosines(NamedTuple):
 
     @classmethod
     def leaning(cls, cos_i, sin_i, slope) -> Cosines:
-        """Those of a facet in the plane of incidence that leans towards ``wi`` by a slope."""
+        """Return the cosines of a facet in the plane of incidence that leans towards ``wi`` by a slope."""
         cos_h = dr.rsqrt(slope * slope + 1)
         cos_d = (cos_i + sin_i * slope) * cos_h
         return cls(cos_i, 2 * cos_d * cos_h - cos_i, cos_h, cos_d)
@@ -29,8 +29,8 @@ class Cosines(NamedTuple):
 
 @dataclass
 class Facet:
-    """A reflection of ``wi`` into ``wo`` at a facet of normal ``h``, the half vector; the cosines are the usual
-    (n·wi), (n·wo), (n·h) and (wi·h) = (wo·h), written cosθ_i, cosθ_o, cosθ_h and cosθ_d."""
+    """A reflection of ``wi`` into ``wo`` at a facet with the normal ``h``, the half vector. The cosines (n·wi), (n·wo),
+    (n·h) and (wi·h) = (wo·h) are written cosθ_i, cosθ_o, cosθ_h and cosθ_d."""
 
     wi: Any
     wo: Any
@@ -48,18 +48,18 @@ class Facet:
 
     @classmethod
     def at(cls, wi, slope_x, slope_y) -> Facet:
-        """The facet whose normal is ∝ (slope_x, slope_y, 1)."""
+        """Return the facet whose normal is ∝ (slope_x, slope_y, 1)."""
         inv_length = dr.rsqrt(slope_x * slope_x + slope_y * slope_y + 1)
         return cls.reflecting(wi, mi.Vector3f(slope_x * inv_length, slope_y * inv_length, inv_length))
 
     @classmethod
     def reflecting(cls, wi, h) -> Facet:
-        """The facet of the normal ``h``."""
+        """Return the facet with the normal ``h``."""
         cos_d = dr.dot(wi, h)
         return cls(wi, 2 * cos_d * h - wi, h, cos_d)
 
     def image(self) -> Facet:
-        """The facet on the other side of the normal, which reflects the same ``wi``."""
+        """Return the facet mirrored about the normal, which reflects the same ``wi``."""
         return self.reflecting(self.wi, mi.Vector3f(-self.h.x, -self.h.y, self.h.z))
 
     @property

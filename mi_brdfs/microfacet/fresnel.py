@@ -1,4 +1,4 @@
-"""Fresnel reflectance F(cosθ_d): each class holds its parameters."""
+"""Fresnel reflectances F(cosθ_d); each class holds its parameters."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .term import Term
 
 
 class Fresnel(Term):
-    """A reflectance, called with the cosine."""
+    """A Fresnel reflectance, called with the cosine."""
 
     def __call__(self, cos: Any) -> Any:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
     def brightness(self, cos: Any) -> Any:
-        """About the luminance of the reflectance, as one number: samplers go by it."""
+        """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
 
 

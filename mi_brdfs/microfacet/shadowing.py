@@ -1,4 +1,4 @@
-"""Shadowing and masking terms G."""
+"""Masking-shadowing terms G."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from .term import Term
 
 
 class Shadowing(Term):
-    """A shadowing term: called with a facet, it returns G. The sampler of its lobe and the estimated albedo follow from
-    the attributes (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
+    """A masking-shadowing term, which returns G when called with a facet. Its attributes determine the lobe's sampler
+    and estimated albedo (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
 
     lean: ClassVar[float] = 0
     """How far the facets seen at grazing lean towards the viewer, which tests/calibration/half_vectors.py fits."""
     reciprocal: ClassVar[bool] = True
-    """Whether G stays the same as wi and wo are exchanged."""
+    """Whether G is symmetric in wi and wo."""
     conserving: ClassVar[bool] = False
-    """Whether all light that it takes is lost to further reflections, about as much as
-    :meth:`.distributions.Distribution.estimated_albedo` says. Only of such a term may G depend on more than the cosines
-    of a facet."""
+    """Whether all light that G removes is lost to further reflections, about as much as
+    :meth:`.distributions.Distribution.estimated_albedo` says. Only then may G depend on more than the cosines of a
+    facet."""
 
     def __call__(self, facet: Facet) -> Any:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
 
 class Smith(Shadowing):
-    """Smith's term for facets whose Λ is in the ``stretched`` cosines,
+    """Smith's term, with Λ defined by the ``stretched`` cosines,
 
     * separable, 1/((1 + Λ(wi))(1 + Λ(wo))) (Smith 1967, doi:10.1109/TAP.1967.1138991; Walter et al. 2007,
       doi:10.2312/EGWR/EGSR07/195-206);
@@ -44,11 +44,11 @@ class Smith(Shadowing):
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated
 
     def slope2(self, v):
-        """(αu v_x)² + (αv v_y)²"""
+        """Return (αu v_x)² + (αv v_y)²."""
         return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
 
     def stretched(self, v):
-        """v_z (1 + 2Λ(v)), which stays finite at the horizon."""
+        """Return v_z (1 + 2Λ(v)), which stays finite at the horizon."""
         raise NotImplementedError
 
     def __call__(self, facet):
@@ -86,7 +86,7 @@ class SmithBeckmann(Smith):
 
 class SmithBlinn(Smith):
     """Walter et al.'s rational approximation of Beckmann's Λ, which they use for Blinn's distribution with
-    a = √(n/2 + 1) cosθ/sinθ: 1 + Λ = (1 + 2.276 a + 2.577 a²)/(3.535 a + 2.181 a²) for a < 1.6, and else 1."""
+    a = √(n/2 + 1) cosθ/sinθ: 1 + Λ = (1 + 2.276 a + 2.577 a²)/(3.535 a + 2.181 a²) for a < 1.6, and 1 otherwise."""
 
     def __init__(self, exponent, correlated: bool):
         alpha = dr.rsqrt(0.5 * exponent + 1)
@@ -100,8 +100,8 @@ class SmithBlinn(Smith):
 
 
 class SchlickSmith(Shadowing):
-    """Schlick's rational stand-in for Smith's term, Π cosθ/(cosθ (1-k) + k) over both directions (Schlick 1994,
-    doi:10.1111/1467-8659.1330233): k = α √(2/π) comes near it for Beckmann facets, k = α/2 for GGX (Karis 2013)."""
+    """Schlick's rational approximation of Smith's term, Π cosθ/(cosθ (1-k) + k) over both directions (Schlick 1994,
+    doi:10.1111/1467-8659.1330233), with k = α √(2/π) for Beckmann facets and k = α/2 for GGX (Karis 2013)."""
 
     lean = 2
 

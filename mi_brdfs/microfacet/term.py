@@ -1,4 +1,4 @@
-"""What distributions, shadowing and Fresnel terms have in common."""
+"""The base class of distributions, shadowing and Fresnel terms."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ T = TypeVar("T", bound="Term")
 
 
 class Term:
-    """A part of a microfacet model, which :func:`mi_brdfs.register` makes known to ``microfacet`` by its ``word``."""
+    """A term of a microfacet model. :func:`mi_brdfs.register` adds it to ``microfacet`` under its ``word``."""
 
     word: ClassVar[str | None] = None
-    """The word of the kit."""
+    """Its word in the kit."""
     parameters: ClassVar[Mapping[str, Any]] = {}
     """The declarations (:mod:`mi_brdfs.parameters`) that go with the word, by name. The class is called with their
-    values by name; one that is anisotropic comes as NAME_u and NAME_v."""
+    values by name; an anisotropic one comes as NAME_u and NAME_v."""
 
     @classmethod
     def of_values(cls: type[T], values: Mapping[str, Any]) -> T:
-        """Return the term of the values of its parameters."""
+        """Return the term for given values of its parameters."""
         spread: dict[str, Any] = {}
         for name, value in values.items():
             spread |= {f"{name}_u": value[0], f"{name}_v": value[1]} if isinstance(value, tuple) else {name: value}

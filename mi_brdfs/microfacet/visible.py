@@ -1,4 +1,4 @@
-"""Samplers of microfacet lobes by the normals that are visible from ``wi``, of GGX and what comes near it."""
+"""Samplers of microfacet lobes by normals visible from ``wi``, for GGX and similar distributions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class BoundedVisibleNormals(Sampler):
     """l/α, which tests/calibration/visible_normals.py fits."""
 
     def _cap(self, distribution, wi):
-        """``(stretched wi, its unit vector, k, b, l)``"""
+        """Return ``(unit vector of the stretched wi, its length, k, b, l)``."""
         alpha_u, alpha_v = distribution.alpha_u, distribution.alpha_v
         stretched = mi.Vector3f(alpha_u * wi.x, alpha_v * wi.y, wi.z)
         length = dr.sqrt(dr.dot(stretched, stretched))
@@ -34,7 +34,7 @@ class BoundedVisibleNormals(Sampler):
         return stretched / length, length, k, k * wi.z / length, self.BIAS * alpha
 
     def _draw(self, distribution, wi, v):
-        """``(unit vector of the stretched wi, point of the cap)``"""
+        """Draw ``(unit vector of the stretched wi, point of the cap)``."""
         unit, _, _, b, bias = self._cap(distribution, wi)
         # The inverse of the linear density; the small bias of narrow lobes must not cancel.
         height = 2 * v.y / (1 - bias + dr.sqrt(dr.square(1 - bias) + 4 * bias * v.y))
@@ -45,14 +45,14 @@ class BoundedVisibleNormals(Sampler):
 
     @staticmethod
     def _facet(distribution, wi, unit, point):
-        """The facet whose stretched normal is the half vector of the unit vector and a point."""
+        """Return the facet whose stretched normal is the half vector of the unit vector and a point."""
         normal = unit + point
         z = dr.maximum(normal.z, SMALL)  # a cap that is nearly the whole sphere ends where the normal vanishes
         h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
         return Facet.reflecting(wi, h * dr.rsqrt(dr.dot(h, h)))
 
     def _density(self, distribution, facet):
-        """``(density, unit vector of the stretched wi, point of the cap)``"""
+        """Return ``(density, unit vector of the stretched wi, point of the cap)``."""
         unit, length, k, b, bias = self._cap(distribution, facet.wi)
         normal = mi.Vector3f(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, facet.cos_h)
         point = normal * (2 * dr.dot(unit, normal) / dr.dot(normal, normal)) - unit
@@ -68,8 +68,10 @@ class BoundedVisibleNormals(Sampler):
 
 
 class AntitheticVisibleNormals(BoundedVisibleNormals):
-    """One of two such normals, whose points in the cap are mirror images about its axis, with probability ∝ what they
-    reflect: Fresnel's term is larger for the one and smaller for the other, and so is the shadowing."""
+    """Draw two such normals, whose points in the cap are mirror images about its axis, and choose one in proportion to
+    how much each reflects: where the Fresnel term, or the shadowing, is larger for one, it is smaller for the other. As
+    both points have the same density in the cap, the chosen direction has the density 2 p W/(W + W') and the weight
+    (W + W')/2, where p and W are those of a single draw."""
 
     def sample(self, lobe, wi, u, v):
         unit, point = self._draw(lobe.distribution, wi, v)

@@ -1,1 +1,1 @@
-"""What knows the classes of Mitsuba: registration, the adapters of models and integrators, variants, and LLVM."""
+"""All code that depends on Mitsuba's classes: registration, the adapters of models and integrators, and LLVM."""

@@ -13,10 +13,10 @@ from ..variants import is_scalar
 
 
 def bsdf_class(model: type[Model], base: type) -> type:
-    """The BSDF class of a model for one variant, of which ``base`` is the ``mi.BSDF``.
+    """Return the BSDF class of a model for one variant, whose ``mi.BSDF`` is ``base``.
 
-    Each variant has a BSDF class of its own, and bindings allow no second base class: so the methods, which work on
-    every variant, are written once below and handed to each class.
+    Each variant has its own BSDF class, and the bindings allow only one base class: so the methods, which work in every
+    variant, are written once below and copied to each class.
     """
     methods = {name: value for name, value in vars(ModelBSDF).items() if name not in ("__dict__", "__weakref__")}
     return type(model.__name__, (base,), {**methods, "model_class": model})
@@ -30,8 +30,8 @@ class ModelBSDF:
     def __init__(self, props):
         mi.BSDF.__init__(self, props)
         self.model = self.model_class(props)
-        # A member, too: what a frozen function reads of a BSDF, Dr.Jit looks for among its members and their lists and
-        # dicts, but not in other Python objects.
+        # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,
+        # but not in other Python objects.
         self.textures = self.model.textures
 
         flags = mi.BSDFFlags
@@ -61,7 +61,7 @@ class ModelBSDF:
     # --- Evaluation and sampling ------------------------------------------------------------------------------------
 
     def _lobes(self, p):
-        """The lobes of the model, which must be of the kinds that the components were made for."""
+        """Return the model's lobes, which must be of the kinds that the components were made for."""
         name, lobes = type(self.model).__name__, self.model.lobes(p)
         if isinstance(lobes, Lobe) or not all(isinstance(lobe, Lobe) for lobe in lobes):
             raise TypeError(f"{name}.lobes returns {lobes!r}; it must return a tuple of lobes.")
@@ -71,25 +71,25 @@ class ModelBSDF:
         if kinds != self.lobe_kinds:
             raise TypeError(
                 f"{name}.lobes returns {len(kinds)} lobes where it returned {len(self.lobe_kinds)}, or others; their "
-                "number and kinds may depend on choices and on what was given, but not on values."
+                "number and kinds may depend on choices and on which parameters are given, but not on values."
             )
         return lobes
 
     def _mixture(self, ctx, si, active):
-        """``(valid, mixture, components, frame)``: the lobes that the context enables, seen from si.wi."""
+        """Return ``(valid, mixture, components, frame)``: the lobes that the context enables, seen from si.wi."""
         components = [k for k, kind in enumerate(self.kinds) if ctx.is_enabled(kind, k)]
         if not components:
             return None
         from_light = ctx.mode == mi.TransportMode.Importance
         transmits = [from_light and self.transmits[k] for k in components]
-        # The viewer is in front; so is wi, unless it leads to a light that shines through.
+        # The viewer is in front; so is wi, unless it leads to a light behind a transmitting lobe.
         front = si.wi.z != 0 if any(transmits) else si.wi.z > 0
         valid = select(si.wi.z < 0 if all(transmits) else front, active, False)
         if valid is False:
             return None
         p = self.model.evaluate(si, valid)
         frame = LobeFrame(getattr(p, "rotation", None), select(si.wi.z < 0, valid, False) if any(transmits) else None)
-        # Replace wi in inactive lanes by a harmless direction: a NaN would enter the derivatives.
+        # Replace wi in inactive lanes by a valid direction: a NaN would enter the derivatives.
         wi = frame.to_local(select(valid, si.wi, mi.Vector3f(0, 0, 1)))
         lobes = self._lobes(p)
         lobes = [lobes[k].adjoint() if from_light else lobes[k] for k in components]
@@ -111,13 +111,13 @@ class ModelBSDF:
 
     def _sample(self, valid, mixture, components, frame, sample1, sample2):
         bs = mi.BSDFSample3f()
-        # The estimator f/pdf of a fixed direction is differentiated, not the direction: then the choice among lobes
-        # and what the direction hits need no derivative for an unbiased gradient.
+        # Differentiate the estimator f/pdf of a fixed direction, not the direction: then an unbiased gradient needs no
+        # derivative of the choice among lobes, nor of what the direction hits.
         with dr.suspend_grad():
             wo, index = mixture.sample(sample1, sample2)
             wo = frame.to_world(wo)
         value, pdf = self._eval_pdf(valid, mixture, frame, wo)
-        # Drop what is hardly ever drawn: the derivatives of its weight would overflow.
+        # Drop samples that are hardly ever drawn: the derivatives of their weights would overflow.
         drawn, density = pdf > 1e-15, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
         weight = value / select(drawn, density, 1)
 
@@ -158,17 +158,17 @@ class ModelBSDF:
         sampled = self._sample(*evaluated, _as(mi.Float, sample1), _as(mi.Point2f, sample2))
         return mi.depolarizer(value), pdf, *sampled
 
-    # --- What else Mitsuba asks -------------------------------------------------------------------------------------
+    # --- Other methods of Mitsuba -------------------------------------------------------------------------------------
 
     def eval_diffuse_reflectance(self, si, active=True):
-        """The albedo at normal incidence: the diffuse colour and the specular lobes' together."""
+        """Return the albedo at normal incidence, of the diffuse and the specular lobes together."""
         normal = mi.Vector3f(0, 0, 1)
         lobes = self._lobes(self.model.evaluate(si, active))
         albedo = sum(lobe.estimated_albedo(normal) for lobe in lobes if not lobe.transmits)
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 
     def mirror_reflectance(self, si, active=True):
-        """What the lobes reflect of the direction that mirrors si.wi, as if they were mirrors: at most 1."""
+        """Return the reflectance of the lobes as mirrors, for the mirror direction of si.wi: at most 1."""
         evaluated = self._mixture(mi.BSDFContext(), si, active)
         if evaluated is None:
             return mi.UnpolarizedSpectrum(0)
@@ -195,7 +195,7 @@ class ModelBSDF:
         return self.textures[name].eval_3(si, active)
 
     def _without_attribute(self, name, kind):
-        """Zero, or in scalar variants an error, as of Mitsuba's own BSDFs."""
+        """Return zero, or raise an error in scalar variants, as Mitsuba's own BSDFs do."""
         if is_scalar():
             known = ", ".join(self.textures)
             raise RuntimeError(f"{self.model.plugins[0]}: Invalid attribute requested {name}; there are {known}.")
@@ -210,13 +210,14 @@ class ModelBSDF:
 
 
 def _as(kind, value):
-    """A value as the type that a method takes: a list, a tuple or a NumPy array, too, as Mitsuba's bindings do."""
+    """Convert a value, also a list, tuple or NumPy array, to a method's argument type, as Mitsuba's bindings do."""
     return value if isinstance(value, kind) else kind(value)
 
 
 class LobeFrame:
-    """The frame in which lobes are evaluated: the local one, turned about the normal by an angle given as (cosine,
-    sine), or None; and mirrored at the surface in the lanes where wi comes from behind, or None if there are none."""
+    """The frame in which lobes are evaluated: the local frame, turned about the normal by an angle given as
+    (cosine, sine), or None; and mirrored at the surface in the lanes where wi comes from behind, or None if there are
+    none."""
 
     def __init__(self, cos_sin, mirrored=None):
         self.cos_sin, self.mirrored = cos_sin, mirrored

@@ -1,4 +1,4 @@
-"""Models that other packages and files bring."""
+"""Models and terms from other packages and files."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from ..models.microfacet import BROUGHT
 from .registry import all_models, is_own, models_in, register, terms_in
 
 ENTRY_POINTS = "mi_brdfs.models"
-"""The group of entry points by which installed packages bring models."""
+"""The entry-point group for models of installed packages."""
 _files: dict[str, str] = {}
-"""The files that were imported by their paths, by the names of their modules."""
+"""The files imported by path, by module name."""
 
 
 def register_installed() -> None:
-    """Register what installed packages bring by entry points: a model or a term of the kit each, or a module with
-    some. One that fails is left out with a warning."""
+    """Register the models and terms of the entry points of installed packages: each names a model, a term of the kit,
+    or a module with some. One that fails is skipped with a warning."""
     for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
         try:
             brought = entry.load()
@@ -32,7 +32,7 @@ def register_installed() -> None:
                 register(each)
         except Exception as error:
             package = f" of {entry.dist.name}" if entry.dist else ""
-            warnings.warn(f"The entry point {entry.name}{package} is left out: {_sentence(error)}", stacklevel=2)
+            warnings.warn(f"The entry point {entry.name}{package} is skipped: {_sentence(error)}", stacklevel=2)
 
 
 def import_models(target: str) -> None:
@@ -41,7 +41,7 @@ def import_models(target: str) -> None:
 
     Raises:
         ImportError: if it cannot be imported, or fails.
-        ValueError: if it defines none, or one that cannot be registered.
+        ValueError: if it defines no model or term, or one that cannot be registered.
     """
     module = _file(Path(target)) if target.endswith(".py") else _module(target)
     found = _brought_by(module)
@@ -56,8 +56,8 @@ def _brought_by(module: ModuleType) -> list[type[Model] | type[Term]]:
 
 
 def source(brought: type[Model] | type[Term]) -> str | None:
-    """What another process gives to :func:`import_models` to know a model or a term: None if nothing does, as for one
-    that was defined in a notebook or within a function."""
+    """Return the argument of :func:`import_models` with which another process gets a model or a term; None if there is
+    none, e.g. for one defined in a notebook or a function."""
     module = sys.modules.get(brought.__module__)
     if brought.__module__ == "__main__" or module is None or brought not in _brought_by(module):
         return None
@@ -65,7 +65,7 @@ def source(brought: type[Model] | type[Term]) -> str | None:
 
 
 def sources() -> list[str]:
-    """The sources of all models and terms that others have brought."""
+    """Return the sources of all models and terms registered by others."""
     found = dict.fromkeys(map(source, [*BROUGHT.values(), *(model for model in all_models() if not is_own(model))]))
     return [each for each in found if each]
 
@@ -75,7 +75,7 @@ def _file(path: Path) -> ModuleType:
         raise ImportError("no such file")
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module  # as dataclasses and pickle look there
+    sys.modules[path.stem] = module  # where dataclasses and pickle look it up
     try:
         spec.loader.exec_module(module)
     except Exception as error:
@@ -92,7 +92,7 @@ def _module(name: str) -> ModuleType:
 
 
 def _sentence(error: Exception, path: Path | None = None) -> str:
-    """What went wrong, and in which line of a file."""
+    """Return what went wrong, and in which line of a file."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if path and Path(frame.filename).resolve() == path.resolve()]
     if isinstance(error, SyntaxError):

@@ -11,9 +11,9 @@ from ..variants import is_scalar
 
 
 def integrator_class(physics: type[Plugin], base: type) -> type:
-    """The integrator class of some physics for one variant, of which ``base`` is the ``mi.SamplingIntegrator``.
+    """Return the integrator class of some physics for one variant, whose ``mi.SamplingIntegrator`` is ``base``.
 
-    As with :func:`mi_brdfs.mitsuba.bsdf.bsdf_class`, the methods are written once below and handed to the class of each
+    As with :func:`mi_brdfs.mitsuba.bsdf.bsdf_class`, the methods are written once below and copied to the class of each
     variant.
     """
     methods = {
@@ -23,13 +23,12 @@ def integrator_class(physics: type[Plugin], base: type) -> type:
 
 
 class PixelCentreIntegrator:
-    """An integrator that looks through the centres of the pixels, so that nothing is random but what its physics draws.
+    """An integrator that traces rays through pixel centres, so that only what its physics draws is random.
 
     The physics has two methods. ``shade(scene, sampler, ray, active)`` returns the unpolarized radiance along a ray,
-    and its opacity; ``finish(colour)`` is what becomes of the mean of a pixel's samples.
+    and its opacity; ``finish(colour)`` maps the mean of a pixel's samples to its final colour.
 
-    A picture is made in two steps, so that any number of passes may add up before the finish: :meth:`sums` and
-    :meth:`put`.
+    A picture takes two steps, :meth:`sums` and :meth:`put`, so that any number of passes may add up before the finish.
     """
 
     physics_class: type[Plugin]
@@ -40,7 +39,7 @@ class PixelCentreIntegrator:
         self.textures = self.physics.textures  # a member, as in ModelBSDF
 
     def sample(self, scene, sampler, ray, medium=None, active=True):
-        """What other integrators, such as ``aov``, see along a ray: each of their samples is finished."""
+        """Return what other integrators, such as ``aov``, see along a ray: each of their samples is finished."""
         radiance, opacity = self.physics.shade(scene, sampler, ray, active)
         return mi.depolarizer(self.physics.finish(radiance)), opacity > 0, []
 
@@ -59,15 +58,15 @@ class PixelCentreIntegrator:
         return image
 
     def sums(self, scene, sensor, seed=0, spp=0):
-        """The sums over the samples of each pixel: red, green, blue and opacity, before the finish.
+        """Return the sums over the samples of each pixel: red, green, blue and opacity, before the finish.
 
-        What this returns for different seeds may be added. The memory that it takes does not depend on ``spp``, except
-        where derivatives of it are recorded; those of ``mi.render`` are not, over several passes.
+        The sums of different seeds may be added. The memory needed does not depend on ``spp``, unless derivatives are
+        recorded; ``mi.render`` does not record them over several passes.
         """
         film, sampler = sensor.film(), self._sampler(sensor, spp)
         if mi.has_flag(film.flags(), mi.FilmFlags.Special):
             raise ValueError(
-                f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; take an hdrfilm."
+                f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; use an hdrfilm."
             )
         if is_scalar():
             totals, pixel = [], pixels(film)
@@ -88,7 +87,7 @@ class PixelCentreIntegrator:
         return total
 
     def _passes(self, scene, sensor, sampler, seed):
-        """The sums of the samples of each pass, of bounded memory, in vectorized variants."""
+        """Yield the sums of the samples of each pass, in bounded memory, in vectorized variants."""
         pixel, spp, at_once = pixels(sensor.film()), sampler.sample_count(), samples_at_once(sensor.film(), sampler)
         count = dr.width(pixel)
         sampler.set_samples_per_wavefront(at_once)
@@ -97,7 +96,7 @@ class PixelCentreIntegrator:
         for _ in range(spp // at_once):
             samples = self._look(scene, sensor, sampler, corner)
             if at_once > 1:
-                dr.eval(samples)  # together: each sum evaluates what it adds, by itself
+                dr.eval(samples)  # together: each sum would evaluate its terms separately
             passed = mi.Vector4f([added(value, count, at_once) for value in samples])
             del samples
             if at_once < spp:
@@ -106,10 +105,10 @@ class PixelCentreIntegrator:
                 dr.eval(passed)
             yield passed
             if at_once < spp:
-                dr.sync_thread()  # or else all passes would take their memory before the first gives it back
+                dr.sync_thread()  # otherwise all passes would allocate before the first frees its memory
 
     def render_backward(self, scene, params, grad_in, sensor=0, seed=0, spp=0):
-        """As Mitsuba's own, but pass by pass, by the derivative of the finish at the mean of all."""
+        """Do as Mitsuba's own, but pass by pass, by the derivative of the finish at the mean of all."""
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
         film, sampler = sensor.film(), self._sampler(sensor, spp)
@@ -127,7 +126,7 @@ class PixelCentreIntegrator:
                 dr.eval()
 
     def render_forward(self, scene, params, sensor=0, seed=0, spp=0):
-        """As Mitsuba's own, but pass by pass."""
+        """Do as Mitsuba's own, but pass by pass."""
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
         film, sampler = sensor.film(), self._sampler(sensor, spp)
@@ -136,7 +135,7 @@ class PixelCentreIntegrator:
         sums, tangent = mi.Vector4f(0), mi.Vector4f(0)
         with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):
             for passed in self._passes(scene, sensor, sampler, seed):
-                # The passes to come need the gradients of the parameters, too.
+                # Later passes need the gradients of the parameters, too.
                 tangent += dr.forward_to(passed, flags=dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
                 sums += dr.detach(passed)
                 dr.eval(sums, tangent)
@@ -146,11 +145,11 @@ class PixelCentreIntegrator:
         return dr.forward_to(film.develop())
 
     def put(self, film, sums, count):
-        """Fill a film with the finished means of its pixels, each with the weight of the ``count`` samples of which
-        ``sums`` are the sums."""
+        """Fill a film with the finished means of its pixels, where ``sums`` are over ``count`` samples, the weight of
+        each pixel."""
         film.prepare([])
         block, has_alpha = film.create_block(), mi.has_flag(film.flags(), mi.FilmFlags.Alpha)
-        # A box filter takes the corner, as Mitsuba's own integrators do.
+        # A box filter needs the corner, as in Mitsuba's own integrators.
         centre = 0 if film.rfilter().is_box_filter() else 0.5
         scalar = is_scalar()
         for corner, total in zip(pixels(film), sums, strict=True) if scalar else [(pixels(film), sums)]:
@@ -161,18 +160,18 @@ class PixelCentreIntegrator:
 
     @staticmethod
     def _sampler(sensor, spp):
-        """A sampler of one's own, for ``spp`` samples per pixel or the scene's number."""
+        """Return a clone of the sensor's sampler, for ``spp`` samples per pixel or the scene's number."""
         sampler = sensor.sampler().clone()
         if spp:
             sampler.set_sample_count(spp)
         return sampler
 
     def _look(self, scene, sensor, sampler, corner):
-        """The red, green and blue of a sample, and its opacity, through the centre of a pixel."""
+        """Return the red, green and blue of a sample through the centre of a pixel, and its opacity."""
         film, time = sensor.film(), sensor.shutter_open()
         if sensor.shutter_open_time() > 0:
             time += sampler.next_1d() * sensor.shutter_open_time()
-        # The film of a sensor that is a surface has no pixels to look through the centre of, but spreads over it.
+        # If the sensor is a surface, its film has no pixel centres, but spreads over the surface.
         inside = 0.5 if sensor.get_shape() is None else sampler.next_2d()
         ray, weight = sensor.sample_ray_differential(
             time=time,
@@ -197,11 +196,11 @@ class PixelCentreIntegrator:
 
 
 LANES = 1 << 22
-"""The most samples that are drawn at once, unless the film has more pixels: fixed, as what is drawn depends on it."""
+"""The most samples drawn at once, unless the film has more pixels: fixed, as the samples depend on it."""
 
 
 def pixels(film):
-    """The corners of a film's pixels, with the border that its filter may want sampled: a list in scalar variants."""
+    """Return the corners of a film's pixels, with the border that its filter may need: a list in scalar variants."""
     border = film.rfilter().border_size() if film.sample_border() else 0
     width, height = (int(size) + 2 * border for size in film.crop_size())
     first = mi.ScalarVector2i(film.crop_offset()) - border
@@ -212,12 +211,12 @@ def pixels(film):
 
 
 def samples_at_once(film, sampler) -> int:
-    """How many samples of each pixel are drawn at once: a divisor of all, as samplers that stratify over all passes
-    demand."""
+    """Return the number of samples of each pixel drawn at once: a divisor of all, as samplers that stratify over all
+    passes require."""
     spp, most = sampler.sample_count(), max(LANES // dr.width(pixels(film)), 1)
     return next(count for count in range(min(spp, most), 0, -1) if spp % count == 0)
 
 
 def added(value, count: int, size: int):
-    """The sums of ``count`` blocks of a value, each of a size; of one that is the same in all lanes, too."""
+    """Return the sums of ``count`` blocks of a value, each of a given size; the value may be uniform."""
     return dr.block_sum(value, size) if dr.width(value) == count * size else dr.repeat(value * size, count)

@@ -1,4 +1,4 @@
-"""From names to models: which plugins there are, whoever wrote them, and how they get into each variant."""
+"""The registry of models, of the pack and of others, by name, and their registration in each variant."""
 
 from __future__ import annotations
 
@@ -31,35 +31,34 @@ Registered = TypeVar("Registered", bound=type[Model] | type[Term])
 MODELS: dict[str, type[Model]] = {}
 INTEGRATORS: dict[str, type[Plugin]] = {name: Shading for name in Shading.plugins}
 _variants: dict[str, dict[str, type[Plugin]]] = {}
-"""What is registered, by variant and name."""
+"""The registered classes, by variant and name."""
 
 
-# --- Which models there are -----------------------------------------------------------------------------------------
+# --- The models -----------------------------------------------------------------------------------------
 
 
 def register(brought: Registered, *, replace: bool = False) -> Registered:
-    """Make a model of your own known by its names, ``model.plugins``, in every variant, present and future, and to all
-    commands and functions that take a name; or a distribution, a shadowing or a Fresnel term to ``microfacet`` (a
-    Fresnel term to all plugins with such parameters) by its ``word``. Also a decorator::
+    """Register a model under its names, ``model.plugins``, in every variant, present and future, and for all commands
+    and functions that take a name; or register a distribution, a shadowing or a Fresnel term for ``microfacet`` (a
+    Fresnel term for all plugins with such parameters) under its ``word``. Also a decorator::
 
         @mi_brdfs.register
         class Lommel(mi_brdfs.Model):
             ...
 
-    Registering an edited class again, as in a notebook, replaces its former self. BSDFs that were loaded before remain
-    what they were.
+    Registering an edited class again, as in a notebook, replaces the former one. BSDFs loaded before do not change.
 
     Args:
         brought: a subclass of :class:`mi_brdfs.Model`, or of :class:`mi_brdfs.microfacet.Distribution`, ``Shadowing``
             or ``Fresnel``.
-        replace: take a name or word that belongs to Mitsuba or to another one.
+        replace: take a name or word that belongs to Mitsuba or to another class.
 
     Returns:
         The class.
 
     Raises:
-        TypeError: if it is no such class.
-        ValueError: if a name is taken or cannot be one, or a model has no docstring.
+        TypeError: if it is not such a class.
+        ValueError: if a name is taken or invalid, or a model has no docstring.
     """
     if isinstance(brought, type) and issubclass(brought, Model):
         _register_model(brought, replace)
@@ -74,15 +73,15 @@ def register(brought: Registered, *, replace: bool = False) -> Registered:
 
 def _register_model(model: type[Model], replace: bool) -> None:
     if not (model.__doc__ or "").strip():
-        raise ValueError(f"{model.__name__} has no docstring: write its manual page there, the first line a summary.")
+        raise ValueError(f"{model.__name__} has no docstring: write its manual page there, first a summary.")
     for name in model.plugins:
         if not re.fullmatch(r"[A-Za-z]\w*", name):
-            raise ValueError(f"{model.__name__}: {name!r} cannot be a plugin name; take letters, digits and _.")
+            raise ValueError(f"{model.__name__}: {name!r} cannot be a plugin name; use letters, digits and _.")
         owner = _owner(name, model)
         if owner and not replace:
             raise ValueError(
                 f'{model.__name__}: the name "{name}" belongs to {owner}; '
-                'choose another one by plugins = ("…",), or register with replace=True.'
+                'choose another one with plugins = ("…",), or register with replace=True.'
             )
     for name in [name for name, other in MODELS.items() if _same(other, model)]:
         del MODELS[name]
@@ -92,7 +91,7 @@ def _register_model(model: type[Model], replace: bool) -> None:
 
 
 def _owner(name: str, model: type[Model]) -> str | None:
-    """Whose a name is, if not the model's own."""
+    """Return the owner of a name, if it is not the model itself."""
     if name in MODELS:
         other = MODELS[name]
         return None if _same(other, model) else f"{other.__module__}.{other.__qualname__}"
@@ -100,17 +99,17 @@ def _owner(name: str, model: type[Model]) -> str | None:
 
 
 def _same(one: type[Model], other: type[Model]) -> bool:
-    """Whether both are the same class, perhaps of different times."""
+    """Return whether both are the same class, perhaps in different versions."""
     return (one.__module__, one.__qualname__) == (other.__module__, other.__qualname__)
 
 
 def models_in(module: ModuleType) -> list[type[Model]]:
-    """The models that a module defines, in the order of their names."""
+    """Return the models that a module defines, in the order of their names."""
     return sorted(_defined(module, Model), key=lambda model: model.plugins)
 
 
 def terms_in(module: ModuleType) -> list[type[Term]]:
-    """The terms with a word that a module defines."""
+    """Return the terms with a word that a module defines."""
     return [term for term in _defined(module, Term) if term.word]
 
 
@@ -120,12 +119,12 @@ def _defined(module: ModuleType, kind: type) -> list[type]:
 
 
 def is_own(model: type[Model]) -> bool:
-    """Whether a model is one of the pack."""
+    """Return whether a model belongs to the pack."""
     return model.__module__.startswith(f"{models.__name__}.")
 
 
 def _take_in_own():
-    """The models of the files in ``mi_brdfs/models``."""
+    """Register the models of the files in ``mi_brdfs/models``."""
     for file in pkgutil.iter_modules(models.__path__):
         for model in models_in(importlib.import_module(f"{models.__name__}.{file.name}")):
             MODELS.update(dict.fromkeys(model.plugins, model))
@@ -135,22 +134,22 @@ _take_in_own()
 
 
 def list_models() -> list[str]:
-    """The names of all BSDF plugins, in alphabetical order, each followed by its aliases."""
+    """Return the names of all BSDF plugins, in alphabetical order, each followed by its aliases."""
     return [name for model in all_models() for name in model.plugins if MODELS[name] is model]
 
 
 def all_models() -> list[type[Model]]:
-    """The models in the same order, each once."""
+    """Return the models in the same order, each once."""
     return sorted(set(MODELS.values()), key=lambda model: model.plugins)
 
 
 def own_models() -> list[type[Model]]:
-    """Those of the pack among them."""
+    """Return the pack's models, in the same order."""
     return [model for model in all_models() if is_own(model)]
 
 
 def find_model(name: str) -> type[Model]:
-    """The model of a plugin name.
+    """Return the model of a plugin name.
 
     Raises:
         ValueError: if there is none, with the closest name there is.
@@ -159,7 +158,7 @@ def find_model(name: str) -> type[Model]:
 
 
 def info(name: str) -> str:
-    """The manual page of a plugin: formula and source, conventions, properties, and the table of its parameters.
+    """Return the manual page of a plugin: formula and source, conventions, properties, and the table of its parameters.
 
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
@@ -174,7 +173,7 @@ def _find(name: str, plugins: dict):
     return plugins[name]
 
 
-# --- How they get into variants -------------------------------------------------------------------------------------
+# --- Registration in variants -------------------------------------------------------------------------------------
 
 
 def install():
@@ -208,7 +207,7 @@ def _register_for(active: str):
 
 
 def _register_in(variant: str):
-    """Register in a variant what is not registered there as it is now."""
+    """Register in a variant all classes whose current version is not registered there."""
     module = importlib.import_module(f"mitsuba.{variant}")
     known = _variants.setdefault(variant, {})
     for name, plugin in (MODELS | INTEGRATORS).items():
@@ -216,7 +215,7 @@ def _register_in(variant: str):
             continue
         if issubclass(plugin, Model):
             if name not in known and variant == mi.variant() and _is_foreign(name):
-                warnings.warn(f'mi_brdfs replaces the BSDF "{name}" that another package registered.', stacklevel=2)
+                warnings.warn(f'mi_brdfs replaces the BSDF "{name}", registered by another package.', stacklevel=2)
             module.register_bsdf(name, bsdf_class(plugin, module.BSDF))
         else:
             module.register_integrator(name, integrator_class(plugin, module.SamplingIntegrator))
@@ -225,16 +224,16 @@ def _register_in(variant: str):
 
 @functools.cache
 def _builtins() -> frozenset[str]:
-    """The names of the plugins that are part of Mitsuba."""
+    """Return the names of Mitsuba's own plugins."""
     return frozenset(path.stem for path in (Path(mi.__file__).parent / "plugins").iterdir())
 
 
 def _is_foreign(name: str) -> bool:
-    """Whether the active variant has a plugin of a name that is not ours, and not part of Mitsuba."""
+    """Return whether the active variant has a plugin of this name that is neither ours nor Mitsuba's own."""
     if name in _builtins():
         return False
     try:
         mi.PluginManager.instance().create_object(mi.Properties(name))
-    except Exception as error:  # of the plugin manager, or of a plugin that wants parameters
+    except Exception as error:  # from the plugin manager, or from a plugin that needs parameters
         return "not found" not in str(error)
     return True

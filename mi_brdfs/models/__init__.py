@@ -1,1 +1,1 @@
-"""The models, one file each: importing the package finds them by themselves."""
+"""The models, one file each; importing ``mi_brdfs`` discovers them."""

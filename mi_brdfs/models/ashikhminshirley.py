@@ -9,7 +9,7 @@ from ..parameters import Number, Reflectance, Rotation
 
 
 class AshikhminShirley(Model):
-    """Ashikhmin and Shirley's anisotropic Phong model (2000), with a diffuse lobe that leaves what is not reflected.
+    """Ashikhmin and Shirley's anisotropic Phong model (2000), with a diffuse lobe for the light not reflected.
 
     M. Ashikhmin and P. Shirley, An anisotropic Phong BRDF model, Journal of Graphics Tools 5(2), 2000,
     doi:10.1080/10867651.2000.10487522.
@@ -19,15 +19,15 @@ class AshikhminShirley(Model):
         fd = 28 Rd/(23π) (1-Rs) (1-(1-cosθ_i/2)⁵) (1-(1-cosθ_o/2)⁵)
         F  = Rs + (1-Rs) (1-wi·h)⁵
 
-    with h = (wi+wo)/|wi+wo|. As a microfacet model fs has the distribution D = √((nu+1)(nv+1))/(2π) cosθ_h^e, which
-    normalises without a cosine, and the shadowing term G = min(cosθ_i, cosθ_o)/(wi·h).
+    with h = (wi+wo)/|wi+wo|. As a microfacet model, fs has the distribution D = √((nu+1)(nv+1))/(2π) cosθ_h^e,
+    normalised without a cosine, and the shadowing term G = min(cosθ_i, cosθ_o)/(wi·h).
 
     Reciprocal. Energy-conserving: the albedo of fs is at most 1 (F = 1), that of fd is Rd (1-Rs) (1-(1-cosθ_i/2)⁵).
-    These exponents are not those of microfacet distributions called "phong" elsewhere, which normalise with n+2.
-    One-sided.
+    These exponents differ from those of microfacet distributions called "phong" elsewhere, which are normalised with
+    n+2. One-sided.
 
-    Sampling: fs by a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.AntitheticNormals), so that no sample falls below the horizon; fd cosine-weighted.
+    Sampling: for fs an antithetic pair of half vectors, one chosen by how much each reflects
+    (mi_brdfs.microfacet.sampling.AntitheticNormals), so that no sample falls below the horizon; for fd the cosine.
 
     Example
     -------
@@ -58,7 +58,7 @@ class AshikhminShirley(Model):
         diffuse = WeightedLobe(
             LambertLobe(p.diffuse_reflectance * (1 - p.specular_reflectance)),
             lambda wi, wo: 28 / 23 * darkening(wi.z) * darkening(wo.z),
-            lambda wi: darkening(wi.z),  # which is exact
+            lambda wi: darkening(wi.z),  # exact
         )
         return diffuse, specular
 

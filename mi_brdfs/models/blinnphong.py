@@ -18,21 +18,21 @@ class BlinnPhong(Model):
 
     with h = (wi+wo)/|wi+wo| and, by ``normalization``,
 
-    * energy: K = (n+2)(n+4) / (8π (2^(-n/2) + n)). The albedo of the lobe is ρs at normal incidence and falls towards
-      grazing; so ρd + ρs <= 1 conserves energy.
+    * energy: K = (n+2)(n+4) / (8π (2^(-n/2) + n)). The lobe's albedo is ρs at normal incidence and falls towards
+      grazing angles, so ρd + ρs <= 1 conserves energy.
     * approximate: K = (n+8)/(8π), the approximation common in games. The albedo exceeds ρs by up to 7.5 % (n = 9).
-    * ndf: K = (n+2)/(2π), which normalises the power as a distribution of facets. It stands in published fits of
-      measured materials. The albedo is 2.9 ρs (n = 10) to 3.85 ρs (n = 100) at normal incidence.
+    * ndf: K = (n+2)/(2π), which normalises the power as an NDF. Published fits of measured materials use it. The albedo
+      is 2.9 ρs (n = 10) to 3.85 ρs (n = 100) at normal incidence.
     * none: K = 1. Gains energy for small n: the albedo is 8π/((n+2)(n+4)) (2^(-n/2) + n) ρs at normal incidence.
-    * original: f cosθ_o = ρs cosθ_h^n/π, where the term is the whole response to a light and π belongs to the light.
-      As a BRDF it is neither reciprocal nor bounded at grazing.
+    * original: f cosθ_o = ρs cosθ_h^n/π, where the term is the whole response to a light and π belongs to the light. As
+      a BRDF it is neither reciprocal nor bounded at grazing angles.
 
-    As a microfacet model it is Blinn's distribution D = (n+2)/(2π) cosθ_h^n with F = 1 and the shadowing term
-    G = cosθ_i cosθ_o times a constant (with cosθ_i alone for ``original``).
+    As a microfacet model, it has Blinn's distribution D = (n+2)/(2π) cosθ_h^n, F = 1, and the shadowing term G = cosθ_i
+    cosθ_o times a constant (cosθ_i alone for ``original``).
 
-    Reciprocal, but for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
+    Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); no sample falls below the horizon.
 
     Example
@@ -72,7 +72,7 @@ class BlinnPhong(Model):
             "none": lambda: 1,
             "original": lambda: dr.inv_pi,
         }[self.normalization]()
-        scale = 4 * dr.two_pi / (n + 2) * scale  # in terms of D, of which G has the rest
+        scale = 4 * dr.two_pi / (n + 2) * scale  # relative to D; G has the rest
         shadowing = ResponseShadowing() if self.normalization == "original" else Implicit()
         specular = MicrofacetLobe(p.specular_reflectance, Blinn(n), shadowing, Unit(), scale)
         return LambertLobe(p.diffuse_reflectance), specular

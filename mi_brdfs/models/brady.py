@@ -17,20 +17,20 @@ class Brady(Model):
 
         f = ρd/π + K ρs F(wi·h)/(4 (wi·h)) exp(-(tanθ_h/β²)^α),    F = f0 + (1-f0) (1-wi·h)⁵
 
-    with h = (wi+wo)/|wi+wo|. α = 2 has the tail of a Gaussian, and lower α longer ones. ``normalization`` chooses K:
+    with h = (wi+wo)/|wi+wo|. α = 2 has the tail of a Gaussian; lower α have longer tails. ``normalization`` chooses K:
 
-    * unit: (α/2)/(π β⁴ Γ(2/α)), with which the exponential over cos⁴θ_h is a distribution of facets, as in the
-      ``epd`` of ``microfacet`` with its alpha = β² and gamma = α/2. The albedo is about ρs F at normal incidence for
-      narrow lobes.
-    * none: 1, as published. The scale of the lobe is left to ρs, which a fit makes as large as it needs: with ρs = 1
-      the albedo is 0.025 at most for α = 2, β = 0.3, F = 1.
+    * unit: (α/2)/(π β⁴ Γ(2/α)), which makes the exponential over cos⁴θ_h an NDF, that of ``epd`` in ``microfacet`` with
+      alpha = β² and gamma = α/2. Narrow lobes have an albedo of about ρs F at normal incidence.
+    * none: 1, as published. This leaves the scale of the lobe to ρs, which a fit makes as large as needed: with ρs = 1
+      the albedo is at most 0.025 for α = 2, β = 0.3, F = 1.
 
-    Of the paper, the formula was checked against public code only; its model B is not part of this plugin.
+    The formula was checked against public code only, not against the paper; the paper's model B is not part of this
+    plugin.
 
-    Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: for F = 1 the albedo is ρs at most, and that of narrow
-    lobes falls like cosθ_i towards grazing. One-sided.
+    Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: for F = 1 the albedo is at most ρs, and that of narrow
+    lobes falls like cosθ_i towards grazing angles. One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); no sample falls below the horizon.
 
     Example
@@ -60,7 +60,7 @@ class Brady(Model):
 
 
 class Projected(Shadowing):
-    """The shadowing term that leaves 1/(wi·h) of 1/(cosθ_i cosθ_o)."""
+    """The shadowing term that turns 1/(cosθ_i cosθ_o) into 1/(wi·h)."""
 
     lean = 1
 

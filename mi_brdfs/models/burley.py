@@ -33,25 +33,24 @@ class Burley(Model):
         Gc   = G for α = 0.25
 
     L is the luminance of the base colour C, so that C/L is its hue; in spectral variants it is the mean of C over the
-    wavelengths that are traced together, and tinted results differ from those of rgb variants. Hues of saturated blues
-    are far above 1, and may lift the tinted f0 as far as 1.1.
+    wavelengths traced together, and tinted results differ from those of rgb variants. The hues of saturated blues are
+    far above 1, and may raise the tinted f0 up to 1.1.
 
-    The course notes have another shadowing term for the specular lobe, G of roughness (0.5 + roughness/2)²; its author
-    replaced it by the one above in 2017. BRDF Explorer decodes C by a power of 2.2 and weighs L by (0.3, 0.6, 0.1);
-    here C is linear, as everywhere in Mitsuba, and L is Mitsuba's luminance. The revisions could be checked against
-    public code only, not against a paper. Mitsuba's ``principled`` has the same base lobe (``flatness`` is subsurface),
-    sheen, and specular lobe for spec_tint = 1 or metallic = 1; otherwise it has the exact Fresnel reflectance in place
-    of F(f0). Its clear coat is 4 cosθ_i cosθ_o times this one.
+    The course notes have another shadowing term for the specular lobe, G of roughness (0.5 + roughness/2)²; the author
+    replaced it by the one above in 2017. BRDF Explorer decodes C by a power of 2.2 and weights L by (0.3, 0.6, 0.1);
+    here C is linear, as everywhere in Mitsuba, and L is Mitsuba's luminance. The revisions were checked against public
+    code only, not against a paper. Mitsuba's ``principled`` has the same base lobe (``flatness`` is subsurface), sheen,
+    and specular lobe for spec_tint = 1 or metallic = 1; otherwise it has the exact Fresnel reflectance instead of
+    F(f0). Its clear coat is 4 cosθ_i cosθ_o times this one.
 
     Reciprocal. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the defaults, 1.60 for roughness = 1 and,
     with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv for roughness = 0.17 and
-    anisotropic = 1, all of them beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a clear coat.
-    One-sided.
+    anisotropic = 1, all beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a clear coat. One-sided.
 
-    Sampling: the base lobe by cosine with a few uniform directions, the sheen by a density of its own, the clear
-    coat by a half vector or its mirror image and the specular lobe by one of two visible normals, chosen by what they
-    reflect (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticVisibleNormals). No sample falls below the
-    horizon.
+    Sampling: for the base lobe the cosine with a few uniform directions, for the sheen a density of its own, for the
+    clear coat an antithetic pair of half vectors and for the specular lobe one of visible normals, one of the pair
+    chosen by how much each reflects (mi_brdfs.microfacet.sampling.AntitheticNormals,
+    mi_brdfs.microfacet.visible.AntitheticVisibleNormals). No sample falls below the horizon.
 
     Example
     -------
@@ -71,11 +70,11 @@ class Burley(Model):
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has neither base lobe nor sheen")
     specular = Number(0.5, (0, 1), "reflectance of the dielectric at normal incidence, in units of 0.08")
     spec_tint = Number(0, (0, 1), "tint of the dielectric's reflection towards the hue of C")
-    roughness = Number(0.5, (0, 1), "roughness of the base and the specular lobe; the facets' is its square")
-    anisotropic = Number(0, (0, 1), "how far the highlight is drawn out along dp_du")
-    sheen = Number(None, (0, 1), "scale of the sheen; not given, there is none")
+    roughness = Number(0.5, (0, 1), "roughness of the base and the specular lobe; its square is the facets' α")
+    anisotropic = Number(0, (0, 1), "how far the highlight is stretched along dp_du")
+    sheen = Number(None, (0, 1), "scale of the sheen; omitted by default")
     sheen_tint = Number(0.5, (0, 1), "tint of the sheen towards the hue of C")
-    clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; not given, there is none")
+    clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; omitted by default")
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
     rotation = Rotation()
 
@@ -107,7 +106,8 @@ class Burley(Model):
 
 
 class CoatShadowing(Shadowing):
-    """Smith's separable term for GGX of α = 0.25, whatever the gloss. The facets are narrower, so do not lean."""
+    """Smith's separable term for GGX of α = 0.25, at any gloss. The facets' distribution is narrower, so they do not
+    lean."""
 
     def __call__(self, facet):
         return self._seen(facet.cos_i) * self._seen(facet.cos_o)
@@ -119,7 +119,7 @@ class CoatShadowing(Shadowing):
 
 
 class CoatLobe(MicrofacetLobe):
-    """A lobe of facets so narrow that its albedo is about that of a mirror."""
+    """A lobe so narrow that its albedo is about that of a mirror."""
 
     seldom = True
 
@@ -134,10 +134,10 @@ def schlick_weight(cos):
 
 
 class BaseLobe(Lobe):
-    """f = ρ/π times Burley's diffuse term, or his approximation of subsurface scattering, or a mixture of the two.
-    Both brighten or darken towards grazing, depending on the roughness.
+    """f = ρ/π times Burley's diffuse term, or his approximation of subsurface scattering, or a mixture of the two. Both
+    brighten or darken towards grazing angles, depending on the roughness.
 
-    Sampled by the cosine, and a few directions uniformly for the brightening.
+    Draw from the cosine and, for the brightening, a few directions uniformly.
     """
 
     glossy = False

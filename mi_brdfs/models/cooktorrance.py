@@ -25,16 +25,16 @@ class CookTorrance(Model):
     * blinn: D = (n+2)/(2π) cosθ_h^n with n = 2/α² - 2; α is limited to 1
 
     F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``, in the
-    form the paper gives), Schlick's approximation for ``f0``, and 1 if none of them is given. ``normalization`` is
+    paper's form), Schlick's approximation for ``f0``, and 1 if none of them is given. ``normalization`` is
 
-    * modern: as above, where D is a distribution of facets (∫ D cosθ_h = 1) and 4 the Jacobian of the half vector.
-      So the conference version of 1981 has it, with D/4 and 1/π.
+    * modern: as above, where D is an NDF (∫ D cosθ_h = 1) and 4 comes from the Jacobian of the half vector. This agrees
+      with the conference version of 1981, which has D/4 and 1/π.
     * tog82: four times that, as printed in 1982, where D lost its factor 1/4. The albedo is up to 4 ρs.
 
-    Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. The paper's sum of several D of different roughness
-    is a ``blendbsdf``. One-sided.
+    Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. For the paper's sum of several D of different
+    roughness, use ``blendbsdf``. One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
 
     Example
@@ -47,7 +47,7 @@ class CookTorrance(Model):
     {"type": "cooktorrance", "material": "Cu", "alpha": 0.25}
     """
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     alpha = Number(0.1, (1e-4, 2), "roughness α (the paper's m), the root mean square slope of the facets")
     fresnel = FresnelSet()

@@ -20,11 +20,11 @@ class EON(Model):
         1-E(θ) = A r (c μ²/(1+S) + S/π (π/2 - θ - μ³ (2+S)/(3 (1+S)²)))
 
     with φ the azimuth between wi and wo, r the roughness, c = 1/2 - 2/(3π), μ = cosθ and S = sinθ. E is the albedo of
-    the first term for ρ = 1. That term is Fujii's variant of Oren and Nayar's qualitative model; the second gives back
-    the light that it loses, after several reflections. r = 0 is Lambert's model.
+    the first term for ρ = 1. That term is Fujii's variant of Oren and Nayar's qualitative model; the second returns the
+    light that the first loses, after several reflections. r = 0 is Lambert's model.
 
-    Reciprocal. Energy-conserving: the albedo is ρ E + ρ_ms (1-E), and 1 in all directions for ρ = 1. E is
-    exact; the paper has a polynomial fit of it, too. One-sided.
+    Reciprocal. Energy-conserving: the albedo is ρ E + ρ_ms (1-E), and 1 in all directions for ρ = 1. E is exact here;
+    the paper also has a polynomial fit. One-sided.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions, as in the paper
     (mi_brdfs.lobes.diffuse.RoughDiffuseLobe); no sample falls below the horizon.
@@ -49,7 +49,7 @@ class EON(Model):
 
 
 class EONLobe(RoughDiffuseLobe):
-    # Of the loss (1 - E)/(A r), that at normal incidence and its mean.
+    # The loss (1 - E)/(A r) at normal incidence, and its mean.
     NORMAL = 1 / 2 - 2 / (3 * math.pi)
     MEAN = NORMAL - (2 / 3 - 28 / (15 * math.pi))
 
@@ -60,7 +60,7 @@ class EONLobe(RoughDiffuseLobe):
         self.multiple = dr.square(reflectance) * (1 - mean_loss) / (1 - reflectance * mean_loss)
 
     def _loss(self, w):
-        """(1 - E)/(A r), arranged so that nothing cancels at grazing, where it vanishes."""
+        """Return (1 - E)/(A r), arranged so that nothing cancels at grazing angles, where it vanishes."""
         cos, sin = w.z, sin_theta(w)
         cos2 = cos * cos
         rise = dr.atan2(cos, sin) - cos * cos2 * (2 + sin) / (3 * dr.square(1 + sin))

@@ -15,17 +15,16 @@ class Kurt(Model):
         f = ρd/π + Σ ks F(wi·h) D(h) / (4 (wi·h) (cosθ_i cosθ_o)^κ)
         D = exp(-((h_x/αu)² + (h_y/αv)²)/h_z²) / (π αu αv h_z⁴),    F = f0 + (1-f0) (1-wi·h)⁵
 
-    with h = (wi+wo)/|wi+wo|, summed over one to eight lobes of ``specular_reflectance_i`` (ks), ``f0_i``,
-    ``alpha_i`` (or ``alpha_u_i`` and ``alpha_v_i``) and ``kurt_exponent_i`` (κ, the paper's α), numbered from 1; a
-    single lobe drops the number. As a microfacet model each is Beckmann's with the shadowing term
-    G = (cosθ_i cosθ_o)^(1-κ)/(wi·h).
+    with h = (wi+wo)/|wi+wo|, summed over one to eight lobes of ``specular_reflectance_i`` (ks), ``f0_i``, ``alpha_i``
+    (or ``alpha_u_i`` and ``alpha_v_i``) and ``kurt_exponent_i`` (κ, the paper's α), numbered from 1; a single lobe
+    needs no number. As a microfacet model, each lobe has Beckmann's D and the shadowing term G = (cosθ_i
+    cosθ_o)^(1-κ)/(wi·h).
 
-    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1. Else the albedo diverges at grazing: for κ = 0.25 and
-    F = 1 it exceeds 1 from 89.9° on for α = 0.3, and from 88° on for α = 1; for κ = 0.5 and α = 0.1 it is 1.05 at 88°
-    and 3.7 at 89.9°.
-    That D's cosine power is 4 was not checked against the paper. One-sided.
+    Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1. Otherwise the albedo diverges at grazing angles: for
+    κ = 0.25 and F = 1 it exceeds 1 from 89.9° on for α = 0.3, and from 88° on for α = 1; for κ = 0.5 and α = 0.1 it is
+    1.05 at 88° and 3.7 at 89.9°. The power 4 of the cosine in D was not checked against the paper. One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
 
     Example

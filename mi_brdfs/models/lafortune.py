@@ -17,21 +17,20 @@ class Lafortune(Model):
         f = ρd/π + Σ ρ_l max(0, Cx wi_x wo_x + Cy wi_y wo_y + Cz wi_z wo_z)^n
 
     summed over one to eight lobes of ``specular_reflectance_i`` (ρ_l), ``cx_i``, ``cy_i``, ``cz_i`` and ``exponent_i``
-    (n), numbered from 1; a single lobe drops the number. Cx = Cy = -Cz < 0 is a mirror lobe (Phong's, for Cz = 1),
-    Cx = Cy > 0 reflects back to where the light came from, |Cz| < |Cx| lies beyond the mirror direction, Cx ≠ Cy is
-    anisotropic.
+    (n), numbered from 1; a single lobe needs no number. Cx = Cy = -Cz < 0 is a mirror lobe (Phong's, for Cz = 1),
+    Cx = Cy > 0 reflects back towards the light, |Cz| < |Cx| lies beyond the mirror direction, Cx ≠ Cy is anisotropic.
     ``normalization`` is
 
-    * energy: ρ_l is multiplied by (n+2)/(2π Cmax^n), where Cmax is the largest of |Cx|, |Cy| and |Cz|: the albedo of
-      a lobe stays below ρ_l.
+    * energy: ρ_l is multiplied by (n+2)/(2π Cmax^n), with Cmax the largest of |Cx|, |Cy| and |Cz|: the albedo of a lobe
+      stays below ρ_l.
     * none: as in the paper and in its published fits, where the C carry the energy. The albedo of a lobe is at most
       2π ρ_l Cmax^n/(n+2), which may exceed 1.
 
-    Reciprocal. Energy-conserving for ``energy`` with ρd + Σ ρ_l <= 1. A spectral exponent is one lobe for each colour.
-    One-sided.
+    Reciprocal. Energy-conserving for ``energy`` with ρd + Σ ρ_l <= 1. For a spectral exponent, use one lobe for each
+    colour. One-sided.
 
-    Sampling: each lobe nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe), also where its axis lies below the
-    horizon (Cz < 0) and only its tail can be seen: there a few samples fall below the horizon.
+    Sampling: each lobe nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe), even if its axis lies below the
+    horizon (Cz < 0) and only its tail is visible: then a few samples fall below the horizon.
 
     Example
     -------
@@ -73,16 +72,17 @@ class Lafortune(Model):
 
 
 class LafortuneLobe(PowerLobe):
-    """ρ·scale·max(0, (C∘wi)·wo / unit)ⁿ: a power of the cosine to the axis C∘wi, times one of its length."""
+    """ρ·scale·max(0, (C∘wi)·wo / unit)ⁿ: a power of the cosine to the axis C∘wi, times the same power of its length."""
 
-    anisotropic = True  # Cx and Cy are apart, and may come to differ
+    anisotropic = True  # Cx and Cy are separate parameters, which may differ
 
     def __init__(self, reflectance, exponent, scale, c, unit):
         super().__init__(reflectance, exponent, scale)
         self.c, self.unit = c, unit
 
     def _stretched(self, wi):
-        """``(C∘wi, its length)``, the length relative to that of wi, which may be off one by a rounding error."""
+        """Return ``(C∘wi, its length)``, the length relative to that of wi, which may differ from one by a rounding
+        error."""
         v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
         return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), TINY))
 
@@ -92,19 +92,19 @@ class LafortuneLobe(PowerLobe):
 
     def peak(self, wi):
         _, length = self._stretched(wi)
-        # (length/unit)² is one less what the factors smaller than unit take away: a large exponent needs its digits.
+        # (length/unit)² is one minus the deficit of the factors smaller than unit: a large exponent needs its digits.
         taken = sum((self.unit - c) * (self.unit + c) * w * w for c, w in zip(self.c, wi, strict=True))
         taken = taken / (self.unit * self.unit * dr.squared_norm(wi))
         near = abs(taken) < 0.5
         log = dr.select(near, 0.5 * log1p(-dr.select(near, taken, 0)), dr.log(length / self.unit))
-        # A C above 1 with a large exponent leaves the range of float32; so bright a lobe is limited.
+        # A C above 1 with a large exponent overflows float32: limit so bright a lobe.
         return self.scale * dr.exp(clamp(self.exponent * log, -dr.inf, 40))
 
-    # Above the horizon, A is at most s, the sine of the axis's angle to the normal. Where the axis lies so far below it
-    # that most of the lobe does, too, t = log(s/A) is drawn ∝ t exp(-(n+1) t), and the azimuth from those above.
+    # Above the horizon, A is at most s, the sine of the axis's angle to the normal. If the axis lies so far below the
+    # horizon that most of the lobe does, too, draw t = log(s/A) ∝ t exp(-(n+1) t), and an azimuth above the horizon.
 
     def _buried(self, frame):
-        """``(whether it does, log s, c² (n+1))``, where c is the cosine."""
+        """Return ``(whether it does, log s, c² (n+1))``, where c is the axis's cosine."""
         cos2 = dr.square(frame.axis.z)
         sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # for which 1 - c² has no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
@@ -118,8 +118,8 @@ class LafortuneLobe(PowerLobe):
 
     @staticmethod
     def _arc(frame, t):
-        """The sine of the largest azimuth, from that of ``up``, above the horizon, or a little more."""
-        square = dr.minimum(2 * t / (1 + t), 1)  # of the cosine to the horizon, A/s being the sine
+        """Return the sine of the largest azimuth above the horizon, relative to ``up``, or a little more."""
+        square = dr.minimum(2 * t / (1 + t), 1)  # the squared cosine to the horizon, whose sine is A/s
         s2, c2 = dr.square(frame.sin), dr.square(frame.axis.z)
         return dr.sqrt(square / (c2 + s2 * square))
 
@@ -137,6 +137,6 @@ class LafortuneLobe(PowerLobe):
     def _pair(self, frame, log_a, versine, power, cos_phi):
         n, usual = self.exponent, super()._pair(frame, log_a, versine, power, cos_phi)
         buried, log_s, _ = self._buried(frame)
-        t = dr.maximum(log_s - log_a, 1e-8)  # rounding errors may leave less than nothing above the horizon
+        t = dr.maximum(log_s - log_a, 1e-8)  # rounding may make it negative
         density = dr.square(n + 1) * t * dr.exp(-n * t - log_s) * cos_phi / (2 * self._arc(frame, t))
         return dr.select(buried, dr.select(power > 0, density, 0), usual)

@@ -10,10 +10,10 @@ class Lambert(Model):
 
         f = ρ/π
 
-    The surface looks equally bright from everywhere. Same as Mitsuba's ``diffuse``.
+    The surface looks equally bright from all directions. Same as Mitsuba's ``diffuse``.
 
     Reciprocal. Energy-conserving: the albedo is ρ. Sampled exactly (cosine-weighted): every weight is ρ. One-sided;
-    wrap it in ``twosided`` for both.
+    nest it in ``twosided`` for both sides.
 
     Example
     -------

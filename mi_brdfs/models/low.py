@@ -23,19 +23,19 @@ class Low(Model):
 
     with h = (wi+wo)/|wi+wo|, the V-cavity G = min(1, 2 cosθ_h cosθ_i/(wi·h), 2 cosθ_h cosθ_o/(wi·h)) and the exact
     Fresnel reflectance F of a dielectric of index ``int_ior`` in vacuum. The smooth variant follows Rayleigh-Rice
-    theory, and has no shadowing. ``normalization`` concerns the microfacet variant:
+    theory, and has no shadowing. ``normalization`` applies to the microfacet variant:
 
-    * fit: as above, as the published fits of the MERL materials need it
-    * paper: without 1/π, as equation 15 is printed
+    * fit: as above, as required by the published fits of the MERL materials
+    * paper: without 1/π, as in the printed equation 15
     * unit: f = ρd/π + A F D G/(4 cosθ_i cosθ_o), D ∝ (1 + B (1 - cosθ_h))^-C normalised by ∫ D cosθ_h = 1; so A <= 1
       conserves energy
 
-    Reciprocal. Energy-conserving for ``unit`` with ρd + A <= 1; otherwise A is whatever a fit made it, and the albedo
-    may exceed 1. The factor 1/π was inferred from the fits. One-sided.
+    Reciprocal. Energy-conserving for ``unit`` with ρd + A <= 1; otherwise A comes from a fit, and the albedo may be
+    above 1. The factor 1/π was inferred from the fits. One-sided.
 
-    Sampling: microfacet by a half vector or its mirror image, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.AntitheticNormals); smooth exactly in S on the disc of projected directions, clipped
-    to it. No sample falls below the horizon.
+    Sampling: for microfacet an antithetic pair of half vectors, one chosen by how much each reflects
+    (mi_brdfs.microfacet.sampling.AntitheticNormals); for smooth exactly S, clipped to the disc of projected directions.
+    No sample falls below the horizon.
 
     Example
     -------
@@ -49,7 +49,7 @@ class Low(Model):
     {"type": "low", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.2]}, "a": 50.0, "b": 2000, "c": 1.2}
     """
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     a = Colour(1, (0, float("inf")), "scale A")
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
     c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
@@ -80,11 +80,11 @@ class Low(Model):
 
 
 class SmoothLobe(Lobe):
-    """f = A F(cosθ_d) (1 + B d²)^-C, where d is the distance of wo_xy from the mirror direction -wi_xy.
+    """f = A F(cosθ_d) (1 + B d²)^-C, where d is the distance of wo_xy from the projected mirror direction -wi_xy.
 
-    As f cosθ_o dω = f dx on the unit disc of projected directions x, d² is drawn from the power law on a chord through
-    -wi_xy, up to the disc's edge. Of the chord's two ends, at the same fraction of their masses, one is chosen with
-    probability ∝ mass times F.
+    On the unit disc of projected directions x, f cosθ_o dω = f dx: the cosine cancels, and S depends on d² only. Draw
+    the azimuth of a chord through -wi_xy, d² from the power law up to the disc's edge, at the same fraction of the mass
+    on both sides, and one of the two points with probability ∝ mass times F.
     """
 
     def __init__(self, reflectance, law, fresnel):
@@ -97,13 +97,13 @@ class SmoothLobe(Lobe):
         return self.reflectance * self.fresnel(wi.z)
 
     def _mass(self, wi, x, y):
-        """The power law's mass on the way from -wi_xy in the direction (x, y) to the edge of the disc."""
+        """Return the power law's mass between -wi_xy and the edge of the disc in the direction (x, y)."""
         along = x * wi.x + y * wi.y
         reach = along + dr.sqrt(along * along + wi.z * wi.z)
         return dr.maximum(self.law.mass(reach * reach), EPSILON)  # at grazing, rounding may leave nothing of the way
 
     def _reflectance(self, wi, x, y):
-        """F for the projected direction (x, y)."""
+        """Return F for the projected direction (x, y)."""
         return self.fresnel(safe_sqrt(1 - 0.25 * (dr.square(x - wi.x) + dr.square(y - wi.y))))
 
     def _brightness(self, wi, x, y):
@@ -111,7 +111,8 @@ class SmoothLobe(Lobe):
         return dr.maximum(luminance(self._reflectance(wi, x, y)), SMALL)
 
     def _end(self, wi, x, y, u):
-        """``(point, W)``: the point at the fraction ``u`` of one end of a chord, and the end's mass times F."""
+        """Return ``(point, W)``: the point at the fraction ``u`` of the mass on one side of a chord, and that mass
+        times F."""
         mass = self._mass(wi, x, y)
         d = safe_sqrt(self.law.inverse(u * mass))
         point = (d * x - wi.x, d * y - wi.y)

@@ -21,21 +21,21 @@ class MetallicRoughness(Model):
 
     with h = (wi+wo)/|wi+wo|, the base colour C, the roughness r and, by ``shadowing``, G = g(cosθ_i) g(cosθ_o) where
 
-    * direct: g(x) = x/(x (1-k) + k) with k = (r+1)²/8, which Karis has for analytic lights. It darkens smooth surfaces
-      at grazing: for C = 1, metallic = 1 and r = 0.1 the albedo is 0.34 at 80°.
-    * ibl: the same with k = r²/2, which he has for image-based lighting; it is nearly Smith's term.
-    * smith: Smith's term for GGX, separable, as that of ``walter``.
+    * direct: g(x) = x/(x (1-k) + k) with k = (r+1)²/8, which Karis uses for analytic lights. It darkens smooth surfaces
+      at grazing angles: for C = 1, metallic = 1 and r = 0.1 the albedo is 0.34 at 80°.
+    * ibl: the same with k = r²/2, which he uses for image-based lighting; it is nearly Smith's term.
+    * smith: Smith's term for GGX, separable, as in ``walter``.
 
     The factor 1-F of the diffuse lobe is common practice, as in the glTF 2.0 specification; Karis's notes have
-    Lambert's lobe without it. It takes away the light that facets between wi and wo reflect, not all that the specular
-    lobe does.
+    Lambert's lobe without it. It removes the light reflected by the facets between wi and wo, not all the light
+    reflected by the specular lobe.
 
-    Reciprocal. Energy-conserving for metallic = 1. Else a bright surface gains energy towards grazing, the smoother the
-    more: for C = 1, metallic = 0 the albedo reaches, for r = 0.5 and r = 0.1, 1.00 and 1.08 (direct), 1.10 and 1.57
-    (ibl), 1.12 and 1.72 (smith). One-sided.
+    Reciprocal. Energy-conserving for metallic = 1. Otherwise a bright surface gains energy towards grazing angles, more
+    so if smoother: for C = 1, metallic = 0 and r = 0.5 or 0.1, the albedo reaches 1.00 or 1.08 (direct), 1.10 or 1.57
+    (ibl), 1.12 or 1.72 (smith). One-sided.
 
-    Sampling: the diffuse lobe by cosine, the specular one by one of two visible normals, chosen by what they reflect
-    (mi_brdfs.microfacet.sampling.AntitheticVisibleNormals). No sample falls below the horizon.
+    Sampling: for the diffuse lobe the cosine, for the specular lobe an antithetic pair of visible normals, one chosen
+    by how much each reflects (mi_brdfs.microfacet.visible.AntitheticVisibleNormals). No sample falls below the horizon.
 
     Example
     -------
@@ -49,7 +49,7 @@ class MetallicRoughness(Model):
 
     base_color = Reflectance(0.5, "base colour C")
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
-    roughness = Number(0.5, (0.01, 1), "roughness r; the facets' is its square")
+    roughness = Number(0.5, (0.01, 1), "roughness r; its square is the facets' α")
     shadowing = Choice(("direct", "ibl", "smith"), "shadowing term")
 
     energy = Energy(

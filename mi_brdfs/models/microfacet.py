@@ -29,19 +29,19 @@ ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", ani
 
 
 class Facets(NamedTuple):
-    """A word for a distribution D, made of the values of the parameters."""
+    """The distribution D of a word, made from the values of its parameters."""
 
     distribution: type[Distribution]
     parameters: Mapping[str, Parameter]
 
 
 class Shadows(NamedTuple):
-    """A word for a shadowing term G, made of the distribution and the values of the parameters."""
+    """The shadowing term G of a word, made from the distribution and the values of its parameters."""
 
     make: Callable[..., Shadowing]
     parameters: Mapping[str, Parameter] = {}
     needs: str | None = None
-    """The method of a distribution that it is made by."""
+    """The method of a distribution that it needs, if any."""
 
     def suits(self, distribution: type[Distribution]) -> bool:
         return not self.needs or getattr(distribution, self.needs) is not getattr(Distribution, self.needs)
@@ -110,8 +110,8 @@ class Microfacet(Model):
 
     and ``shadowing`` one of
 
-    * smith: 1/((1+Λ(wi)) (1+Λ(wo))) (Smith 1967, doi:10.1109/TAP.1967.1138991), with the Λ that belongs to beckmann or
-      ggx; for blinn, Walter et al.'s rational approximation of Beckmann's
+    * smith: 1/((1+Λ(wi)) (1+Λ(wo))) (Smith 1967, doi:10.1109/TAP.1967.1138991), with the Λ of beckmann or ggx; for
+      blinn, Walter et al.'s rational approximation of Beckmann's
     * smith-correlated: 1/(1+Λ(wi)+Λ(wo)) (Heitz 2014, https://jcgt.org/published/0003/02/03/), for the same
       distributions
     * vcavity: min(1, 2 h_z cosθ_i/(wi·h), 2 h_z cosθ_o/(wi·h)) (Torrance and Sparrow)
@@ -127,19 +127,18 @@ class Microfacet(Model):
     F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``),
     Schlick's approximation for ``f0``, and 1 if none of them is given.
 
-    Other plugins are entries of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx with
-    smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino`` (hepd
-    with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and the
-    specular lobe of ``metallicroughness`` (ggx with smith).
+    Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
+    with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``
+    (hepd with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and
+    the specular lobe of ``metallicroughness`` (ggx with smith).
 
     Reciprocal. With ρd + ρs <= 1 vcavity conserves energy for every D, and smith and smith-correlated for beckmann and
-    ggx; for the others see the table below. The more αu and αv differ, the less schlick shadows. Of Ashikhmin and
-    Premoze's term, of Neumann's and of the EPD only the formulas were known, from later papers and public code.
-    One-sided.
+    ggx; for the others see the table below. The more αu and αv differ, the less schlick shadows. For Ashikhmin and
+    Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later papers and public code. One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticNormalsTowardViewer), so that no sample falls below
-    the horizon; ggx with smith, smith-correlated or schlick by visible normals (mi_brdfs.microfacet.choice).
+    the horizon; for ggx with smith, smith-correlated or schlick, visible normals (mi_brdfs.microfacet.choice).
 
     Example
     -------
@@ -154,7 +153,7 @@ class Microfacet(Model):
     {"type": "microfacet", "distribution": "gtr", "alpha": 0.2, "gamma": 1.5, "shadowing": "vcavity", "material": "Al"}
     """
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     distribution = OneOf({word: it.parameters for word, it in DISTRIBUTIONS.items()}, "distribution D of the facets")
     shadowing = OneOf({word: it.parameters for word, it in SHADOWING.items()}, "shadowing term G")
@@ -212,14 +211,14 @@ class Microfacet(Model):
 # --- Words of others ------------------------------------------------------------------------------------------------
 
 BROUGHT: dict[tuple[str, str], type[Term]] = {}
-"""The terms that others have brought, by the name of the choice and the word."""
+"""The terms registered by others, by the name of the choice and the word."""
 
 
 def add_term(term: type[Term], replace: bool) -> None:
-    """Make a distribution, a shadowing or a Fresnel term known by its word: see :func:`mi_brdfs.register`."""
+    """Register a distribution, a shadowing or a Fresnel term under its word: see :func:`mi_brdfs.register`."""
     name, word = term.__name__, term.word
     if not word or not re.fullmatch(r"[a-z][a-z0-9-]*", word):
-        raise ValueError(f'{name}: word is {word!r}; it must be small letters, digits and -, as word = "student-t".')
+        raise ValueError(f'{name}: word is {word!r}; it must be lower-case letters, digits and -, as in "student-t".')
     kinds = {Distribution: Microfacet.distribution, Shadowing: Microfacet.shadowing, Fresnel: fresnel_parameters.OTHERS}
     kind, choice = next((kind, choice) for kind, choice in kinds.items() if issubclass(term, kind))
     former = BROUGHT.get((choice.name, word))
@@ -232,7 +231,7 @@ def add_term(term: type[Term], replace: bool) -> None:
     others = [it for it in Microfacet.declared() if it is not choice and not (kind is Fresnel and it.name == "fresnel")]
     taken = {name for parameter in others for name in parameter.names}
     if clash := next((name for it in term.parameters for name in (it, f"{it}_u", f"{it}_v") if name in taken), None):
-        raise ValueError(f"{name}: a parameter cannot be called {clash}, as microfacet has that.")
+        raise ValueError(f"{name}: a parameter cannot be called {clash}, a parameter of microfacet.")
     choice.add(word, term.parameters)
     BROUGHT[choice.name, word] = term
     if kind is Distribution:

@@ -15,20 +15,20 @@ class Minnaert(Model):
 
         f = ρ (k+1)/(2π) (cosθ_i cosθ_o)^(k-1)
 
-    k = 1 is Lambert's model; above, surfaces darken towards their limb, and below they brighten. ``normalization``
-    chooses what becomes of the formula:
+    k = 1 is Lambert's model; for larger k surfaces darken towards their limb, for smaller k they brighten.
+    ``normalization`` chooses the form:
 
-    * energy: as above for k >= 1. For k < 1 it would diverge at grazing, and is held from a cosine of 0.1 on:
-      f = ρ (k+1)/(2π) (m_i m_o/0.1)^(k-1), where m = max(cosθ, 0.1). The albedo rises from about 10^(k-1) ρ at
-      normal incidence to ρ at most: 0.31 ρ and 0.99 ρ for k = 0.5.
+    * energy: as above for k >= 1. For k < 1 it would diverge at grazing angles, and is held below a cosine of 0.1:
+      f = ρ (k+1)/(2π) (m_i m_o/0.1)^(k-1), where m = max(cosθ, 0.1). The albedo rises from about 10^(k-1) ρ at normal
+      incidence to at most ρ: 0.31 ρ and 0.99 ρ for k = 0.5.
     * published: as above for all k. The albedo is ρ cosθ_i^(k-1): for k = 0.5 it is 1.41 ρ at 60° and 7.6 ρ at 89°.
     * none: f cosθ_o = ρ/π (cosθ_i cosθ_o)^k, the shading formula; not reciprocal. The albedo is
       2ρ/(k+1) cosθ_i^k, up to 2ρ.
 
-    Reciprocal, but for ``none``. Energy-conserving for k >= 1, and for ``energy`` at any k. The paper is about the
-    exponents; the factor (k+1)/2π, which is common usage, could not be compared with it. One-sided.
+    Reciprocal, except for ``none``. Energy-conserving for k >= 1, and for ``energy`` at any k. The paper is about the
+    exponents; the factor (k+1)/2π is common usage, and could not be compared with it. One-sided.
 
-    Sampling: the cosine by its inverse cumulative distribution, so every weight is the albedo.
+    Sampling: the inverse cumulative distribution of the cosine, so that every weight is the albedo.
 
     Example
     -------
@@ -42,7 +42,7 @@ class Minnaert(Model):
 
     reflectance = Reflectance(0.5, "scale ρ; for k >= 1 the albedo at normal incidence")
     exponent = Number(1.5, (0, 100), "exponent k: above 1 the limb darkens, below it brightens")
-    normalization = Choice(("energy", "published", "none"), "what becomes of the formula at grazing")
+    normalization = Choice(("energy", "published", "none"), "the form at grazing angles")
 
     energy = Energy(
         0.5,
@@ -58,7 +58,7 @@ class Minnaert(Model):
 
 
 class MinnaertLobe(ZonalLobe):
-    """p ∝ μ max(μ, c)^(k-1), where c is 0.1 for ``energy`` and k < 1, and else 0."""
+    """p ∝ μ max(μ, c)^(k-1), where c is 0.1 for ``energy`` and k < 1, and 0 otherwise."""
 
     HELD = 0.1
 
@@ -66,7 +66,7 @@ class MinnaertLobe(ZonalLobe):
         self.reflectance, self.exponent, self.normalization = reflectance, exponent, normalization
         self.reciprocal = normalization != "none"
         self.held = exponent < 1 if normalization == "energy" else False
-        # The integrals of p for c = 0 over [0, c], and of what holding it takes away.
+        # The integral over [0, c] of p for c = 0, and of what holding it removes.
         self.mass = dr.select(self.held, dr.exp(math.log(self.HELD) * (exponent + 1)), 0)
         self.lost = 0.5 * (1 - exponent) * self.mass
 

@@ -15,24 +15,24 @@ class Nishino(Model):
 
         D = C |exp(κ cosᵞθ_h) - 1|,    ∫ D cosθ_h dω_h = 1
 
-    with h = (wi+wo)/|wi+wo|. κ < 0 makes a flat-topped lobe of steep sides, κ > 0 a peaked one, and κ → 0 is Blinn's,
-    (γ+2)/(2π) cosᵞθ_h. The higher γ, the narrower. By ``variant``,
+    with h = (wi+wo)/|wi+wo|. κ < 0 gives a flat-topped lobe with steep sides, κ > 0 a peaked one, and κ → 0 Blinn's,
+    (γ+2)/(2π) cosᵞθ_h. The higher γ, the narrower the lobe. By ``variant``,
 
-    * microfacet: f = ρd/π + ρs F(wi·h) D G/(4 cosθ_i cosθ_o), where facets that are distributed like that lie in
-      V-cavities, G = min(1, 2 cosθ_h cosθ_i/(wi·h), 2 cosθ_h cosθ_o/(wi·h)). F is exact for conductors (``eta`` and
-      ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``), Schlick's approximation for ``f0``, and 1
-      if none of them is given.
-    * dsbrdf: f = ρd/π + ρs D/4. The paper has the BRDF itself distributed like that, without F and G, in a sum of such
-      lobes whose κ and γ are curves over the angle between wi and h, one for each colour channel. This is one lobe with
-      constant κ and γ; the factor 1/4 makes the albedo of a narrow one about ρs at normal incidence.
+    * microfacet: f = ρd/π + ρs F(wi·h) D G/(4 cosθ_i cosθ_o), for facets of this distribution in V-cavities, G = min(1,
+      2 cosθ_h cosθ_i/(wi·h), 2 cosθ_h cosθ_o/(wi·h)). F is exact for conductors (``eta`` and ``k``, or ``material``)
+      and dielectrics (``int_ior`` over ``ext_ior``), Schlick's approximation for ``f0``, and 1 if none of them is
+      given.
+    * dsbrdf: f = ρd/π + ρs D/4. In the paper the BRDF itself has this distribution, without F and G, as a sum of lobes
+      whose κ and γ are curves over the angle between wi and h, one for each colour channel. Here it is one lobe with
+      constant κ and γ; the factor 1/4 makes the albedo of a narrow lobe about ρs at normal incidence.
 
-    C was derived here, for every κ and γ. The paper's own notation was not at hand: it is cited from public code, and
-    from memory.
+    C was derived here, for every κ and γ. The paper was not at hand: its notation is cited from public code and from
+    memory.
 
-    Reciprocal. Energy-conserving for ``microfacet`` with ρd + ρs <= 1. For ``dsbrdf`` the albedo falls towards
-    grazing, for narrow lobes like cos²θ_i. One-sided.
+    Reciprocal. Energy-conserving for ``microfacet`` with ρd + ρs <= 1. For ``dsbrdf`` the albedo falls towards grazing
+    angles, like cos²θ_i for narrow lobes. One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormals and AntitheticNormalsTowardViewer); no sample falls below the
     horizon.
 
@@ -47,11 +47,14 @@ class Nishino(Model):
     {"type": "nishino", "kappa": -8, "gamma": 40, "material": "Cu"}
     """
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe")
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")
     gamma = Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe")
-    variant = OneOf({"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}}, "facets of that distribution, or itself")
+    variant = OneOf(
+        {"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}},
+        "distribution of the facets, or of f itself",
+    )
 
     energy = Energy(1, [({"variant": "microfacet"}, 1), ({"variant": "dsbrdf"}, 1)])
 

@@ -13,23 +13,23 @@ class OrenNayar(Model):
 
     M. Oren and S. K. Nayar, Generalization of Lambert's reflectance model, SIGGRAPH 1994, doi:10.1145/192161.192213.
 
-    The surface consists of V-shaped cavities of Lambertian facets, whose slope angles are normally distributed with
-    standard deviation σ. It looks flatter than Lambert's: brighter at the limb and towards the light, darker where
-    light and viewer are above it. With α = max(θ_i, θ_o), β = min(θ_i, θ_o), φ the azimuth between wi and wo, and
-    C1 = 1 - σ²/(2 (σ² + 0.33)), B = 0.45 σ²/(σ² + 0.09), ``model`` chooses between the two fits of the paper:
+    The surface consists of V-cavities of Lambertian facets, whose slope angles are normally distributed with standard
+    deviation σ. It looks flatter than Lambert's: brighter at the limb and towards the light, darker where light and
+    viewer are above it. With α = max(θ_i, θ_o), β = min(θ_i, θ_o), φ the azimuth between wi and wo, and C1 = 1 - σ²/(2
+    (σ² + 0.33)), B = 0.45 σ²/(σ² + 0.09), ``model`` chooses between the two fits of the paper:
 
     * qualitative: f = ρ/π (C1 + B max(0, cosφ) sinα tanβ), which leaves out interreflection.
     * full: f = ρ/π (C1 + C2 cosφ tanβ + C3 (1-|cosφ|) tan((α+β)/2)) + 0.17 ρ²/π σ²/(σ² + 0.13) (1 - cosφ (2β/π)²),
-      C2 = B sinα for cosφ >= 0 and B (sinα - (2β/π)³) else, C3 = 0.125 σ²/(σ² + 0.09) (4αβ/π²)².
-      For σ > 0.66 and dark ρ this turns negative opposite the light at grazing, and is set to zero there.
+      C2 = B sinα for cosφ >= 0 and B (sinα - (2β/π)³) otherwise, C3 = 0.125 σ²/(σ² + 0.09) (4αβ/π²)². For σ > 0.66 and
+      dark ρ this turns negative at grazing angles opposite the light, and is set to zero there.
 
-    σ may be given as ``alpha`` = √2 σ, the roughness of a Beckmann distribution, instead. σ = 0 is Lambert's model.
+    ``alpha`` = √2 σ, the roughness of a Beckmann distribution, may be given instead of σ. σ = 0 is Lambert's model.
 
-    Reciprocal. Not energy-conserving, by little: for ρ = 1 the albedo at grazing reaches 1.015 (qualitative, σ = 0.2)
-    and 1.050 (full, σ = 0.3). Rough surfaces lose light: at normal incidence it is 0.56 and 0.72 for σ = π/2. ``eon``
-    does neither.
+    Reciprocal. Not quite energy-conserving: for ρ = 1 the albedo at grazing angles reaches 1.015 (qualitative, σ = 0.2)
+    and 1.050 (full, σ = 0.3). Rough surfaces lose energy: the albedo at normal incidence is 0.56 and 0.72 for σ = π/2.
+    ``eon`` neither gains nor loses.
 
-    The constants are those that other implementations agree on; they could not be compared with the paper. One-sided.
+    Other implementations agree on the constants, which could not be compared with the paper. One-sided.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions
     (mi_brdfs.lobes.diffuse.RoughDiffuseLobe); no sample falls below the horizon.
@@ -48,7 +48,7 @@ class OrenNayar(Model):
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     sigma = Number(0.35, (0, 1.5708), "standard deviation σ of the facets' slope angle, in radians",
                    spelling=Spelling("alpha", (0, 2.2), math.sqrt(0.5), "√2 σ, as a Beckmann roughness"))  # fmt: skip
-    model = Choice(("qualitative", "full"), "which fit of the paper")
+    model = Choice(("qualitative", "full"), "one of the paper's fits")
 
     energy = Energy(0.498, [({"model": "qualitative"}, 1.02), ({"model": "full"}, 1.05)])
 
@@ -62,10 +62,10 @@ class RoughDiffuse(Model):
 
     M. Oren and S. K. Nayar, Generalization of Lambert's reflectance model, SIGGRAPH 1994, doi:10.1145/192161.192213.
 
-    The same as ``orennayar``, whose page has the formulas, for σ = α/√2: in its full form or, with
-    ``use_fast_approx``, the qualitative one.
+    The same as ``orennayar``, whose page has the formulas, for σ = α/√2: the full fit or, with ``use_fast_approx``, the
+    qualitative one.
 
-    Reciprocal. Not energy-conserving, by little: for ρ = 1 the albedo at grazing reaches 1.050 (α = 0.42), or 1.015
+    Reciprocal. Not quite energy-conserving: for ρ = 1 the albedo at grazing angles reaches 1.050 (α = 0.42), or 1.015
     (α = 0.28) with ``use_fast_approx``. One-sided.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions
@@ -104,7 +104,7 @@ class QualitativeLobe(RoughDiffuseLobe):
         super().__init__(reflectance, self.RETRO * self.b / self.c1)
 
     def estimated_albedo(self, wi):
-        # Exact at normal incidence and at grazing.
+        # Exact at normal and at grazing incidence.
         return self.reflectance * (self.c1 + 0.5 * self.b * (1 - wi.z * wi.z))
 
     def eval(self, wi, wo):
@@ -128,7 +128,7 @@ class FullLobe(QualitativeLobe):
         flatter = wi.z < wo.z
         cos_a, cos_b = dr.select(flatter, wi.z, wo.z), dr.select(flatter, wo.z, wi.z)
         sin_a, sin_b = dr.select(flatter, sin_i, sin_o), dr.select(flatter, sin_o, sin_i)
-        # Complements of the angles, in units of a right one: at grazing they keep digits that the angles lose.
+        # Complements of the angles, in right angles: at grazing angles they keep digits that the angles lose.
         a, b = (dr.atan2(cos, sin) * (2 * dr.inv_pi) for cos, sin in ((cos_a, sin_a), (cos_b, sin_b)))
         tan_mean = (sin_a + sin_b) / dr.maximum(cos_a + cos_b, EPSILON)
         # cosφ sinβ and 2β/(π sinβ): at the normal, where φ is nothing, these have derivatives. Up to sinβ = 1e-3

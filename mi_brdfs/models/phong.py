@@ -16,15 +16,16 @@ class Phong(Model):
 
     with r the mirror direction. ``normalization`` chooses the specular term:
 
-    * energy: as above. The albedo of the lobe is ρs at normal incidence and falls towards grazing, for narrow lobes
-      like cosθ; so ρd + ρs <= 1 conserves energy.
+    * energy: as above. The lobe's albedo is ρs at normal incidence and falls towards grazing angles, like cosθ for
+      narrow lobes, so ρd + ρs <= 1 conserves energy.
     * none: ρs max(0, r·wo)ⁿ. Its albedo is 2π ρs/(n+2) at normal incidence: it gains energy for n < 4.28.
-    * original: f cosθ_o = ρs max(0, r·wo)ⁿ/π, the formula of 1975, where the term is the whole response to a light
-      and π belongs to the light. As a BRDF it is neither reciprocal nor bounded at grazing; its albedo is at most
+    * original: f cosθ_o = ρs max(0, r·wo)ⁿ/π, the formula of 1975, where the term is the whole response to a light and
+      π belongs to the light. As a BRDF it is neither reciprocal nor bounded at grazing angles; its albedo is at most
       2ρs/(n+1).
 
-    Reciprocal, but for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. Same as ``phong`` of
-    Mitsuba 0.6. One-sided. The lobe is zero 90° away from r even for n = 0, so n = 0 is not Lambert's model.
+    Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. Same as ``phong`` of
+    Mitsuba 0.6. One-sided. The lobe is zero from 90° away from r, even for n = 0, which is therefore not Lambert's
+    model.
 
     Sampling: nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe); no sample falls below the horizon.
 

@@ -32,20 +32,20 @@ class Schlick94(Model):
     * interreflection: the same plus (1 - G(cosθ_i) G(cosθ_o)) / (4π cosθ_i cosθ_o), which returns the shadowed light
     * plain: D = Z A / (4π cosθ_i cosθ_o)
 
-    Scratches run along the tangent dp_du: the smaller p, the more facets lean across. Z/π is the GGX distribution of
+    Scratches run along the tangent dp_du: the smaller p, the more facets lean across. Z/π is the GGX distribution with
     α² = r. A is not normalised: its mean over the azimuths is √p over the arithmetic-geometric mean of 1 and p, so
     brushed surfaces are darker.
 
-    The second term of f is the paper's double layer over a layer that is diffuse (r' = 1), if its C' is given
-    (``diffuse_reflectance``). Left out are glossy lower layers, and the blend of D with a diffuse part and with a
-    perfect mirror, by weights 4 r (1-r) and what that leaves.
+    The second term of f is the paper's double layer over a diffuse layer (r' = 1), if C' is given
+    (``diffuse_reflectance``). The plugin leaves out glossy lower layers, and the blend of D with a diffuse part and a
+    perfect mirror, by the weight 4 r (1-r) and the rest.
 
-    Reciprocal. Gains energy towards grazing: there G of a smooth surface shadows less than facets of that slope do,
-    and the other two variants have no limit, as they divide by cosθ_i. One-sided.
+    Reciprocal. Gains energy towards grazing angles: there G of a smooth surface shadows less than facets of that slope
+    do, and the other two variants have no limit, as they divide by cosθ_i. One-sided.
 
-    Sampling: Z A by a half vector or its mirror image, chosen by what they reflect, whose azimuths follow an ellipse
-    near A (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); the interreflection by its cosθ_o, nearly
-    exact except for S(u); the lower layer cosine-weighted.
+    Sampling: for Z A an antithetic pair of half vectors, with azimuths from an ellipse near A, one chosen by how much
+    each reflects (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); for the interreflection its cosθ_o,
+    nearly exact except for S(u); for the lower layer the cosine.
 
     Example
     -------
@@ -62,10 +62,10 @@ class Schlick94(Model):
     plugins = ("schlick",)
 
     specular_reflectance = Reflectance(0.04, "reflectance C at normal incidence")
-    diffuse_reflectance = Reflectance(None, "reflectance C' of a diffuse layer below; not given, there is none")
+    diffuse_reflectance = Reflectance(None, "reflectance C' of a diffuse layer below; omitted by default")
     roughness = Number(0.05, (1e-6, 1), "roughness r, the square of GGX's α")
     isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed")
-    variant = Choice(("shadowed", "interreflection", "plain"), "what becomes of the shadowed light")
+    variant = Choice(("shadowed", "interreflection", "plain"), "treatment of the shadowed light")
     rotation = Rotation()
 
     energy = Energy(
@@ -112,8 +112,8 @@ class Unshadowed(Shadowing):
 
 
 class SchlickNormals(Distribution):
-    """D = Z A/π. q has the Z of D, and in place of A the azimuths of an ellipse with axes ∝ √p and 1, whose densities
-    have the same ratio. Of all ellipses it is the best, with an efficiency of 0.96 for p = 0.1 and 0.73 for 0.01."""
+    """D = Z A/π. q has D's Z, and instead of A the azimuths of an ellipse with axes ∝ √p and 1, whose densities have
+    the same ratio. It is the best of all ellipses, with an efficiency of 0.96 for p = 0.1 and 0.73 for 0.01."""
 
     LOSS = GGX.LOSS
     long_tailed = True
@@ -137,7 +137,7 @@ class SchlickNormals(Distribution):
         return super().estimated_albedo(cos) * root / mean
 
     def _zenith(self, facet):
-        """Z."""
+        """Return Z."""
         return self.r / dr.square(facet.sin2_h + self.r * dr.square(facet.cos_h))
 
     def eval(self, facet):
@@ -159,9 +159,10 @@ class SchlickNormals(Distribution):
 class InterreflectionLobe(Lobe):
     """f = S(u) (1 - G(cosθ_i) G(cosθ_o)) / (4π cosθ_i cosθ_o).
 
-    f cosθ_o is S times a density of x = cosθ_o: with k = (1-r)/r, 1 - G G' = (1 - G) + G h(x), h = (1-x)/(1 + k x).
-    Samples take the constant or h, by their integrals. For h stands a law that can be inverted, of which the part
-    beyond x is (1 - t)^(1+e), t = log(1 + k x)/log(1 + k): for k = 0 it is h, with e = 1, which falls as 1/√log k.
+    f cosθ_o is S times a function of x = cosθ_o: with k = (1-r)/r, 1 - G G' = (1 - G) + G h(x), h = (1-x)/(1 + k x).
+    Draw from the constant or from h, in proportion to their integrals. An invertible law replaces h, with the
+    complementary cumulative distribution (1 - t)^(1+e), t = log(1 + k x)/log(1 + k): for k = 0 it is h, with e = 1; e
+    falls as 1/√log k.
     """
 
     def __init__(self, roughness, fresnel):
@@ -172,14 +173,14 @@ class InterreflectionLobe(Lobe):
         self.integral = self._integral()
 
     def _integral(self):
-        """∫ h from 0 to 1."""
+        """Return ∫ h from 0 to 1."""
         k = self.k
         series = 1 / 2 - k * (1 / 6 - k * (1 / 12 - k * (1 / 20 - k / 30)))
         k = dr.maximum(k, 0.2)
         return dr.select(self.k < 0.2, series, ((1 + k) * dr.log(1 + k) - k) / dr.square(k))
 
     def _constant(self, wi):
-        """``(1 - G(cosθ_i), the integral of 1 - G G')``"""
+        """Return ``(1 - G(cosθ_i), the integral of 1 - G G')``."""
         lost = self.roughness * (1 - wi.z) / (wi.z + self.roughness * (1 - wi.z))
         return lost, lost + (1 - lost) * self.integral
 

@@ -18,24 +18,25 @@ class Toon(Model):
         f cosθ_o = ρd/Zd (b + (1-b) S(cosθ_o; td, sd)) + ρs/Zs S(r·wo; ts, ss),    r = 2 (n·wi) n - wi
         S(c; t, s) = 3x² - 2x³,    x = min(max((c - t + s)/2s, 0), 1)
 
-    with S the step of a cosine c from 0 at t-s to 1 at t+s, and r the mirror direction. A point is lit fully where its
-    normal is within acos td of the light, by the fraction b from there to 90°, where it turns away, and shows a
-    highlight where the mirror direction is within acos ts of it. Large lamps blur the edges: use points, or the sun.
-    The bands are the paper's, which looks them up in a texture of cosθ_o; the formula is this plugin's. It stands for
-    the whole response to a light, cosine included. ``normalization`` chooses the scale:
+    with S a step in the cosine c, from 0 at t-s to 1 at t+s, and r the mirror direction. A point is fully lit where its
+    normal is within acos td of the light, lit by the fraction b from there to 90°, and shows a highlight where the
+    mirror direction is within acos ts of the light. Large lamps blur the edges: use points, or the sun. The bands are
+    from the paper, which looks them up in a texture of cosθ_o; the formula is this plugin's. It stands for the whole
+    response to a light, cosine included. ``normalization`` chooses the scale:
 
     * energy: Z is 2π times the integral of the band over the cosines from 0 to 1. The albedo of the diffuse lobe is ρd.
-      That of the specular lobe is ρs as long as the horizon does not clip the highlight, and falls to about half of
-      that at grazing. A lobe whose band is empty (t = 1 and s = b = 0) is black.
+      That of the specular lobe is ρs unless the horizon clips the highlight, and falls to about half of that at grazing
+      angles. A lobe whose band is empty (t = 1 and s = b = 0) is black.
     * none: Z = π, the shading formula: each band is as bright as Lambert's model under a light straight above. The
-      albedo is 2ρd times the integral, and for the specular lobe at most 2ρs times its own: ρd and 0.2 ρs for the
-      defaults, up to 2ρd and 2ρs for bands as wide as the hemisphere.
+      albedo is 2ρd times the integral of the band, and for the specular lobe at most 2ρs times that of its own: ρd and
+      0.2 ρs for the defaults, up to 2ρd and 2ρs for bands as wide as the hemisphere.
 
-    Not reciprocal: f diverges like 1/cosθ_o at grazing. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
+    Not reciprocal: f diverges like 1/cosθ_o at grazing angles. Energy-conserving for ``energy`` with ρd + ρs <= 1.
+    One-sided.
 
-    Sampling: the cosines by their inverse cumulative distributions, and the azimuth about r where it is above the
-    horizon. The weight of the diffuse lobe is its albedo, that of the specular lobe between half its largest albedo and
-    all of it; no sample falls below the horizon.
+    Sampling: the inverse cumulative distributions of the cosines, and the azimuths about r that lie above the horizon.
+    The weight of the diffuse lobe is its albedo, that of the specular lobe between half its largest albedo and all of
+    it; no sample falls below the horizon.
 
     Example
     -------
@@ -49,13 +50,11 @@ class Toon(Model):
 
     diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy")
     diffuse_threshold = Number(0.5, (0, 1), "cosine td at which the lit band ends")
-    diffuse_smooth = Number(0.05, (0, 1), "half the width sd of its edge, in the cosine; 0 is hard, with no derivative")
-    diffuse_shadow = Number(0, (0, 1), "brightness b of the dark band, as a fraction of that of the lit one")
+    diffuse_smooth = Number(0.05, (0, 1), "half width sd of its edge, in the cosine; 0 is hard, with no derivative")
+    diffuse_shadow = Number(0, (0, 1), "brightness b of the dark band, relative to the lit one")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe; its largest albedo for energy")
     specular_threshold = Number(0.9, (0, 1), "cosine ts at which the highlight ends")
-    specular_smooth = Number(
-        0.02, (0, 1), "half the width ss of its edge, in the cosine; 0 is hard, with no derivative"
-    )
+    specular_smooth = Number(0.02, (0, 1), "half width ss of its edge, in the cosine; 0 is hard, with no derivative")
     normalization = Choice(("energy", "none"), "scale Z")
 
     energy = Energy(
@@ -78,7 +77,7 @@ class Toon(Model):
         )
 
     def _albedo(self, reflectance, mass):
-        """The albedo of a band whose integral over the cosines is ``mass``."""
+        """Return the albedo of a band whose integral over the cosines is ``mass``."""
         return reflectance * (2 * mass if self.normalization == "none" else dr.select(mass > EMPTY, 1.0, 0.0))
 
 
@@ -87,8 +86,8 @@ EMPTY = 1e-12
 
 
 class Step:
-    """S, also as a density of the cosine on [0, 1], where its integral is ``mass``. To keep the digits of narrow bands
-    it deals in the *excess*, by which a cosine exceeds the threshold.
+    """S, also as a density of the cosine on [0, 1], where its integral is ``mass``. To keep the digits of narrow bands,
+    it uses the *excess* of a cosine over the threshold.
     """
 
     START = 0.1, 0.28
@@ -105,7 +104,7 @@ class Step:
         return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
 
     def _integral(self, excess):
-        """The integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""
+        """Return the integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""
         x = self._x(excess)
         return 2 * self.smooth * x * x * x * (1 - 0.5 * x) + dr.maximum(excess - self.smooth, 0)
 
@@ -114,7 +113,7 @@ class Step:
         return x * x * (3 - 2 * x)
 
     def sample(self, u):
-        """The excess of the cosine below which the fraction ``u`` of the density lies."""
+        """Return the excess of the cosine below which the fraction ``u`` of the density lies."""
         integral = self.start + u * self.mass
         ramp = integral < self.smooth
         # x³ (1 - x/2) = y: a fit good to 1 %, and two steps of Newton's method, after which it is good to 1e-9.
@@ -128,7 +127,7 @@ class Step:
 
 
 class BandsLobe(ZonalLobe):
-    """p ∝ b + (1-b) S, the lit band and the dark one, of which ``mass`` is the integral."""
+    """p ∝ b + (1-b) S, the lit band and the dark one; ``mass`` is their integral."""
 
     reciprocal = False
 
@@ -149,8 +148,8 @@ class BandsLobe(ZonalLobe):
 class HighlightLobe(Lobe):
     """f cosθ_o ∝ S(A) above the horizon, with A the cosine to the mirror direction.
 
-    A > 0 is drawn ∝ S, and then an azimuth among those above the horizon. Where S reaches beyond A = 0, the ring of -A
-    takes its share of the samples: it is above the horizon where the ring of A, its antipodes, is below.
+    Draw A > 0 ∝ S, and then an azimuth above the horizon. Where S extends beyond A = 0, the ring of -A takes its share
+    of the samples: it is above the horizon where the ring of A, its antipodes, is below.
     """
 
     reciprocal = False
@@ -166,7 +165,7 @@ class HighlightLobe(Lobe):
         return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
 
     def _ring(self, frame, versine):
-        """``(sinθ_ring, visible)``: the fraction of the ring at A = 1 - versine >= 0 that lies above the horizon."""
+        """Return ``(sinθ_ring, visible)``, with the fraction of the ring at A = 1 - versine >= 0 above the horizon."""
         sin = safe_sqrt(versine * (2 - versine))
         rise, height = frame.sin * sin, frame.axis.z * (1 - versine)
         cut = height < rise
@@ -174,18 +173,18 @@ class HighlightLobe(Lobe):
         return sin, dr.select(cut, 1 - below, 1)
 
     def _pair(self, excess, visible):
-        """What the visible parts of the rings of A and -A reflect, from the excess of A."""
+        """Return what the visible parts of the rings of A and -A reflect, from the excess of A."""
         behind = -2 * self.step.threshold - excess
         return self.step.eval(excess) * visible, self.step.eval(behind) * (1 - visible)
 
     def estimated_albedo(self, wi):
-        # The ring that halves the solid angle of the highlight stands for all.
+        # The ring that halves the highlight's solid angle represents all rings.
         return self.reflected * self._ring(self._frame(wi), 0.5 * dr.minimum(self.mass, 1))[1]
 
     def eval_pdf(self, wi, wo):
         frame, t = self._frame(wi), self.step.threshold
-        # The versine has the digits of a small highlight, the cosine those of a wide one. The squares are subtracted
-        # one by one, as rounding errors shrink with what is left.
+        # The versine keeps the digits of a small highlight, the cosine those of a wide one. Subtract the squares one by
+        # one, as rounding errors shrink with the remainder.
         away = wo - frame.axis
         cos, versine, excess = dr.dot(wo, frame.axis), 0.5 * dr.squared_norm(away), 1 - t
         for d in (away.x, away.y, away.z):

@@ -8,10 +8,10 @@ from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
 class Walter(Model):
     """The GGX microfacet model of Walter, Marschner, Li and Torrance (2007), its reflection part.
 
-    B. Walter, S. R. Marschner, H. Li and K. E. Torrance, Microfacet models for refraction through rough surfaces,
-    EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206. The anisotropic and the height-correlated form: E. Heitz,
-    Understanding the masking-shadowing function in microfacet-based BRDFs, Journal of Computer Graphics Techniques
-    3(2), 2014, https://jcgt.org/published/0003/02/03/.
+    B. Walter, S. R. Marschner, H. Li and K. E. Torrance, Microfacet models for refraction through rough surfaces, EGSR
+    2007, doi:10.2312/EGWR/EGSR07/195-206. For the anisotropic and the height-correlated form: E. Heitz, Understanding
+    the masking-shadowing function in microfacet-based BRDFs, Journal of Computer Graphics Techniques 3(2), 2014,
+    https://jcgt.org/published/0003/02/03/.
 
         f = ρd/π + ρs F(wi·h) D(h) G(wi, wo) / (4 cosθ_i cosθ_o)
         D = 1 / (π αu αv ((h_x/αu)² + (h_y/αv)² + h_z²)²)
@@ -21,13 +21,12 @@ class Walter(Model):
     1/(1+Λ(wi)+Λ(wo)) (correlated). F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics
     (``int_ior`` over ``ext_ior``), Schlick's approximation for ``f0``, and 1 if none of them is given.
 
-    Reciprocal. Energy-conserving with ρd + ρs <= 1: the albedo of the lobe stays below ρs, and far below for rough
-    surfaces, as light is reflected once only (α = 1, F = 1: 0.31 ρs at normal incidence). Same as Mitsuba's
-    ``roughconductor`` with ``distribution="ggx"`` (separable), but in polarized variants the light is depolarised.
-    One-sided.
+    Reciprocal. Energy-conserving with ρd + ρs <= 1: the lobe's albedo stays below ρs, and far below for rough surfaces,
+    as light is reflected only once (α = 1, F = 1: 0.31 ρs at normal incidence). Same as Mitsuba's ``roughconductor``
+    with ``distribution="ggx"`` (separable), except that polarized variants depolarise the light. One-sided.
 
-    Sampling: bounded visible normals, tilted towards the normal; for dielectrics one of two, chosen by what they
-    reflect (mi_brdfs.microfacet.sampling.BoundedVisibleNormals and AntitheticVisibleNormals).
+    Sampling: bounded visible normals, tilted towards the normal; for dielectrics an antithetic pair, one chosen by how
+    much each reflects (mi_brdfs.microfacet.visible.BoundedVisibleNormals and AntitheticVisibleNormals).
 
     Example
     -------
@@ -39,7 +38,7 @@ class Walter(Model):
     {"type": "walter", "material": "Au", "alpha": 0.2}
     """
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; not given, there is no such lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     alpha = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
     fresnel = FresnelSet()

@@ -22,22 +22,22 @@ class Ward(Model):
 
     with h = (wi+wo)/|wi+wo| and, by ``variant``,
 
-    * balanced (2010): S = 1/(4 (wi·h)² h_z⁴). Conserves energy: the albedo of the lobe stays below ρs.
+    * balanced (2010): S = 1/(4 (wi·h)² h_z⁴). Conserves energy: the lobe's albedo stays below ρs.
     * ward (1992, equation 5a): S = 1/(4 √(cosθ_i cosθ_o)). Loses energy up to about 85°, and then diverges like
       cosθ_i^(-1/2): at 89.9° the albedo is 1.04 ρs for α = 0.3, and 2.35 ρs in the plane of αu = 1 as αv → 0.
     * ward-duer (2006): S = 1/(4 cosθ_i cosθ_o). Up to 80° the albedo is within 30 % of that of balanced: at most 28 %
-      below it (α = 1), and above it at 80° by 18 % (α = 0.35), or by 30 % for two roughnesses. At 89° it is 2.1 ρs
-      (α = 0.1) to 5.1 ρs (α = 0.5).
-    * approximate (1992, equation 5b): S as ward, with exp(-2 ((h_x/αu)² + (h_y/αv)²)/(1+h_z)). Much wider than 5a for
-      all but small roughness: 1.1 times (α = 0.1), 5.2 times (α = 0.5) its value at tanθ_h = 2α.
+      below it (α = 1), and at 80° 18 % above it (α = 0.35), or 30 % if αu ≠ αv. At 89° it is 2.1 ρs (α = 0.1) to 5.1 ρs
+      (α = 0.5).
+    * approximate (1992, equation 5b): S as in ward, with exp(-2 ((h_x/αu)² + (h_y/αv)²)/(1+h_z)). Much wider than 5a
+      except for small roughness: 1.1 times (α = 0.1), 5.2 times (α = 0.5) its value at tanθ_h = 2α.
 
     Every variant is a microfacet model: Beckmann's distribution D = E/(π h_z⁴) with F = 1 and the shadowing term
-    G = Kelemen's, h_z⁴ √(cosθ_i cosθ_o) or h_z⁴; only equation 5b has a distribution of its own.
+    G = Kelemen's, h_z⁴ √(cosθ_i cosθ_o) or h_z⁴; only equation 5b has its own distribution.
 
     Reciprocal. Energy-conserving for ``balanced`` with ρd + ρs <= 1. Same parameters as ``ward`` of Mitsuba 0.6.
     One-sided.
 
-    Sampling: a half vector or its mirror image, chosen by what they reflect
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
 
     Example
@@ -76,8 +76,8 @@ class Ward(Model):
 class ApproximateBeckmann(Distribution):
     """D = exp(-2 ((h_x/αu)² + (h_y/αv)²)/(1+h_z)) / (π αu αv), Ward's equation 5b; not normalised.
 
-    As sin²/(1+cos) = 1-cos, D is exp(-2g(1-cosθ_h)) at a given azimuth: its integral over the hemisphere converges to
-    one as α → 0, and can be inverted; q = D/(1 - exp(-2g)).
+    As sin²/(1+cos) = 1-cos, D is ∝ exp(-2g(1-cosθ_h)) at a given azimuth: its integral over the hemisphere converges to
+    one as α → 0, and its cumulative distribution can be inverted; q = D/(1 - exp(-2g)).
     """
 
     def eval(self, facet):
@@ -96,7 +96,7 @@ class ApproximateBeckmann(Distribution):
 
 
 class WardDuer(Shadowing):
-    """h_z⁴: what is left of D's 1/h_z⁴ is 1/(cosθ_i cosθ_o)."""
+    """h_z⁴, which cancels D's 1/h_z⁴ and leaves 1/(cosθ_i cosθ_o)."""
 
     def __call__(self, facet):
         return dr.square(dr.square(facet.cos_h))

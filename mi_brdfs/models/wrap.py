@@ -7,7 +7,7 @@ from ..parameters import Choice, Number, Reflectance
 
 
 class Wrap(Model):
-    """Wrapped diffuse reflection, of which Valve's half-Lambert (1998) is the best known.
+    """Wrapped diffuse reflection, best known as Valve's half-Lambert (1998).
 
     J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, SIGGRAPH 2006 course notes,
     doi:10.1145/1185657.1185832. P.-P. Sloan, D. Nowrouzezahrai and H. Yuan, Wrap shading, Journal of Graphics, GPU, and
@@ -16,14 +16,14 @@ class Wrap(Model):
 
         f |cosθ_o| = ρ/Z ((cosθ_o + w)/(1 + w))ⁿ,    cosθ_o > -w
 
-    The shading reaches past the terminator, to where cosθ_o = -w. The formula stands for the whole response to a
-    light, cosine included. (w, n) = (0, 1) is Lambert's model, (1, 2) the half-Lambert. ``domain`` chooses which light
+    The shading reaches past the terminator, to cosθ_o = -w. The formula stands for the whole response to a light,
+    cosine included. (w, n) = (0, 1) is Lambert's model, (1, 2) the half-Lambert. ``domain`` chooses the light that
     counts:
 
-    * hemisphere: that in front. It cannot light what faces away from it, so of the look in games the flatter shading
-      remains, and the terminator stays where it is.
-    * sphere: that from behind, too, as if through a thin sheet; so there is a second, transmitting lobe. It shows on
-      open surfaces only: on closed ones, the rest of the body shadows the light.
+    * hemisphere: light from the front. It cannot light surfaces that face away, so only the flatter shading of the look
+      in games remains, and the terminator does not move.
+    * sphere: also light from behind, as if through a thin sheet, in a second, transmitting lobe. It is visible on open
+      surfaces only: the rest of a closed body shadows the light.
 
     ``normalization`` chooses the scale:
 
@@ -32,10 +32,10 @@ class Wrap(Model):
     * none: Z = π, the shading formula. The albedo is 2ρ (1+w)/(n+1) on the sphere, and on the hemisphere
       1 - (w/(1+w))ⁿ⁺¹ times that: 4/3 ρ and 7/6 ρ for the half-Lambert, up to 4ρ and 2ρ for n = 0.
 
-    Not reciprocal, but for (0, 1): f diverges like 1/cosθ_o at grazing. Energy-conserving for ``energy``. One-sided:
-    seen from the front only, also on the sphere, which ``twosided`` does not take.
+    Not reciprocal, except for (0, 1): f diverges like 1/cosθ_o at grazing angles. Energy-conserving for ``energy``.
+    One-sided: visible from the front only, also on the sphere, which ``twosided`` refuses.
 
-    Sampling: the cosine by its inverse cumulative distribution, so every weight is the albedo.
+    Sampling: the inverse cumulative distribution of the cosine, so that every weight is the albedo.
 
     Example
     -------
@@ -51,7 +51,7 @@ class Wrap(Model):
     reflectance = Reflectance(0.5, "albedo ρ")
     wrap = Number(1, (0, 1), "w: how far behind the terminator the light reaches, as a cosine")
     exponent = Number(2, (0, 100), "exponent n: the higher, the darker the terminator")
-    domain = Choice(("hemisphere", "sphere"), "which light counts")
+    domain = Choice(("hemisphere", "sphere"), "the light that counts")
     normalization = Choice(("energy", "none"), "scale Z")
 
     energy = Energy(
@@ -93,7 +93,7 @@ class WrapLobe(ZonalLobe):
 
 
 class FrontLobe(WrapLobe):
-    """p ∝ (μ + w)ⁿ for μ > 0, where ``behind`` is the part of the integral over μ > -w that this leaves out."""
+    """p ∝ (μ + w)ⁿ for μ > 0; ``behind`` is the fraction of the integral over μ > -w that this leaves out."""
 
     def __init__(self, reflected, wrap, exponent, behind):
         super().__init__(reflected, wrap, exponent)
