@@ -31,7 +31,9 @@ CLIMBS, STEPS, ROUNDS = 16, 32, 12
 LOG2_COUNTS = 9, 11
 """The samples for each setting, at first and in the last round."""
 LOG2_CHOICE, LOG2_FINAL = 14, 17
-"""Those that decide among the ends of the climbs, and those that measure the brightest, several times."""
+"""Those that decide among the ends of the climbs, and those that measure the brightest with each of some seeds."""
+SEEDS = range(100, 108)
+"""Their variates have no part in the choice."""
 
 
 class Setting(NamedTuple):
@@ -69,7 +71,9 @@ def default_albedo(model: type[Model]) -> float:
     """Return the largest albedo of the default parameters, at some angles up to 89.9°."""
     angles = [0, 20, 40, 60, 70, 75, 80, 83, 86, 88, 89, 89.5, 89.9]
     wi = np.array([direction(angle, azimuth) for angle in angles for azimuth in (0, 45, 90)])
-    return float(albedos(mi.load_dict({"type": model.plugins[0]}), wi, LOG2_CHOICE).max())
+    bsdf = mi.load_dict({"type": model.plugins[0]})
+    brightest = wi[[albedos(bsdf, wi, LOG2_CHOICE).argmax()]]
+    return float(np.mean([albedos(bsdf, brightest, LOG2_FINAL, seed) for seed in SEEDS]))
 
 
 def largest_albedo(model: type[Model], given: Mapping[str, Any]) -> Setting:
@@ -124,8 +128,8 @@ class _Search:
         return tried[np.arange(CLIMBS), found.reshape(CLIMBS, -1).argmax(axis=1)]
 
     def _measured(self, point: Array) -> Setting:
-        """Return the setting of a point with its albedo, by variates that had no part in the choice."""
-        found = np.concatenate([self._albedos(point[None], LOG2_FINAL, seed) for seed in range(100, 108)])
+        """Return the setting of a point with its albedo."""
+        found = np.concatenate([self._albedos(point[None], LOG2_FINAL, seed) for seed in SEEDS])
         numbers = {name: float(value) for name, value in self._numbers(point).items()}
         return Setting(float(found.mean()), float(found.std(ddof=1)) / len(found) ** 0.5, numbers, self.given)
 
