@@ -16,16 +16,17 @@ from .parameters.parameter import BoundParameters
 
 
 class Energy(NamedTuple):
-    """The largest directional albedos of a model, at angles up to 89.9°, rounded up
-    (``tests/calibration/largest_albedo.py``). Float32 rounding may exceed them by 1e-4, and by 2 % at 89.9° where
-    narrow lobes have steep flanks (``epd`` with α < 0.003)."""
+    """The largest directional albedos of a model, at angles up to 89.9°, rounded up to three digits, as
+    ``mi-brdfs energy`` measures them. Float32 rounding may exceed them by 1e-4, and by 2 % at 89.9° where narrow lobes
+    have steep flanks (``epd`` with α < 0.003)."""
 
     default: float
     """With the default parameters."""
     largest: list[tuple[dict[str, Any], float]]
     """In white, for some choices by name (a tuple stands for each of its words), the maximum over all values of the
     other parameters: at most 1 if the model conserves energy, infinite beyond about 100. White means that every colour
-    and the Fresnel reflectance are 1, except that a diffuse lobe beside others is black."""
+    and the Fresnel reflectance are 1, except that a diffuse lobe beside others is black
+    (``diffuse_reflectance``)."""
 
     NOTE = """\
 At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
@@ -131,7 +132,8 @@ class Model(Plugin):
     def manual(cls) -> str:
         """Return the manual page, with the table of the largest albedos."""
         if cls.energy is None:
-            return "\n".join([super().manual(), *_heading("Largest albedo"), "Not measured.", ""])
+            text = f"Not measured. ``mi-brdfs energy {cls.plugins[0]}`` does it."
+            return "\n".join([super().manual(), *_heading("Largest albedo"), text, ""])
         rows = [list(row) for row in cls.energy.rows()]
         return "\n".join([super().manual(), *_section("Largest albedo", rows), "", Energy.NOTE, ""])
 

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import reference as ref
-from albedos import view
 from scipy.stats import qmc
+
+from mi_brdfs.measure.settings import view
 
 
 class Reference(NamedTuple):

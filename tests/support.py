@@ -11,6 +11,7 @@ from mi_brdfs.measure.arrays import context as context
 from mi_brdfs.measure.arrays import interaction as interaction
 from mi_brdfs.measure.arrays import luminance
 from mi_brdfs.measure.arrays import numbers as numbers
+from mi_brdfs.measure.arrays import per_lane as per_lane
 from mi_brdfs.measure.directions import direction as direction
 from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measure.variates import lattice, sampling_efficiency
@@ -27,22 +28,6 @@ def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     w = hemisphere(count, seed, lowest)
     w[::2, 2] *= -1
     return w
-
-
-def per_lane() -> mi.Texture:
-    """A texture whose ``value``, a float or a colour, may differ from lane to lane."""
-
-    class Lanes(mi.Texture):
-        def __init__(self):
-            super().__init__(mi.Properties())
-
-        def eval(self, si, active=True):
-            return self.value
-
-        def eval_1(self, si, active=True):
-            return self.value
-
-    return Lanes()
 
 
 def call(method, ctx, wi, *arrays):

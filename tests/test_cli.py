@@ -208,14 +208,17 @@ def test_without_a_choice_a_bad_llvm_is_avoided(folder):
         assert f"unset {llvm.VARIABLE}" in done.stderr and "scalar_rgb." in done.stderr
 
 
+HOURS = "render", "scenes/box.xml", "--spp", 10**6
+
+
 def interrupted(folder, *arguments, running, times=1):
-    """Start a render that would take hours, on a terminal, and press Ctrl-C once ``running`` shows on it."""
+    """Start a command on a terminal, and press Ctrl-C once ``running`` shows on it."""
     pty = pytest.importorskip("pty")
     terminal, its_end = pty.openpty()
+    env = {**os.environ, "TERM": "xterm"}
     process = subprocess.Popen(
-        command("render", "scenes/box.xml", "--spp", 10**6, *arguments),
-        cwd=folder, stdout=subprocess.PIPE, stderr=its_end, text=True, env={**os.environ, "TERM": "xterm"},
-    )  # fmt: skip
+        command(*arguments), cwd=folder, stdout=subprocess.PIPE, stderr=its_end, text=True, env=env
+    )
     os.close(its_end)
     shown = ""
     while not re.search(running, shown):
@@ -237,7 +240,7 @@ def interrupted(folder, *arguments, running, times=1):
 def test_ctrl_c_keeps_what_is_finished(folder, variant):
     if variant.startswith("llvm") and llvm.version() is None:
         pytest.skip("no LLVM here")
-    status, out, err = interrupted(folder, "--variant", variant, running=r"[1-9]\d*/1000000")
+    status, out, err = interrupted(folder, *HOURS, "--variant", variant, running=r"[1-9]\d*/1000000")
     assert status == 130
     assert out.split() == ["box.exr", "box.png"]
     finished = re.search(r"Interrupted; the image has the (\d+) of 1000000 samples per pixel", err)
@@ -250,10 +253,21 @@ def test_ctrl_c_keeps_what_is_finished(folder, variant):
 def test_a_second_ctrl_c_aborts_at_once(folder):
     if llvm.version() is None:
         pytest.skip("no LLVM here")
-    status, out, err = interrupted(folder, "--variant", "llvm_ad_rgb", "-Dres=4096", running="Rendering", times=2)
+    status, out, err = interrupted(
+        folder, *HOURS, "--variant", "llvm_ad_rgb", "-Dres=4096", running="Rendering", times=2
+    )
     assert status == 130 and out == ""
     assert "Aborted; nothing was written." in err and "Traceback" not in err
     assert not list(folder.glob("*.exr"))
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_a_measurement(folder):
+    if llvm.version() is None:
+        pytest.skip("no LLVM here")
+    status, out, err = interrupted(folder, "energy", "--variant", "llvm_ad_rgb", running="Measuring blinnphong")
+    assert status == 130 and out == ""
+    assert "Interrupted; nothing was written." in err and "Traceback" not in err
 
 
 def test_errors_of_mitsuba_in_one_line():

@@ -6,11 +6,14 @@ from functools import partial
 import mitsuba as mi
 import numpy as np
 import pytest
-from albedos import albedos, brightest, choices, fault, white
 from reference_albedos import REFERENCES
 from support import direction
 
+from mi_brdfs.measure.albedo import albedos, default_albedo, largest_albedo
+from mi_brdfs.measure.energy import fault
+from mi_brdfs.measure.settings import choices, white
 from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.models.microfacet import BROUGHT
 
 PLUGINS = {model: model.plugins[0] for model in own_models()}
 CONFIGURATIONS = [(model, given, albedo) for model in PLUGINS for given, albedo in model.energy.largest]
@@ -25,9 +28,9 @@ def configuration(value):
 @pytest.mark.parametrize("model, given, stated", CONFIGURATIONS, ids=configuration)
 def test_largest_albedo(model, given, stated):
     """No setting of all numbers, and no direction of view, is brighter than the page states, and one is nearly as
-    bright. The integral of the reference says the same of it. The search is a quick one."""
-    found = brightest(model, given)
-    assert not fault(stated, found.albedo, found.noise, slack=0.05), found
+    bright. The integral of the reference says the same of it."""
+    found = largest_albedo(model, given)
+    assert not fault(stated, found.albedo, found.noise), found
     for reference in REFERENCES:
         if reference.model == PLUGINS[model] and reference.given == given:
             tolerance = 2e-3 * found.albedo + 3 * found.noise
@@ -42,18 +45,17 @@ def test_references_are_configurations():
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model", PLUGINS, ids=configuration)
 def test_largest_albedo_of_the_defaults(model):
-    angles = [0, 20, 40, 60, 70, 75, 80, 83, 86, 88, 89, 89.5, 89.9]
-    wi = np.array([direction(angle, 17) for angle in angles])
-    assert not fault(model.energy.default, albedos(mi.load_dict({"type": PLUGINS[model]}), wi, 14).max())
+    assert not fault(model.energy.default, default_albedo(model))
 
 
 @pytest.mark.parametrize("model", PLUGINS, ids=configuration)
 def test_every_choice_is_covered(model):
-    """Whatever words are chosen, some configuration on the page includes them, or the plugin refuses them."""
+    """Whatever words of its own are chosen, some configuration on the page includes them, or the plugin refuses
+    them."""
     pages = [choices(model.declared(), given) for given, _ in model.energy.largest if not numbers_in(given)]
     covered = [words for page in pages for words in page]
     for words in choices(model.declared(), {}):
-        if words not in covered:
+        if words not in covered and not BROUGHT.keys() & words.items():
             with pytest.raises(RuntimeError, match="is not known for"):
                 mi.load_dict({"type": PLUGINS[model]} | words)
 
@@ -70,7 +72,7 @@ GRAZING = [*range(60, 80), *np.arange(80, 89.95, 0.3)]
 def albedo(model, /, *angles, azimuth=17, **given):
     """The largest albedo at some angles, of a plugin in white."""
     wi = np.array([direction(angle, azimuth) for angle in angles or GRAZING])
-    bsdf = mi.load_dict({"type": PLUGINS[model], **white(model), **given})
+    bsdf = mi.load_dict({"type": PLUGINS[model], **white(model, given), **given})
     return albedos(bsdf, wi, 12 if len(wi) > 1 else 16).max()
 
 

@@ -72,6 +72,14 @@ def test_it_passes_all_checks(tmp_path, word):
     assert "fail" not in command(tmp_path, "check", word)
 
 
+def test_its_energy_is_measured(tmp_path):
+    """As the integral has it: w/2 (1 - μ ln(1 + 1/μ)) at 89.9°, for w = 0.3 and 1."""
+    cosine = np.cos(np.radians(89.9))
+    largest = 0.5 * (1 - cosine * np.log(1 + 1 / cosine))
+    assert [np.ceil(1000 * w * largest) for w in (0.3, 1)] == [149, 495]
+    assert "energy = Energy(0.149, [({}, 0.495)])" in command(tmp_path, "energy", "dust")
+
+
 def test_it_is_plotted_and_pictured(tmp_path):
     command(tmp_path, "plot", "dust", "-o", "dust.png")
     command(tmp_path, "gallery", "dust", "-o", "pictures", "--size", "32", "--spp", "4")

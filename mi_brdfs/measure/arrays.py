@@ -57,6 +57,22 @@ def sample_arguments(variates: Array) -> tuple[mi.Float, mi.Point2f]:
     return mi.Float(variates[:, 0].copy()), mi.Point2f(_columns(variates[:, 1:]))
 
 
+def per_lane() -> mi.Texture:
+    """Return a texture whose ``value``, a float or a colour, may differ from lane to lane."""
+
+    class Lanes(mi.Texture):
+        def __init__(self):
+            super().__init__(mi.Properties())
+
+        def eval(self, si, active=True):
+            return self.value
+
+        def eval_1(self, si, active=True):
+            return self.value
+
+    return Lanes()
+
+
 def numbers(value: Any, count: int | None = None) -> Array:
     """Return a float, vector, spectrum or Mueller matrix (of which the first entry counts) as float64 of shape
     (count, channels), by default with as many rows as it has lanes."""

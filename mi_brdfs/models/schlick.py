@@ -69,7 +69,7 @@ class Schlick94(Model):
     rotation = Rotation()
 
     energy = Energy(
-        0.456,
+        0.457,
         [
             ({"variant": "shadowed"}, 6.62),
             ({"variant": "interreflection"}, float("inf")),

@@ -1,0 +1,168 @@
+"""``mi-brdfs energy``"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from math import isinf
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from ..mitsuba.registry import all_models, find_model
+from ..model import Energy, Model
+from .app import command
+from .errors import one_line
+from .interrupts import interruptible
+from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
+from .variants import set_tracing_variant
+
+if TYPE_CHECKING:
+    from ..measure.albedo import Setting
+
+T = TypeVar("T")
+
+LINE = 80
+"""The statement is broken into several lines where one would be longer."""
+
+
+class Measured(NamedTuple):
+    """A model with the largest albedo of its defaults, and its configurations with the brightest setting of each."""
+
+    model: type[Model]
+    default: float
+    found: list[tuple[dict[str, Any], Setting]]
+
+
+@command()
+def energy(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="TYPE…", help="Types that `list` shows. Default: all.")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Compare with what the classes state. Exit status 1 if that is wrong.")
+    ] = False,
+    variant: Annotated[
+        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+    ] = None,
+) -> None:
+    """Measure the largest albedo of models, by default and in white for each choice, and print the line that states it
+    in the class."""
+    try:
+        models = list(dict.fromkeys(map(find_model, names))) if names else all_models()
+    except ValueError as error:
+        fail(one_line(error), Exit.USAGE)
+    if check:
+        for model in models:
+            if model.energy is None:
+                err.print(f"{model.plugins[0]} states no energy.")
+        models = [model for model in models if model.energy is not None]
+    chosen = set_tracing_variant(variant)
+    start = time.perf_counter()
+    with stdout_to_stderr(), interruptible():
+        measured = _measure_all(models)
+    wrong = check and _print_comparison(measured)
+    if not check:
+        _print_statements(measured)
+    err.print(f"{len(models)} measured in {time.perf_counter() - start:.1f} s, {chosen}.")
+    if wrong:
+        raise typer.Exit(Exit.ERROR)
+
+
+def _measure_all(models: list[type[Model]]) -> list[Measured]:
+    from ..measure.albedo import default_albedo, largest_albedo
+    from ..measure.energy import configurations
+
+    subject = TextColumn("Measuring {task.description}", markup=False)
+    columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    measured = []
+    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        todo = {model: _of(model, configurations) for model in models}
+        task = progress.add_task("", total=sum(map(len, todo.values())))
+        for model, configured in todo.items():
+            progress.update(task, description=model.plugins[0])
+            result = Measured(model, _of(model, default_albedo), [])
+            for given in configured:
+                result.found.append((given, _of(model, largest_albedo, given)))
+                progress.advance(task)
+            measured.append(result)
+    return measured
+
+
+def _of(model: type[Model], measure: Callable[..., T], *given: Any) -> T:
+    """Return what a function measures of a model, or fail with a sentence about the model."""
+    try:
+        return measure(model, *given)
+    except Exception as error:
+        name, text = model.plugins[0], one_line(error)
+        fail(text if text.startswith(f"{name}: ") else f"{name}: {text}")
+
+
+def _print_statements(measured: list[Measured]) -> None:
+    """The table of the manual page for each model, and the statement."""
+    from ..measure.energy import energy_of
+
+    for model, default, found in measured:
+        stated = energy_of(model, default, found)
+        heading, *rows = stated.rows()
+        table = Table(*heading, box=None, pad_edge=False)
+        for row in rows:
+            table.add_row(*row)
+        out.print(model.plugins[0], style="bold")
+        print_table(table)
+        out.print(f"\n{_statement(stated)}\n")
+
+
+def _print_comparison(measured: list[Measured]) -> bool:
+    """A row for each configuration, and below what is wrong. Return whether anything is."""
+    from ..measure.energy import fault
+
+    table = Table("type", "configuration", "stated", "found", "", box=None, pad_edge=False)
+    faults = []
+    for model, default, found in measured:
+        name, (_, of_default, *others) = model.plugins[0], model.energy.rows()
+        compared = [(of_default[0], model.energy.default, default, 0.0, "")]
+        for row, (_, stated), (_, it) in zip(others, model.energy.largest, found, strict=True):
+            compared.append((row[0], stated, it.albedo, it.noise, f", at {it.place}"))
+        for words, stated, albedo, noise, place in compared:
+            problem = fault(stated, albedo, noise)
+            shown = "no limit" if isinf(stated) else f"{stated:.4g}"
+            table.add_row(
+                name, words, shown, f"{albedo:.4g}", Text(*("WRONG", "red") if problem else ("right", "green"))
+            )
+            if problem:
+                faults.append(f"{name}: {words}: {shown} is stated, but {problem}: found {albedo:.5g}{place}")
+    print_table(table)
+    for sentence in faults:
+        out.print(sentence)
+    return bool(faults)
+
+
+def _statement(stated: Energy) -> str:
+    """The line of code, in several lines if it is long."""
+    default, *rows = [
+        f"{stated.default:g}",
+        *(f"({_literal(given)}, {_number(albedo)})" for given, albedo in stated.largest),
+    ]
+    line = f"energy = Energy({default}, [{', '.join(rows)}])"
+    if len(line) <= LINE:
+        return line
+    return "\n".join(
+        ["energy = Energy(", f"    {default},", "    [", *(f"        {row}," for row in rows), "    ],", ")"]
+    )
+
+
+def _number(albedo: float) -> str:
+    return 'float("inf")' if isinf(albedo) else f"{albedo:g}"
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_literal(name)}: {_literal(it)}" for name, it in value.items()) + "}"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_literal, value))})"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
