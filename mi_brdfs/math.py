@@ -9,6 +9,7 @@ end nothing that divides falls below one of three values, of which a power is st
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -24,14 +25,14 @@ SMALL = 1e-9
 """The least length, and other divisors of which derivatives take up to the fourth power."""
 
 
-def select(mask, a, b):
+def select(mask: Any, a: Any, b: mi.Float) -> Any:
     """Return ``dr.select``, without its cost for vectors if the mask is a bool, as in scalar variants."""
     if isinstance(mask, bool):
         return a if mask else b
     return dr.select(mask, a, b)
 
 
-def clamp(x, low: float, high: float):
+def clamp(x: Any, low: float, high: float) -> Any:
     """Return x limited to [low, high]. Unlike that of ``dr.clip``, its derivative keeps an optimised parameter from
     getting stuck: at a limit it is one, and from beyond a limit gradient descent is led back.
 
@@ -43,28 +44,28 @@ def clamp(x, low: float, high: float):
     return _limited(x, low, high)
 
 
-def _limited(x, low, high):
+def _limited(x: Any, low: Any, high: Any) -> Any:
     return dr.minimum(dr.maximum(x, float(low)), float(high))
 
 
 class _Clamp(dr.CustomOp):
-    def eval(self, x, low, high):
+    def eval(self, x: Any, low: Any, high: Any) -> Any:
         self.below, self.above = x < low, x > high
         return _limited(x, low, high)
 
-    def forward(self):
+    def forward(self) -> None:
         self.set_grad_out(self.grad_in("x"))
 
-    def backward(self):
+    def backward(self) -> None:
         grad = self.grad_out()
         outward = (self.below & (grad > 0)) | (self.above & (grad < 0))
         self.set_grad_in("x", dr.select(outward, 0, grad))
 
-    def name(self):
+    def name(self) -> str:
         return "clamp"
 
 
-def square(x):
+def square(x: Any) -> Any:
     """Return x² of a parameter limited to x >= 0. Its derivative at exactly 0, which is 0, is replaced by that at 0.03:
     otherwise an optimisation that reaches this limit by a long step would stay there."""
     if dr.is_diff_v(x) and dr.grad_enabled(x):
@@ -72,66 +73,66 @@ def square(x):
     return dr.square(x)
 
 
-def log1p(x):
+def log1p(x: Any) -> Any:
     """Return log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
     small = abs(x) < 0.5
     near = dr.select(small, x, 0)
     return dr.select(small, near * _log1p_series(near), dr.log(dr.select(small, 1, 1 + x)))
 
 
-def expm1(x):
+def expm1(x: Any) -> Any:
     """Return exp(x) - 1, accurate to a few ulp."""
     small = abs(x) < 0.5
     near = dr.select(small, x, 0)
     return dr.select(small, near * _expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
 
 
-def log1p_ratio(x):
+def log1p_ratio(x: Any) -> Any:
     """Return log(1 + x)/x, and its limit 1 at x = 0."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
     return dr.select(small, _log1p_series(near), dr.log(1 + far) / far)
 
 
-def expm1_ratio(x, shift=0, scale=1):
+def expm1_ratio(x: Any, shift: Any = 0, scale: Any = 1) -> Any:
     """Return (exp(x) - 1)/x, and its limit 1 at x = 0, times ``scale`` = exp(-``shift``)."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
     return dr.select(small, _expm1_series(near) * scale, (dr.exp(far - shift) - scale) / far)
 
 
-def _log1p_series(x):
+def _log1p_series(x: Any) -> Any:
     """Return log(1 + x)/x for |x| <= 0.5: log(1 + x) = 2 atanh(y) with |y| <= 1/3, so the next term is below 1e-8."""
     half = 1 / (2 + x)
     y2 = dr.square(x * half)
     return 2 * half * (1 + y2 * (1 / 3 + y2 * (1 / 5 + y2 * (1 / 7 + y2 * (1 / 9 + y2 * (1 / 11 + y2 / 13))))))
 
 
-def _expm1_series(x):
+def _expm1_series(x: Any) -> Any:
     """Return (exp(x) - 1)/x for |x| <= 0.5; the next term is below 1e-8."""
     return 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8))))))
 
 
-def log_cos(cos, sin2):
+def log_cos(cos: Any, sin2: Any) -> Any:
     """Return log(cosθ), from sin²θ where the cosine has lost its digits."""
     near = sin2 < 0.5
     x = dr.select(near, -sin2, 0)
     return dr.select(near, 0.5 * x * _log1p_series(x), dr.log(dr.select(near, 1, dr.maximum(cos, TINY))))
 
 
-def safe_sqrt(x):
+def safe_sqrt(x: Any) -> Any:
     """Return sqrt(x), and 0 for x <= 0, with derivative 0 there."""
     positive = x > 0
     return dr.select(positive, dr.sqrt(dr.select(positive, x, 1)), 0)
 
 
-def sin_theta(w):
+def sin_theta(w: mi.Vector3f) -> Any:
     """sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least EPSILON, where its derivative
     is 0."""
     return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, TINY))
 
 
-def normalize_or(x, y, fallback: tuple[float, float]):
+def normalize_or(x: Any, y: Any, fallback: tuple[float, float]) -> tuple[Any, Any]:
     """Return the 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
     length2 = x * x + y * y
     valid = length2 > 1e-24  # of which the derivative takes the power -3/2
@@ -139,7 +140,7 @@ def normalize_or(x, y, fallback: tuple[float, float]):
     return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
 
 
-def choose(u, probability):
+def choose(u: Any, probability: mi.Float) -> tuple[Any, Any]:
     """Return ``(chosen, u')``: whether an event of the given probability happens, decided by the uniform variate ``u``,
     and a fresh uniform variate rescaled from it."""
     chosen = u < probability
@@ -155,7 +156,7 @@ def gauss_legendre(count: int) -> list[tuple[float, float]]:
     return [(float(0.5 * (1 + x)), float(0.5 * w)) for x, w in zip(nodes, weights, strict=True)]
 
 
-def luminance(colour):
+def luminance(colour: Any) -> Any:
     """Return the brightness of a reflectance as one number: its luminance in rgb variants, its mean over the
     wavelengths in the others (with four wavelengths the CIE weights may all vanish, and a zero here would starve a
     lobe)."""

@@ -14,6 +14,10 @@ from .lobes import Lobe
 from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
 
+ENERGY_NOTE = """\
+At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
+others is 0; parameters not named take all values in their range."""
+
 
 class Energy(NamedTuple):
     """The largest directional albedos of a model, at angles up to 89.9°, rounded up to three digits, as
@@ -27,10 +31,6 @@ class Energy(NamedTuple):
     other parameters: at most 1 if the model conserves energy, infinite beyond about 100. White means that every colour
     and the Fresnel reflectance are 1, except that a diffuse lobe beside others is black
     (``diffuse_reflectance``)."""
-
-    NOTE = """\
-At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
-others is 0; parameters not named take all values in their range."""
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return ``(configuration, largest albedo, class)`` for the manual page."""
@@ -53,7 +53,7 @@ class Plugin:
     plugins: ClassVar[tuple[str, ...]] = ()
     """The plugin's name in scenes, and its aliases; by default the class name in lower case."""
 
-    def __init_subclass__(cls, **kwargs):
+    def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         cls.plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
         if isinstance(cls.plugins, str):
@@ -79,7 +79,7 @@ class Plugin:
         members = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
         return [value for value in members.values() if isinstance(value, Parameter)]
 
-    def evaluate(self, si, active) -> SimpleNamespace:
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
         """Return the values of the parameters at a surface interaction, except for choices."""
         return SimpleNamespace(**self.parameters.evaluate(si, active))
 
@@ -91,12 +91,12 @@ class Plugin:
     @classmethod
     def summary(cls) -> str:
         """Return the first line of the manual page."""
-        return inspect.cleandoc(cls.__doc__).splitlines()[0]
+        return inspect.cleandoc(cls.__doc__ or "").splitlines()[0]
 
     @classmethod
     def example(cls) -> dict[str, Any]:
         """Return the plugin dict at the end of the manual page, or else the defaults."""
-        last = inspect.cleandoc(cls.__doc__).rpartition("\n\n")[2]
+        last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2]
         return ast.literal_eval(last) if last.startswith("{") else {"type": cls.plugins[0]}
 
     @classmethod
@@ -109,7 +109,7 @@ class Plugin:
     def manual(cls) -> str:
         """Return the manual page: the docstring and the table of parameters."""
         rows = [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]
-        return "\n".join([inspect.cleandoc(cls.__doc__), "", *_section("Parameters", rows), ""])
+        return "\n".join([inspect.cleandoc(cls.__doc__ or ""), "", *_section("Parameters", rows), ""])
 
 
 class Model(Plugin):
@@ -119,7 +119,7 @@ class Model(Plugin):
     energy: ClassVar[Energy | None] = None
     """The largest albedos; None if they were not measured."""
 
-    def lobes(self, p) -> tuple[Lobe, ...]:
+    def lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
         """Return the model's lobes at a surface point, where ``p`` holds the values of the declared parameters. Their
         number and kinds depend only on the model's choices and on which parameters are given."""
         raise NotImplementedError(f"{type(self).__name__} does not define lobes.")
@@ -135,7 +135,7 @@ class Model(Plugin):
             text = f"Not measured. ``mi-brdfs energy {cls.plugins[0]}`` does it."
             return "\n".join([super().manual(), *_heading("Largest albedo"), text, ""])
         rows = [list(row) for row in cls.energy.rows()]
-        return "\n".join([super().manual(), *_section("Largest albedo", rows), "", Energy.NOTE, ""])
+        return "\n".join([super().manual(), *_section("Largest albedo", rows), "", ENERGY_NOTE, ""])
 
 
 def _section(title: str, table: list[list[str]]) -> list[str]:

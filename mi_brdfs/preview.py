@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import mitsuba as mi
 import numpy as np
 
@@ -55,7 +58,7 @@ def preview_scene(bsdf: dict | mi.BSDF) -> dict:
     }
 
 
-def _smooth(points, count: int) -> np.ndarray:
+def _smooth(points: Sequence[Any], count: int) -> np.ndarray:
     """Return ``count`` points on the Catmull-Rom curve through ``points``, shape (count, 2)."""
     p = np.array([points[0], *points, points[-1]])
     t = np.linspace(0, len(points) - 1, count)

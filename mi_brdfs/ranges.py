@@ -50,7 +50,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     params.update(inside)
 
 
-def _ranges(params) -> Iterator[tuple[str, Range]]:
+def _ranges(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
     """Yield ``(key, range)`` of the traversed parameters of our BSDFs."""
     for key in params.keys():
         node = params.properties[key][2]
@@ -65,18 +65,18 @@ def _ranges(params) -> Iterator[tuple[str, Range]]:
             yield key, node.model.ranges[path[-levels]]
 
 
-def _is_ours(node) -> bool:
+def _is_ours(node: Any) -> bool:
     return isinstance(node, mi.BSDF) and hasattr(node, "model")
 
 
-def _holds_coefficients(node, value) -> bool:
+def _holds_coefficients(node: Any, value: Any) -> bool:
     """Return whether a texture holds the coefficients of spectra instead of rgb colours."""
     kind = node.class_name()
     upsampled = kind == "SRGBReflectanceSpectrum" or (kind.startswith("BitmapTexture") and value.shape[-1] == 3)
     return mi.is_spectral and upsampled
 
 
-def _projected(value, limits: Range):
+def _projected(value: Any, limits: Range) -> Any:
     low, high = limits
     inside = dr.minimum(dr.maximum(dr.detach(value), low), high)
     if dr.grad_enabled(value):

@@ -56,5 +56,10 @@ def test_style():
     assert done.returncode == 0, done.stdout
 
 
+def test_types():
+    done = subprocess.run([sys.executable, "-m", "mypy", "--no-incremental"], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_types_are_shipped():
     assert (Path(mi_brdfs.__file__).parent / "py.typed").exists()

@@ -15,7 +15,7 @@ from mi_brdfs.gallery.sheet import Row, sheet
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
-from mi_brdfs.model import Energy, Model, Plugin
+from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
 
 from .made import ROOT, Page, Picture, code
 
@@ -137,7 +137,7 @@ def _overview(models: list[type[Model]]) -> str:
 
 
 def _model(model: type[Model]) -> str:
-    return _page(model, _picture(model), _strip(model), _table(model.energy.rows()), Energy.NOTE)
+    return _page(model, _picture(model), _strip(model), _table(model.energy.rows()), ENERGY_NOTE)
 
 
 def _integrator() -> str:

@@ -116,7 +116,7 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
 
 def year(model: type[Model]) -> str:
     """Return a model's year of publication: the first year on its manual page, if there is one."""
-    found = re.search(r"\b(1[789]|20)\d\d\b", model.__doc__)
+    found = re.search(r"\b(1[789]|20)\d\d\b", model.__doc__ or "")
     return found[0] if found else ""
 
 

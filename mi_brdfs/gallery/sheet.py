@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from PIL import Image, ImageDraw, ImageFont
 
@@ -49,5 +49,5 @@ def sheet(rows: list[Row]) -> Image.Image:
     return image
 
 
-def _width(font, text: str) -> int:
+def _width(font: Any, text: str) -> int:
     return max(int(font.getlength(line)) + 1 for line in text.split("\n"))

@@ -30,14 +30,14 @@ class Sweep:
         return f"{type}: {self.parameter}" + (f", with {given}" if given else "")
 
 
-def shown(value) -> str:
+def shown(value: Any) -> str:
     """Return a value as a label."""
     if isinstance(value, dict):
         return "(" + ", ".join(f"{channel:g}" for channel in value["value"]) + ")"
     return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def sweep(parameter: str, *values, **given) -> Sweep:
+def sweep(parameter: str, *values: Any, **given: Any) -> Sweep:
     return Sweep(parameter, values, given)
 
 
@@ -169,7 +169,8 @@ def sweeps_of(model: type[Model]) -> list[Sweep]:
     name = model.plugins[0]
     if is_own(model) and name in SWEEPS:
         return SWEEPS[name]
-    numbers, colours = [], []
+    numbers: list[Sweep] = []
+    colours: list[Sweep] = []
     for parameter in model.declared():
         if values := _values(parameter):
             own = {"type", *parameter.names}

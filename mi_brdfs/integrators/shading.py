@@ -21,7 +21,7 @@ class Radiance(Colour):
     """Whether the bound value is a literal zero."""
 
     def bind(self, reader: PropertyReader) -> Radiance:
-        texture = reader.colour(self.name, self.default, self.limits)
+        texture = reader.colour(self.name, self.default or 0, self.limits)
         # Not from the texture: evaluating it may wait for a thread that loads a BSDF, and waits for Python.
         values = reader.colour_values(self.name) if self.name in reader else [self.default]
         dark = values is not None and not any(values)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
@@ -14,21 +16,21 @@ class LambertLobe(Lobe):
 
     glossy = False
 
-    def __init__(self, reflectance):
+    def __init__(self, reflectance: Any) -> None:
         self.reflectance = reflectance
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         return self.reflectance
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         pdf = wo.z * dr.inv_pi
         return self.reflectance * pdf, pdf
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return mi.warp.square_to_cosine_hemisphere(v)
 
 
-def over_diffuse(reflectance, *lobes):
+def over_diffuse(reflectance: Any, *lobes: Lobe) -> tuple[Lobe, ...]:
     """Return lobes over a diffuse one, if its reflectance was given."""
     return lobes if reflectance is None else (LambertLobe(reflectance), *lobes)
 
@@ -39,22 +41,22 @@ class ZonalLobe(Lobe):
 
     glossy = False
 
-    def density(self, cos):
+    def density(self, cos: mi.Float) -> mi.Float:
         """Return p, whose integral over the cosine is one."""
         raise NotImplementedError
 
-    def cosine(self, u):
+    def cosine(self, u: mi.Float) -> mi.Float:
         """Return the cosine below which the fraction ``u`` of p lies."""
         raise NotImplementedError
 
-    def adjoint(self):
+    def adjoint(self) -> Lobe:
         return self if self.reciprocal else AdjointZonalLobe(self)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         pdf = self.density(wo.z) * dr.inv_two_pi
         return self.estimated_albedo(wi) * pdf, pdf
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         cos = self.cosine(v.x)
         sin = safe_sqrt(1 - cos * cos)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
@@ -64,19 +66,21 @@ class ZonalLobe(Lobe):
 class AdjointZonalLobe(AdjointLobe):
     """f(wo, wi) |cosθ_o| = albedo(wo)·p(cosθ_i)/(2π cosθ_i) cosθ_o, cosine-sampled."""
 
-    def _radiance(self, wi):
+    lobe: ZonalLobe
+
+    def _radiance(self, wi: mi.Vector3f) -> mi.Float:
         """What a lobe of an albedo of 1 makes of light from ``wi``, times π."""
         return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, EPSILON)
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         return self.lobe.estimated_albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         viewer = self._mirrored(wo)
         pdf = viewer.z * dr.inv_pi
         return self.lobe.estimated_albedo(viewer) * (self._radiance(wi) * pdf), pdf
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self._mirrored(mi.warp.square_to_cosine_hemisphere(v))
 
 
@@ -93,20 +97,20 @@ class RoughDiffuseLobe(Lobe):
 
     glossy = False
 
-    def __init__(self, reflectance, retro):
+    def __init__(self, reflectance: Any, retro: mi.Float) -> None:
         self.reflectance, self.retro = reflectance, retro
 
-    def eval(self, wi, wo):
+    def eval(self, wi: mi.Vector3f, wo: mi.Vector3f) -> Any:
         """Return f."""
         raise NotImplementedError
 
-    def _uniform(self, wi):
+    def _uniform(self, wi: mi.Vector3f) -> mi.Float:
         """Return the probability of the uniform directions."""
         mu, r = wi.z, self.retro
         share = 0.162925 + mu * (-0.372058 + mu * (0.538233 - 0.290822 * mu))
         return dr.select(r > 0, dr.power(dr.maximum(r, TINY), 0.1), 0) * share
 
-    def _matrix(self, wi):
+    def _matrix(self, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
         """Return ``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of
         wi."""
         mu, r = wi.z, self.retro
@@ -117,7 +121,7 @@ class RoughDiffuseLobe(Lobe):
         # The clipping below needs d <= 0; the fit exceeds that by 0.003 near normal incidence.
         return a, b, c, dr.minimum(d, 0)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         a, b, c, d = self._matrix(wi)
         x, y = normalize_or(wi.x, wi.y, (1, 0))
         along, across = x * wo.x + y * wo.y, x * wo.y - y * wo.x
@@ -129,7 +133,7 @@ class RoughDiffuseLobe(Lobe):
         uniform = self._uniform(wi)
         return self.eval(wi, wo) * wo.z, uniform * dr.inv_two_pi + (1 - uniform) * transformed
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         is_uniform, _ = choose(u, self._uniform(wi))
         a, b, c, d = self._matrix(wi)
         # The transform moves what lies beyond half an ellipse in the disc below the horizon: squeeze that out.

@@ -35,16 +35,16 @@ class Lobe:
     seldom = False
     """Whether it is drawn from so rarely, beside others, that branching is faster than always drawing from it."""
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         """Return an estimate of ∫ f |cosθ_o| dω_o. It decides the choice among lobes and the albedo AOV, so it need not
         be exact, but it must be positive wherever the lobe reflects anything."""
         raise NotImplementedError(f"{type(self).__name__} does not define estimated_albedo.")
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         """Return ``(value, pdf)``: f |cosθ_o|, and the density with which :meth:`sample` draws ``wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define eval_pdf.")
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         """Draw a direction ``wo`` from three uniform variates, ``u`` and ``v = (v.x, v.y)``. It may lie beyond the
         horizon, where the lobe is zero."""
         raise NotImplementedError(f"{type(self).__name__} does not define sample.")
@@ -57,7 +57,7 @@ class Lobe:
         The default is sampled like the lobe itself; override it if that misses directions."""
         return self if self.reciprocal else AdjointLobe(self)
 
-    def mirror_reflectance(self, wi):
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
         """Return the lobe's colour times its Fresnel reflectance for the mirror direction of ``wi``, regardless of its
         width and scale: its reflectance as a mirror. It is 0 for diffuse lobes."""
         return 0
@@ -68,21 +68,21 @@ class AdjointLobe(Lobe):
 
     reciprocal = False
 
-    def __init__(self, lobe: Lobe):
+    def __init__(self, lobe: Lobe) -> None:
         self.lobe, self.glossy, self.transmits = lobe, lobe.glossy, lobe.transmits
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         return self.lobe.estimated_albedo(wi)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))
         _, pdf = self.lobe.eval_pdf(wi, wo)
         return value * (abs(wo.z) / dr.maximum(wi.z, EPSILON)), pdf
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.lobe.sample(wi, u, v)
 
-    def _mirrored(self, w):
+    def _mirrored(self, w: mi.Vector3f) -> mi.Vector3f:
         return mi.Vector3f(w.x, w.y, -w.z) if self.transmits else w
 
 
@@ -90,20 +90,20 @@ class WeightedLobe(Lobe):
     """A lobe times g(wi, wo) = g(wo, wi), sampled like the lobe: the weight is g times the lobe's. ``mean(wi)``
     approximates the mean of g over ``wo``."""
 
-    def __init__(self, lobe: Lobe, g: Callable[[Any, Any], Any], mean: Callable[[Any], Any]):
+    def __init__(self, lobe: Lobe, g: Callable[[Any, Any], Any], mean: Callable[[Any], Any]) -> None:
         self.lobe, self.g, self.mean = lobe, g, mean
         self.glossy, self.reciprocal = lobe.glossy, lobe.reciprocal
         self.anisotropic, self.transmits = lobe.anisotropic, lobe.transmits
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         return self.lobe.estimated_albedo(wi) * self.mean(wi)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         value, pdf = self.lobe.eval_pdf(wi, wo)
         return value * self.g(wi, wo), pdf
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.lobe.sample(wi, u, v)
 
-    def mirror_reflectance(self, wi):
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
         return self.lobe.mirror_reflectance(wi) * self.mean(wi)

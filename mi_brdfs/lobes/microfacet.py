@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
+import mitsuba as mi
 
 from ..math import EPSILON, safe_sqrt
 from ..microfacet.choice import sampler_of
+from ..microfacet.distributions import Distribution
 from ..microfacet.facet import Cosines, Facet
+from ..microfacet.fresnel import Fresnel
+from ..microfacet.shadowing import Shadowing
 from .lobe import Lobe
 
 
@@ -29,13 +35,15 @@ class MicrofacetLobe(Lobe):
     NEARER_UPRIGHT = 0.08
     """and under a shadowing term that does not lean."""
 
-    def __init__(self, colour, distribution, shadowing, fresnel, scale=1):
+    def __init__(
+        self, colour: Any, distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel, scale: Any = 1
+    ) -> None:
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
         self.sampler = sampler_of(distribution, shadowing, fresnel)
         self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         """Return an estimate from F, D and G at a typical facet.
 
         At grazing the facets seen lean towards the viewer: F is that of a larger cosine than cosθ_i, and a shadowing
@@ -64,18 +72,18 @@ class MicrofacetLobe(Lobe):
         # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
         return self.reflectance * (self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9)) * seen)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         facet = Facet.between(wi, wo)
         facets = self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
         return self.reflectance * (self.fresnel(facet.cos_d) * facets), self.sampler.pdf(self, facet)
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.sampler.sample(self, wi, u, v)
 
-    def mirror_reflectance(self, wi):
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
         return self.colour * self.fresnel(wi.z)
 
-    def weight_over_ndf(self, facet):
+    def weight_over_ndf(self, facet: Facet) -> mi.Float:
         """Return f cosθ_o·4cosθ_d/D for ρ = 1, as the one number that samplers use: times D/q it is the weight of a
         half vector drawn with the density q."""
         return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet) * facet.cos_d / facet.cos_i

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
@@ -16,26 +18,26 @@ class AxisFrame:
     one of the pair.
     """
 
-    def __init__(self, axis):
+    def __init__(self, axis: mi.Vector3f) -> None:
         self.axis = axis
         self.sin = sin_theta(axis)
         x, y = normalize_or(axis.x, axis.y, (1, 0))
         self.up = mi.Vector3f(-axis.z * x, -axis.z * y, self.sin)
         self.side = mi.Vector3f(-y, x, 0)
 
-    def cosine(self, w):
+    def cosine(self, w: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Bool]:
         """Return ``(log A, 1 - A, inside)`` of the direction ``w``, where ``inside`` says whether A > 0."""
         versine = 0.5 * dr.squared_norm(w - self.axis)
         inside = versine < 1
         versine = dr.select(inside, versine, 0)
         return log1p(-versine), versine, inside
 
-    def direction(self, log_a, b, c):
+    def direction(self, log_a: mi.Float, b: mi.Float, c: mi.Float) -> mi.Vector3f:
         """Return the direction of cosine A whose remainder points along ``b up + c side``, with b² + c² = 1."""
         sin = dr.sqrt(dr.maximum(-expm1(2 * log_a), 0))
         return self.axis * dr.exp(log_a) + self.up * (sin * b) + self.side * (sin * c)
 
-    def mirrored_z(self, w, versine):
+    def mirrored_z(self, w: mi.Vector3f, versine: mi.Float) -> mi.Float:
         """Return the cosine to the normal of the mirror image of ``w``, or 0 below the horizon."""
         return dr.maximum(2 * self.axis.z * (1 - versine) - w.z, 0)
 
@@ -43,17 +45,17 @@ class AxisFrame:
 class MirrorLobe(Lobe):
     """A lobe of scale·max(0, A)ⁿ around the mirror direction."""
 
-    def __init__(self, reflectance, exponent, scale):
+    def __init__(self, reflectance: Any, exponent: mi.Float, scale: Any) -> None:
         self.reflectance, self.exponent, self.scale = reflectance, exponent, scale
 
-    def frame(self, wi) -> AxisFrame:
+    def frame(self, wi: mi.Vector3f) -> AxisFrame:
         return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
 
-    def peak(self, wi):
+    def peak(self, wi: mi.Vector3f) -> Any:
         """Return the scale for ``wi``."""
         return self.scale
 
-    def mirror_reflectance(self, wi):
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
         log_a, _, inside = self.frame(wi).cosine(mi.Vector3f(-wi.x, -wi.y, wi.z))
         relative = dr.select(inside, dr.exp(self.exponent * log_a), 0) * self.peak(wi) / self.scale
         return self.reflectance * relative
@@ -72,22 +74,22 @@ class PowerLobe(MirrorLobe):
     where both lie well above the horizon, and below three times its mean everywhere.
     """
 
-    def _masses(self, frame):
+    def _masses(self, frame: AxisFrame) -> tuple[mi.Float, mi.Float]:
         """The integrals of the two terms over the pair, relative to 2π/(n+2). The second one stands for a ratio of
         Gamma functions, √π Γ((n+1)/2) / Γ(n/2+1): exact for n = 0 and in the limit, and else within 2 %."""
         return dr.maximum(frame.axis.z, 0), frame.sin * dr.rsqrt(dr.two_pi * self.exponent + 4)
 
-    def _share(self, frame):
+    def _share(self, frame: AxisFrame) -> mi.Float:
         axial, lateral = self._masses(frame)
         return axial / dr.maximum(axial + lateral, EPSILON)  # an axis straight below the surface has neither
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         # Exact for an axis along the normal or in the horizon.
         axial, lateral = self._masses(self.frame(wi))
         mass = dr.sqrt(axial * axial + lateral * lateral)
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 2) * mass)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         n, frame = self.exponent, self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(n * log_a), 0)
@@ -100,14 +102,14 @@ class PowerLobe(MirrorLobe):
             / dr.maximum(wo.z + frame.mirrored_z(wo, versine), EPSILON),
         )
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         frame = self.frame(wi)
         u, log_a, b, c = self._draw(frame, u, v)
         wo, mirrored = frame.direction(log_a, b, c), frame.direction(log_a, -b, c)
         z, mirrored_z = dr.maximum(wo.z, 0), dr.maximum(mirrored.z, 0)
         return dr.select(u * (z + mirrored_z) < z, wo, mirrored)
 
-    def _draw(self, frame, u, v):
+    def _draw(self, frame: AxisFrame, u: mi.Float, v: mi.Point2f) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
         """Return ``(u, log A, |B|/√(1-A²), …)`` of the mixture, with the remaining variate ``u``."""
         n = self.exponent
         is_axial, u = choose(u, self._share(frame))
@@ -116,7 +118,9 @@ class PowerLobe(MirrorLobe):
         b = dr.select(is_axial, abs(cos_phi), safe_sqrt(1 - c * c))
         return u, dr.select(is_axial, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1)), b, c
 
-    def _pair(self, frame, log_a, versine, power, cos_phi):
+    def _pair(
+        self, frame: AxisFrame, log_a: mi.Float, versine: mi.Float, power: mi.Float, cos_phi: mi.Float
+    ) -> mi.Float:
         """Return the density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
         n = self.exponent
         axial = (n + 2) * (1 - versine)
@@ -135,12 +139,12 @@ class PowerResponseLobe(MirrorLobe):
 
     reciprocal = False
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         # The tanh estimates what lies above the horizon, within 0.12.
         visible = 0.5 + 0.5 * dr.tanh(wi.z * dr.sqrt(self.exponent + 1))
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 1) * visible)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         frame = self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(self.exponent * log_a), 0)
@@ -148,7 +152,7 @@ class PowerResponseLobe(MirrorLobe):
         alone = frame.mirrored_z(wo, versine) <= 0
         return self.reflectance * (self.peak(wi) * power), dr.select(alone, pdf, 0.5 * pdf)
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         frame = self.frame(wi)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         log_a = log1p(-v.x) / (self.exponent + 1)

@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import ONE_MINUS_EPSILON, SMALL, TINY, clamp, luminance, select
+from .lobe import Lobe
 
 
 class Mixture:
@@ -14,7 +15,7 @@ class Mixture:
     In ``mirrored`` lanes (a mask, or None) light comes from behind: there only transmitting lobes count, and elsewhere
     only the others."""
 
-    def __init__(self, lobes, wi, mirrored=None):
+    def __init__(self, lobes: list[Lobe], wi: mi.Vector3f, mirrored: mi.Bool | None = None) -> None:
         self.lobes, self.wi = lobes, wi
         if len(lobes) == 1:
             self.probabilities = [mi.Float(1)]
@@ -30,7 +31,7 @@ class Mixture:
             dr.select(black, count, energy) * scale for count, energy in zip(counts, energies, strict=True)
         ]
 
-    def eval_pdf(self, wo, transmitted):
+    def eval_pdf(self, wo: mi.Vector3f, transmitted: bool) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
         """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
         total, density = 0, 0
         for probability, lobe in zip(self.probabilities, self.lobes, strict=True):
@@ -39,7 +40,7 @@ class Mixture:
                 total, density = total + value, density + probability * pdf
         return mi.UnpolarizedSpectrum(total), density
 
-    def sample(self, u, v):
+    def sample(self, u: mi.Float, v: mi.Point2f) -> tuple[mi.Vector3f, mi.UInt32]:
         """Return ``(wo, k)``: a direction and the index of the lobe that it was drawn from."""
         if len(self.lobes) == 1:
             return self.lobes[0].sample(self.wi, u, v), 0

@@ -61,13 +61,15 @@ def per_lane() -> mi.Texture:
     """Return a texture whose ``value``, a float or a colour, may differ from lane to lane."""
 
     class Lanes(mi.Texture):
-        def __init__(self):
+        value: Any
+
+        def __init__(self) -> None:
             super().__init__(mi.Properties())
 
-        def eval(self, si, active=True):
+        def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
             return self.value
 
-        def eval_1(self, si, active=True):
+        def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
             return self.value
 
     return Lanes()

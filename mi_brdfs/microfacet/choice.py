@@ -17,7 +17,7 @@ def sampler_of(distribution: Distribution, shadowing: Shadowing, fresnel: Fresne
     return WithForwardShare(sampler) if isinstance(fresnel, Dielectric) else sampler
 
 
-def _sampler_of_facets(distribution, shadowing, fresnel):
+def _sampler_of_facets(distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel) -> Sampler:
     rises = isinstance(fresnel, Dielectric | Schlick)  # towards grazing angles, from a few percent to one
     if isinstance(distribution, GGX) and isinstance(shadowing, SmithGGX):
         if not shadowing.correlated:

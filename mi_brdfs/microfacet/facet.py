@@ -20,7 +20,7 @@ class Cosines(NamedTuple):
     cos_d: Any
 
     @classmethod
-    def leaning(cls, cos_i, sin_i, slope) -> Cosines:
+    def leaning(cls, cos_i: mi.Float, sin_i: mi.Float, slope: mi.Float) -> Cosines:
         """Return the cosines of a facet in the plane of incidence that leans towards ``wi`` by a slope."""
         cos_h = dr.rsqrt(slope * slope + 1)
         cos_d = (cos_i + sin_i * slope) * cos_h
@@ -38,7 +38,7 @@ class Facet:
     cos_d: Any
 
     @classmethod
-    def between(cls, wi, wo) -> Facet:
+    def between(cls, wi: mi.Vector3f, wo: mi.Vector3f) -> Facet:
         """The facet that reflects ``wi`` into ``wo``, both above the horizon."""
         # Opposite directions within the horizon have none; derivatives divide by the length, up to its fourth power.
         h = mi.Vector3f(wi.x + wo.x, wi.y + wo.y, dr.maximum(wi.z + wo.z, SMALL))
@@ -47,13 +47,13 @@ class Facet:
         return cls(wi, wo, h * inv_length, 0.5 * length2 * inv_length)
 
     @classmethod
-    def at(cls, wi, slope_x, slope_y) -> Facet:
+    def at(cls, wi: mi.Vector3f, slope_x: mi.Float, slope_y: mi.Float) -> Facet:
         """Return the facet whose normal is ∝ (slope_x, slope_y, 1)."""
         inv_length = dr.rsqrt(slope_x * slope_x + slope_y * slope_y + 1)
         return cls.reflecting(wi, mi.Vector3f(slope_x * inv_length, slope_y * inv_length, inv_length))
 
     @classmethod
-    def reflecting(cls, wi, h) -> Facet:
+    def reflecting(cls, wi: mi.Vector3f, h: mi.Vector3f) -> Facet:
         """Return the facet with the normal ``h``."""
         cos_d = dr.dot(wi, h)
         return cls(wi, 2 * cos_d * h - wi, h, cos_d)
@@ -63,22 +63,22 @@ class Facet:
         return self.reflecting(self.wi, mi.Vector3f(-self.h.x, -self.h.y, self.h.z))
 
     @property
-    def cos_i(self):
+    def cos_i(self) -> mi.Float:
         return self.wi.z
 
     @property
-    def cos_o(self):
+    def cos_o(self) -> mi.Float:
         return self.wo.z
 
     @property
-    def cos_h(self):
+    def cos_h(self) -> mi.Float:
         return self.h.z
 
     @property
-    def sin2_h(self):
+    def sin2_h(self) -> mi.Float:
         # Not 1 - cos², which loses the digits of narrow lobes.
         return self.h.x * self.h.x + self.h.y * self.h.y
 
     @property
-    def tan2_h(self):
+    def tan2_h(self) -> mi.Float:
         return self.sin2_h / dr.square(self.cos_h)

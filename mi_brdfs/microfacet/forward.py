@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, choose, normalize_or, safe_sqrt, select
-from .sampling import Sampler
+from .facet import Facet
+from .sampling import FacetLobe, Sampler
 
 
 class WithForwardShare(Sampler):
@@ -23,11 +26,12 @@ class WithForwardShare(Sampler):
     LARGEST = 0.8
     """The share where it needs it most. tests/calibration/forward.py fits both."""
 
-    def __init__(self, sampler):
+    def __init__(self, sampler: Sampler) -> None:
         self.sampler = sampler
 
-    def _share(self, lobe, wi):
-        distribution, fresnel, z = lobe.distribution, lobe.fresnel, self._cosine(wi)
+    def _share(self, lobe: FacetLobe, wi: mi.Vector3f) -> mi.Float:
+        distribution, z = lobe.distribution, self._cosine(wi)
+        fresnel: Any = lobe.fresnel  # a Dielectric
         # From a facet in the plane of incidence that is steeper than three of four.
         x, y = normalize_or(wi.x, wi.y, (1, 0))
         g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
@@ -39,15 +43,15 @@ class WithForwardShare(Sampler):
         return self.LARGEST * brighter / ((1 + brighter) * (1 + distinct))
 
     @staticmethod
-    def _cosine(wi):
+    def _cosine(wi: mi.Vector3f) -> mi.Float:
         """The z of above, not too small for what divides by it."""
         return dr.maximum(wi.z, 1e-3)
 
-    def sample(self, lobe, wi, u, v):
+    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         forward, u = choose(u, self._share(lobe, wi))
         return select(forward, self._draw(wi, v), self.sampler.sample(lobe, wi, u, v))
 
-    def _draw(self, wi, v):
+    def _draw(self, wi: mi.Vector3f, v: mi.Point2f) -> mi.Vector3f:
         z = self._cosine(wi)
         ratio = dr.sqrt(v.x) / (1 + z)  # z'/(z + z')
         cos = z * ratio / (1 - ratio)
@@ -58,7 +62,7 @@ class WithForwardShare(Sampler):
         sin = safe_sqrt(1 - cos * cos)
         return mi.Vector3f(sin * (x * cos_delta - y * sin_delta), sin * (y * cos_delta + x * sin_delta), cos)
 
-    def pdf(self, lobe, facet):
+    def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         wi, wo, z, cos = facet.wi, facet.wo, self._cosine(facet.wi), dr.maximum(facet.cos_o, 0)
         x_i, y_i = normalize_or(-wi.x, -wi.y, (1, 0))
         x_o, y_o = normalize_or(wo.x, wo.y, (1, 0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 
 from ..math import luminance, safe_sqrt, square
 from .term import Term
@@ -24,7 +25,7 @@ class Fresnel(Term):
 class Unit(Fresnel):
     """F = 1."""
 
-    def __call__(self, cos):
+    def __call__(self, cos: mi.Float) -> Any:
         return 1.0
 
     brightness = __call__
@@ -33,15 +34,15 @@ class Unit(Fresnel):
 class Schlick(Fresnel):
     """F = f0 + (1 - f0)(1 - cosθ)⁵ (Schlick 1994, doi:10.1111/1467-8659.1330233)."""
 
-    def __init__(self, f0):
+    def __init__(self, f0: Any) -> None:
         self.f0 = f0
 
-    def __call__(self, cos):
+    def __call__(self, cos: mi.Float) -> Any:
         m = dr.maximum(1 - cos, 0)
         m2 = m * m
         return self.f0 + (1 - self.f0) * (m2 * m2 * m)
 
-    def brightness(self, cos):
+    def brightness(self, cos: mi.Float) -> mi.Float:
         return Schlick(luminance(self.f0))(cos)
 
 
@@ -49,10 +50,10 @@ class Dielectric(Fresnel):
     """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
     Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
-    def __init__(self, eta):
+    def __init__(self, eta: Any) -> None:
         self.eta = eta
 
-    def __call__(self, cos):
+    def __call__(self, cos: mi.Float) -> Any:
         step = self.eta * self.eta - 1
         g2 = step + cos * cos
         total = g2 <= 0
@@ -69,10 +70,10 @@ class Dielectric(Fresnel):
 class Conductor(Fresnel):
     """The exact unpolarized reflectance of a conductor of relative complex index ``eta`` - i ``k``."""
 
-    def __init__(self, eta, k):
+    def __init__(self, eta: Any, k: mi.Float) -> None:
         self.eta, self.k = eta, k
 
-    def __call__(self, cos):
+    def __call__(self, cos: mi.Float) -> Any:
         cos2 = cos * cos
         sin2 = 1 - cos2
         # a + ib = sqrt((η - ik)² - sin²θ)
@@ -86,5 +87,5 @@ class Conductor(Fresnel):
         p = (even_p - odd_p) / (even_p + odd_p)
         return 0.5 * s * (1 + p)
 
-    def brightness(self, cos):
+    def brightness(self, cos: mi.Float) -> mi.Float:
         return Conductor(luminance(self.eta), luminance(self.k))(cos)

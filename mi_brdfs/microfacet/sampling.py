@@ -3,21 +3,37 @@ draws it with."""
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, SMALL, choose, clamp, normalize_or, safe_sqrt, select
+from .distributions import Distribution
 from .facet import Facet
+from .fresnel import Fresnel
+from .shadowing import Shadowing
+
+
+class FacetLobe(Protocol):
+    """What samplers know of a microfacet lobe."""
+
+    distribution: Distribution
+    shadowing: Shadowing
+    fresnel: Fresnel
+
+    def weight_over_ndf(self, facet: Facet) -> mi.Float:
+        """f cosθ_o·4cosθ_d/D for a reflectance of 1, as one number."""
 
 
 class Sampler:
     """How directions of a microfacet lobe are drawn; the lobe is handed to each method."""
 
-    def sample(self, lobe, wi, u, v):
+    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         """A direction for three uniform variates, as of :meth:`mi_brdfs.lobes.Lobe.sample`."""
         raise NotImplementedError(f"{type(self).__name__} does not define sample.")
 
-    def pdf(self, lobe, facet):
+    def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         """The density per solid angle with which it draws ``facet.wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define pdf.")
 
@@ -43,31 +59,35 @@ class AntitheticNormals(Sampler):
     RISING = 0.35
     """How much less the reflectance rises than it seems."""
 
-    def _bias(self, lobe, wi):
+    def _bias(self, lobe: FacetLobe, wi: mi.Vector3f) -> mi.Float:
         """τ."""
         shadowed = wi.z * dr.minimum(self.BROAD * lobe.distribution.mean_square_slope(), 1)
         bias = self.SHADOWED * shadowed + self.RISING * (1 - self._brighter(lobe, wi))
         return dr.minimum(bias, 0.9)  # at 1 the ends of the line would have no samples
 
     @staticmethod
-    def _brighter(lobe, wi, cos=1):
+    def _brighter(lobe: FacetLobe, wi: mi.Vector3f, cos: mi.Float = 1) -> mi.Float:
         """How much brighter the reflectance is at a cosine, by default that of normal incidence."""
         return dr.minimum(lobe.fresnel.brightness(cos) / dr.maximum(lobe.fresnel.brightness(wi.z), SMALL), 1)
 
-    def _azimuth(self, lobe, wi, u, v):
+    def _azimuth(
+        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Float
+    ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         """``(u, cosψ, sinψ, which)``, with what is left of ``u``, and the choices made, for :meth:`_tan2`."""
         sin, cos = dr.sincos(dr.two_pi * v)
         return u, cos, sin, None
 
-    def _tan2(self, lobe, wi, line, which, v):
+    def _tan2(self, lobe: FacetLobe, wi: mi.Vector3f, line: Line, which: Any, v: mi.Float) -> mi.Float:
         """A tan²θ_h on the line."""
         return line.inverse_cdf(draw_linear(self._bias(lobe, wi), v))
 
-    def _density(self, lobe, line, facet, cos, sin, q):
+    def _density(
+        self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
+    ) -> mi.Float:
         """Of the half vectors drawn so, where ``q`` is that of the distribution."""
         return q * linear_density(self._bias(lobe, facet.wi), line.part(facet)) / line.mass
 
-    def sample(self, lobe, wi, u, v):
+    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         distribution = lobe.distribution
         u, cos, sin, which = self._azimuth(lobe, wi, u, v.x)
         x, y = normalize_or(distribution.alpha_u * cos, distribution.alpha_v * sin, (1, 0))
@@ -77,7 +97,7 @@ class AntitheticNormals(Sampler):
         weight, other = reflected(lobe, facet), reflected(lobe, image)
         return select(u * (weight + other) < weight, facet.wo, image.wo)
 
-    def pdf(self, lobe, facet):
+    def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         distribution = lobe.distribution
         x, y = normalize_or(facet.h.x, facet.h.y, (1, 0))
         line = Line(distribution, facet.wi, x, y)
@@ -92,7 +112,7 @@ class AntitheticNormals(Sampler):
 class Line:
     """The half vectors whose slopes lie along (x, y), which is of length one."""
 
-    def __init__(self, distribution, wi, x, y):
+    def __init__(self, distribution: Distribution, wi: mi.Vector3f, x: mi.Float, y: mi.Float) -> None:
         self.distribution = distribution
         along, z = abs(x * wi.x + y * wi.y), dr.maximum(wi.z, EPSILON)  # of which the square is not 0
         limit2 = dr.square((along + dr.sqrt(along * along + z * z)) / z)
@@ -102,11 +122,11 @@ class Line:
         self.mass, self.rest = distribution.cdf(limit2, self.g)
         """C(R), and what it lacks to one."""
 
-    def part(self, facet):
+    def part(self, facet: Facet) -> mi.Float:
         """The m of a facet on the line."""
         return clamp(self.distribution.cdf(facet.tan2_h, self.g)[0] / self.mass, 0, 1)
 
-    def inverse_cdf(self, m):
+    def inverse_cdf(self, m: mi.Float) -> mi.Float:
         """The tan²θ_h of an m."""
         return self.distribution.inverse_cdf(m * self.mass, self.rest + (1 - m) * self.mass, self.g)
 
@@ -129,10 +149,10 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     STEEP_IMPLICIT = 0.7
     """The largest δ under the implicit term."""
 
-    def __init__(self, lean: float):
+    def __init__(self, lean: float) -> None:
         self.lean = lean
 
-    def _along(self, lobe, wi):
+    def _along(self, lobe: FacetLobe, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         """``(x, y, λ, δ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
         distribution = lobe.distribution
         x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
@@ -152,7 +172,9 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
             steep = steep / (steep + dr.sqrt(seen + cos2))
         return x, y, leaning + (1 - leaning) * steep, steep
 
-    def _azimuth(self, lobe, wi, u, v):
+    def _azimuth(
+        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Float
+    ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         x, y, leaning, steep = self._along(lobe, wi)
         leans, u = choose(u, leaning)
         is_steep, u = choose(u, steep) if lobe.distribution.long_tailed else (False, u)
@@ -161,7 +183,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
         return u, cos * x - sin * y, cos * y + sin * x, (leans, is_steep)
 
-    def _tan2(self, lobe, wi, line, which, v):
+    def _tan2(self, lobe: FacetLobe, wi: mi.Vector3f, line: Line, which: Any, v: mi.Float) -> mi.Float:
         leans, is_steep = which
         tan2 = line.inverse_cdf(draw_linear(dr.select(leans, self.OUTWARD, self._bias(lobe, wi)), v))
         if not lobe.distribution.long_tailed:
@@ -169,7 +191,9 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         cos = 1 - v * (1 - line.lowest)
         return dr.select(leans & is_steep, (1 - cos) * (1 + cos) / dr.square(cos), tan2)
 
-    def _density(self, lobe, line, facet, cos, sin, q):
+    def _density(
+        self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
+    ) -> mi.Float:
         distribution = lobe.distribution
         x, y, leaning, steep = self._along(lobe, facet.wi)
         lines = 0.5 * dr.pi * abs(cos * x + sin * y)
@@ -182,16 +206,16 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         return dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
 
 
-def linear_density(bias, m):
+def linear_density(bias: mi.Float, m: mi.Float) -> mi.Float:
     """The density 1 + τ - 2 τ m on [0, 1]."""
     return 1 + bias - 2 * bias * m
 
 
-def draw_linear(bias, u):
+def draw_linear(bias: mi.Float, u: mi.Float) -> mi.Float:
     return 2 * u / (1 + bias + safe_sqrt(dr.square(1 + bias) - 4 * bias * u))
 
 
-def reflected(lobe, facet):
+def reflected(lobe: FacetLobe, facet: Facet) -> mi.Float:
     """What a facet reflects, ``lobe.weight_over_ndf``, or next to nothing if that leads below the horizon. It is never
     zero: the derivative of a share in what a pair reflects divides by the square of that."""
     valid = (facet.cos_d > SMALL) & (facet.cos_o > 0)

@@ -6,9 +6,10 @@ import functools
 from typing import Any, ClassVar
 
 import drjit as dr
+import mitsuba as mi
 
 from ..math import TINY
-from .facet import Facet
+from .facet import Cosines, Facet
 from .term import Term
 
 
@@ -25,7 +26,7 @@ class Shadowing(Term):
     :meth:`.distributions.Distribution.estimated_albedo` says. Only then may G depend on more than the cosines of a
     facet."""
 
-    def __call__(self, facet: Facet) -> Any:
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
 
@@ -40,18 +41,18 @@ class Smith(Shadowing):
     lean = 1
     conserving = True
 
-    def __init__(self, alpha_u, alpha_v, correlated: bool):
+    def __init__(self, alpha_u: mi.Float, alpha_v: mi.Float, correlated: bool) -> None:
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated
 
-    def slope2(self, v):
+    def slope2(self, v: mi.Vector3f) -> mi.Float:
         """Return (αu v_x)² + (αv v_y)²."""
         return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
 
-    def stretched(self, v):
+    def stretched(self, v: mi.Vector3f) -> mi.Float:
         """Return v_z (1 + 2Λ(v)), which stays finite at the horizon."""
         raise NotImplementedError
 
-    def __call__(self, facet):
+    def __call__(self, facet: Any) -> mi.Float:
         cos_i, cos_o = facet.cos_i, facet.cos_o
         length_i, length_o = self.stretched(facet.wi), self.stretched(facet.wo)
         if self.correlated:
@@ -62,7 +63,7 @@ class Smith(Shadowing):
 class SmithGGX(Smith):
     """Λ = ½(√(1 + 1/a²) - 1) with 1/a² = ((αu v_x)² + (αv v_y)²)/v_z²: exact for GGX."""
 
-    def stretched(self, v):
+    def stretched(self, v: mi.Vector3f) -> mi.Float:
         return dr.sqrt(self.slope2(v) + v.z * v.z)
 
 
@@ -77,7 +78,7 @@ class SmithBeckmann(Smith):
     FIT = (1, 0.221556308, 0.0959011886, 0.0280231588, 5.94910138e-3, 9.66725376e-4, 6.13396596e-4, -1.03606616e-4,
            4.20437499e-5)  # fmt: skip
 
-    def stretched(self, v):
+    def stretched(self, v: mi.Vector3f) -> mi.Float:
         slope = dr.sqrt(dr.maximum(self.slope2(v), TINY))
         a = dr.minimum(v.z / slope, 10)
         root = dr.rcp(functools.reduce(lambda sum, factor: sum * a + factor, reversed(self.FIT)))
@@ -88,11 +89,11 @@ class SmithBlinn(Smith):
     """Walter et al.'s rational approximation of Beckmann's Λ, which they use for Blinn's distribution with
     a = √(n/2 + 1) cosθ/sinθ: 1 + Λ = (1 + 2.276 a + 2.577 a²)/(3.535 a + 2.181 a²) for a < 1.6, and 1 otherwise."""
 
-    def __init__(self, exponent, correlated: bool):
+    def __init__(self, exponent: mi.Float, correlated: bool) -> None:
         alpha = dr.rsqrt(0.5 * exponent + 1)
         super().__init__(alpha, alpha, correlated)
 
-    def stretched(self, v):
+    def stretched(self, v: mi.Vector3f) -> mi.Float:
         slope = dr.sqrt(dr.maximum(self.slope2(v), TINY))
         a = dr.minimum(v.z / slope, 1.6)
         rational = 2 * slope * (1 - 1.259 * a + 0.396 * a * a) / (3.535 + 2.181 * a)
@@ -105,10 +106,10 @@ class SchlickSmith(Shadowing):
 
     lean = 2
 
-    def __init__(self, k):
+    def __init__(self, k: mi.Float) -> None:
         self.k = k
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         i, o = (cos / (cos + self.k * (1 - cos)) for cos in (facet.cos_i, facet.cos_o))
         return i * o
 
@@ -119,7 +120,7 @@ class Kelemen(Shadowing):
 
     conserving = True
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return facet.cos_i * facet.cos_o / dr.square(facet.cos_d)
 
 
@@ -129,7 +130,7 @@ class VCavity(Shadowing):
 
     conserving = True
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.minimum(1, 2 * facet.cos_h * dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d)
 
 
@@ -138,7 +139,7 @@ class Implicit(Shadowing):
 
     lean = 4
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return facet.cos_i * facet.cos_o
 
 
@@ -148,7 +149,7 @@ class Neumann(Shadowing):
 
     lean = 1
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.minimum(facet.cos_i, facet.cos_o)
 
 
@@ -157,7 +158,7 @@ class AshikhminPremoze(Shadowing):
 
     lean = 2
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         i, o = facet.cos_i, facet.cos_o
         return i * o / (i + o - i * o)
 
@@ -166,7 +167,7 @@ class AshikhminShirleyShadowing(Shadowing):
     """cosθ_i cosθ_o / (cosθ_d max(cosθ_i, cosθ_o)) (Ashikhmin and Shirley 2000,
     doi:10.1080/10867651.2000.10487522)."""
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d
 
 
@@ -175,8 +176,8 @@ class KurtShadowing(Shadowing):
 
     lean = 0.4
 
-    def __init__(self, kurt_exponent):
+    def __init__(self, kurt_exponent: mi.Float) -> None:
         self.exponent = kurt_exponent
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.power(facet.cos_i * facet.cos_o, 1 - self.exponent) / facet.cos_d

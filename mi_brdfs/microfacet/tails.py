@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 
 from ..math import ONE_MINUS_EPSILON, clamp, expm1_ratio, gauss_legendre, log_cos
 from .distributions import Isotropic
+from .facet import Facet
 from .laws import (
     LARGEST_TAN2,
     BentLaw,
@@ -28,27 +31,27 @@ class GTR(Isotropic):
 
     long_tailed = True
 
-    def __init__(self, alpha, gamma):
+    def __init__(self, alpha: mi.Float, gamma: mi.Float) -> None:
         super().__init__()
         self.alpha, self.alpha2 = alpha, dr.square(alpha)
         # In s = sin²θ: 1 + (α²-1) cos²θ = α² (1 + k s)
         self.law = PowerLaw((1 - self.alpha2) / self.alpha2, gamma)
 
-    def mean_square_slope(self):
+    def mean_square_slope(self) -> mi.Float:
         return self.alpha2
 
-    def roughness(self):
+    def roughness(self) -> mi.Float | None:
         return self.alpha
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         return self.law.eval(facet.sin2_h) * dr.inv_pi / self.law.norm
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         tan2 = dr.minimum(tan2, LARGEST_TAN2)
         c = clamp(self.law.mass(tan2 / (1 + tan2)) / self.law.norm, 0, 1)
         return c, 1 - c
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         s = clamp(self.law.inverse(c * self.law.norm), 0, ONE_MINUS_EPSILON)
         return s / (1 - s)
 
@@ -56,24 +59,24 @@ class GTR(Isotropic):
 class Berry(Isotropic):
     """D = k/(π log(1+k) (1 + k sin²θ_h)), k = 1/α² - 1 (Berry 1923): GTR of γ = 1."""
 
-    def __init__(self, alpha):
+    def __init__(self, alpha: mi.Float) -> None:
         super().__init__()
         self.alpha2 = dr.square(alpha)
         self.k = (1 - self.alpha2) / self.alpha2
         self.range = dr.log(1 + self.k)
 
-    def mean_square_slope(self):
+    def mean_square_slope(self) -> mi.Float:
         return self.alpha2
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         return self.k / (dr.pi * self.range * (1 + self.k * facet.sin2_h))
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         tan2 = dr.minimum(tan2, LARGEST_TAN2)
         c = dr.minimum(dr.log(1 + self.k * (tan2 / (1 + tan2))) / self.range, 1)
         return c, 1 - c
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         s = clamp((dr.exp(c * self.range) - 1) / self.k, 0, ONE_MINUS_EPSILON)
         return s / (1 - s)
 
@@ -84,14 +87,14 @@ class ABC(Isotropic):
 
     long_tailed = True
 
-    def __init__(self, b, c, scale=None):
+    def __init__(self, b: mi.Float, c: mi.Float, scale: Any = None) -> None:
         super().__init__()
         self.law = PowerLaw(b, c)
         cosine_mass = self._cosine_mass()
         self.scale = dr.inv_two_pi / cosine_mass if scale is None else scale
         self.total = self.scale * dr.two_pi * cosine_mass
 
-    def _cosine_mass(self):
+    def _cosine_mass(self) -> mi.Float:
         """∫ (1 - y)(1 + B y)^-C over 0 <= y <= 1."""
         b = self.law.k
         broad = b < 0.5
@@ -100,23 +103,23 @@ class ABC(Isotropic):
         closed = (PowerLaw(b, self.law.gamma - 1).norm - self.law.norm) / dr.select(broad, 1, b)
         return self.law.norm - dr.select(broad, quadrature, closed)
 
-    def mean_square_slope(self):
+    def mean_square_slope(self) -> mi.Float:
         return dr.minimum(2 / (1 + self.law.k * self.law.gamma), 1)
 
-    def estimated_albedo(self, cos):
+    def estimated_albedo(self, cos: mi.Float) -> Any:
         return super().estimated_albedo(cos) * self.total
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
 
-    def density(self, facet, g):
+    def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         return self.law.eval(versine(facet.cos_h, facet.sin2_h)) * dr.inv_two_pi / self.law.norm
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         c = clamp(self.law.mass(versine_of_tan2(tan2)) / self.law.norm, 0, 1)
         return c, 1 - c
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return tan2_of_versine(self.law.inverse(c * self.law.norm))
 
 
@@ -135,7 +138,7 @@ class HemiEPD(Isotropic):
     NARROWER, BROADER = 6.5, (0.6, 0.28)
     """Of the exponent that Blinn's distribution would have, for κ > 0 and for κ < 0."""
 
-    def __init__(self, kappa, gamma):
+    def __init__(self, kappa: mi.Float, gamma: mi.Float) -> None:
         super().__init__()
         self.kappa, self.gamma, self.power = kappa, gamma, gamma / (gamma + 2)
         self.law = BentLaw(kappa * self.power)
@@ -144,7 +147,7 @@ class HemiEPD(Isotropic):
         self.scaled = dr.select(large, 46, 0), dr.select(large, math.exp(-46), 1)
         self.integral = self._integral()
 
-    def _integral(self):
+    def _integral(self) -> mi.Float:
         """J, good to 1e-5: by quadrature in a variable that spreads what happens at the end of [0, 1] at which the
         integrand is largest, for κ < 0 that at 0, and squeezes the other one."""
         falls = self.kappa < 0
@@ -157,26 +160,26 @@ class HemiEPD(Isotropic):
             integral += dr.select(falls, 3 * x * x, 2 - 2 * x) * weight * growth * value
         return integral * log_k / k
 
-    def mean_square_slope(self):
+    def mean_square_slope(self) -> mi.Float:
         # That of Blinn's distribution with about the same mean of log(cosθ).
         a, (b, c) = self.NARROWER, self.BROADER
         up, down = dr.maximum(self.kappa, 0), dr.maximum(-self.kappa, 0)
         narrower = dr.select(self.kappa > 0, 1 + up * up / (up + a), 1 / (1 + b * dr.log(1 + c * down)))
         return 2 / (2 + self.gamma * narrower)
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
         bent = expm1_ratio(self.kappa * power, *self.scaled) / self.integral
         return (self.gamma + 2) * dr.inv_two_pi * power * bent
 
-    def density(self, facet, g):
+    def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         m, s = cosine_power_cdf(facet.tan2_h, self.gamma + 2)
         return (self.gamma + 2) * dr.inv_two_pi * s / facet.cos_h * self.law.eval(m, s)
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return inverse_cosine_power_cdf(self.law.inverse_cdf(c, complement), self.gamma + 2)
 
 
@@ -194,7 +197,7 @@ class EPD(Isotropic):
     FAR = 1.5
     """How far the law reaches; tests/calibration/epd.py fits it."""
 
-    def __init__(self, alpha, gamma):
+    def __init__(self, alpha: mi.Float, gamma: mi.Float) -> None:
         super().__init__()
         self.alpha, self.alpha2, self.gamma = alpha, dr.square(alpha), gamma
         # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3
@@ -209,38 +212,38 @@ class EPD(Isotropic):
         at = [fall * self._rest(t) / self.law.eval(t) for fall, t in zip(falls, borders, strict=True)]
         self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
 
-    def _limited(self, tan2):
+    def _limited(self, tan2: mi.Float) -> mi.Float:
         return dr.minimum(tan2, 1e16)  # of which derivatives take the square
 
-    def _power(self, tan2):
+    def _power(self, tan2: mi.Float) -> mi.Float:
         """(tan²θ/α²)ᵞ"""
         x = tan2 / self.alpha2
         # At the normal the derivative of a low power has no end; and exp(-exp(5)) is no float32.
         power = dr.exp(dr.minimum(self.gamma * dr.log(dr.maximum(x, 1e-24)), 5))
         return dr.select(x > 1e-24, power, 0)
 
-    def _rest(self, tan2):
+    def _rest(self, tan2: mi.Float) -> Any:
         """What D cosθ dω is proportional to, per tan²θ, but for that power."""
         return 1
 
-    def mean_square_slope(self):
+    def mean_square_slope(self) -> mi.Float:
         return dr.minimum(self.median, 1)
 
-    def roughness(self):
+    def roughness(self) -> mi.Float | None:
         return self.alpha
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-12)  # the square of 1/cos², times 1/α², is a float32
         # 1/cos⁴ as a part of the exponent: its adjoint would overflow where the power makes up for it.
         return self.scale * dr.exp(-2 * dr.log(cos2) - self._power(facet.sin2_h / cos2))
 
-    def density(self, facet, g):
+    def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         slope = facet.sin2_h, dr.square(facet.cos_h)
         return dr.inv_pi * facet.cos_h * self.law.eval(*slope) * self.steps.eval(self.law.cdf(*slope))
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         c = dr.minimum(self.steps.cdf(self.law.cdf(dr.minimum(tan2, LARGEST_TAN2))), 1)
         return c, 1 - c
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return self.law.inverse_cdf(self.steps.inverse_cdf(c))

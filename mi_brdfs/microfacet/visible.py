@@ -6,8 +6,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, SMALL, safe_sqrt, select, sin_theta
+from .distributions import Distribution
 from .facet import Facet
-from .sampling import Sampler, reflected
+from .sampling import FacetLobe, Sampler, reflected
 
 
 class BoundedVisibleNormals(Sampler):
@@ -22,7 +23,9 @@ class BoundedVisibleNormals(Sampler):
     BIAS = 0.75
     """l/α, which tests/calibration/visible_normals.py fits."""
 
-    def _cap(self, distribution, wi):
+    def _cap(
+        self, distribution: Distribution, wi: mi.Vector3f
+    ) -> tuple[mi.Vector3f, mi.Float, mi.Float, mi.Float, mi.Float]:
         """Return ``(unit vector of the stretched wi, its length, k, b, l)``."""
         alpha_u, alpha_v = distribution.alpha_u, distribution.alpha_v
         stretched = mi.Vector3f(alpha_u * wi.x, alpha_v * wi.y, wi.z)
@@ -33,7 +36,7 @@ class BoundedVisibleNormals(Sampler):
         k = (1 - a2) * s2 / (s2 + a2 * wi.z * wi.z)
         return stretched / length, length, k, k * wi.z / length, self.BIAS * alpha
 
-    def _draw(self, distribution, wi, v):
+    def _draw(self, distribution: Distribution, wi: mi.Vector3f, v: mi.Point2f) -> tuple[mi.Vector3f, mi.Vector3f]:
         """Draw ``(unit vector of the stretched wi, point of the cap)``."""
         unit, _, _, b, bias = self._cap(distribution, wi)
         # The inverse of the linear density; the small bias of narrow lobes must not cancel.
@@ -44,14 +47,14 @@ class BoundedVisibleNormals(Sampler):
         return unit, mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
 
     @staticmethod
-    def _facet(distribution, wi, unit, point):
+    def _facet(distribution: Distribution, wi: mi.Vector3f, unit: mi.Vector3f, point: mi.Vector3f) -> Facet:
         """Return the facet whose stretched normal is the half vector of the unit vector and a point."""
         normal = unit + point
         z = dr.maximum(normal.z, SMALL)  # a cap that is nearly the whole sphere ends where the normal vanishes
         h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
         return Facet.reflecting(wi, h * dr.rsqrt(dr.dot(h, h)))
 
-    def _density(self, distribution, facet):
+    def _density(self, distribution: Distribution, facet: Facet) -> tuple[mi.Float, mi.Vector3f, mi.Vector3f]:
         """Return ``(density, unit vector of the stretched wi, point of the cap)``."""
         unit, length, k, b, bias = self._cap(distribution, facet.wi)
         normal = mi.Vector3f(facet.h.x / distribution.alpha_u, facet.h.y / distribution.alpha_v, facet.cos_h)
@@ -60,10 +63,10 @@ class BoundedVisibleNormals(Sampler):
         uniform = distribution.eval(facet) / (2 * (k * facet.cos_i + length))
         return uniform * (1 - bias + 2 * bias * height), unit, point
 
-    def sample(self, lobe, wi, u, v):
+    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self._facet(lobe.distribution, wi, *self._draw(lobe.distribution, wi, v)).wo
 
-    def pdf(self, lobe, facet):
+    def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         return self._density(lobe.distribution, facet)[0]
 
 
@@ -73,13 +76,13 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
     both points have the same density in the cap, the chosen direction has the density 2 p W/(W + W') and the weight
     (W + W')/2, where p and W are those of a single draw."""
 
-    def sample(self, lobe, wi, u, v):
+    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         unit, point = self._draw(lobe.distribution, wi, v)
         facet, image = (self._facet(lobe.distribution, wi, unit, w) for w in (point, self._image(point)))
         weight, other = self._weight(lobe, facet), self._weight(lobe, image)
         return select(u * (weight + other) < weight, facet.wo, image.wo)
 
-    def pdf(self, lobe, facet):
+    def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         density, unit, point = self._density(lobe.distribution, facet)
         image = self._facet(lobe.distribution, facet.wi, unit, self._image(point))
         # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
@@ -87,10 +90,10 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
         return 2 * density * (weight / (weight + self._weight(lobe, image)))
 
     @staticmethod
-    def _image(point):
+    def _image(point: mi.Vector3f) -> mi.Vector3f:
         return mi.Vector3f(-point.x, -point.y, point.z)
 
     @staticmethod
-    def _weight(lobe, facet):
+    def _weight(lobe: FacetLobe, facet: Facet) -> mi.Float:
         """f cosθ_o over the density, but for what is the same for both."""
         return reflected(lobe, facet) / dr.maximum(facet.cos_d, SMALL)

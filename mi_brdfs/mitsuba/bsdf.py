@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
@@ -27,7 +30,7 @@ class ModelBSDF:
 
     model_class: type[Model]
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
         self.model = self.model_class(props)
         # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,
@@ -38,7 +41,7 @@ class ModelBSDF:
         common = flags.FrontSide
         if any(texture.is_spatially_varying() for texture in self.textures.values()):
             common |= flags.SpatiallyVarying
-        self.lobe_kinds = None
+        self.lobe_kinds: list[tuple[bool, bool, bool]] = []
         self.kinds, self.transmits, components = [], [], []
         for lobe in self._lobes(self.model.placeholders()):
             if lobe.transmits:
@@ -60,13 +63,13 @@ class ModelBSDF:
 
     # --- Evaluation and sampling ------------------------------------------------------------------------------------
 
-    def _lobes(self, p):
+    def _lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
         """Return the model's lobes, which must be of the kinds that the components were made for."""
         name, lobes = type(self.model).__name__, self.model.lobes(p)
         if isinstance(lobes, Lobe) or not all(isinstance(lobe, Lobe) for lobe in lobes):
             raise TypeError(f"{name}.lobes returns {lobes!r}; it must return a tuple of lobes.")
         kinds = [(lobe.glossy, lobe.transmits, lobe.reciprocal) for lobe in lobes]
-        if self.lobe_kinds is None:
+        if not self.lobe_kinds:
             self.lobe_kinds = kinds
         if kinds != self.lobe_kinds:
             raise TypeError(
@@ -75,7 +78,9 @@ class ModelBSDF:
             )
         return lobes
 
-    def _mixture(self, ctx, si, active):
+    def _mixture(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, active: mi.Bool
+    ) -> tuple[mi.Bool, Mixture, list[int], LobeFrame] | None:
         """Return ``(valid, mixture, components, frame)``: the lobes that the context enables, seen from si.wi."""
         components = [k for k, kind in enumerate(self.kinds) if ctx.is_enabled(kind, k)]
         if not components:
@@ -92,11 +97,13 @@ class ModelBSDF:
         # Replace wi in inactive lanes by a valid direction: a NaN would enter the derivatives.
         wi = frame.to_local(select(valid, si.wi, mi.Vector3f(0, 0, 1)))
         lobes = self._lobes(p)
-        lobes = [lobes[k].adjoint() if from_light else lobes[k] for k in components]
-        return valid, Mixture(lobes, wi, frame.mirrored), components, frame
+        enabled = [lobes[k].adjoint() if from_light else lobes[k] for k in components]
+        return valid, Mixture(enabled, wi, frame.mirrored), components, frame
 
     @staticmethod
-    def _eval_pdf(valid, mixture, frame, wo):
+    def _eval_pdf(
+        valid: mi.Bool, mixture: Mixture, frame: LobeFrame, wo: mi.Vector3f
+    ) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
         value, pdf, z = mi.UnpolarizedSpectrum(0), mi.Float(0), frame.mirror(wo).z
         for transmitted in sorted({lobe.transmits for lobe in mixture.lobes}):
             here = select(z < 0 if transmitted else z > 0, valid, False)
@@ -109,7 +116,9 @@ class ModelBSDF:
             value, pdf = value + select(here, side[0], 0), pdf + select(here, side[1], 0)
         return value, pdf
 
-    def _sample(self, valid, mixture, components, frame, sample1, sample2):
+    def _sample(
+        self, valid: mi.Bool, mixture: Mixture, components: list[int], frame: LobeFrame, sample1: Any, sample2: Any
+    ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
         bs = mi.BSDFSample3f()
         # Differentiate the estimator f/pdf of a fixed direction, not the direction: then an unbiased gradient needs no
         # derivative of the choice among lobes, nor of what the direction hits.
@@ -129,13 +138,17 @@ class ModelBSDF:
         bs.sampled_component, bs.sampled_type = component, kind
         return bs, mi.depolarizer(select(drawn, weight, mi.UnpolarizedSpectrum(0)))
 
-    def sample(self, ctx, si, sample1, sample2, active=True):
+    def sample(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, sample1: Any, sample2: Any, active: mi.Bool = True
+    ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
         evaluated = self._mixture(ctx, si, active)
         if evaluated is None:
             return dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
         return self._sample(*evaluated, _as(mi.Float, sample1), _as(mi.Point2f, sample2))
 
-    def eval_pdf(self, ctx, si, wo, active=True):
+    def eval_pdf(
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: Any, active: mi.Bool = True
+    ) -> tuple[mi.Spectrum, mi.Float]:
         evaluated = self._mixture(ctx, si, active)
         if evaluated is None:
             return mi.Spectrum(0), mi.Float(0)
@@ -143,13 +156,21 @@ class ModelBSDF:
         value, pdf = self._eval_pdf(valid, mixture, frame, _as(mi.Vector3f, wo))
         return mi.depolarizer(value), pdf
 
-    def eval(self, ctx, si, wo, active=True):
+    def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: Any, active: mi.Bool = True) -> mi.Spectrum:
         return self.eval_pdf(ctx, si, wo, active)[0]
 
-    def pdf(self, ctx, si, wo, active=True):
+    def pdf(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: Any, active: mi.Bool = True) -> mi.Float:
         return self.eval_pdf(ctx, si, wo, active)[1]
 
-    def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
+    def eval_pdf_sample(
+        self,
+        ctx: mi.BSDFContext,
+        si: mi.SurfaceInteraction3f,
+        wo: Any,
+        sample1: Any,
+        sample2: Any,
+        active: mi.Bool = True,
+    ) -> tuple[mi.Spectrum, mi.Float, mi.BSDFSample3f, mi.Spectrum]:
         evaluated = self._mixture(ctx, si, active)
         if evaluated is None:
             return mi.Spectrum(0), mi.Float(0), dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
@@ -160,14 +181,14 @@ class ModelBSDF:
 
     # --- Other methods of Mitsuba -------------------------------------------------------------------------------------
 
-    def eval_diffuse_reflectance(self, si, active=True):
+    def eval_diffuse_reflectance(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.Spectrum:
         """Return the albedo at normal incidence, of the diffuse and the specular lobes together."""
         normal = mi.Vector3f(0, 0, 1)
         lobes = self._lobes(self.model.evaluate(si, active))
         albedo = sum(lobe.estimated_albedo(normal) for lobe in lobes if not lobe.transmits)
         return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
 
-    def mirror_reflectance(self, si, active=True):
+    def mirror_reflectance(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.UnpolarizedSpectrum:
         """Return the reflectance of the lobes as mirrors, for the mirror direction of si.wi: at most 1."""
         evaluated = self._mixture(mi.BSDFContext(), si, active)
         if evaluated is None:
@@ -176,40 +197,40 @@ class ModelBSDF:
         reflectance = sum(lobe.mirror_reflectance(mixture.wi) for lobe in mixture.lobes)
         return select(valid, clamp(mi.UnpolarizedSpectrum(reflectance), 0, 1), mi.UnpolarizedSpectrum(0))
 
-    def has_attribute(self, name, active=True):
+    def has_attribute(self, name: str, active: mi.Bool = True) -> mi.Bool:
         return mi.Bool(name in self.textures)
 
-    def eval_attribute(self, name, si, active=True):
+    def eval_attribute(self, name: str, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.UnpolarizedSpectrum:
         if name not in self.textures:
             return self._without_attribute(name, mi.UnpolarizedSpectrum)
         return evaluate_colour(self.textures, name, si, active)
 
-    def eval_attribute_1(self, name, si, active=True):
+    def eval_attribute_1(self, name: str, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.Float:
         if name not in self.textures:
             return self._without_attribute(name, mi.Float)
         return self.textures[name].eval_1(si, active)
 
-    def eval_attribute_3(self, name, si, active=True):
+    def eval_attribute_3(self, name: str, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.Color3f:
         if name not in self.textures:
             return self._without_attribute(name, mi.Color3f)
         return self.textures[name].eval_3(si, active)
 
-    def _without_attribute(self, name, kind):
+    def _without_attribute(self, name: str, kind: type) -> Any:
         """Return zero, or raise an error in scalar variants, as Mitsuba's own BSDFs do."""
         if is_scalar():
             known = ", ".join(self.textures)
             raise RuntimeError(f"{self.model.plugins[0]}: Invalid attribute requested {name}; there are {known}.")
         return kind(0)
 
-    def traverse(self, callback):
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         for name, texture in self.textures.items():
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
-    def to_string(self):
+    def to_string(self) -> str:
         return self.model.described()
 
 
-def _as(kind, value):
+def _as(kind: type, value: Any) -> Any:
     """Convert a value, also a list, tuple or NumPy array, to a method's argument type, as Mitsuba's bindings do."""
     return value if isinstance(value, kind) else kind(value)
 
@@ -219,22 +240,22 @@ class LobeFrame:
     (cosine, sine), or None; and mirrored at the surface in the lanes where wi comes from behind, or None if there are
     none."""
 
-    def __init__(self, cos_sin, mirrored=None):
+    def __init__(self, cos_sin: Any, mirrored: Any = None) -> None:
         self.cos_sin, self.mirrored = cos_sin, mirrored
 
-    def mirror(self, w):
+    def mirror(self, w: mi.Vector3f) -> mi.Vector3f:
         if self.mirrored is None:
             return w
         return mi.Vector3f(w.x, w.y, select(self.mirrored, -w.z, w.z))
 
-    def to_local(self, w):
+    def to_local(self, w: mi.Vector3f) -> mi.Vector3f:
         w = self.mirror(w)
         if self.cos_sin is None:
             return w
         cos, sin = self.cos_sin
         return mi.Vector3f(cos * w.x + sin * w.y, cos * w.y - sin * w.x, w.z)
 
-    def to_world(self, w):
+    def to_world(self, w: mi.Vector3f) -> mi.Vector3f:
         w = self.mirror(w)
         if self.cos_sin is None:
             return w

@@ -10,6 +10,7 @@ import traceback
 import warnings
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from ..microfacet.term import Term
 from ..model import Model
@@ -66,14 +67,15 @@ def source(brought: type[Model] | type[Term]) -> str | None:
 
 def sources() -> list[str]:
     """Return the sources of all models and terms registered by others."""
-    found = dict.fromkeys(map(source, [*BROUGHT.values(), *(model for model in all_models() if not is_own(model))]))
+    brought: list[Any] = [*BROUGHT.values(), *(model for model in all_models() if not is_own(model))]
+    found = dict.fromkeys(map(source, brought))
     return [each for each in found if each]
 
 
 def _file(path: Path) -> ModuleType:
     if not path.is_file():
         raise ImportError("no such file")
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    spec: Any = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[path.stem] = module  # where dataclasses and pickle look it up
     try:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -31,19 +34,28 @@ class PixelCentreIntegrator:
     A picture takes two steps, :meth:`sums` and :meth:`put`, so that any number of passes may add up before the finish.
     """
 
-    physics_class: type[Plugin]
+    physics_class: type[Any]
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         mi.SamplingIntegrator.__init__(self, props)
         self.physics = self.physics_class(props)
         self.textures = self.physics.textures  # a member, as in ModelBSDF
 
-    def sample(self, scene, sampler, ray, medium=None, active=True):
+    def sample(
+        self,
+        scene: mi.Scene,
+        sampler: mi.Sampler,
+        ray: mi.RayDifferential3f,
+        medium: Any = None,
+        active: mi.Bool = True,
+    ) -> Any:
         """Return what other integrators, such as ``aov``, see along a ray: each of their samples is finished."""
         radiance, opacity = self.physics.shade(scene, sampler, ray, active)
         return mi.depolarizer(self.physics.finish(radiance)), opacity > 0, []
 
-    def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
+    def render(
+        self, scene: mi.Scene, sensor: Any = 0, seed: int = 0, spp: int = 0, develop: bool = True, evaluate: bool = True
+    ) -> mi.TensorXf:
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
         film, count = sensor.film(), self._sampler(sensor, spp).sample_count()
@@ -57,7 +69,7 @@ class PixelCentreIntegrator:
             dr.sync_thread()
         return image
 
-    def sums(self, scene, sensor, seed=0, spp=0):
+    def sums(self, scene: mi.Scene, sensor: Any, seed: int = 0, spp: int = 0) -> Any:
         """Return the sums over the samples of each pixel: red, green, blue and opacity, before the finish.
 
         The sums of different seeds may be added. The memory needed does not depend on ``spp``, unless derivatives are
@@ -86,7 +98,7 @@ class PixelCentreIntegrator:
                 dr.eval(total)
         return total
 
-    def _passes(self, scene, sensor, sampler, seed):
+    def _passes(self, scene: mi.Scene, sensor: Any, sampler: mi.Sampler, seed: int) -> Iterator[mi.Vector4f]:
         """Yield the sums of the samples of each pass, in bounded memory, in vectorized variants."""
         pixel, spp, at_once = pixels(sensor.film()), sampler.sample_count(), samples_at_once(sensor.film(), sampler)
         count = dr.width(pixel)
@@ -107,7 +119,9 @@ class PixelCentreIntegrator:
             if at_once < spp:
                 dr.sync_thread()  # otherwise all passes would allocate before the first frees its memory
 
-    def render_backward(self, scene, params, grad_in, sensor=0, seed=0, spp=0):
+    def render_backward(
+        self, scene: mi.Scene, params: Any, grad_in: Any, sensor: Any = 0, seed: int = 0, spp: int = 0
+    ) -> None:
         """Do as Mitsuba's own, but pass by pass, by the derivative of the finish at the mean of all."""
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
@@ -125,7 +139,7 @@ class PixelCentreIntegrator:
                 dr.backward_from(dr.dot(passed, adjoint))
                 dr.eval()
 
-    def render_forward(self, scene, params, sensor=0, seed=0, spp=0):
+    def render_forward(self, scene: mi.Scene, params: Any, sensor: Any = 0, seed: int = 0, spp: int = 0) -> Any:
         """Do as Mitsuba's own, but pass by pass."""
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
@@ -144,7 +158,7 @@ class PixelCentreIntegrator:
         self.put(film, sums, sampler.sample_count())
         return dr.forward_to(film.develop())
 
-    def put(self, film, sums, count):
+    def put(self, film: mi.Film, sums: Any, count: Any) -> None:
         """Fill a film with the finished means of its pixels, where ``sums`` are over ``count`` samples, the weight of
         each pixel."""
         film.prepare([])
@@ -159,14 +173,14 @@ class PixelCentreIntegrator:
         film.put_block(block)
 
     @staticmethod
-    def _sampler(sensor, spp):
+    def _sampler(sensor: Any, spp: int) -> mi.Sampler:
         """Return a clone of the sensor's sampler, for ``spp`` samples per pixel or the scene's number."""
         sampler = sensor.sampler().clone()
         if spp:
             sampler.set_sample_count(spp)
         return sampler
 
-    def _look(self, scene, sensor, sampler, corner):
+    def _look(self, scene: mi.Scene, sensor: Any, sampler: mi.Sampler, corner: Any) -> list[mi.Float]:
         """Return the red, green and blue of a sample through the centre of a pixel, and its opacity."""
         film, time = sensor.film(), sensor.shutter_open()
         if sensor.shutter_open_time() > 0:
@@ -187,11 +201,11 @@ class PixelCentreIntegrator:
             colour = mi.Color3f(colour[0])
         return [*colour, opacity]
 
-    def traverse(self, callback):
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         for name, texture in self.textures.items():
             callback.put(name, texture, mi.ParamFlags.Differentiable)
 
-    def to_string(self):
+    def to_string(self) -> str:
         return self.physics.described()
 
 
@@ -199,7 +213,7 @@ LANES = 1 << 22
 """The most samples drawn at once, unless the film has more pixels: fixed, as the samples depend on it."""
 
 
-def pixels(film):
+def pixels(film: mi.Film) -> Any:
     """Return the corners of a film's pixels, with the border that its filter may need: a list in scalar variants."""
     border = film.rfilter().border_size() if film.sample_border() else 0
     width, height = (int(size) + 2 * border for size in film.crop_size())
@@ -210,13 +224,13 @@ def pixels(film):
     return mi.Point2f(mi.Point2u(index % width, index // width)) + first
 
 
-def samples_at_once(film, sampler) -> int:
+def samples_at_once(film: mi.Film, sampler: mi.Sampler) -> int:
     """Return the number of samples of each pixel drawn at once: a divisor of all, as samplers that stratify over all
     passes require."""
     spp, most = sampler.sample_count(), max(LANES // dr.width(pixels(film)), 1)
     return next(count for count in range(min(spp, most), 0, -1) if spp % count == 0)
 
 
-def added(value, count: int, size: int):
+def added(value: Any, count: int, size: int) -> mi.Float:
     """Return the sums of ``count`` blocks of a value, each of a given size; the value may be uniform."""
     return dr.block_sum(value, size) if dr.width(value) == count * size else dr.repeat(value * size, count)

@@ -44,7 +44,7 @@ class TooLate:
     that says how to get them. Mitsuba then stays in the variant that it is in, or takes the next one of several."""
 
     @staticmethod
-    def find_spec(name: str, path=None, target=None) -> None:
+    def find_spec(name: str, path: object = None, target: object = None) -> None:
         if name.startswith("mitsuba.llvm"):
             raise ImportError(problem() or f"Dr.Jit found no LLVM: {cure()}.")
 
@@ -77,7 +77,7 @@ def extra_library() -> str | None:
         installed = files(PACKAGE) or []
     except PackageNotFoundError:
         return None
-    return next((str(file.locate().resolve()) for file in installed if file.name == "libLLVM.so"), None)
+    return next((os.path.realpath(str(file.locate())) for file in installed if file.name == "libLLVM.so"), None)
 
 
 def loaded_file() -> str | None:

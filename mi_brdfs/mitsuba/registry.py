@@ -10,7 +10,7 @@ import re
 import warnings
 from pathlib import Path
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import mitsuba as mi
 
@@ -113,7 +113,7 @@ def terms_in(module: ModuleType) -> list[type[Term]]:
     return [term for term in _defined(module, Term) if term.word]
 
 
-def _defined(module: ModuleType, kind: type) -> list[type]:
+def _defined(module: ModuleType, kind: type) -> list[Any]:
     classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, kind)]
     return [value for value in classes if value.__module__ == module.__name__]
 
@@ -123,7 +123,7 @@ def is_own(model: type[Model]) -> bool:
     return model.__module__.startswith(f"{models.__name__}.")
 
 
-def _take_in_own():
+def _take_in_own() -> None:
     """Register the models of the files in ``mi_brdfs/models``."""
     for file in pkgutil.iter_modules(models.__path__):
         for model in models_in(importlib.import_module(f"{models.__name__}.{file.name}")):
@@ -166,7 +166,7 @@ def info(name: str) -> str:
     return _find(name, MODELS | INTEGRATORS).manual()
 
 
-def _find(name: str, plugins: dict):
+def _find(name: str, plugins: dict) -> Any:
     if name not in plugins:
         closest = difflib.get_close_matches(str(name), plugins, n=1, cutoff=0.0)[0]
         raise ValueError(f"There is no model {name!r}; did you mean {closest!r}?")
@@ -176,7 +176,7 @@ def _find(name: str, plugins: dict):
 # --- Registration in variants -------------------------------------------------------------------------------------
 
 
-def install():
+def install() -> None:
     """Register the plugins in the active variant, if there is one, and in every variant that becomes active."""
     _follow_variants()
     if mi.variant() is not None:
@@ -184,11 +184,11 @@ def install():
 
 
 @functools.cache  # Mitsuba may import a package of plugins anew after each change of variant
-def _follow_variants():
+def _follow_variants() -> None:
     mi.detail.add_variant_callback(_on_variant)
 
 
-def _on_variant(old: str | None, new: str | None):
+def _on_variant(old: str | None, new: str | None) -> None:
     if new is None:
         return
     try:
@@ -200,13 +200,13 @@ def _on_variant(old: str | None, new: str | None):
     _register_for(new)
 
 
-def _register_for(active: str):
+def _register_for(active: str) -> None:
     # Mitsuba asks scalar_rgb what kind of plugin a name stands for, whatever the active variant.
     for variant in {active, "scalar_rgb"}:
         _register_in(variant)
 
 
-def _register_in(variant: str):
+def _register_in(variant: str) -> None:
     """Register in a variant all classes whose current version is not registered there."""
     module = importlib.import_module(f"mitsuba.{variant}")
     known = _variants.setdefault(variant, {})

@@ -85,7 +85,7 @@ def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
     return path
 
 
-def write(figure, path: Path) -> None:
+def write(figure: Any, path: Path) -> None:
     """Write a figure; a Plotly figure as a page that needs no network."""
     if path.suffix.lower() in PAGES:
         figure.write_html(path, include_plotlyjs=True)

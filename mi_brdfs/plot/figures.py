@@ -169,7 +169,15 @@ class LabelledCurve(NamedTuple):
     look: dict[str, Any]
 
 
-def _planar(draw: Callable, heights: tuple[float, float], bsdfs, angles, azimuth, scale, labels) -> Figure:
+def _planar(
+    draw: Callable,
+    heights: tuple[float, float],
+    bsdfs: Sequence[Any],
+    angles: Sequence[float],
+    azimuth: float,
+    scale: str,
+    labels: Sequence[str] | None,
+) -> Figure:
     """Draw a row of panels for the BSDF or for each angle, and a column for each scale. ``heights`` are those of a
     panel of width 1, without and with transmission."""
     check_angles(angles)
@@ -241,7 +249,7 @@ def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool) ->
     ax.set_xlabel(f"{quantity(QUANTITY)}, {'log' if log else 'linear'} radius", fontsize=TEXT, color=INK)
 
 
-def _at(theta, radius) -> tuple[np.ndarray, np.ndarray]:
+def _at(theta: Any, radius: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the point at an angle to the vertical, in degrees, and a distance."""
     return radius * np.sin(np.radians(theta)), radius * np.cos(np.radians(theta))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 
@@ -78,7 +78,7 @@ def quantity(name: str) -> str:
     return name + (", luminance" if mi.is_rgb else ", mean of the spectrum" if mi.is_spectral else "")
 
 
-def _loaded(given, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
+def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
     if isinstance(given, str):
         for source in find_sources(given):
             bsdf = source.load()
@@ -91,7 +91,7 @@ def _loaded(given, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
     yield labels.get(id(given)) or name_of(bsdf), bsdf
 
 
-def _labels_of_dicts(bsdfs) -> dict[int, str]:
+def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:
     """Return a label for each dict, by its identity: the type, and the parameters that not all dicts of this type
     share. The only one of its type shows them all."""
     told = [
@@ -107,7 +107,7 @@ def _labels_of_dicts(bsdfs) -> dict[int, str]:
     return labels
 
 
-def _shown(value) -> str:
+def _shown(value: Any) -> str:
     """Return a parameter's value in a label."""
     if isinstance(value, dict):
         value = value.get("value", value.get("type"))

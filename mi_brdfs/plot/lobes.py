@@ -8,7 +8,7 @@ the sampler locate narrow lobes: none is too narrow to be found.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -117,7 +117,7 @@ def _refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
         off |= abs(b - (a + c) / 2) > 0.02
         off &= right[0] - left[0] > 1e-4
         halves = (left, middle), (middle, right)
-        left, right = (
+        left, right = (  # type: ignore[assignment]
             tuple(np.concatenate([half[end][which][off] for half in halves]) for which in (0, 1)) for end in (0, 1)
         )
     order = np.argsort(np.concatenate(points))
@@ -188,5 +188,5 @@ def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int) ->
 
 def _lines(even: Array, sampled: Array, mirror: float) -> Array:
     """Return the angles of grid lines."""
-    dense = np.quantile(sampled, np.linspace(0, 1, len(even))) if len(sampled) else []
+    dense: Any = np.quantile(sampled, np.linspace(0, 1, len(even))) if len(sampled) else []
     return np.unique(np.concatenate([even, dense, [mirror]]).clip(even[0], even[-1]))
