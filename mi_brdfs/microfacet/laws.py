@@ -67,9 +67,13 @@ class BentLaw:
         mass = dr.select(above, c, complement)
         y = mass * self.norm * dr.select(above, 1, dr.exp(self.kappa))
         sign = dr.select(above, -1, 1)
-        exponential = log1p_ratio(sign * self.kappa * y)
+        # log(1 + κ y)/κ, but a large exp(κ) out of the logarithm: a derivative divides by its square.
+        large = (c >= 0.5) & (self.kappa * y > 1e8)
+        exponential = log1p_ratio(dr.select(large, 0, sign * self.kappa * y))
         rational = expm1_ratio(sign * self.k * y) * dr.select(above, 1 + self.k, 1)
         value = y * dr.select(self.rises, exponential, rational)
+        kappa = dr.select(large, self.kappa, 1)
+        value = dr.select(large, 1 + dr.log(dr.select(large, kappa * mass * self.norm, 1)) / kappa, value)
         return dr.select(above, 1 - value, value)
 
 
