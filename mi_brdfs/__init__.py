@@ -16,13 +16,12 @@ import mitsuba as mi  # noqa: E402
 
 __version__ = "0.1.0"
 
-_TESTED = (3, 9)
-_version = tuple(int(number) for number in re.findall(r"\d+", mi.__version__)[:2])
-if _version < _TESTED:
-    raise ImportError(f"mi_brdfs needs Mitsuba 3.9 or newer, this is {mi.__version__}: pip install -U mitsuba")
-if _version > _TESTED:
-    warnings.warn(f"mi_brdfs was tested with Mitsuba 3.9, this is {mi.__version__}.", stacklevel=2)
-
+_OLDEST, _TESTED = (3, 7, 1), (3, 9)
+_version = tuple(int(number) for number in re.findall(r"\d+", mi.__version__)[:3])
+if _version < _OLDEST:
+    raise ImportError(f"mi_brdfs needs Mitsuba 3.7.1 or newer, this is {mi.__version__}: pip install -U mitsuba")
+if _version[:2] > _TESTED:
+    warnings.warn(f"mi_brdfs was tested with Mitsuba 3.7.1 to 3.9, this is {mi.__version__}.", stacklevel=2)
 llvm.check(mi.variant())
 
 from . import lobes, microfacet, parameters  # noqa: E402

@@ -24,10 +24,12 @@ def test_version():
 @pytest.mark.parametrize(
     "version, outcome",
     [
-        ("3.8.1", "ImportError: mi_brdfs needs Mitsuba 3.9 or newer, this is 3.8.1: pip install -U mitsuba"),
+        ("3.6.4", "ImportError: mi_brdfs needs Mitsuba 3.7.1 or newer, this is 3.6.4: pip install -U mitsuba"),
+        ("3.7.0", "ImportError"),
         ("2.99.0", "ImportError"),
+        ("3.7.1", ""),
         ("3.9.1", ""),
-        ("3.10.0", "UserWarning: mi_brdfs was tested with Mitsuba 3.9, this is 3.10.0."),
+        ("3.10.0", "UserWarning: mi_brdfs was tested with Mitsuba 3.7.1 to 3.9, this is 3.10.0."),
         ("4.0.0.dev1", "UserWarning"),
     ],
 )

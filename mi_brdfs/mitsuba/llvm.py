@@ -2,7 +2,7 @@
 
 Dr.Jit looks for LLVM once, in a thread started by ``import drjit`` (so by ``import mitsuba``), and takes what
 ``DRJIT_LIBLLVM_PATH`` names or else the system's. Mitsuba 3.9 refuses LLVM before 15; on machines with AVX-512,
-15 and 16 abort the whole process in an ordinary render (``Cannot select: fminimum``).
+15 and 16 abort the whole process in an ordinary render (``Cannot select: fminimum``). Mitsuba 3.7 and 3.8 do neither.
 """
 
 from __future__ import annotations
@@ -129,7 +129,10 @@ def _is_safe() -> bool:
 
 
 def _aborts(found: tuple[int, int, int]) -> bool:
-    return found[0] in ABORTING_MAJORS and _has_avx512()
+    import drjit as dr
+
+    since_3_9 = tuple(map(int, dr.__version__.split(".")[:2])) > (1, 3)
+    return found[0] in ABORTING_MAJORS and since_3_9 and _has_avx512()
 
 
 @cache
