@@ -28,10 +28,10 @@ class WithForwardShare(Sampler):
 
     def _share(self, lobe, wi):
         distribution, fresnel, z = lobe.distribution, lobe.fresnel, self._cosine(wi)
-        # From a facet in the plane of incidence that is steeper than three of four.
+        # From about the median facet in the plane of incidence. (Derivatives of higher quantiles may overflow.)
         x, y = normalize_or(wi.x, wi.y, (1, 0))
         g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
-        slope2 = distribution.inverse_cdf(0.75, 0.25, g)
+        slope2 = distribution.inverse_cdf(0.45, 0.55, g)
         cos2 = z * z + slope2 / (1 + slope2)
         low = z * z / cos2
         brighter = low * (1 - low) * fresnel(z) / dr.maximum(fresnel(dr.minimum(dr.sqrt(cos2), 1)), EPSILON)
