@@ -13,7 +13,8 @@ from mi_brdfs.parameters import ParameterError
 SCENES = Path(__file__).parents[1] / "scenes" / "shading"
 NAMES = [path.stem for path in sorted(SCENES.glob("*.xml"))]
 
-WHITE = {"type": "lambert", "reflectance": 0.8}
+ALBEDO = 0.8
+WHITE = {"type": "lambert", "reflectance": ALBEDO}
 SUN = {"type": "directional", "direction": [0, 0, -1], "irradiance": 1.0}
 SKY = {"type": "constant", "radiance": 0.5}
 
@@ -55,16 +56,20 @@ def plate(bsdf, *others, size=2, tilt=0.0, sensor=None, **settings):
     return mi.load_dict(scene | {f"light{k}": other for k, other in enumerate(others)})
 
 
-def value(bsdf, *others, spp=1, **settings):
-    """The shade of such a plate, the mean of the picture."""
+def shade(bsdf, *others, spp=1, **settings):
+    """The shade of such a plate: the mean of the picture."""
     return shaded(plate(bsdf, *others, **settings), spp=spp).mean()
 
 
-def lamp(shape, **more):
-    """An area light at a height of 10."""
-    T = mi.ScalarTransform4f
-    to_world = T().translate([0, 0, 10]).rotate([1, 0, 0], 180)
-    return {"type": shape, "to_world": to_world, "emitter": {"type": "area", "radiance": 3.0}, **more}
+def lamp(shape, radiance=3.0, to_world=None):
+    """An area light, by default at a height of 10."""
+    above = mi.ScalarTransform4f().translate([0, 0, 10]).rotate([1, 0, 0], 180)
+    return {"type": shape, "to_world": to_world or above, "emitter": {"type": "area", "radiance": radiance}}
+
+
+def noisy(size=4, **settings):
+    """A plate that a bright sky lights, where each sample sees another part of the sky."""
+    return plate(WHITE, SKY | {"radiance": 1.2}, size=size, **settings)
 
 
 @contextmanager

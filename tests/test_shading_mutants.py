@@ -2,7 +2,8 @@
 
 import mitsuba as mi
 import pytest
-from test_shading_render import check_alpha, check_finish, check_memory, check_pixels
+from test_shading_films import check_alpha, check_pixels
+from test_shading_passes import check_finish, check_memory
 from test_shading_through import check_layers, check_masks
 
 from mi_brdfs.integrators import shading

@@ -1,0 +1,127 @@
+"""What ``shading`` can be part of: derivatives, frozen functions, threads and other integrators."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from plates import SKY, SUN, WHITE, film, from_above, noisy, plate, shaded
+
+from mi_brdfs.mitsuba import integrator as adapter
+from mi_brdfs.mitsuba.integrator import LANES
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    ("lanes", "opacity", "keys"),
+    [
+        (LANES, None, [
+            "plate.bsdf.exponent.value", "plate.bsdf.diffuse_reflectance.value",
+            "plate.bsdf.specular_reflectance.value", "light0.intensity.value", "light0.position",
+            "light1.radiance.value", "integrator.ambient.value",
+        ]),
+        (8, 0.3, ["light2.bsdf.opacity.value", "plate.bsdf.diffuse_reflectance.value", "integrator.ambient.value"]),
+    ],
+    ids=["", "in passes, through a mask"],
+)  # fmt: skip
+def test_differentiable(lanes, opacity, keys, monkeypatch):
+    """By the logarithms of parameters of BSDFs, of lights and of the ambient light, as finite differences have it."""
+    monkeypatch.setattr(adapter, "LANES", lanes)
+    bsdf = {"type": "phong", "normalization": "original", "exponent": 10.0}
+    others = [{"type": "point", "position": [1, 0.5, 2], "intensity": 4.0}, SKY | {"radiance": 0.1}]
+    if opacity:
+        mask = {"type": "mask", "opacity": opacity, "inner": {"type": "twosided", "inner": WHITE}}
+        T = mi.ScalarTransform4f
+        others.append({"type": "rectangle", "to_world": T().translate([0, 0, 1]).scale(9), "bsdf": mask})
+    settings = {"ambient": 0.2, "environment_reflection": True, "tonemap": "reinhard"}
+    scene = plate(bsdf, *others, tilt=20, **settings)
+    params = mi.traverse(scene)
+
+    def mean(seed):
+        return dr.mean(mi.render(scene, params, spp=4, seed=seed, seed_grad=1 + seed), axis=None)
+
+    originals = {key: type(params[key])(params[key]) for key in keys}  # what params gives is no copy
+    for key in keys:
+        dr.enable_grad(params[key])
+    params.update()
+    dr.backward(mean(seed=0))
+    gradients = {key: np.sum(np.array(dr.grad(params[key])) * np.array(originals[key])) for key in keys}
+    for key, original in originals.items():
+        ends = []
+        for factor in (1.01, 0.99):
+            params[key] = type(original)(factor * original)
+            params.update()
+            ends.append(np.array(mean(seed=1), np.float64).item())
+        params[key] = type(original)(original)
+        params.update()
+        assert gradients[key] == pytest.approx((ends[0] - ends[1]) / 0.02, rel=0.01), key
+        assert abs(gradients[key]) > 1e-3
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    ("kind", "around", "lanes"),
+    [
+        ("perspective", None, LANES),
+        ("perspective", None, 256),
+        ("radiancemeter", None, LANES),
+        ("perspective", "aov", LANES),
+    ],
+    ids=["one pass", "passes", "meter", "aov"],
+)
+def test_frozen_pictures(kind, around, lanes, monkeypatch):
+    """Recorded, and replayed for other parameters: of a plate seen through a mask."""
+    monkeypatch.setattr(adapter, "LANES", lanes)
+    own = {"type": "shading", "ambient": 0.1, "clamp": False}
+    T = mi.ScalarTransform4f
+    pane = {"type": "mask", "opacity": 0.3, "inner": {"type": "twosided", "inner": WHITE}}
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "aov", "aovs": "d:depth", "own": own} if around else own,
+            # Mitsuba cannot freeze an orthographic camera, nor a thin lens.
+            "sensor": {"type": kind, "to_world": from_above(), "film": film(1 if kind == "radiancemeter" else 8)},
+            "ball": {"type": "sphere", "bsdf": {"type": "phong"}},
+            "pane": {"type": "rectangle", "to_world": T().translate([0, 0, 2]).scale(9), "bsdf": pane},
+            "light": SUN | {"irradiance": 0.5},
+            "sky": SKY | {"radiance": 0.1},
+        }
+    )
+    params = mi.traverse(scene)
+    ambient = next(key for key in params.keys() if key.endswith("ambient.value"))
+    frozen = dr.freeze(lambda scene, seed: mi.render(scene, spp=8, seed=seed), auto_opaque=False)
+    pictures = []
+    for seed in range(4):
+        for key in ("ball.bsdf.diffuse_reflectance.value", ambient):
+            params[key] = mi.Float(0.1 * (seed + 1))
+        params.update()
+        pictures.append(np.array(frozen(scene, dr.opaque(mi.UInt32, seed))))
+        np.testing.assert_allclose(pictures[-1], shaded(scene, spp=8, seed=seed), atol=1e-5)
+    assert abs(pictures[3] - pictures[2]).max() > 0.03
+    assert frozen.n_recordings < 4
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_pictures_made_in_several_threads(monkeypatch):
+    """At the same time, each of a scene of its own, in several passes."""
+    monkeypatch.setattr(adapter, "LANES", 4 * 16 * 16)
+    scenes = [noisy(16, ambient=0.1 * k, clamp=False) for k in range(4)]
+    alone = [shaded(scene, spp=12, seed=k) for k, scene in enumerate(scenes)]
+
+    def work(k):
+        return shaded(scenes[k], spp=12, seed=k)
+
+    with ThreadPoolExecutor(3) as pool:
+        for together, expected in zip(pool.map(work, range(4)), alone, strict=True):
+            np.testing.assert_allclose(together, expected, rtol=1e-5)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_within_aov():
+    scene = plate(WHITE, SUN, tilt=10)
+    both = {"type": "aov", "aovs": "dd:depth,ab:albedo", "inner": {"type": "shading"}}
+    image = shaded(scene, integrator=mi.load_dict(both), spp=2)
+    np.testing.assert_allclose(image[..., :3], shaded(scene, spp=1), rtol=1e-4)
+    np.testing.assert_allclose(image[..., 3], 5, rtol=0.1)
+    np.testing.assert_allclose(image[..., 4:], 0.8, rtol=1e-4)
