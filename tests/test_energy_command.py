@@ -148,7 +148,7 @@ ERRORS = {
         "glow: {'knid': 'new'} is no configuration: there are no such",
     ),
     "no word": ("glow", '1, [({"kind": "old"}, 1)]', 1, "glow: {'kind': 'old'} is no configuration: glow: kind = "),
-    "no number": ("glow", '1, [({"depth": 0.5}, 1)]', 1, "glow: {'depth': 0.5} is no configuration: glow: unknown"),
+    "no number": ("glow", '1, [({"depth": 0.5}, 1)]', 1, "glow: unknown parameter depth"),
 }
 
 

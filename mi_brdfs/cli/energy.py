@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 LINE = 80
-"""The statement is broken into several lines where one would be longer."""
+"""The length beyond which the statement is broken into several lines."""
 
 
 class Measured(NamedTuple):
@@ -44,14 +44,14 @@ def energy(
         list[str] | None, typer.Argument(metavar="TYPE…", help="Types that `list` shows. Default: all.")
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Compare with what the classes state. Exit status 1 if that is wrong.")
+        bool, typer.Option("--check", help="Compare with what the classes state. Exit with 1 if any of it is wrong.")
     ] = False,
     variant: Annotated[
         str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
     ] = None,
 ) -> None:
-    """Measure the largest albedo of models, by default and in white for each choice, and print the line that states it
-    in the class."""
+    """Measure the largest albedo of models, by default and in white for each choice, and print the line of code that
+    states it in the class."""
     try:
         models = list(dict.fromkeys(map(find_model, names))) if names else all_models()
     except ValueError as error:
@@ -103,7 +103,7 @@ def _of(model: type[Model], measure: Callable[..., T], *given: Any) -> T:
 
 
 def _print_statements(measured: list[Measured]) -> None:
-    """The table of the manual page for each model, and the statement."""
+    """Print the table of the manual page for each model, and the statement."""
     from ..measure.energy import energy_of
 
     for model, default, found in measured:
@@ -118,7 +118,7 @@ def _print_statements(measured: list[Measured]) -> None:
 
 
 def _print_comparison(measured: list[Measured]) -> bool:
-    """A row for each configuration, and below what is wrong. Return whether anything is."""
+    """Print a row for each configuration, and below what is wrong. Return whether anything is."""
     from ..measure.energy import fault
 
     table = Table("type", "configuration", "stated", "found", "", box=None, pad_edge=False)
@@ -143,7 +143,7 @@ def _print_comparison(measured: list[Measured]) -> bool:
 
 
 def _statement(stated: Energy) -> str:
-    """The line of code, in several lines if it is long."""
+    """Return the line of code, in several lines if it is long."""
     default, *rows = [
         f"{stated.default:g}",
         *(f"({_literal(given)}, {_number(albedo)})" for given, albedo in stated.largest),

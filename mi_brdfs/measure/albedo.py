@@ -1,8 +1,8 @@
 """The largest directional albedo of a model: a search over the direction of view and all of its free numbers.
 
 A setting is a point of the unit cube, with a side for each axis (:mod:`.settings`). The search takes the brightest of
-points all over the cube, and climbs from each by steps that shrink. Free numbers are textures that have another value
-in each lane: so one kernel evaluates thousands of settings.
+a Latin hypercube of points, and climbs from each by steps that shrink. Free numbers are textures with a value for each
+lane, so that one kernel evaluates thousands of settings.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from ..model import Model
 
 LANES = 1 << 20
-"""How many samples are drawn at once."""
+"""Samples drawn at once."""
 STARTS = 2048
-"""So many points of the cube are tried first."""
+"""Points of the cube that are tried first."""
 CLIMBS, STEPS, ROUNDS = 16, 32, 12
-"""From so many of them the search climbs on, and tries so many steps in each of so many rounds."""
+"""The number of climbs, of the steps that each tries in a round, and of rounds."""
 LOG2_COUNTS = 9, 11
-"""The samples for each setting, at first and in the last round."""
+"""Samples for each setting, at first and in the last round."""
 LOG2_CHOICE, LOG2_FINAL = 14, 17
-"""Those that decide among the ends of the climbs, and those that measure the brightest with each of some seeds."""
+"""Samples that decide among the ends of the climbs, and those that measure the brightest for each of the seeds."""
 SEEDS = range(100, 108)
-"""Their variates have no part in the choice."""
+"""Seeds of variates that have no part in the choice."""
 
 
 class Setting(NamedTuple):
