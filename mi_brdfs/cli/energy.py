@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 LINE = 80
-"""The statement is broken into several lines where one would be longer."""
+"""The longest line; a longer statement is split into several."""
 
 
 class Measured(NamedTuple):
@@ -41,10 +41,10 @@ class Measured(NamedTuple):
 @command()
 def energy(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE…", help="Types that `list` shows. Default: all.")
+        list[str] | None, typer.Argument(metavar="TYPE…", help="Types, as `list` shows them. Default: all.")
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Compare with what the classes state. Exit status 1 if that is wrong.")
+        bool, typer.Option("--check", help="Compare with the classes' statements. Exit with 1 if one is wrong.")
     ] = False,
     variant: Annotated[
         str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
