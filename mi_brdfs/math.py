@@ -1,9 +1,9 @@
 """Float32-stable primitives.
 
 Narrow lobes live in the last bits of a cosine: (N·H)^n at n = 1e5, or a GGX peak at alpha = 1e-3, lose all their digits
-when computed from N·H itself. The functions below take what does keep its digits, such as sin²θ or |i - R|².
-They work on every variant's floats and spectra, and their derivatives are finite wherever their values are. To that
-end nothing that divides falls below one of three values, of which a power is still a float32.
+when computed from N·H itself. The functions below take quantities that keep their digits, such as sin²θ or |i - R|².
+They work on every variant's floats and spectra, and their derivatives are finite wherever their values are. To that end
+no divisor falls below one of three values, chosen so that a power of it is still a float32.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 ONE_MINUS_EPSILON = 1 - 2**-24
 """The largest float32 below one: uniform variates are clamped to it."""
 TINY = 1e-30
-"""The least of squares, of arguments of logarithms and powers, and of what only draws divide by."""
+"""The least square, argument of a logarithm or power, or divisor that only sampling uses."""
 EPSILON = 1e-15
 """The least divisor, such as a cosine or a density: the derivative of a quotient divides by its square."""
 SMALL = 1e-9
-"""The least length, and other divisors of which derivatives take up to the fourth power."""
+"""The least length, or other divisor that derivatives take up to the fourth power."""
 
 
 def select(mask: Any, a: Any, b: mi.Float) -> Any:
@@ -135,7 +135,7 @@ def sin_theta(w: mi.Vector3f) -> Any:
 def normalize_or(x: Any, y: Any, fallback: tuple[float, float]) -> tuple[Any, Any]:
     """Return the 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
     length2 = x * x + y * y
-    valid = length2 > 1e-24  # of which the derivative takes the power -3/2
+    valid = length2 > 1e-24  # the derivative takes its power -3/2
     scale = dr.rsqrt(dr.select(valid, length2, 1))
     return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
 

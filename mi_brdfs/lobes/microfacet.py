@@ -22,18 +22,18 @@ class MicrofacetLobe(Lobe):
     (:mod:`mi_brdfs.microfacet.choice`).
     """
 
-    # Of the estimated albedo; tests/calibration/estimated_albedo.py fits them.
+    # Constants of the estimated albedo, fitted by tests/calibration/estimated_albedo.py.
     TYPICAL = 0.57
     """The squared slope of the typical facet, in units of the mean square slope of narrow lobes."""
     LOST = 1.7
-    """How fast the loss of a shadowing term that conserves energy vanishes from the normal on, where another term has
-    it at the typical facet."""
+    """How fast the loss of an energy-conserving shadowing term vanishes away from the normal; other terms include it at
+    the typical facet."""
     NEARER = 0.25
-    """How much nearer to the normal facets are seen at grazing than at the mirror's cosine,"""
+    """How much nearer to the normal than the mirror's cosine facets are visible at grazing angles,"""
     NEARER_LONG_TAILED = 0.43
-    """of a long tail under a shadowing term that conserves energy,"""
+    """for a long tail under an energy-conserving shadowing term,"""
     NEARER_UPRIGHT = 0.08
-    """and under a shadowing term that does not lean."""
+    """and for a shadowing term that does not lean."""
 
     def __init__(
         self, colour: Any, distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel, scale: Any = 1
@@ -46,9 +46,10 @@ class MicrofacetLobe(Lobe):
     def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         """Return an estimate from F, D and G at a typical facet.
 
-        At grazing the facets seen lean towards the viewer: F is that of a larger cosine than cosθ_i, and a shadowing
-        term that does not conserve energy is evaluated at such a facet in the plane of incidence. That and its image
-        about the normal have cosθ_d that add up to 2 cosθ_h cosθ_i, until at grazing only the first one is seen.
+        At grazing angles the visible facets lean towards the viewer: F is evaluated at a cosine larger than cosθ_i, and
+        a shadowing term that does not conserve energy at such a facet in the plane of incidence. The cosθ_d of that
+        facet and its image about the normal add up to 2 cosθ_h cosθ_i, until at grazing angles only the first one is
+        visible.
         """
         cos, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
         sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, EPSILON)
@@ -56,9 +57,9 @@ class MicrofacetLobe(Lobe):
         if self.shadowing.conserving:
             seen = self.distribution.estimated_albedo(wi.z)
         else:
-            # The 0.18 keeps what it reflects above the horizon up to a mean square slope of 4.
+            # The 0.18 keeps its reflection above the horizon up to a mean square slope of 4.
             typical2 = self.TYPICAL * slope2 / (1 + 0.18 * slope2)
-            slope = typical2 * dr.rsqrt(typical2 + cos * cos)  # the mirror is typical of what is narrow
+            slope = typical2 * dr.rsqrt(typical2 + cos * cos)  # narrow lobes are about mirrors
             facet = Cosines.leaning(cos, dr.sqrt(sin2), slope)
             seen = self.shadowing(facet) * dr.maximum(0.5 * facet.cos_d / cos, facet.cos_h)
             seen *= self.distribution.estimated_albedo(1 - self.LOST * versine)

@@ -81,7 +81,7 @@ class PowerLobe(MirrorLobe):
 
     def _share(self, frame: AxisFrame) -> mi.Float:
         axial, lateral = self._masses(frame)
-        return axial / dr.maximum(axial + lateral, EPSILON)  # an axis straight below the surface has neither
+        return axial / dr.maximum(axial + lateral, EPSILON)  # both are zero for an axis straight below the surface
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         # Exact for an axis along the normal or in the horizon.

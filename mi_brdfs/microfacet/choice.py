@@ -12,7 +12,7 @@ from .visible import AntitheticVisibleNormals, BoundedVisibleNormals
 
 
 def sampler_of(distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel) -> Sampler:
-    """The sampler of a lobe of these terms, by what tests/calibration/samplers.py measures."""
+    """Return the sampler for a lobe of these terms, as measured by tests/calibration/samplers.py."""
     sampler = _sampler_of_facets(distribution, shadowing, fresnel)
     return WithForwardShare(sampler) if isinstance(fresnel, Dielectric) else sampler
 

@@ -18,7 +18,8 @@ class Shadowing(Term):
     and estimated albedo (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
 
     lean: ClassVar[float] = 0
-    """How far the facets seen at grazing lean towards the viewer, which tests/calibration/half_vectors.py fits."""
+    """How far the facets visible at grazing angles lean towards the viewer, fitted by
+    tests/calibration/half_vectors.py."""
     reciprocal: ClassVar[bool] = True
     """Whether G is symmetric in wi and wo."""
     conserving: ClassVar[bool] = False
@@ -71,8 +72,7 @@ class SmithBeckmann(Smith):
     """Λ = ½(exp(-a²)/(a √π) - erfc(a)), a as for GGX: exact for Beckmann's distribution.
 
     That is ½ i(a)/a, where i(a) = exp(-a²)/√π - a erfc(a), the integral of erfc from a on, is fitted by an eighth power
-    to 3e-8 (tests/calibration/smith_beckmann.py): it takes a tenth of the time of the error function and the
-    exponential.
+    to 3e-8 (tests/calibration/smith_beckmann.py), in a tenth of the time of the error function and the exponential.
     """
 
     FIT = (1, 0.221556308, 0.0959011886, 0.0280231588, 5.94910138e-3, 9.66725376e-4, 6.13396596e-4, -1.03606616e-4,

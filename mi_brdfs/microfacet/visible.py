@@ -21,7 +21,7 @@ class BoundedVisibleNormals(Sampler):
     """
 
     BIAS = 0.75
-    """l/α, which tests/calibration/visible_normals.py fits."""
+    """l/α, fitted by tests/calibration/visible_normals.py."""
 
     def _cap(
         self, distribution: Distribution, wi: mi.Vector3f
@@ -50,7 +50,7 @@ class BoundedVisibleNormals(Sampler):
     def _facet(distribution: Distribution, wi: mi.Vector3f, unit: mi.Vector3f, point: mi.Vector3f) -> Facet:
         """Return the facet whose stretched normal is the half vector of the unit vector and a point."""
         normal = unit + point
-        z = dr.maximum(normal.z, SMALL)  # a cap that is nearly the whole sphere ends where the normal vanishes
+        z = dr.maximum(normal.z, SMALL)  # the normal vanishes at the end of a cap that is nearly the whole sphere
         h = mi.Vector3f(distribution.alpha_u * normal.x, distribution.alpha_v * normal.y, z)
         return Facet.reflecting(wi, h * dr.rsqrt(dr.dot(h, h)))
 

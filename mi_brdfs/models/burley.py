@@ -141,9 +141,9 @@ class BaseLobe(Lobe):
     """
 
     glossy = False
-    # tests/calibration/burley.py fits these.
+    # Fitted by tests/calibration/burley.py.
     UNIFORM = 0.1, 0.3
-    """The shares of uniform directions for the one and the other."""
+    """The fractions of uniform directions for the diffuse term and for subsurface scattering."""
     SUBSURFACE = 1.43, 0.68
     """a and b of the albedo of subsurface scattering, about a - b cosθ_i."""
 
@@ -151,12 +151,12 @@ class BaseLobe(Lobe):
         self.reflectance, self.roughness, self.subsurface = reflectance, roughness, subsurface
 
     def estimated_albedo(self, wi):
-        # To some 10 %. cos²θ_d is a half on average, for which d - 1 is roughness - 0.5.
+        # Accurate to about 10 %. cos²θ_d is a half on average, for which d - 1 is roughness - 0.5.
         retro = 1 + (self.roughness - 0.5) * schlick_weight(wi.z)
         return self.reflectance * dr.lerp(retro, self.SUBSURFACE[0] - self.SUBSURFACE[1] * wi.z, self.subsurface)
 
     def _uniform(self, wi):
-        """The share of the uniform directions."""
+        """Return the fraction of uniform directions."""
         return self.UNIFORM[0] * self.roughness + self.UNIFORM[1] * self.subsurface * dr.square(1 - wi.z)
 
     def eval_pdf(self, wi, wo):

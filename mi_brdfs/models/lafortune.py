@@ -106,7 +106,7 @@ class LafortuneLobe(PowerLobe):
     def _buried(self, frame):
         """Return ``(whether it does, log s, c² (n+1))``, where c is the axis's cosine."""
         cos2 = dr.square(frame.axis.z)
-        sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # for which 1 - c² has no digits
+        sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # 1 - c² would have no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
         return depth > sin2, 0.5 * dr.log(sin2), depth
 

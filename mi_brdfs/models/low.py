@@ -100,14 +100,14 @@ class SmoothLobe(Lobe):
         """Return the power law's mass between -wi_xy and the edge of the disc in the direction (x, y)."""
         along = x * wi.x + y * wi.y
         reach = along + dr.sqrt(along * along + wi.z * wi.z)
-        return dr.maximum(self.law.mass(reach * reach), EPSILON)  # at grazing, rounding may leave nothing of the way
+        return dr.maximum(self.law.mass(reach * reach), EPSILON)  # at grazing angles, rounding may leave no distance
 
     def _reflectance(self, wi, x, y):
         """Return F for the projected direction (x, y)."""
         return self.fresnel(safe_sqrt(1 - 0.25 * (dr.square(x - wi.x) + dr.square(y - wi.y))))
 
     def _brightness(self, wi, x, y):
-        """What the choice of an end goes by, which must not vanish."""
+        """Return the reflectance that decides the choice of a side, which must not vanish."""
         return dr.maximum(luminance(self._reflectance(wi, x, y)), SMALL)
 
     def _end(self, wi, x, y, u):

@@ -95,7 +95,7 @@ class RoughDiffuse(Model):
 class QualitativeLobe(RoughDiffuseLobe):
     """f = ρ/π (C1 + B max(0, cosφ) sinα tanβ)."""
 
-    RETRO = 0.7  # of B/C1; tests/calibration/orennayar.py fits this and that of the full form
+    RETRO = 0.7  # of B/C1; fitted by tests/calibration/orennayar.py, as is that of the full form
 
     def __init__(self, reflectance, sigma):
         self.sigma2 = square(sigma)
@@ -131,8 +131,8 @@ class FullLobe(QualitativeLobe):
         # Complements of the angles, in right angles: at grazing angles they keep digits that the angles lose.
         a, b = (dr.atan2(cos, sin) * (2 * dr.inv_pi) for cos, sin in ((cos_a, sin_a), (cos_b, sin_b)))
         tan_mean = (sin_a + sin_b) / dr.maximum(cos_a + cos_b, EPSILON)
-        # cosφ sinβ and 2β/(π sinβ): at the normal, where φ is nothing, these have derivatives. Up to sinβ = 1e-3
-        # the second one is its limit, to float32.
+        # cosφ sinβ and 2β/(π sinβ): unlike φ, these have derivatives at the normal. Up to sinβ = 1e-3 the second equals
+        # its limit in float32.
         along = (wi.x * wo.x + wi.y * wo.y) / sin_a
         ratio = dr.select(sin_b > 1e-3, (1 - b) / dr.maximum(sin_b, 1e-3), 2 * dr.inv_pi)
         ratio2 = dr.square(ratio)

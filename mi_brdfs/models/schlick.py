@@ -12,8 +12,8 @@ from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance, Rotation
 
 TYPICAL = 0.58
-"""The cosine that estimates take for u, of directions that are no mirror images; tests/calibration/schlick.py fits
-it."""
+"""The cosine that albedo estimates use for u, for directions that are not mirror images; fitted by
+tests/calibration/schlick.py."""
 
 
 class Schlick94(Model):
@@ -191,7 +191,7 @@ class InterreflectionLobe(Lobe):
         lost, integral = self._constant(wi)
         x, k = wo.z, self.k
         gone = x * log1p_ratio(k * x) / self.scale
-        # The 1e-7 is what rounding leaves of 1 - gone: a power below one has a derivative there.
+        # The 1e-7 is the rounding error of 1 - gone: a power below one has a derivative there.
         law = (1 + self.power) * dr.power(dr.maximum(1 - gone, 1e-7), self.power) / ((1 + k * x) * self.scale)
         shadowed = lost + (1 - lost) * (1 - x) / (1 + k * x)
         facet = Facet.between(wi, wo)

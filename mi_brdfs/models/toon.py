@@ -99,7 +99,7 @@ class Step:
         self.mass = self._integral(1 - threshold) - self.start
 
     def _x(self, excess):
-        # The floor makes a jump of an edge of width 0.
+        # The floor turns an edge of width 0 into a jump.
         smooth = dr.maximum(self.smooth, EPSILON)
         return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
 
@@ -116,7 +116,7 @@ class Step:
         """Return the excess of the cosine below which the fraction ``u`` of the density lies."""
         integral = self.start + u * self.mass
         ramp = integral < self.smooth
-        # x³ (1 - x/2) = y: a fit good to 1 %, and two steps of Newton's method, after which it is good to 1e-9.
+        # x³ (1 - x/2) = y: a fit accurate to 1 %, and to 1e-9 after two Newton steps.
         y = dr.select(ramp, integral / (2 * dr.maximum(self.smooth, TINY)), 0.5)
         root = dr.cbrt(y)
         x = root * (1 + root * (self.START[0] + self.START[1] * root))

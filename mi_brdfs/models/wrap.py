@@ -78,7 +78,7 @@ class Wrap(Model):
 
 
 def _power(x, exponent):
-    """x^exponent for x >= 0, with a derivative at 0."""
+    """Return x^exponent for x >= 0, with a derivative at 0."""
     return dr.power(x + TINY, exponent)
 
 
