@@ -127,8 +127,8 @@ def safe_sqrt(x: Any) -> Any:
 
 
 def sin_theta(w: mi.Vector3f) -> Any:
-    """sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least EPSILON, where its derivative
-    is 0."""
+    """Return sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least EPSILON, where its
+    derivative is 0."""
     return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, TINY))
 
 

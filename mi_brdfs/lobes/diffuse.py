@@ -69,7 +69,7 @@ class AdjointZonalLobe(AdjointLobe):
     lobe: ZonalLobe
 
     def _radiance(self, wi: mi.Vector3f) -> mi.Float:
-        """What a lobe of an albedo of 1 makes of light from ``wi``, times π."""
+        """Return π times the response of a lobe of albedo 1 to light from ``wi``."""
         return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, EPSILON)
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Any:

@@ -75,8 +75,9 @@ class PowerLobe(MirrorLobe):
     """
 
     def _masses(self, frame: AxisFrame) -> tuple[mi.Float, mi.Float]:
-        """The integrals of the two terms over the pair, relative to 2π/(n+2). The second one stands for a ratio of
-        Gamma functions, √π Γ((n+1)/2) / Γ(n/2+1): exact for n = 0 and in the limit, and else within 2 %."""
+        """Return the integrals of the two terms over the pair, relative to 2π/(n+2). The second one approximates a
+        ratio of Gamma functions, √π Γ((n+1)/2) / Γ(n/2+1): exactly for n = 0 and in the limit, and within 2 %
+        otherwise."""
         return dr.maximum(frame.axis.z, 0), frame.sin * dr.rsqrt(dr.two_pi * self.exponent + 4)
 
     def _share(self, frame: AxisFrame) -> mi.Float:
@@ -140,7 +141,7 @@ class PowerResponseLobe(MirrorLobe):
     reciprocal = False
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Any:
-        # The tanh estimates what lies above the horizon, within 0.12.
+        # The tanh estimates the fraction above the horizon, within 0.12.
         visible = 0.5 + 0.5 * dr.tanh(wi.z * dr.sqrt(self.exponent + 1))
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 1) * visible)
 

@@ -39,8 +39,9 @@ class Facet:
 
     @classmethod
     def between(cls, wi: mi.Vector3f, wo: mi.Vector3f) -> Facet:
-        """The facet that reflects ``wi`` into ``wo``, both above the horizon."""
-        # Opposite directions within the horizon have none; derivatives divide by the length, up to its fourth power.
+        """Return the facet that reflects ``wi`` into ``wo``, both above the horizon."""
+        # Opposite directions in the horizon have no half vector; derivatives divide by the length, up to its fourth
+        # power.
         h = mi.Vector3f(wi.x + wo.x, wi.y + wo.y, dr.maximum(wi.z + wo.z, SMALL))
         length2 = dr.dot(h, h)
         inv_length = dr.rsqrt(length2)

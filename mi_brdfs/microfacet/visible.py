@@ -95,5 +95,5 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
 
     @staticmethod
     def _weight(lobe: FacetLobe, facet: Facet) -> mi.Float:
-        """f cosθ_o over the density, but for what is the same for both."""
+        """Return f cosθ_o over the density, except for factors common to both."""
         return reflected(lobe, facet) / dr.maximum(facet.cos_d, SMALL)

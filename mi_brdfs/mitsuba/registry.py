@@ -201,7 +201,7 @@ def _on_variant(old: str | None, new: str | None) -> None:
 
 
 def _register_for(active: str) -> None:
-    # Mitsuba asks scalar_rgb what kind of plugin a name stands for, whatever the active variant.
+    # Mitsuba asks scalar_rgb for the kind of a plugin, whatever the active variant.
     for variant in {active, "scalar_rgb"}:
         _register_in(variant)
 
