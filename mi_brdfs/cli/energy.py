@@ -41,7 +41,7 @@ class Measured(NamedTuple):
 @command()
 def energy(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE…", help="Types that `list` shows. Default: all.")
+        list[str] | None, typer.Argument(metavar="TYPE…", help="Types, as `list` shows them. Default: all.")
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Compare with what the classes state. Exit with 1 if any of it is wrong.")
