@@ -202,3 +202,17 @@ def test_starts_end_no_worse_than_with_the_built_in(name):
         losses.append(np.nan_to_num(after, nan=np.inf))
     ours, theirs = (np.quantile(of, np.arange(0.1, 1, 0.1)) for of in losses)
     assert (ours <= theirs).all()
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("bsdf", [{"type": "orennayar", "model": "full"}, {"type": "roughdiffuse"}])
+def test_a_black_surface_can_become_brighter(bsdf):
+    loaded = mi.load_dict(bsdf | {"reflectance": 0.0})
+    params = mi.traverse(loaded)
+    key = next(key for key in params.keys() if key.startswith("reflectance"))
+    dr.enable_grad(params[key])
+    params.update()
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = mi.Vector3f(0, 0, 1)
+    dr.backward(mi.luminance(loaded.eval(mi.BSDFContext(), si, mi.Vector3f(0.6, 0, 0.8), True)))
+    assert dr.grad(params[key])[0] > 0.1

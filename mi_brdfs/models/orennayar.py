@@ -142,5 +142,5 @@ class FullLobe(QualitativeLobe):
         c3 = 0.125 * self.sigma2 / (self.sigma2 + 0.09) * dr.square(1 - a) * ratio2 * sin_b
         once = self.c1 + c2 * along / dr.maximum(cos_b, EPSILON) + c3 * (sin_b - abs(along)) * tan_mean
         twice = self._twice() * (1 - along * sin_b * ratio2)
-        rho = self.reflectance
-        return dr.maximum(rho * dr.inv_pi * (once + rho * twice), 0)
+        # Not of the product: a black surface could not be optimised.
+        return self.reflectance * dr.inv_pi * dr.maximum(once + self.reflectance * twice, 0)
