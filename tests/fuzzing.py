@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from hypothesis import Phase, given, settings
 
+from mi_brdfs.models.microfacet import BROUGHT
 from mi_brdfs.parameters import Choice, Colour, Flag, FresnelSet, Number, OneOf, PerLobe, Rotation
 
 
@@ -87,9 +88,9 @@ def _(flag: Flag):
 
 @alternatives.register
 def _(one_of: OneOf):
-    return [
-        Options({one_of.name: word}) | own for word, declared in one_of.words.items() for own in ways(declared.values())
-    ]
+    """Of the pack's own words: what others bring, they test."""
+    words = {word: declared for word, declared in one_of.words.items() if (one_of.name, word) not in BROUGHT}
+    return [Options({one_of.name: word}) | own for word, declared in words.items() for own in ways(declared.values())]
 
 
 @alternatives.register
