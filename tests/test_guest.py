@@ -37,7 +37,7 @@ def student_t(wi, wo):
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
 @pytest.mark.parametrize(
-    "bsdf, reference", [({"type": "lommelseeliger", "w": 0.6}, lommel_seeliger), (KIT, student_t)], ids=["model", "D"]
+    "bsdf, reference", [({"type": "regolith", "w": 0.6}, lommel_seeliger), (KIT, student_t)], ids=["model", "D"]
 )
 def test_formulas(variant, bsdf, reference):
     count = 40 if is_scalar() else 10_000
@@ -56,7 +56,7 @@ def command(folder, *words):
 
 
 def test_it_is_listed_and_has_a_page(tmp_path):
-    assert {"lommelseeliger", "dust"} <= set(mi_brdfs.list_models())
+    assert {"regolith", "dust"} <= set(mi_brdfs.list_models())
     assert "The law of Lommel and Seeliger" in command(tmp_path, "list")
     assert "single-scattering albedo w" in command(tmp_path, "info", "dust")
     page = command(tmp_path, "info", "microfacet")
@@ -83,8 +83,8 @@ def test_its_energy_is_measured(tmp_path):
 def test_it_is_plotted_and_pictured(tmp_path):
     command(tmp_path, "plot", "dust", "-o", "dust.png")
     command(tmp_path, "gallery", "dust", "-o", "pictures", "--size", "32", "--spp", "4")
-    assert (tmp_path / "dust.png").exists() and (tmp_path / "pictures" / "lommelseeliger.png").exists()
+    assert (tmp_path / "dust.png").exists() and (tmp_path / "pictures" / "regolith.png").exists()
 
 
 def test_it_is_benched(tmp_path):
-    assert "lommelseeliger" in command(tmp_path, "bench", "--only", "efficiency")
+    assert "regolith" in command(tmp_path, "bench", "--only", "efficiency")

@@ -20,7 +20,7 @@ class LommelSeeliger(mi_brdfs.Model):
     Reciprocal. Energy-conserving. One-sided.
     """
 
-    plugins = ("lommelseeliger", "dust")
+    plugins = ("regolith", "dust")
 
     w = Reflectance(0.3, "single-scattering albedo w")
 
