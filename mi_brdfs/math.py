@@ -25,7 +25,7 @@ SMALL = 1e-9
 """The least length, or other divisor that derivatives take up to the fourth power."""
 
 
-def select(mask: Any, a: Any, b: mi.Float) -> Any:
+def select(mask: Any, a: Any, b: Any) -> Any:
     """Return ``dr.select``, without its cost for vectors if the mask is a bool, as in scalar variants."""
     if isinstance(mask, bool):
         return a if mask else b

@@ -91,7 +91,7 @@ class Steps:
             value = dr.select(c * len(self.heights) < k, value, height)
         return value * len(self.heights) / self.total
 
-    def cdf(self, c: mi.Float) -> tuple[mi.Float, mi.Float]:
+    def cdf(self, c: mi.Float) -> mi.Float:
         c = c * len(self.heights)
         return sum(height * dr.clip(c - k, 0, 1) for k, height in enumerate(self.heights)) / self.total
 
@@ -116,7 +116,7 @@ class RootLaw:
         outer = x + self.far * y
         return 0.5 * (1 + self.lowest) * self.far / (dr.square(outer) * dr.sqrt((x + self.near * y) / outer))
 
-    def cdf(self, x: mi.Float, y: mi.Float = 1) -> tuple[mi.Float, mi.Float]:
+    def cdf(self, x: mi.Float, y: mi.Float = 1) -> mi.Float:
         return (dr.sqrt((x + self.near * y) / (x + self.far * y)) - self.lowest) / (1 - self.lowest)
 
     def inverse_cdf(self, c: mi.Float) -> mi.Float:
