@@ -103,8 +103,7 @@ class AntitheticNormals(Sampler):
         line = Line(distribution, facet.wi, x, y)
         cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
 
-        # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
-        weight, other = dr.maximum(lobe.weight_over_ndf(facet), EPSILON), reflected(lobe, facet.image())
+        weight, other = reflected_above(lobe, facet), reflected(lobe, facet.image())
         density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
         return density / (2 * facet.cos_d) * (weight / (weight + other))
 
@@ -133,7 +132,7 @@ class Line:
 
 class AntitheticNormalsTowardViewer(AntitheticNormals):
     """The pair for shadowing terms under which, at grazing, those facets count that lean towards ``wi``, along the
-    plane of incidence: a part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and τ = -0.6.
+    plane of incidence: a part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and τ = -0.75.
 
     Smith's term leans by 1, the implicit one by 4; V-cavities do not, nor do dielectrics, which reflect less where it
     leans to.
@@ -212,7 +211,8 @@ def linear_density(bias: mi.Float, m: mi.Float) -> mi.Float:
 
 
 def draw_linear(bias: mi.Float, u: mi.Float) -> mi.Float:
-    return 2 * u / (1 + bias + safe_sqrt(dr.square(1 + bias) - 4 * bias * u))
+    """A draw of that density, in the form in which a small bias does not cancel."""
+    return 2 * u / (1 + bias + dr.sqrt(dr.square(1 + bias) - 4 * bias * u))
 
 
 def reflected(lobe: FacetLobe, facet: Facet) -> mi.Float:
@@ -223,3 +223,9 @@ def reflected(lobe: FacetLobe, facet: Facet) -> mi.Float:
     wo = mi.Vector3f(facet.wo.x, facet.wo.y, dr.maximum(facet.wo.z, SMALL))
     safe = Facet(facet.wi, wo, facet.h, dr.maximum(facet.cos_d, SMALL))
     return dr.maximum(select(valid, lobe.weight_over_ndf(safe), 0), EPSILON)
+
+
+def reflected_above(lobe: FacetLobe, facet: Facet) -> mi.Float:
+    """The same of a facet that is known to reflect above the horizon, as ``eval_pdf`` knows. Its terms are those of the
+    lobe's value, so Dr.Jit computes them once."""
+    return dr.maximum(lobe.weight_over_ndf(facet), EPSILON)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, SMALL, safe_sqrt, select, sin_theta
+from ..math import SMALL, safe_sqrt, select, sin_theta
 from .distributions import Distribution
 from .facet import Facet
-from .sampling import FacetLobe, Sampler, reflected
+from .sampling import FacetLobe, Sampler, draw_linear, linear_density, reflected, reflected_above
 
 
 class BoundedVisibleNormals(Sampler):
@@ -39,9 +39,7 @@ class BoundedVisibleNormals(Sampler):
     def _draw(self, distribution: Distribution, wi: mi.Vector3f, v: mi.Point2f) -> tuple[mi.Vector3f, mi.Vector3f]:
         """Draw ``(unit vector of the stretched wi, point of the cap)``."""
         unit, _, _, b, bias = self._cap(distribution, wi)
-        # The inverse of the linear density; the small bias of narrow lobes must not cancel.
-        height = 2 * v.y / (1 - bias + dr.sqrt(dr.square(1 - bias) + 4 * bias * v.y))
-        z = height * (1 + b) - b
+        z = draw_linear(-bias, v.y) * (1 + b) - b
         sin = safe_sqrt(1 - z * z)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.x)
         return unit, mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
@@ -61,7 +59,7 @@ class BoundedVisibleNormals(Sampler):
         point = normal * (2 * dr.dot(unit, normal) / dr.dot(normal, normal)) - unit
         height = dr.maximum(point.z + b, 0) / (1 + b)
         uniform = distribution.eval(facet) / (2 * (k * facet.cos_i + length))
-        return uniform * (1 - bias + 2 * bias * height), unit, point
+        return uniform * linear_density(-bias, height), unit, point
 
     def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self._facet(lobe.distribution, wi, *self._draw(lobe.distribution, wi, v)).wo
@@ -85,8 +83,7 @@ class AntitheticVisibleNormals(BoundedVisibleNormals):
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         density, unit, point = self._density(lobe.distribution, facet)
         image = self._facet(lobe.distribution, facet.wi, unit, self._image(point))
-        # The facet's own terms are the same as in its lobe's value: Dr.Jit computes them once.
-        weight = dr.maximum(lobe.weight_over_ndf(facet), EPSILON) / dr.maximum(facet.cos_d, SMALL)
+        weight = reflected_above(lobe, facet) / dr.maximum(facet.cos_d, SMALL)
         return 2 * density * (weight / (weight + self._weight(lobe, image)))
 
     @staticmethod
