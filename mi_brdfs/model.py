@@ -42,6 +42,11 @@ class Energy(NamedTuple):
         return rows
 
 
+def full_name(cls: type) -> str:
+    """Return the dotted name of a class: the same for all versions of it, as of a cell of a notebook run again."""
+    return f"{cls.__module__}.{cls.__qualname__}"
+
+
 class Plugin:
     """A plugin defined by declarations: a subclass's docstring is its manual page, and its class attributes declare the
     parameters (:mod:`mi_brdfs.parameters`).

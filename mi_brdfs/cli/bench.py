@@ -13,7 +13,7 @@ from .app import command
 from .interrupts import interruptible
 from .options import check_folder, check_names, write_json
 from .terminal import err, out, print_table, stdout_to_stderr
-from .variants import set_tracing_variant
+from .variants import TracingVariant, set_tracing_variant
 
 
 @command()
@@ -24,9 +24,7 @@ def bench(
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures to this file.")
     ] = None,
-    variant: Annotated[
-        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
-    ] = None,
+    variant: TracingVariant = None,
 ) -> None:
     """Measure efficiency, time and noise against Mitsuba's BSDFs: about ten minutes on an idle machine."""
     from ..bench import SECTIONS

@@ -23,7 +23,7 @@ from .errors import one_line
 from .interrupts import ending_processes, interruptible
 from .options import check_folder, check_names, write_json
 from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
-from .variants import set_tracing_variant
+from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
     from ..measure.sources import BSDFSource
@@ -47,9 +47,7 @@ def check(
         list[str] | None, typer.Option("--only", metavar="NAME", help="Run only this check; may be repeated.")
     ] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check this many BSDFs in parallel.")] = 1,
-    variant: Annotated[
-        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
-    ] = None,
+    variant: TracingVariant = None,
 ) -> None:
     """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit with 1 if any
     fails."""

@@ -13,13 +13,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from ..mitsuba.registry import all_models, find_model
+from ..mitsuba.registry import find_models
 from ..model import Energy, Model
 from .app import command
 from .errors import one_line
 from .interrupts import interruptible
 from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
-from .variants import set_tracing_variant
+from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
     from ..measure.albedo import Setting
@@ -46,14 +46,12 @@ def energy(
     check: Annotated[
         bool, typer.Option("--check", help="Compare with what the classes state. Exit with 1 if any of it is wrong.")
     ] = False,
-    variant: Annotated[
-        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
-    ] = None,
+    variant: TracingVariant = None,
 ) -> None:
     """Measure the largest albedo of models, by default and in white for each choice, and print the line of code that
     states it in the class."""
     try:
-        models = list(dict.fromkeys(map(find_model, names))) if names else all_models()
+        models = find_models(names)
     except ValueError as error:
         fail(one_line(error), Exit.USAGE)
     if check:

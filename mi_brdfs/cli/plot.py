@@ -12,7 +12,7 @@ from .errors import one_line
 from .interrupts import interruptible
 from .options import check_folder
 from .terminal import Exit, fail, out, stdout_to_stderr
-from .variants import set_tracing_variant
+from .variants import TracingVariant, set_tracing_variant
 
 
 @command()
@@ -46,9 +46,7 @@ def plot(
         str | None,
         typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian, sphere. Default: both."),
     ] = None,
-    variant: Annotated[
-        str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
-    ] = None,
+    variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
     hemisphere, as albedo curves, or as bodies to turn in a browser (sphere)."""

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import mitsuba as mi
+import typer
 
 from ..mitsuba import llvm
 from ..variants import is_measurable
 from .terminal import Exit, err, fail
+
+TracingVariant = Annotated[
+    str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+]
+"""The option --variant of commands that measure."""
 
 
 def set_variant(wanted: str | None) -> str:

@@ -25,7 +25,7 @@ try:
 except ImportError:
     raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
 
-from ..mitsuba.registry import all_models, find_model
+from ..mitsuba.registry import find_models
 from ..model import Model
 from ..preview import preview_scene
 from ..render import ctrl_c, display_image, write
@@ -63,7 +63,7 @@ def gallery(
         ValueError: if there is no such model; the message has the closest name.
         OSError: if the folder cannot be created or written to.
     """
-    models = list(dict.fromkeys(map(find_model, types))) or all_models()
+    models = find_models(types)
     entries = [Entry(model) for model in models]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

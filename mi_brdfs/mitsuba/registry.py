@@ -8,6 +8,7 @@ import importlib
 import pkgutil
 import re
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -20,7 +21,7 @@ from ..microfacet.distributions import Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import Shadowing
 from ..microfacet.term import Term
-from ..model import Model, Plugin
+from ..model import Model, Plugin, full_name
 from ..models.microfacet import add_term
 from . import llvm
 from .bsdf import bsdf_class
@@ -83,7 +84,7 @@ def _register_model(model: type[Model], replace: bool) -> None:
                 f'{model.__name__}: the name "{name}" belongs to {owner}; '
                 'choose another one with plugins = ("…",), or register with replace=True.'
             )
-    for name in [name for name, other in MODELS.items() if _same(other, model)]:
+    for name in [name for name, other in MODELS.items() if full_name(other) == full_name(model)]:
         del MODELS[name]
     MODELS.update(dict.fromkeys(model.plugins, model))
     for variant in _variants:
@@ -93,14 +94,9 @@ def _register_model(model: type[Model], replace: bool) -> None:
 def _owner(name: str, model: type[Model]) -> str | None:
     """Return the owner of a name, if it is not the model itself."""
     if name in MODELS:
-        other = MODELS[name]
-        return None if _same(other, model) else f"{other.__module__}.{other.__qualname__}"
+        owner = full_name(MODELS[name])
+        return None if owner == full_name(model) else owner
     return "Mitsuba" if name in _builtins() else "mi_brdfs" if name in INTEGRATORS else None
-
-
-def _same(one: type[Model], other: type[Model]) -> bool:
-    """Return whether both are the same class, perhaps in different versions."""
-    return (one.__module__, one.__qualname__) == (other.__module__, other.__qualname__)
 
 
 def models_in(module: ModuleType) -> list[type[Model]]:
@@ -146,6 +142,15 @@ def all_models() -> list[type[Model]]:
 def own_models() -> list[type[Model]]:
     """Return the pack's models, in the same order."""
     return [model for model in all_models() if is_own(model)]
+
+
+def find_models(names: Iterable[str] | None) -> list[type[Model]]:
+    """Return the models of some plugin names, each once, or all models if there are no names.
+
+    Raises:
+        ValueError: as :func:`find_model`.
+    """
+    return list(dict.fromkeys(map(find_model, names or []))) or all_models()
 
 
 def find_model(name: str) -> type[Model]:

@@ -19,7 +19,7 @@ from ..microfacet.shadowing import (
 )
 from ..microfacet.tails import ABC, EPD, GTR, HemiEPD
 from ..microfacet.term import Term
-from ..model import Energy, Model
+from ..model import Energy, Model, full_name
 from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation
 from ..parameters import fresnel as fresnel_parameters
 from ..parameters.messages import listed
@@ -222,9 +222,8 @@ def add_term(term: type[Term], replace: bool) -> None:
     kinds = {Distribution: Microfacet.distribution, Shadowing: Microfacet.shadowing, Fresnel: fresnel_parameters.OTHERS}
     kind, choice = next((kind, choice) for kind, choice in kinds.items() if issubclass(term, kind))
     former = BROUGHT.get((choice.name, word))
-    own = former and (former.__module__, former.__qualname__) == (term.__module__, term.__qualname__)
-    if word in choice.words and not (own or replace):
-        owner = f"{former.__module__}.{former.__qualname__}" if former else "mi_brdfs"
+    owner = full_name(former) if former else "mi_brdfs"
+    if word in choice.words and owner != full_name(term) and not replace:
         raise ValueError(
             f'{name}: the word "{word}" belongs to {owner}; take another one, or register with replace=True.'
         )
