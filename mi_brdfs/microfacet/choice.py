@@ -3,10 +3,10 @@ them."""
 
 from __future__ import annotations
 
-from .distributions import GGX, Distribution
+from .distributions import GGX, AshikhminShirleyNormals, Distribution
 from .forward import WithForwardShare
 from .fresnel import Dielectric, Fresnel, Schlick
-from .sampling import AntitheticNormals, AntitheticNormalsTowardViewer, Sampler
+from .sampling import AntitheticNormals, AntitheticNormalsTowardViewer, AntitheticSteepNormals, Sampler
 from .shadowing import SchlickSmith, Shadowing, SmithGGX
 from .visible import AntitheticVisibleNormals, BoundedVisibleNormals
 
@@ -27,4 +27,8 @@ def _sampler_of_facets(distribution: Distribution, shadowing: Shadowing, fresnel
             return AntitheticVisibleNormals()
     if isinstance(distribution, GGX) and isinstance(shadowing, SchlickSmith):
         return AntitheticVisibleNormals()
-    return AntitheticNormalsTowardViewer(shadowing.lean) if shadowing.lean else AntitheticNormals()
+    # Those normals are drawn without a cosine, and so steep ones more often.
+    favours_steep = shadowing.favours_steep and not isinstance(distribution, AshikhminShirleyNormals)
+    if shadowing.lean:
+        return AntitheticNormalsTowardViewer(shadowing.lean, distribution.long_tailed or favours_steep)
+    return AntitheticSteepNormals() if favours_steep else AntitheticNormals()

@@ -12,7 +12,8 @@ from ..math import EPSILON, SMALL, choose, clamp, normalize_or, safe_sqrt, selec
 from .distributions import Distribution
 from .facet import Facet
 from .fresnel import Fresnel
-from .shadowing import Shadowing
+from .laws import tan2_of_versine, versine
+from .shadowing import Implicit, Shadowing
 
 
 class FacetLobe(Protocol):
@@ -129,6 +130,46 @@ class Line:
         """The tan²θ_h of an m."""
         return self.distribution.inverse_cdf(m * self.mass, self.rest + (1 - m) * self.mass, self.g)
 
+    def uniform(self, v: mi.Float) -> mi.Float:
+        """A tan²θ_h, of which cosθ_h is uniform."""
+        return tan2_of_versine(v * (1 - self.lowest))
+
+    def uniform_density(self) -> mi.Float:
+        """Of half vectors drawn so; the azimuth is uniform in ψ, not in that of the half vector."""
+        stretch = self.distribution.alpha_u * self.distribution.alpha_v * self.g
+        return dr.inv_two_pi / (stretch * (1 - self.lowest))
+
+
+class AntitheticSteepNormals(AntitheticNormals):
+    """The pair for shadowing terms under which, at grazing, a facet reflects the more the steeper it is, wherever it
+    faces: on a part of the lines the half vectors are uniform."""
+
+    STEEP = 1
+    """How many of the facets whose slope is at least a half the part counts; tests/calibration/half_vectors.py fits
+    it."""
+    LARGEST = 0.5
+    """The largest part: facets that nearly all lie near the horizon are no more uniform than flat ones."""
+
+    def _steep(self, lobe: FacetLobe, wi: mi.Vector3f) -> mi.Float:
+        steep = self.STEEP * dr.square(dr.square(1 - wi.z)) * steep_facets(lobe.distribution, wi)
+        return dr.minimum(steep, self.LARGEST)
+
+    def _azimuth(
+        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Float
+    ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
+        is_steep, u = choose(u, self._steep(lobe, wi))
+        u, cos, sin, _ = super()._azimuth(lobe, wi, u, v)
+        return u, cos, sin, is_steep
+
+    def _tan2(self, lobe: FacetLobe, wi: mi.Vector3f, line: Line, which: Any, v: mi.Float) -> mi.Float:
+        return dr.select(which, line.uniform(v), super()._tan2(lobe, wi, line, None, v))
+
+    def _density(
+        self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
+    ) -> mi.Float:
+        density = super()._density(lobe, line, facet, cos, sin, q)
+        return dr.lerp(density, line.uniform_density(), self._steep(lobe, facet.wi))
+
 
 class AntitheticNormalsTowardViewer(AntitheticNormals):
     """The pair for shadowing terms under which, at grazing, those facets count that lean towards ``wi``, along the
@@ -137,19 +178,20 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     Smith's term leans by 1, the implicit one by 4; V-cavities do not, nor do dielectrics, which reflect less where it
     leans to.
 
-    Of a distribution with a long tail, the few steep facets may reflect more at grazing than all others together. On
-    a part δ of the leaning lines the half vectors are uniform, whatever the distribution: that bounds their weights.
+    Of a distribution with a long tail, or under some shadowing terms, the few steep facets may reflect more at grazing
+    than all others together. On a part δ of the leaning lines the half vectors are uniform, or have a density
+    ∝ 1/√(1 - cosθ_h) under the implicit term, whatever the distribution: that bounds their weights.
     """
 
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
-    STEEP = 0.5
+    STEEP = 0.65
     """How many of the steep facets δ counts: those whose slope is at least a half."""
     STEEP_IMPLICIT = 0.7
     """The largest δ under the implicit term."""
 
-    def __init__(self, lean: float) -> None:
-        self.lean = lean
+    def __init__(self, lean: float, steep: bool) -> None:
+        self.lean, self.steep = lean, steep
 
     def _along(self, lobe: FacetLobe, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         """``(x, y, λ, δ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
@@ -160,11 +202,11 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), 0.95)  # others lie across the plane of incidence
-        if not distribution.long_tailed:
+        if not self.steep:
             return x, y, leaning, 0
-        _, steep = distribution.cdf(0.25, (1 - cos2) / dr.maximum(slope2, EPSILON))
-        steep = self.STEEP * dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep
-        if self.lean >= 4:
+        steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
+        steep *= self.STEEP
+        if isinstance(lobe.shadowing, Implicit):
             # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
             steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), EPSILON))
         else:
@@ -176,7 +218,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         x, y, leaning, steep = self._along(lobe, wi)
         leans, u = choose(u, leaning)
-        is_steep, u = choose(u, steep) if lobe.distribution.long_tailed else (False, u)
+        is_steep, u = choose(u, steep) if self.steep else (False, u)
         sin, cos = dr.sincos(dr.two_pi * v)
         sin = dr.select(leans, 2 * v - 1, sin)
         cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
@@ -185,24 +227,31 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     def _tan2(self, lobe: FacetLobe, wi: mi.Vector3f, line: Line, which: Any, v: mi.Float) -> mi.Float:
         leans, is_steep = which
         tan2 = line.inverse_cdf(draw_linear(dr.select(leans, self.OUTWARD, self._bias(lobe, wi)), v))
-        if not lobe.distribution.long_tailed:
+        if not self.steep:
             return tan2
-        cos = 1 - v * (1 - line.lowest)
-        return dr.select(leans & is_steep, (1 - cos) * (1 + cos) / dr.square(cos), tan2)
+        return dr.select(
+            leans & is_steep, line.uniform(dr.square(v) if isinstance(lobe.shadowing, Implicit) else v), tan2
+        )
 
     def _density(
         self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
     ) -> mi.Float:
-        distribution = lobe.distribution
         x, y, leaning, steep = self._along(lobe, facet.wi)
         lines = 0.5 * dr.pi * abs(cos * x + sin * y)
         outward = linear_density(self.OUTWARD, line.part(facet)) * q / line.mass
-        if distribution.long_tailed:
-            # The azimuth is uniform in ψ, not in φ.
-            stretch = distribution.alpha_u * distribution.alpha_v * line.g
-            uniform = dr.inv_two_pi / (stretch * (1 - line.lowest))
-            outward = dr.lerp(outward, uniform, steep)
+        if self.steep:
+            steepest = line.uniform_density()
+            if isinstance(lobe.shadowing, Implicit):
+                height = dr.maximum(versine(facet.cos_h, facet.sin2_h), 1e-12)  # at the normal there is no end
+                steepest *= 0.5 * dr.sqrt((1 - line.lowest) / height)
+            outward = dr.lerp(outward, steepest, steep)
         return dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
+
+
+def steep_facets(distribution: Distribution, wi: mi.Vector3f) -> mi.Float:
+    """How many facets of the plane of incidence have a slope of at least a half."""
+    slope2 = dr.maximum(distribution.mean_square_slope_along(wi), EPSILON)
+    return distribution.cdf(0.25, (wi.x * wi.x + wi.y * wi.y) / slope2)[1]
 
 
 def linear_density(bias: mi.Float, m: mi.Float) -> mi.Float:

@@ -20,6 +20,9 @@ class Shadowing(Term):
     lean: ClassVar[float] = 0
     """How far the facets visible at grazing angles lean towards the viewer, fitted by
     tests/calibration/half_vectors.py."""
+    favours_steep: ClassVar[bool] = False
+    """Whether G cosθ_d/(cosθ_i cosθ_h) has no bound, so that at grazing few steep facets may reflect most of all,
+    whatever the distribution."""
     reciprocal: ClassVar[bool] = True
     """Whether G is symmetric in wi and wo."""
     conserving: ClassVar[bool] = False
@@ -148,6 +151,7 @@ class Neumann(Shadowing):
     Computer Graphics Forum 18(3), 1999)."""
 
     lean = 1
+    favours_steep = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.minimum(facet.cos_i, facet.cos_o)
@@ -157,6 +161,7 @@ class AshikhminPremoze(Shadowing):
     """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premoze, Distribution-based BRDFs, 2007)."""
 
     lean = 2
+    favours_steep = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         i, o = facet.cos_i, facet.cos_o
@@ -166,6 +171,8 @@ class AshikhminPremoze(Shadowing):
 class AshikhminShirleyShadowing(Shadowing):
     """cosθ_i cosθ_o / (cosθ_d max(cosθ_i, cosθ_o)) (Ashikhmin and Shirley 2000,
     doi:10.1080/10867651.2000.10487522)."""
+
+    favours_steep = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.minimum(facet.cos_i, facet.cos_o) / facet.cos_d

@@ -15,7 +15,7 @@ from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet import shadowing
 from mi_brdfs.microfacet.distributions import GGX, Beckmann, Blinn
 from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
-from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
+from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer, AntitheticSteepNormals
 from mi_brdfs.microfacet.tails import ABC, EPD, GTR
 from mi_brdfs.models.blinnphong import ResponseShadowing
 from mi_brdfs.models.brady import Projected
@@ -72,6 +72,9 @@ def fits() -> Iterator[Fit]:
         kind(*map(number, values))
         for kind, *values in [(GTR, 0.1, 1), (ABC, 1e4, 0.8), (ABC, 100, 1), (EPD, 0.05, 0.3), (EPD, 0.2, 0.5)]
     ]
+    broad = [GTR(number(alpha), number(gamma)) for alpha, gamma in [(0.5, 2), (1, 2), (0.5, 1.5), (1, 0.5)]]
+    upright = lobes([*broad, *(Blinn(number(exponent)) for exponent in (0.1, 1))], upright[1:], unit)
+    yield attributes(AntitheticSteepNormals, "STEEP", variance_loss(upright, STEEPEST))
     implicit = lobes([*long_tailed, *longer_tailed], [shadowing.Implicit()], unit)
     yield attributes(AntitheticNormalsTowardViewer, "STEEP_IMPLICIT", variance_loss(implicit, STEEPEST))
 
@@ -94,7 +97,7 @@ def of_lean(name, of_term) -> Fit:
 
     def loss(lean):
         for lobe in of_term:
-            lobe.sampler = AntitheticNormalsTowardViewer(number(lean))
+            lobe.sampler = AntitheticNormalsTowardViewer(number(lean), lobe.sampler.steep)
         return measured()
 
     return Fit(f"{name}.lean", [of_term[0].shadowing.lean], loss)
