@@ -41,6 +41,8 @@ _files = [
     importlib.import_module(f"rows.{path.stem}") for path in sorted((Path(__file__).parent / "rows").glob("[a-z]*.py"))
 ]
 ROWS = [row for file in _files for row in file.ROWS]
+FIRST_ROWS = {row.name.split()[0]: row for row in reversed(ROWS)}
+"""One of each plugin."""
 EXTREME = [row for file in _files for row in getattr(file, "EXTREME", [])]
 SMOOTH = {name: bsdf for file in _files for name, bsdf in file.SMOOTH.items()}
 

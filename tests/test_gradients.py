@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 import reference
-from catalogue import ROWS, SMOOTH, mostly_slow
+from catalogue import FIRST_ROWS, ROWS, SMOOTH, mostly_slow
 from support import direction, hemisphere, interaction
 
 LINEAR = ("reflectance", "subsurface", "metallic", "specular.", "tint", "sheen", "clearcoat.")
@@ -191,9 +191,6 @@ def pairs_of_directions(count=500):
     kinked = [(wi, mirror), (wi, wi)]
     wi, wo = (np.float32(np.concatenate(part)) for part in zip(*smooth, *kinked, strict=True))
     return wi, wo, np.arange(len(wi)) >= len(smooth) * count
-
-
-FIRST_ROWS = {row.name.split()[0]: row for row in reversed(ROWS)}
 
 
 @pytest.mark.usefixtures("llvm_rgb")

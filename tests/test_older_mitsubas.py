@@ -7,12 +7,13 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+from catalogue import FIRST_ROWS
 
 from mi_brdfs.mitsuba import llvm
 
 TESTS = Path(__file__).parent
 WHAT = (
-    "test_values.py::test_matches_the_reference",
+    *(f"test_values.py::test_matches_the_reference[{row.name}]" for row in FIRST_ROWS.values()),
     "test_contracts.py",
     "test_parameters.py",
     "test_registry.py",
@@ -45,6 +46,6 @@ def older(request, tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.skipif(llvm.extra_library() is None, reason="the llvm extra is not installed")
 def test_models_are_the_same(older):
-    command = [older, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *(TESTS / what for what in WHAT)]
+    command = [older, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *(f"{TESTS}/{what}" for what in WHAT)]
     run = subprocess.run(command, cwd=TESTS.parent, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-1000:]
