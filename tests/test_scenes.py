@@ -31,7 +31,7 @@ def test_scene_files_have_defaults(path):
 def test_picture_shows_the_scene(path):
     """Rendered anew with few samples and averaged over squares, the picture differs by its noise, up to 0.004 on the
     display's scale from 0 to 1."""
-    stored = np.array(mi.Bitmap(str(scenes.PICTURES / f"{path.stem}.jpg")), np.float64) / 255
+    stored = np.array(mi.Bitmap(str(scenes.LARGE / f"{path.stem}.jpg")), np.float64) / 255
     now = np.array(scenes.picture(path, spp=16), np.float64) / 255
     assert stored.shape == now.shape
     assert abs(squares(stored) - squares(now)).mean() < 0.01, f"stale: run python docs/generate {path.stem}"

@@ -65,7 +65,7 @@ def _lamps() -> dict[str, dict]:
 
 
 def _point() -> dict[str, dict]:
-    return {"light": {"type": "point", "position": [-6.2, -6.4, 4.0], "intensity": 270.0}}
+    return {"light": {"type": "point", "position": [-15.5, -16.0, 10.0], "intensity": 1700.0}}
 
 
 STAGES: dict[str, Callable[[], dict[str, dict]]] = {"studio": _studio, "lamp": _lamps, "point": _point}

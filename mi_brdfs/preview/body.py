@@ -25,7 +25,8 @@ BEVEL = 0.004
 def body(bsdf: dict | mi.BSDF) -> mi.Mesh:
     """Return the body, with u around its axis and v along it."""
     foot, knob = _smooth(FOOT, 72), _smooth(KNOB, 56)
-    elevation = np.linspace(*(np.arcsin((end - CENTRE) / RADIUS) for end in (foot[-1, 1], knob[0, 1])), 260)
+    low, high = np.arcsin((np.array([foot[-1, 1], knob[0, 1]]) - CENTRE) / RADIUS)
+    elevation = np.linspace(low, high, 260)
     radius = RADIUS - DEPTH / (1 + ((elevation - GROOVE) / GROOVE_WIDTH) ** 6)
     ball = np.stack([radius * np.cos(elevation), CENTRE + radius * np.sin(elevation)], axis=-1)
     positions, normals, uv = _revolve(np.concatenate([foot[:-1], ball, knob[1:]]), 384)
