@@ -18,6 +18,9 @@ ENERGY_NOTE = """\
 At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
 others is 0; parameters not named take all values in their range."""
 
+FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
+"""The families of models, in the order in which they are shown."""
+
 
 class Energy(NamedTuple):
     """The largest directional albedos of a model, at angles up to 89.9°, rounded up to three digits, as
@@ -121,6 +124,8 @@ class Model(Plugin):
     """A BRDF model. A subclass is its paper in code: its docstring cites and gives the formula, its class attributes
     declare the parameters, and :meth:`lobes` says what they mean."""
 
+    family: ClassVar[str] = ""
+    """With which models it is shown: one of ``FAMILIES`` or another word; those without one come last."""
     energy: ClassVar[Energy | None] = None
     """The largest albedos; None if they were not measured."""
 

@@ -57,3 +57,19 @@ def efficiencies(bsdf: dict, angles) -> np.ndarray:
     probe = BSDFProbe(mi.load_dict(bsdf))
     wi = np.array([direction(theta) for theta in angles])
     return sampling_efficiency(luminance(probe.weights(probe.whole, wi, lattice(13, 1))))
+
+
+def small_picture(scene, size=32, spp=16):
+    """A small rendering of a scene, free of NaN, infinite and negative pixels, and neither black nor blown out.
+
+    Few samples may put a spectral pixel outside the sRGB gamut, where a channel is negative; its luminance never is.
+    """
+    params = mi.traverse(scene)
+    params[next(key for key in params.keys() if key.endswith("film.size"))] = [size, size]
+    params.update()
+    image = np.array(mi.render(scene, spp=1 if is_scalar() else spp))
+    assert np.isfinite(image).all()
+    assert ((image @ [0.2126, 0.7152, 0.0722] if mi.is_spectral else image) >= 0).all()
+    assert 0.02 < np.median(image) < 0.9
+    assert (image > 2).mean() < 0.1
+    return image

@@ -30,9 +30,10 @@ def test_digests_are_of_the_pictures():
     assert set(made.read_digests()) == {name(each) for each in EVERYTHING if isinstance(each, Picture)}
 
 
-def test_one_thumbnail_and_strip_a_model():
-    for folder in models.THUMBNAILS, models.STRIPS:
-        assert {path.stem for path in folder.iterdir()} == {model.plugins[0] for model in own_models()}
+def test_two_portraits_and_a_strip_a_model():
+    for folder in models.THUMBNAILS, models.LARGE, models.STRIPS:
+        files = {path.stem for path in folder.iterdir() if path.is_file()}
+        assert files == {model.plugins[0] for model in own_models()}
 
 
 class Chalk(Lambert):
@@ -57,10 +58,10 @@ def test_another_model_makes_its_own_pages_and_pictures_stale(monkeypatch, as_be
     monkeypatch.setattr(registry, "is_own", lambda model: model is Chalk or is_own(model))
     assert {name(each) for each in everything() if each.is_stale()} == {
         "README.md", "mi_brdfs/models/README.md", "scenes/catalogue.xml",
-        "docs/thumbnails/chalk.png", "docs/sweeps/chalk.jpg", "docs/gallery.jpg",
+        "docs/thumbnails/chalk.png", "docs/thumbnails/large/chalk.jpg", "docs/sweeps/chalk.jpg", "docs/gallery.jpg",
     }  # fmt: skip
     text = scenes.catalogue()
-    assert text.count('<shape type="sphere">') == len(own_models())
+    assert text.count('<shape type="sphere" id=') == len(own_models())
     assert text.count('        <bsdf type="chalk">\n            <float name="reflectance" value="0.9"/>\n') == 1
     assert "minnaert 1941" in text and "lambert 1760, chalk 1899, minnaert 1941" in " ".join(text.split())
 

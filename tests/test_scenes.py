@@ -1,4 +1,4 @@
-"""The scenes and the preview load everywhere and give a sane picture; what goes with the scenes is up to date."""
+"""The scenes load everywhere and give a sane picture; what goes with the scenes is up to date."""
 
 import xml.etree.ElementTree as ElementTree
 
@@ -9,31 +9,14 @@ import pytest
 from generate import scenes
 from generate.made import ROOT
 from generate.scenes import SCENES
-from support import is_scalar
+from support import small_picture
 
-import mi_brdfs
 from mi_brdfs.mitsuba.registry import own_models
-
-
-def picture(scene, size=32, spp=16):
-    """A small rendering of a scene, free of NaN, infinite and negative pixels, and neither black nor blown out.
-
-    Few samples may put a spectral pixel outside the sRGB gamut, where a channel is negative; its luminance never is.
-    """
-    params = mi.traverse(scene)
-    params[next(key for key in params.keys() if key.endswith("film.size"))] = [size, size]
-    params.update()
-    image = np.array(mi.render(scene, spp=1 if is_scalar() else spp))
-    assert np.isfinite(image).all()
-    assert ((image @ [0.2126, 0.7152, 0.0722] if mi.is_spectral else image) >= 0).all()
-    assert 0.02 < np.median(image) < 0.9
-    assert (image > 2).mean() < 0.1
-    return image
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_scene_files(path, variant):
-    picture(mi.load_file(str(path)))
+    small_picture(mi.load_file(str(path)))
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
@@ -48,7 +31,7 @@ def test_scene_files_have_defaults(path):
 def test_picture_shows_the_scene(path):
     """Rendered anew with few samples and averaged over squares, the picture differs by its noise, up to 0.004 on the
     display's scale from 0 to 1."""
-    stored = np.array(mi.Bitmap(str(scenes.PICTURES / f"{path.stem}.jpg")), np.float64) / 255
+    stored = np.array(mi.Bitmap(str(scenes.LARGE / f"{path.stem}.jpg")), np.float64) / 255
     now = np.array(scenes.picture(path, spp=16), np.float64) / 255
     assert stored.shape == now.shape
     assert abs(squares(stored) - squares(now)).mean() < 0.01, f"stale: run python docs/generate {path.stem}"
@@ -93,20 +76,3 @@ def test_legacy_scene_keeps_its_parameters():
         if key.endswith(f"{parameter}.value")
     }
     assert values == pytest.approx({"alpha_u": 0.07, "alpha_v": 0.25, "exponent": 80})
-
-
-@pytest.mark.parametrize("name", [name for model in own_models() for name in model.plugins])
-def test_preview(name, variant):
-    scene = mi.load_dict(mi_brdfs.preview_scene({"type": name}))
-    if not is_scalar():
-        picture(scene)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_preview_takes_a_loaded_bsdf_and_shows_it():
-    bright, dark = (
-        picture(mi.load_dict(mi_brdfs.preview_scene(mi.load_dict({"type": "lambert", "reflectance": value}))))
-        for value in (0.9, 0.1)
-    )
-    assert bright[16, 16].mean() > 4 * dark[16, 16].mean()
-    assert bright[0].mean() == pytest.approx(dark[0].mean(), rel=0.1)

@@ -394,11 +394,11 @@ def test_preview_scenes_are_the_users_own(variant):
     """Changing one changes neither the next nor the material that it was made of."""
     material = {"type": "ward", "specular_reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.3]}}
     given = COPIES["pickle"](material)
-    scene = mi_brdfs.preview_scene(given)
+    scene = mi_brdfs.preview_scene(given, stage="lamp")
     scene["sensor"]["film"].update(width=4, height=3)
-    scene["sky"]["radiance"] *= 2
-    other = mi_brdfs.preview_scene(given)
-    assert (other["sensor"]["film"]["width"], 2 * other["sky"]["radiance"]) == (512, scene["sky"]["radiance"])
+    scene["key"]["radius"] *= 2
+    other = mi_brdfs.preview_scene(given, stage="lamp")
+    assert (other["sensor"]["film"]["width"], 2 * other["key"]["radius"]) == (512, scene["key"]["radius"])
     assert given == material
     smaller = copy.copy(scene) | {"integrator": {"type": "direct"}}
     assert mi.render(mi.load_dict(smaller), spp=1).shape == (3, 4, 3)

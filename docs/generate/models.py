@@ -10,8 +10,8 @@ from pathlib import Path
 from PIL import Image
 
 from mi_brdfs import preview
-from mi_brdfs.gallery import overview, picture, year
-from mi_brdfs.gallery.sheet import Row, sheet
+from mi_brdfs.gallery import overview, sheet, shot, sweep_row
+from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
@@ -21,11 +21,13 @@ from .made import ROOT, Page, Picture, code
 
 REFERENCE = ROOT / "mi_brdfs" / "models" / "README.md"
 THUMBNAILS = ROOT / "docs" / "thumbnails"
+LARGE = THUMBNAILS / "large"
 STRIPS = ROOT / "docs" / "sweeps"
 GALLERY = ROOT / "docs" / "gallery.jpg"
 CHAPTER = ROOT / "docs" / "folklore.md"
 PICTURES_PER_LINE = 5
-SIZE, SAMPLES, STRIP_SAMPLES = 160, 256, 64
+SIZE, SAMPLES = 160, 256
+LARGE_SIZE, STRIP_SIZE, FEWER_SAMPLES = 384, 200, 64
 
 INTRODUCTION = """\
 # The plugins
@@ -35,8 +37,10 @@ INTRODUCTION = """\
 Directions are unit vectors away from the surface: wi is the given one (towards the viewer), wo the sampled one
 (towards the light), n the normal, h the half vector; cosθ_i, cosθ_o and cosθ_h are their cosines to n. f is the BRDF.
 Every colour and every number is a texture slot; a literal outside its range is an error, and a textured or optimised
-value is clamped to the range where it is evaluated. Pictures show the examples, strips the effect of one parameter;
-`mi-brdfs gallery` renders all of them.
+value is clamped to the range where it is evaluated. Pictures show the models of a family in one colour and about
+equally rough, strips the effect of one parameter; they are larger behind their links, and `mi-brdfs gallery` renders
+all of them. Diffuse and cartoon models stand under a point light: the curve below a picture of a strip is the luminance
+across its middle, beside that of the first one.
 """
 
 
@@ -45,36 +49,40 @@ def pages() -> list[Page]:
 
 
 def pictures() -> list[Picture]:
-    """Return a thumbnail and the main sweep of each model, and the overview of all thumbnails."""
+    """Return two portraits and the main sweep of each model, and the overview of all thumbnails."""
+    stage = "".join(map(code, (preview, preview.body, preview.studio)))
     found = []
     for model in own_models():
         name = model.plugins[0]
-        example = [repr((model.example(), SIZE, SAMPLES)), code(preview)]
-        swept = [repr((main_sweep(model), SIZE, STRIP_SAMPLES)), code(preview)]
-        found += [
-            Picture(THUMBNAILS / f"{name}.png", partial(list, example), partial(_draw_thumbnail, model)),
-            Picture(STRIPS / f"{name}.jpg", partial(list, swept), partial(_draw_strip, model)),
-        ]
+        for file, size, spp in (
+            (THUMBNAILS / f"{name}.png", SIZE, SAMPLES),
+            (LARGE / f"{name}.jpg", LARGE_SIZE, FEWER_SAMPLES),
+        ):
+            sources = [repr((portrait(model), stage_of(model), size, spp)), stage]
+            found.append(Picture(file, partial(list, sources), partial(_draw_portrait, model, size, spp)))
+        sources = [repr((main_sweep(model), stage_of(model), STRIP_SIZE, FEWER_SAMPLES)), stage]
+        found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), partial(_draw_strip, model)))
     return [*found, Picture(GALLERY, _thumbnails, _draw_gallery)]
 
 
 def _thumbnails() -> list[str | bytes]:
-    """Return the sources of the overview: names, years and files."""
+    """Return the sources of the overview: names, families, years and files."""
     files = [THUMBNAILS / f"{model.plugins[0]}.png" for model in own_models()]
-    years = [f"{model.plugins[0]} {year(model)}" for model in own_models()]
-    return [*years, *(file.read_bytes() for file in files if file.is_file())]
+    names = [f"{model.plugins[0]} {model.family} {year(model)}" for model in own_models()]
+    return [*names, *(file.read_bytes() for file in files if file.is_file())]
 
 
-def _draw_thumbnail(model: type[Model], path: Path) -> None:
-    thumbnail(model).save(path, optimize=True)
+def _draw_portrait(model: type[Model], size: int, spp: int, path: Path) -> None:
+    path.parent.mkdir(exist_ok=True)
+    shot(portrait(model), stage_of(model), size, spp).picture.save(path, quality=88, optimize=True)
 
 
 def _draw_strip(model: type[Model], path: Path) -> None:
-    strip(model).save(path, quality=88, optimize=True)
+    strip(model).save(path, quality=85, optimize=True)
 
 
 def _draw_gallery(path: Path) -> None:
-    all_thumbnails().save(path, quality=92, optimize=True)
+    all_thumbnails().save(path, quality=90, optimize=True)
 
 
 def reference() -> str:
@@ -99,16 +107,10 @@ def _code(text: str) -> str:
     return re.sub(r"``(.+?)``", r"`\1`", text)
 
 
-def thumbnail(model: type[Model], size: int = SIZE, spp: int = SAMPLES) -> Image.Image:
-    """Render the model's example in the preview scene."""
-    return picture(model.example(), size, spp)
-
-
-def strip(model: type[Model], spp: int = STRIP_SAMPLES) -> Image.Image:
+def strip(model: type[Model], spp: int = FEWER_SAMPLES) -> Image.Image:
     """Render the model's main sweep."""
-    name, main = model.plugins[0], main_sweep(model)
-    pictures = [picture(bsdf, SIZE, spp) for bsdf in main.bsdfs(name)]
-    return sheet([Row(main.heading(name), pictures, [shown(value) for value in main.values])])
+    name, main, stage = model.plugins[0], main_sweep(model), stage_of(model)
+    return sheet([sweep_row(main, name, stage, [shot(bsdf, stage, STRIP_SIZE, spp) for bsdf in main.bsdfs(name)])])
 
 
 def main_sweep(model: type[Model]) -> Sweep:
@@ -117,20 +119,22 @@ def main_sweep(model: type[Model]) -> Sweep:
 
 def all_thumbnails() -> Image.Image:
     """Return the overview picture in README.md."""
-    return overview([(model, Image.open(THUMBNAILS / f"{model.plugins[0]}.png")) for model in own_models()])
+    return overview([(model, Image.open(THUMBNAILS / f"{model.plugins[0]}.png")) for model in by_family(own_models())])
 
 
 def _picture(model: type[Model]) -> str:
-    return f"![{model.plugins[0]}](../../docs/thumbnails/{model.plugins[0]}.png)"
+    name, folder = model.plugins[0], "../../docs/thumbnails"
+    return f"[![{name}]({folder}/{name}.png)]({folder}/large/{name}.jpg)"
 
 
 def _strip(model: type[Model]) -> str:
     name, main = model.plugins[0], main_sweep(model)
-    return f"![{main.heading(name)}: {', '.join(map(shown, main.values))}](../../docs/sweeps/{name}.jpg)"
+    file = f"../../docs/sweeps/{name}.jpg"
+    return f"[![{main.heading(name)}: {', '.join(map(shown, main.values))}]({file})]({file})"
 
 
 def _overview(models: list[type[Model]]) -> str:
-    cells = [f"{_picture(model)}<br>[`{model.plugins[0]}`](#{model.plugins[0]})" for model in models]
+    cells = [f"{_picture(model)}<br>[`{model.plugins[0]}`](#{model.plugins[0]})" for model in by_family(models)]
     cells += [""] * (-len(cells) % PICTURES_PER_LINE)
     lines = [cells[k : k + PICTURES_PER_LINE] for k in range(0, len(cells), PICTURES_PER_LINE)]
     return _table([[""] * PICTURES_PER_LINE, *lines])

@@ -11,7 +11,9 @@ from mi_brdfs.render import display_image
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
 import numpy as np
+from PIL import Image
 
+from .labels import Label, labelled, labels_of
 from .made import ROOT, Picture
 from .scenes import read
 
@@ -20,14 +22,17 @@ PICTURES = ROOT / "docs" / "scenes" / "shading"
 FINER, SAMPLES, QUALITY = 3, 1024, 88
 
 
-def picture(path: Path, spp: int = SAMPLES) -> mi.Bitmap:
-    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one."""
+def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
+    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one, with labels."""
     scene = mi.load_file(str(path))
     width, height = scene.sensors()[0].film().size()
     fine = mi.load_file(str(path), width=str(FINER * width), height=str(FINER * height))
     shaded = np.array(mi.render(fine, spp=1)).reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
     traced = np.array(mi.render(scene, integrator=mi.load_dict({"type": "path", "max_depth": 5}), spp=spp))
-    return display_image(mi.Bitmap(np.concatenate([shaded, traced])))
+    image = Image.fromarray(np.array(display_image(mi.Bitmap(np.concatenate([shaded, traced])))))
+    names = [label._replace(y=label.y / 2) for label in labels_of(path)]
+    halves = [Label(text, 0, y, False) for text, y in (("shaded", 0), ("path-traced", 0.5))]
+    return labelled(image, [*names, *halves])
 
 
 def pictures() -> list[Picture]:
@@ -35,4 +40,4 @@ def pictures() -> list[Picture]:
 
 
 def _draw(scene: Path, path: Path) -> None:
-    picture(scene).write(str(path), quality=QUALITY)
+    picture(scene).save(path, quality=QUALITY, optimize=True)

@@ -26,7 +26,7 @@ def gallery(
     spp: Annotated[
         int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; the pictures are denoised.")
     ] = 16,
-    size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 192,
+    size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 256,
     variant: Annotated[
         str | None,
         typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),

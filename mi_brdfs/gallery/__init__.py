@@ -11,10 +11,10 @@ It needs ``pip install 'mi_brdfs[gallery]'``.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import Path
+from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -25,18 +25,22 @@ try:
 except ImportError:
     raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
 
+from ..measure.arrays import luminance
 from ..mitsuba.registry import find_models
 from ..model import Model
 from ..preview import preview_scene
 from ..render import ctrl_c, display_image, write
+from .families import by_family, portrait, stage_of, year
 from .html import Section, page
 from .sheet import Row, sheet
-from .sweeps import shown, sweeps_of
+from .sweeps import Sweep, shown, sweeps_of
 
 __all__ = ["gallery"]
 
-SIZE, SPP = 192, 16
-PER_ROW = 7
+SIZE, SPP = 256, 16
+PER_ROW = 6
+ACROSS = 3
+"""How many rows of pixels in the middle of a picture make its profile."""
 
 
 def gallery(
@@ -63,8 +67,7 @@ def gallery(
         ValueError: if there is no such model; the message has the closest name.
         OSError: if the folder cannot be created or written to.
     """
-    models = find_models(types)
-    entries = [Entry(model) for model in models]
+    entries = [Entry(model) for model in by_family(find_models(types))]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     done, total = 0, sum(len(entry.bsdfs) for entry in entries)
@@ -72,31 +75,42 @@ def gallery(
         for entry in entries:
             for bsdf in entry.bsdfs:
                 with ctrl_c() as interrupt:  # a render cannot be interrupted
-                    image = picture(bsdf, size, spp)
+                    image = shot(bsdf, entry.stage, size, spp)
                 if interrupt.pressed:
                     raise KeyboardInterrupt
-                entry.pictures.append(image)
+                entry.shots.append(image)
                 done += 1
                 on_picture(entry.type, done, total)
             entry.write(folder)
     finally:
-        begun = [entry for entry in entries if entry.pictures]
+        begun = [entry for entry in entries if entry.shots]
         if begun:
             begun[-1].write(folder)
-            _save(overview([(entry.model, entry.pictures[0]) for entry in begun]), folder / "overview.png")
+            _save(overview([(entry.model, entry.shots[0].picture) for entry in begun]), folder / "overview.png")
             text = page([entry.section() for entry in begun], f"{power_of_4(spp)} samples per pixel, denoised")
             (folder / "index.html").write_text(text, encoding="utf-8")
     return folder / "index.html"
 
 
-def picture(bsdf: dict, size: int = SIZE, spp: int = SPP, seed: int = 0) -> Image.Image:
-    """Return a material in the preview scene, denoised and tone-mapped; a square of ``size`` pixels."""
-    scene = preview_scene(bsdf)
+class Shot(NamedTuple):
+    """A picture of a material, and what it is to be judged by."""
+
+    picture: Image.Image
+    """Tone-mapped, a square."""
+    profile: np.ndarray
+    """The luminance in its middle, from left to right."""
+
+
+def shot(bsdf: dict, stage: str = "studio", size: int = SIZE, spp: int = SPP, seed: int = 0) -> Shot:
+    """Return a material in the preview scene, denoised, in a square of ``size`` pixels."""
+    scene = preview_scene(bsdf, stage)
     # The denoiser expects pixels that do not share samples; this sampler takes powers of 4.
     scene["sensor"]["film"] |= {"width": size, "height": size, "rfilter": {"type": "box"}}
     scene["sensor"]["sampler"] = {"type": "ldsampler", "sample_count": power_of_4(spp)}
     image = np.array(mi.render(mi.load_dict(scene), seed=seed))
-    return Image.fromarray(np.array(display_image(mi.Bitmap(mitsuba_oidn.denoise(image, hdr=True)))))
+    middle = slice((size - ACROSS) // 2, (size + ACROSS) // 2)
+    profile = luminance(image[middle].mean(axis=0))
+    return Shot(Image.fromarray(np.array(display_image(mi.Bitmap(mitsuba_oidn.denoise(image, hdr=True))))), profile)
 
 
 def power_of_4(spp: int) -> int:
@@ -105,37 +119,46 @@ def power_of_4(spp: int) -> int:
 
 
 def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
-    """Return an image of models with their names and years, in rows of the same length except for the last."""
-    rows, lines = [], -(-len(portraits) // PER_ROW)
-    length = -(-len(portraits) // lines)
-    for first in range(0, len(portraits), length):
-        some = portraits[first : first + length]
-        rows.append(Row("", [image for _, image in some], [f"{model.plugins[0]}\n{year(model)}" for model, _ in some]))
+    """Return an image of models with their names and years, by family: a family of up to six is in one row, beside
+    others as far as there is room."""
+    rows: list[Row] = []
+    for family, group in groupby(portraits, key=lambda each: each[0].family):
+        members = list(group)
+        for first in range(0, len(members), PER_ROW):
+            some = members[first : first + PER_ROW]
+            if not rows or len(rows[-1].pictures) + len(some) > PER_ROW:
+                rows.append(Row({}, [], []))
+            row = rows[-1]
+            if not first and family:
+                row.headings[len(row.pictures)] = family
+            row.pictures.extend(image for _, image in some)
+            row.captions.extend(f"{model.plugins[0]}\n{year(model)}" for model, _ in some)
     return sheet(rows)
 
 
-def year(model: type[Model]) -> str:
-    """Return a model's year of publication: the first year on its manual page, if there is one."""
-    found = re.search(r"\b(1[789]|20)\d\d\b", model.__doc__ or "")
-    return found[0] if found else ""
+def sweep_row(sweep: Sweep, type: str, stage: str, shots: list[Shot]) -> Row:
+    """Return the pictures of a sweep, as far as they go; under a point light, with what a limb and a terminator look
+    like."""
+    captions = [shown(value) for value in sweep.values[: len(shots)]]
+    profiles = [each.profile for each in shots] if stage == "point" else []
+    return Row({0: sweep.heading(type)}, [each.picture for each in shots], captions, profiles)
 
 
 class Entry:
-    """A model with the plugin dicts to show, its example and then its sweeps, and the pictures finished so far."""
+    """A model with the plugin dicts to show, its portrait and then its sweeps, and the pictures finished so far."""
 
     def __init__(self, model: type[Model]):
-        self.model, self.type = model, model.plugins[0]
+        self.model, self.type, self.stage = model, model.plugins[0], stage_of(model)
         self.sweeps = sweeps_of(model)
-        self.bsdfs = [model.example(), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
-        self.pictures: list[Image.Image] = []
+        self.bsdfs = [portrait(model), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
+        self.shots: list[Shot] = []
 
     def rows(self) -> list[Row]:
         """Return a row for each sweep, as far as there are pictures."""
-        pictures = iter(self.pictures[1:])
-        rows = []
-        for sweep in self.sweeps:
-            some = list(islice(pictures, len(sweep.values)))
-            rows.append(Row(sweep.heading(self.type), some, [shown(value) for value in sweep.values[: len(some)]]))
+        shots = iter(self.shots[1:])
+        rows = [
+            sweep_row(sweep, self.type, self.stage, list(islice(shots, len(sweep.values)))) for sweep in self.sweeps
+        ]
         return [row for row in rows if row.pictures]
 
     def write(self, folder: Path) -> None:
@@ -144,7 +167,7 @@ class Entry:
             _save(sheet(rows), folder / f"{self.type}.png")
 
     def section(self) -> Section:
-        rows = [(row.heading, row.captions) for row in self.rows()]
+        rows = [(row.headings[0], row.captions) for row in self.rows()]
         return Section(self.model, year(self.model), self.bsdfs[0], rows)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from itertools import groupby
 from typing import NamedTuple
 
 import mitsuba as mi
@@ -17,8 +18,8 @@ body { margin: 0 auto; padding: 1rem; max-width: 68rem; font: 1rem/1.45 system-u
 h2 { margin: 3rem 0 0.5rem; border-top: 1px solid var(--line); padding-top: 1rem }
 h2 span, footer { color: var(--faint); font-weight: normal }
 a { color: inherit }
-nav { line-height: 1.9 }
-nav a { margin-right: 0.8rem; white-space: nowrap }
+nav p { margin: 0.3rem 0; color: var(--faint) }
+nav a { margin-right: 0.6rem; color: var(--ink); display: inline-block; padding: 0.2rem 0 }
 img { max-width: 100%; height: auto }
 pre { overflow-x: auto; padding: 0.6rem 0.8rem; background: #f5f5f5; font-size: 0.85rem }
 """
@@ -29,14 +30,17 @@ class Section(NamedTuple):
 
     model: type[Model]
     year: str
-    example: dict
+    portrait: dict
     rows: list[tuple[str, list[str]]]
     """Headings and captions of the contact sheet."""
 
 
 def page(sections: list[Section], quality: str) -> str:
     """Return the page as text; ``quality`` says how the pictures were made."""
-    links = "\n".join(f'<a href="#{name}">{name}</a>' for name in (section.model.plugins[0] for section in sections))
+    links = "\n".join(
+        f"<p>{family + ': ' if family else ''}{' '.join(map(_link, group))}</p>"
+        for family, group in groupby(sections, key=lambda section: section.model.family)
+    )
     parts = "\n".join(map(_section, sections))
     return f"""<!doctype html>
 <html lang="en">
@@ -49,9 +53,12 @@ def page(sections: list[Section], quality: str) -> str:
 <body>
 <header>
 <h1>What BRDFs look like</h1>
-<p>The models of mi_brdfs in one scene: a soft key light from the left, a rim light from behind on
-the right, and a dim sky. The tangent dp_du runs around the body.</p>
-<img src="overview.png" alt="An example of each model: {", ".join(section.model.plugins[0] for section in sections)}">
+<p>The models of mi_brdfs by family and year, in one studio, each family in one colour and about equally rough. The
+tangent dp_du runs around the body. Diffuse and cartoon models are shown under a point light from the left; the curve
+below a picture is the luminance across its middle, beside that of the first one. Pictures are larger behind their
+links.</p>
+<a href="overview.png"><img src="overview.png"
+alt="A picture of each model: {", ".join(section.model.plugins[0] for section in sections)}"></a>
 <nav>
 {links}
 </nav>
@@ -66,6 +73,11 @@ the right, and a dim sky. The tangent dp_du runs around the body.</p>
 """
 
 
+def _link(section: Section) -> str:
+    name = section.model.plugins[0]
+    return f'<a href="#{name}">{name}</a>'
+
+
 def _section(section: Section) -> str:
     name, *aliases = section.model.plugins
     also = f", also <code>{'</code>, <code>'.join(aliases)}</code>" if aliases else ""
@@ -76,7 +88,7 @@ def _section(section: Section) -> str:
 <p>{_code(section.model.summary())}</p>
 {image}
 <p>The picture in the overview shows</p>
-<pre>{escape(str(section.example))}</pre>
+<pre>{escape(str(section.portrait))}</pre>
 <details><summary>Reference</summary>
 <pre>{escape(section.model.manual())}</pre>
 </details>

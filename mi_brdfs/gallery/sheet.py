@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-PAPER, INK, FAINT = "white", "#222222", "#666666"
+PAPER, INK, FAINT, PALE = "white", "#222222", "#666666", "#bbbbbb"
 GAP = 8
+FINER = 3
+"""How many times larger profiles are drawn, for smooth lines."""
 
 
 class Row(NamedTuple):
     """Pictures of the same size, side by side."""
 
-    heading: str
-    """The heading above them; may be empty."""
+    headings: dict[int, str]
+    """The headings above, by the column where they begin."""
     pictures: list[Image.Image]
     captions: list[str]
     """A caption below each picture; its second line is fainter."""
+    profiles: Sequence[np.ndarray] = ()
+    """If there are any, the brightness across each picture, to be drawn below it beside the first one, which is
+    pale."""
 
 
 def sheet(rows: list[Row]) -> Image.Image:
@@ -28,25 +35,48 @@ def sheet(rows: list[Row]) -> Image.Image:
     captions = [caption for row in rows for caption in row.captions]
     column = max(size, *(_width(font, caption) for caption in captions)) + GAP
     lines = max(caption.count("\n") for caption in captions) + 1
-    heights = [(line + GAP // 2 if row.heading else 0) + size + lines * line + 2 * GAP for row in rows]
-    width = max([column * len(row.pictures) for row in rows] + [_width(font, row.heading) + GAP for row in rows])
+    heights = [
+        (line + GAP // 2 if row.headings else 0) + size + (size // 3 if row.profiles else 0) + lines * line + 2 * GAP
+        for row in rows
+    ]
+    reach = [column * at + _width(font, text) + GAP for row in rows for at, text in row.headings.items()]
+    width = max([column * len(row.pictures) for row in rows] + reach)
 
     image = Image.new("RGB", (width + GAP, sum(heights) + GAP), PAPER)
     draw = ImageDraw.Draw(image)
     top = GAP
     for row, height in zip(rows, heights, strict=True):
         y = top
-        if row.heading:
-            draw.text((GAP, y), row.heading, INK, font)
-            y += line + GAP // 2
+        for at, text in row.headings.items():
+            draw.text((GAP + at * column, y), text, INK, font)
+        y += line + GAP // 2 if row.headings else 0
         for k, (picture, caption) in enumerate(zip(row.pictures, row.captions, strict=True)):
             x = GAP + k * column
-            image.paste(picture, (x + (column - GAP - size) // 2, y))
+            left = x + (column - GAP - size) // 2
+            image.paste(picture, (left, y))
+            below = y + size
+            if row.profiles:
+                image.paste(_profile(row.profiles, k, size), (left, below))
+                below += size // 3
             for number, text in enumerate(caption.split("\n")):
-                middle = (x + (column - GAP) / 2, y + size + GAP // 4 + number * line)
+                middle = (x + (column - GAP) / 2, below + GAP // 4 + number * line)
                 draw.text(middle, text, FAINT if number else INK, font, anchor="ma")
         top += height
     return image
+
+
+def _profile(profiles: Sequence[np.ndarray], k: int, size: int) -> Image.Image:
+    """Return the k-th profile over the first one, both from zero to the brightest of all."""
+    width, height = size * FINER, size // 3 * FINER
+    image = Image.new("RGB", (width, height), PAPER)
+    draw = ImageDraw.Draw(image)
+    top = max(max(np.max(each) for each in profiles), 1e-9)
+    floor = height - 2 * FINER
+    for each, colour in ((profiles[0], PALE), (profiles[k], INK)):
+        x = (np.arange(len(each)) + 0.5) * width / len(each)
+        y = floor - np.clip(each / top, 0, 1) * (floor - 3 * FINER)
+        draw.line(list(zip(x.tolist(), y.tolist(), strict=True)), colour, round(1.4 * FINER), joint="curve")
+    return image.resize((size, height // FINER), Image.Resampling.LANCZOS)
 
 
 def _width(font: Any, text: str) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 from ..mitsuba.registry import is_own
 from ..model import Model
 from ..parameters import Choice, Number, Parameter, Reflectance
+from .families import BLUE, CLAY, GREEN, RED, rgb
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,7 @@ def sweep(parameter: str, *values: Any, **given: Any) -> Sweep:
     return Sweep(parameter, values, given)
 
 
-def rgb(*channels: float) -> dict:
-    return {"type": "rgb", "value": list(channels)}
-
-
-RED, GOLD, CLAY = rgb(0.6, 0.1, 0.05), rgb(0.9, 0.6, 0.25), rgb(0.6, 0.35, 0.2)
-GREEN, BLUE, INDIGO = rgb(0.1, 0.3, 0.2), rgb(0.1, 0.2, 0.4), rgb(0.02, 0.03, 0.1)
+GOLD, INDIGO = rgb(0.9, 0.6, 0.25), rgb(0.02, 0.03, 0.1)
 
 SWEEPS: dict[str, list[Sweep]] = {
     "ashikhminshirley": [

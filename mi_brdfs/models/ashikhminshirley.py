@@ -41,6 +41,8 @@ class AshikhminShirley(Model):
      "exponent_u": 20, "exponent_v": 400}
     """
 
+    family = "cosine lobes"
+
     diffuse_reflectance = Reflectance(0.5, "colour Rd of the diffuse lobe")
     specular_reflectance = Reflectance(0.05, "reflectance Rs of the specular lobe at normal incidence")
     exponent = Number(100, (0, 1e6), "exponent n: the higher, the narrower the highlight", anisotropic=True)

@@ -47,6 +47,8 @@ class BlinnPhong(Model):
      "exponent": 80, "normalization": "ndf"}
     """
 
+    family = "cosine lobes"
+
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")

@@ -44,6 +44,8 @@ class Brady(Model):
     {"type": "brady", "f0": 0.6, "exponent": 0.8, "diffuse_reflectance": 0.1}
     """
 
+    family = "fits to measurements"
+
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
     specular_reflectance = Colour(1, (0, float("inf")), "scale ρs of the specular lobe")
     f0 = Reflectance(0.04, "Fresnel reflectance at normal incidence")

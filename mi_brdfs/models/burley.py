@@ -64,6 +64,7 @@ class Burley(Model):
     """
 
     plugins = ("burley", "disney")
+    family = "production"
 
     base_color = Reflectance(0.5, "base colour C")
     subsurface = Number(0, (0, 1), "share of the subsurface approximation in the base lobe")

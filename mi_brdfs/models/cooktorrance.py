@@ -47,6 +47,8 @@ class CookTorrance(Model):
     {"type": "cooktorrance", "material": "Cu", "alpha": 0.25}
     """
 
+    family = "microfacets"
+
     diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     alpha = Number(0.1, (1e-4, 2), "roughness α (the paper's m), the root mean square slope of the facets")

@@ -39,6 +39,8 @@ class EON(Model):
     {"type": "eon", "reflectance": {"type": "rgb", "value": [0.6, 0.35, 0.2]}, "roughness": 0.8}
     """
 
+    family = "diffuse"
+
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     roughness = Number(0.5, (0, 1), "roughness r")
 

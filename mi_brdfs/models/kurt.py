@@ -38,6 +38,8 @@ class Kurt(Model):
     {"type": "kurt", "diffuse_reflectance": {"type": "rgb", "value": [0.03, 0.2, 0.2]}, "alpha_1": 0.05, "alpha_2": 0.3}
     """
 
+    family = "microfacets"
+
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
     specular = PerLobe(
         8,

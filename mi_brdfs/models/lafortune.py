@@ -45,6 +45,8 @@ class Lafortune(Model):
     {"type": "lafortune", "exponent_1": 20, "cx_2": 0.9, "cy_2": 0.9, "cz_2": 0.7, "exponent_2": 9}
     """
 
+    family = "cosine lobes"
+
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
     specular = PerLobe(
         8,

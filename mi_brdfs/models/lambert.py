@@ -24,6 +24,8 @@ class Lambert(Model):
     {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
     """
 
+    family = "diffuse"
+
     reflectance = Reflectance(0.5, "albedo ρ")
 
     energy = Energy(0.5, [({}, 1)])

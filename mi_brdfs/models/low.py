@@ -49,6 +49,8 @@ class Low(Model):
     {"type": "low", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.2]}, "a": 50.0, "b": 2000, "c": 1.2}
     """
 
+    family = "fits to measurements"
+
     diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     a = Colour(1, (0, float("inf")), "scale A")
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")

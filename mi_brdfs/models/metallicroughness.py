@@ -47,6 +47,8 @@ class MetallicRoughness(Model):
     {"type": "metallicroughness", "base_color": {"type": "rgb", "value": [0.9, 0.6, 0.3]}, "metallic": 1.0}
     """
 
+    family = "production"
+
     base_color = Reflectance(0.5, "base colour C")
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
     roughness = Number(0.5, (0.01, 1), "roughness r; its square is the facets' α")

@@ -153,6 +153,8 @@ class Microfacet(Model):
     {"type": "microfacet", "distribution": "gtr", "alpha": 0.2, "gamma": 1.5, "shadowing": "vcavity", "material": "Al"}
     """
 
+    family = "microfacets"
+
     diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     distribution = OneOf({word: it.parameters for word, it in DISTRIBUTIONS.items()}, "distribution D of the facets")

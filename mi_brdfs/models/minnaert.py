@@ -40,6 +40,8 @@ class Minnaert(Model):
     {"type": "minnaert", "reflectance": {"type": "rgb", "value": [0.3, 0.28, 0.25]}, "exponent": 0.7}
     """
 
+    family = "diffuse"
+
     reflectance = Reflectance(0.5, "scale ρ; for k >= 1 the albedo at normal incidence")
     exponent = Number(1.5, (0, 100), "exponent k: above 1 the limb darkens, below it brightens")
     normalization = Choice(("energy", "published", "none"), "the form at grazing angles")

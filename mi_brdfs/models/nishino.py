@@ -47,6 +47,8 @@ class Nishino(Model):
     {"type": "nishino", "kappa": -8, "gamma": 40, "material": "Cu"}
     """
 
+    family = "fits to measurements"
+
     diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe")
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")

@@ -45,6 +45,8 @@ class OrenNayar(Model):
     {"type": "orennayar", "reflectance": {"type": "rgb", "value": [0.6, 0.35, 0.2]}, "sigma": 0.5, "model": "full"}
     """
 
+    family = "diffuse"
+
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     sigma = Number(0.35, (0, 1.5708), "standard deviation σ of the facets' slope angle, in radians",
                    spelling=Spelling("alpha", (0, 2.2), math.sqrt(0.5), "√2 σ, as a Beckmann roughness"))  # fmt: skip
@@ -80,6 +82,8 @@ class RoughDiffuse(Model):
 
     {"type": "roughdiffuse", "alpha": 0.4, "use_fast_approx": True}
     """
+
+    family = "diffuse"
 
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     alpha = Number(0.2, (0, 2.2), "roughness α of the surface, as of a Beckmann distribution")

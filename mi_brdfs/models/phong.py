@@ -39,6 +39,8 @@ class Phong(Model):
     {"type": "phong", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.4]}, "exponent": 60}
     """
 
+    family = "cosine lobes"
+
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")

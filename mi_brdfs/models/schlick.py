@@ -60,6 +60,7 @@ class Schlick94(Model):
     """
 
     plugins = ("schlick",)
+    family = "microfacets"
 
     specular_reflectance = Reflectance(0.04, "reflectance C at normal incidence")
     diffuse_reflectance = Reflectance(None, "reflectance C' of a diffuse layer below; omitted by default")

@@ -48,6 +48,8 @@ class Toon(Model):
     {"type": "toon", "diffuse_reflectance": {"type": "rgb", "value": [0.6, 0.15, 0.1]}, "diffuse_shadow": 0.3}
     """
 
+    family = "cartoon"
+
     diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy")
     diffuse_threshold = Number(0.5, (0, 1), "cosine td at which the lit band ends")
     diffuse_smooth = Number(0.05, (0, 1), "half width sd of its edge, in the cosine; 0 is hard, with no derivative")

@@ -38,6 +38,8 @@ class Walter(Model):
     {"type": "walter", "material": "Au", "alpha": 0.2}
     """
 
+    family = "microfacets"
+
     diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
     specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
     alpha = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)

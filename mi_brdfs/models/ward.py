@@ -50,6 +50,8 @@ class Ward(Model):
     {"type": "ward", "alpha_u": 0.05, "alpha_v": 0.3}
     """
 
+    family = "microfacets"
+
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
     alpha = Number(0.1, (1e-4, 1), "roughness α, the root mean square slope of the facets",

@@ -48,6 +48,8 @@ class Wrap(Model):
     {"type": "wrap", "reflectance": {"type": "rgb", "value": [0.6, 0.35, 0.2]}, "wrap": 0.5, "domain": "sphere"}
     """
 
+    family = "diffuse"
+
     reflectance = Reflectance(0.5, "albedo ρ")
     wrap = Number(1, (0, 1), "w: how far behind the terminator the light reaches, as a cosine")
     exponent = Number(2, (0, 100), "exponent n: the higher, the darker the terminator")

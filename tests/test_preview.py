@@ -1,0 +1,86 @@
+"""The preview scene: it shows any material in every variant and on every stage, and the body is what it should be."""
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import direction, is_scalar, small_picture
+
+import mi_brdfs
+from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.preview import STAGES
+from mi_brdfs.preview.body import ANGLE, AZIMUTH, BEVEL, CENTRE, ELEVATION, RADIUS
+from mi_brdfs.preview.studio import studio
+
+GOLD = {"type": "walter", "material": "Au", "alpha": 0.1}
+
+
+@pytest.mark.parametrize("name", [name for model in own_models() for name in model.plugins])
+def test_preview(name, variant):
+    scene = mi.load_dict(mi_brdfs.preview_scene({"type": name}))
+    if not is_scalar():
+        small_picture(scene)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_preview_takes_a_loaded_bsdf_and_shows_it():
+    bright, dark = (
+        small_picture(mi.load_dict(mi_brdfs.preview_scene(mi.load_dict({"type": "lambert", "reflectance": value}))))
+        for value in (0.9, 0.1)
+    )
+    assert bright[16, 16].mean() > 4 * dark[16, 16].mean()
+    assert bright[0].mean() == pytest.approx(dark[0].mean(), rel=0.1)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_stage(stage, variant):
+    scene = mi_brdfs.preview_scene({"type": "phong"}, stage)
+    scene["sensor"]["film"] |= {"width": 24, "height": 24}
+    image = np.array(mi.render(mi.load_dict(scene), spp=4))
+    assert np.isfinite(image).all() and image.max() > 0.3
+
+
+def test_a_stage_that_is_not_there():
+    with pytest.raises(ValueError, match="no stage 'stduio'; there are studio, lamp or point"):
+        mi_brdfs.preview_scene({"type": "phong"}, "stduio")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_gold_looks_like_gold_and_no_picture_is_blown_out():
+    """Orange yellow, light and dark, in a picture that is nowhere much brighter than white paper."""
+    image = small_picture(mi.load_dict(mi_brdfs.preview_scene(GOLD)), 64)
+    ball = image[16:40, 20:44].reshape(-1, 3)
+    red, green, blue = ball.mean(axis=0)
+    assert 0.7 < green / red < 0.85 and blue / red < 0.4
+    assert np.quantile(ball[:, 0], 0.95) > 6 * np.quantile(ball[:, 0], 0.05)
+    white = small_picture(mi.load_dict(mi_brdfs.preview_scene({"type": "lambert", "reflectance": 1.0})), 64)
+    assert 0.8 < np.quantile(white, 0.99) < 1.4
+
+
+def test_the_studio_is_the_same_every_time():
+    once = studio()
+    studio.cache_clear()
+    np.testing.assert_array_equal(studio(), once)
+    assert once.shape == (256, 512, 3) and once.dtype == np.float32 and once.min() > 0.05 and once.max() < 5
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_body_is_a_ball_with_a_facet_and_a_groove():
+    """Normals agree with the triangles, also where the ball was cut."""
+    params = mi.traverse(mi_brdfs.preview_scene({"type": "lambert"})["body"])
+    positions, normals = (np.array(params[f"vertex_{name}"]).reshape(-1, 3) for name in ("positions", "normals"))
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
+    around = np.linalg.norm(positions - [0, 0, CENTRE], axis=1)
+    level = abs(positions[:, 2] - CENTRE) < 0.2
+    np.testing.assert_allclose(around[level], RADIUS, atol=1e-3)
+    flat = normals @ (facet := direction(np.degrees(np.pi / 2 - ELEVATION), np.degrees(AZIMUTH))) > 0.99999
+    assert flat.sum() > 1000
+    distance = (positions[flat] - [0, 0, CENTRE]) @ facet
+    np.testing.assert_allclose(distance, RADIUS * np.cos(ANGLE), atol=BEVEL / 2)
+    groove = (positions[:, 2] < CENTRE - 0.3) & (positions[:, 2] > CENTRE - 0.6)
+    assert around[groove].min() == pytest.approx(RADIUS - 0.055, abs=2e-3)
+    corners = positions[np.array(params["faces"]).reshape(-1, 3)]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    large = np.linalg.norm(across, axis=1) > 1e-6
+    own = normals[np.array(params["faces"]).reshape(-1, 3)].mean(axis=1)
+    cosine = (across * own).sum(axis=1) / np.linalg.norm(across, axis=1).clip(1e-12) / np.linalg.norm(own, axis=1)
+    assert np.quantile(cosine[large], 0.01) > 0.97 and cosine[large].min() > 0.8
