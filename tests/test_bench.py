@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from generate import readme
+from generate.models import model_table
 from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, phong
 from rich.console import Console
 
@@ -452,20 +453,23 @@ def test_results_in_markdown():
     assert "* Of 3 targets 2 are missed !" in text
 
 
-def test_the_readme_has_the_summary(monkeypatch, tmp_path):
-    """Between its marks, once; what is outside stays."""
+def test_a_page_has_the_summary(monkeypatch, tmp_path):
     monkeypatch.setattr(readme, "MEASURED", tmp_path / "bench.json")
-    monkeypatch.setattr(readme, "README", tmp_path / "README.md")
     readme.MEASURED.write_text(json.dumps(results().to_dict()), encoding="utf-8")
-    models = "<!-- models -->\nold\n<!-- end of models -->\n"
-    readme.README.write_text(f"{models}<!-- bench -->\nold\n<!-- end of bench -->\nafter\n", encoding="utf-8")
+    assert readme.bench() == f"{readme.INTRODUCTION}\n{results().markdown()}"
+
+
+def test_the_readme_has_the_models(monkeypatch, tmp_path):
+    """Between its marks, once; what is outside stays."""
+    monkeypatch.setattr(readme, "README", tmp_path / "README.md")
+    readme.README.write_text("before\n<!-- models -->\nold\n<!-- end of models -->\nafter\n", encoding="utf-8")
     for _ in range(2):
-        readme.page().make()
-        text = readme.README.read_text(encoding="utf-8")
-        assert text.endswith(f"\n<!-- bench -->\n\n{results().markdown()}\n<!-- end of bench -->\nafter\n")
-    readme.README.write_text(models, encoding="utf-8")
-    with pytest.raises(ValueError, match="no place between <!-- bench -->"):
-        readme.page().make()
+        readme.README.write_text(readme.text(), encoding="utf-8")
+        text = f"before\n<!-- models -->\n\n{model_table()}\n<!-- end of models -->\nafter\n"
+        assert readme.README.read_text(encoding="utf-8") == text
+    readme.README.write_text("before\nafter\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="no place between <!-- models -->"):
+        readme.text()
 
 
 # --- All together ---------------------------------------------------------------------------------------------------

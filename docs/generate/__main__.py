@@ -18,7 +18,7 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 
 def everything() -> list[Page | Picture]:
     """Return all generated files, each after its sources."""
-    pages = [*scenes.pages(), *models.pages(), readme.page()]
+    pages = [*scenes.pages(), *models.pages(), *readme.pages()]
     return [*pages, *models.pictures(), *scenes.pictures(), *shading.pictures()]
 
 
@@ -29,8 +29,8 @@ def main(
     every: Annotated[bool, typer.Option("--all", help="Make everything, stale or not.")] = False,
     check: Annotated[bool, typer.Option("--check", help="List what is stale; exit with 1 if anything is.")] = False,
 ) -> None:
-    """Make stale pages and pictures: the models' reference, the tables in README.md, the scenes' page and the scene
-    with all models; thumbnails, sweeps, pictures of scenes."""
+    """Make stale pages and pictures: the models' reference, the table in README.md, the results of the bench, the
+    scenes' page and the scene with all models; thumbnails, sweeps, pictures of scenes."""
     mi.set_variant("llvm_ad_rgb")
     made, wanted = everything(), set(names or ())
     if unknown := wanted - {each.path.stem for each in made}:

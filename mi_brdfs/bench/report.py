@@ -1,4 +1,4 @@
-"""The results, figures with their targets: as tables, as JSON, and as the README's summary."""
+"""The results, figures with their targets: as tables, as JSON, and as the summary in docs/bench.md."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Results:
         return [_table(section, self.of(section)) for section in self.sections]
 
     def markdown(self) -> str:
-        """Return the README's summary."""
+        """Return the summary in docs/bench.md."""
         return summary(self.figures, self.setup, self.cases)
 
 

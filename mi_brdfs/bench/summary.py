@@ -1,4 +1,4 @@
-"""The README's summary of the results, in Markdown."""
+"""The summary of the results in docs/bench.md, in Markdown."""
 
 from __future__ import annotations
 

@@ -1,0 +1,251 @@
+"""README.md works as it stands, from top to bottom, and what it says of numbers and of other files is so."""
+
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mi_brdfs
+from mi_brdfs.bench.cases import Case
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+# --- Its blocks -----------------------------------------------------------------------------------------------------
+
+SHORTER = {
+    "mi-brdfs render": " --spp 1 -Dwidth=96",
+    "mi-brdfs gallery": " --size 32 --spp 4",
+    "mi-brdfs bench": " --only recompiles",
+}
+"""What the README names to make commands that take long shorter, and here is added to them."""
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def lines():
+    """Return the lines of all shell blocks without what makes and fills an environment, as the tests run in one, and
+    without the command that runs them."""
+    for line in "".join(blocks("sh")).splitlines():
+        parts = [part for part in line.split("  #")[0].rstrip().split(" && ") if not makes_environment(part)]
+        parts = [part + next((more for c, more in SHORTER.items() if part.startswith(c)), "") for part in parts]
+        if parts and not parts[0].startswith("python -m pytest"):
+            yield " && ".join(parts)
+
+
+def makes_environment(command):
+    return command.startswith(("python3 -m venv", ". .venv", "pip install"))
+
+
+def copy_of_checkout(folder):
+    leave_out = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info")
+    return Path(shutil.copytree(ROOT, folder / "checkout", ignore=leave_out))
+
+
+@pytest.mark.parametrize("line", [*lines()])
+def test_shell(line, tmp_path):
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-c", line], cwd=copy_of_checkout(tmp_path), env=os.environ | {"PATH": path},
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_no_command_is_left_out():
+    assert {line.split()[1] for line in lines()} == {
+        "list", "info", "doctor", "render", "plot", "gallery", "check", "energy", "bench",
+    }  # fmt: skip
+    assert all(
+        option in README for more in SHORTER.values() for option in re.findall(r"--only \w+|--spp|-Dwidth", more)
+    )
+
+
+def test_python(tmp_path):
+    """All blocks in one process, in order; the picture is neither dark nor clipped."""
+    show = "print(copper['diffuse_reflectance'] + max(copper['specular_reflectance']['value']))"
+    code = "\n".join([*blocks("python"), show])
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.splitlines()[-1]) <= 1
+    picture = np.array(mi.Bitmap(str(tmp_path / "copper.png")))
+    assert 40 < picture.mean() < 200 and (picture == 255).all(axis=-1).mean() < 0.05
+    red, _, blue = picture[200:350, 100:400, :3].mean(axis=(0, 1))
+    assert red > 1.2 * blue
+
+
+def test_the_gate_finds_its_command():
+    (command,) = re.findall(r"^python3 -m venv .* pytest.*$", README, re.MULTILINE)
+    assert "[dev]" in command and "./tests/guest" in command
+
+
+# --- Names and numbers ----------------------------------------------------------------------------------------------
+
+
+def test_extras_are_there():
+    extras = set(re.findall(r"^(\w+) = ", PROJECT.split("[project.optional-dependencies]")[1].split("\n[")[0], re.M))
+    assert set(re.findall(r'"\.\[(\w+)\]"', README)) == {"llvm", "all", "dev"} <= extras
+
+
+def test_links_lead_to_files():
+    targets = re.findall(r"\]\((?!\w+:)([^)#]*)(?:#([\w-]+))?\)", README)
+    assert len(targets) > 30
+    for file, anchor in targets:
+        path = ROOT / file
+        assert path.exists(), file
+        assert not anchor or f"## {anchor}\n" in path.read_text(encoding="utf-8"), anchor
+
+
+def test_links_are_absolute_where_the_address_is_known(monkeypatch):
+    """In the description that the package index shows."""
+    interface = types.SimpleNamespace(MetadataHookInterface=type("Hook", (), {"root": str(ROOT)}))
+    monkeypatch.setitem(sys.modules, "hatchling.metadata.plugin.interface", interface)
+    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    unknown, known = {}, {"urls": {"Source": "https://forge.example/mi_brdfs"}}
+    for metadata in unknown, known:
+        module.Description().update(metadata)
+    assert unknown["readme"]["text"] == README
+    text = known["readme"]["text"]
+    assert not re.search(r"\]\((?!https://)", text) and text.count("](") == README.count("](")
+    assert "](https://forge.example/mi_brdfs/raw/HEAD/docs/gallery.jpg)" in text
+    assert "](https://forge.example/mi_brdfs/blob/HEAD/docs/bench.md)" in text
+
+
+def test_noise_and_speed():
+    """The ranges are those of the last bench, rounded."""
+    bench = json.loads((ROOT / "docs" / "bench.json").read_text(encoding="utf-8"))
+    same = {case.beside for case in (Case(**case) for case in bench["cases"].values()) if case.same}
+    paragraph = README.split("## Noise and speed\n")[1].split("\n## ")[0]
+    said = [tuple(map(float, pair)) for pair in re.findall(r"([\d.]+) to ([\d.]+) times", paragraph)]
+    compared = [f for f in bench["figures"] if f["section"] == "variance" and f["subject"] in same]
+    noise = [f["value"] for f in compared if f["name"] in ("sphere", "Cornell box")]
+    scalar = [f["value"] for f in bench["figures"] if f["section"] == "scalar" and f["targets"]]
+    assert said == [(round(min(noise), 1), round(max(noise), 1)), (round(min(scalar)), round(max(scalar)))]
+
+
+def test_citation():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    for ours, theirs in ("version", "version"), ("license", "license"), ("authors = [{ name", "  - name"):
+        value = re.search(rf'^{re.escape(ours)} = "(.*?)"', PROJECT, re.MULTILINE)[1]
+        assert f"\n{theirs}: {value}\n" in citation
+    assert f"\nversion: {mi_brdfs.__version__}\n" in citation
+
+
+# --- Scenes of Mitsuba 0.6 ------------------------------------------------------------------------------------------
+
+COLOUR = '<bsdf type="phong">{}</bsdf>'
+WEIGHT = '<float name="weight" value="0.5"/><bsdf type="phong"/><bsdf type="ward"/>'
+CHECKS = '<texture name="diffuseReflectance" type="checkerboard"/>'
+EDITS = {
+    '<shape type="disk"><transform name="toWorld">{}</transform></shape>': [
+        ("lookAt", '<lookAt origin="0, 0, 1" target="0, 0, 0"/>', '<lookat origin="0, 0, 1" target="0, 0, 0"/>')
+    ],
+    COLOUR: [
+        ("<srgb", '<srgb name="diffuseReflectance" value="#804020"/>',
+         '<rgb name="diffuseReflectance" value="0.216, 0.051, 0.014"/>'),
+        ("#804020", '<rgb name="diffuseReflectance" value="#804020"/>',
+         '<rgb name="diffuseReflectance" value="0.216, 0.051, 0.014"/>'),
+        ("three values", '<spectrum name="diffuseReflectance" value="0.2, 0.1, 0.1"/>',
+         '<rgb name="diffuseReflectance" value="0.2, 0.1, 0.1"/>'),
+        ("ensureEnergyConservation", '<boolean name="ensureEnergyConservation" value="true"/>', ""),
+        ("specularSamplingWeight", '<float name="specularSamplingWeight" value="0.5"/>', ""),
+        ("texture `scale`", '<texture name="diffuseReflectance" type="scale"><float name="scale" value="2"/></texture>',
+         CHECKS),
+    ],
+    '<emitter type="constant">{}</emitter>': [
+        ("<blackbody", '<blackbody name="radiance" temperature="5000"/>',
+         '<spectrum type="blackbody" name="radiance"><float name="temperature" value="5000"/></spectrum>')
+    ],
+    '<bsdf type="roughdiffuse">{}</bsdf>': [
+        ("of `roughdiffuse`", '<spectrum name="diffuseReflectance" value="0.3"/>',
+         '<spectrum name="reflectance" value="0.3"/>')
+    ],
+    '<integrator type="path">{}</integrator>': [
+        ("strictNormals", '<boolean name="strictNormals" value="true"/>', "")
+    ],
+    '<sensor type="perspective"><film type="hdrfilm">{}</film></sensor>': [
+        ("highQualityEdges", '<boolean name="highQualityEdges" value="true"/>', "")
+    ],
+    '<shape type="ply"><string name="filename" value="{{ply}}"/>{}</shape>': [
+        ("maxSmoothAngle", '<float name="maxSmoothAngle" value="30"/>', "")
+    ],
+    '<shape type="sphere">{}</shape>': [
+        ("with `phong`", '<bsdf type="roughconductor"><string name="distribution" value="phong"/></bsdf>',
+         '<bsdf type="microfacet"><string name="distribution" value="blinn"/></bsdf>'),
+        ("mixturebsdf", '<bsdf type="mixturebsdf"><string name="weights" value="1"/><bsdf type="phong"/></bsdf>',
+         f'<bsdf type="blendbsdf">{WEIGHT}</bsdf>'),
+        ("`bump`", '<bsdf type="bump"><texture type="checkerboard"/><bsdf type="phong"/></bsdf>',
+         '<bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="phong"/></bsdf>'),
+    ],
+    '<sensor type="perspective">{}</sensor>': [
+        *((f"`{name}`", f'<sampler type="{name}"/>', f'<sampler type="{instead}"/>')
+          for name in ("halton", "hammersley", "sobol") for instead in ("multijitter", "ldsampler")),
+        ("ldrfilm", '<film type="ldrfilm"/>', '<film type="hdrfilm"/>'),
+    ],
+    "{}": [("`sun`", '<emitter type="sun"/>', '<emitter type="sunsky"/>'),
+           ("`sky`", '<emitter type="sky"/>', '<emitter type="sunsky"/>')],
+}  # fmt: skip
+"""Elements of 0.6 by what surrounds them: a word of the row in README.md, what it refuses, and what it says instead."""
+
+UNCHANGED = [
+    '<bsdf type="phong" id="a"/><shape type="sphere"><ref id="a"/></shape>',
+    '<default name="n" value="9"/><bsdf type="phong"><float name="exponent" value="$n"/></bsdf>',
+    COLOUR.format('<spectrum name="diffuseReflectance" value="0.3"/>'),
+    COLOUR.format('<spectrum name="diffuseReflectance" value="400:0.1, 700:0.9"/>'),
+    COLOUR.format(CHECKS.replace("/>", '><float name="uscale" value="3"/></texture>')),
+    '<bsdf type="twosided"><bsdf type="ward"/></bsdf>',
+    '<bsdf type="mask"><float name="opacity" value="0.5"/><bsdf type="ward"/></bsdf>',
+    f'<bsdf type="blendbsdf">{WEIGHT}</bsdf>',
+]
+
+
+def load_06(text):
+    return mi.load_string(f'<scene version="0.6.0">{text}</scene>')
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("outside", EDITS)
+def test_edits_of_06(outside, tmp_path):
+    """Each is needed, and enough."""
+    mesh = mi.Mesh("triangle", 3, 1)
+    mesh.write_ply(str(tmp_path / "triangle.ply"))
+    table = README.split("| in 0.6 | instead |\n")[1].split("\n\n")[0]
+    for word, old, new in EDITS[outside]:
+        assert word in table
+        around = outside.replace("{{ply}}", str(tmp_path / "triangle.ply"))
+        with pytest.raises(RuntimeError):
+            load_06(around.replace("{}", old))
+        load_06(around.replace("{}", new))
+
+
+def test_every_row_is_tested():
+    table = README.split("| in 0.6 | instead |\n")[1].split("\n\n")[0].splitlines()[1:]
+    words = [word for edits in EDITS.values() for word, _, _ in edits]
+    assert [row for row in table if not any(word in row.split("|")[1] for word in words)] == []
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("text", UNCHANGED)
+def test_unchanged_from_06(text):
+    load_06(text)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_includes_of_06(tmp_path):
+    included = '<scene version="0.6.0"><bsdf type="phong" id="a"><spectrum name="diffuseReflectance" value="1"/></bsdf>'
+    (tmp_path / "a.xml").write_text(included + "</scene>")
+    load_06(f'<include filename="{tmp_path / "a.xml"}"/><shape type="sphere"><ref id="a"/></shape>')
