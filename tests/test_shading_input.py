@@ -18,7 +18,7 @@ import mi_brdfs
         ({"tonemap": "filmic"}, r'shading: tonemap = "filmic" is unknown; it must be one of "none" or "reinhard"'),
         ({"area_lights": "center"}, r'must be one of "sample" or "centre"'),
         ({"shadows": "yes"}, r'shading: shadows = "yes" is a string; it must be true or false'),
-        ({"max_depth": 3}, "shading: unknown parameter max_depth; did you mean"),
+        ({"max_depth": 3}, "shading: unknown parameter max_depth; known are "),
     ],
 )
 def test_bad_parameters(given, message):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 
+from ..mitsuba.registry import plugin_names
+from ..parameters.messages import brief, meant
+
 
 def one_line(error: BaseException) -> str:
     """Reduce a Mitsuba exception to one line: its cause, with the place in the scene file if known."""
@@ -19,7 +22,7 @@ def one_line(error: BaseException) -> str:
         return f"{broken[1]}: line {broken[3]}: {broken[2]}"
     if unused:
         return f"-D {', '.join(unused)}: the scene has no <default> parameter of this name"
-    sentence = _hint(text) or _last_of_traceback(rest if place else text)
+    sentence = _hint(text) or _unknown_type(text) or _last_of_traceback(rest if place else text)
     return f"{place[1]}: line {place[2]}: {sentence}" if place else sentence
 
 
@@ -28,6 +31,17 @@ def _hint(text: str) -> str | None:
     pattern = r'unreferenced propert.+? plugin of type "(\w+)":\n  - string ".*?": "(\1: .+?)"$'
     found = re.search(pattern, text, re.DOTALL | re.MULTILINE)
     return found and found[2]
+
+
+def _unknown_type(text: str) -> str | None:
+    """What is wrong where no plugin has a type, and which one may have been meant."""
+    found = re.search(r'(\w+) plugin of type "(.+)": .*Plugin "\2" not found', text, re.DOTALL)
+    if not found:
+        return None
+    kind, name = found[1].replace("unknown", "").strip(), brief(found[2])
+    closest = meant(name, plugin_names())
+    hint = f'; did you mean "{closest}"?' if closest else ""
+    return f'there is no {f"{kind} " if kind else ""}plugin "{name}"{hint}'
 
 
 def _last_of_traceback(text: str) -> str:

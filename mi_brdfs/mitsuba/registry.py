@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import importlib
 import pkgutil
@@ -23,6 +22,7 @@ from ..microfacet.shadowing import Shadowing
 from ..microfacet.term import Term
 from ..model import Model, Plugin, full_name
 from ..models.microfacet import add_term
+from ..parameters.messages import meant
 from . import llvm
 from .bsdf import bsdf_class
 from .integrator import integrator_class
@@ -134,6 +134,11 @@ def list_models() -> list[str]:
     return [name for model in all_models() for name in model.plugins if MODELS[name] is model]
 
 
+def plugin_names() -> set[str]:
+    """Return the names of all plugins, of the pack, of guests, and of Mitsuba."""
+    return {*MODELS, *INTEGRATORS, *_builtins()}
+
+
 def all_models() -> list[type[Model]]:
     """Return the models in the same order, each once."""
     return sorted(set(MODELS.values()), key=lambda model: model.plugins)
@@ -173,8 +178,9 @@ def info(name: str) -> str:
 
 def _find(name: str, plugins: dict) -> Any:
     if name not in plugins:
-        closest = difflib.get_close_matches(str(name), plugins, n=1, cutoff=0.0)[0]
-        raise ValueError(f"There is no model {name!r}; did you mean {closest!r}?")
+        closest = meant(str(name), plugins)
+        hint = f"did you mean {closest!r}?" if closest else f"there are {', '.join(sorted(plugins))}."
+        raise ValueError(f"There is no model {name!r}; {hint}")
     return plugins[name]
 
 

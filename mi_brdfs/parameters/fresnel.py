@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,7 +11,7 @@ from ..math import clamp
 from ..microfacet.fresnel import Conductor, Dielectric, Fresnel, Schlick, Unit
 from .colours import constant_texture, evaluate_colour, rgb_texture, scaled_colour
 from .groups import OneOf
-from .messages import interval, listed, shown
+from .messages import interval, listed, meant, shown
 from .parameter import Parameter, ParameterRow
 from .reader import PropertyReader, Range
 
@@ -113,11 +112,14 @@ class FresnelSet(Parameter):
         folder = Path(mi.__file__).parent / "data" / "ior"
         known = sorted(path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd"))
         if material not in known:
-            closest = difflib.get_close_matches(material, known, n=3, cutoff=0.0)
+            closest = meant(material, known)
+            hint = f'; did you mean "{closest}"? It' if closest else "; it"
+            # Of two measurements of a material, as Cu and Cu_palik, the first.
+            first = [it for it in known if not (it.endswith("_palik") and it.removesuffix("_palik") in known)]
             raise reader.error(
                 "material",
-                f"= {shown(material)} is unknown; the closest of Mitsuba's {len(known)} conductors are "
-                f'{listed(closest, quote=True)}, and "none" means F = 1',
+                f'= {shown(material)} is unknown{hint} must be "none", for F = 1, or one of Mitsuba\'s conductors '
+                + ", ".join(first),
             )
         return {name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}
 

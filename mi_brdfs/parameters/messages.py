@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -48,6 +49,16 @@ def listed(words: Iterable[str], last: str = "or", quote: bool = False) -> str:
     """Join words as a sentence lists them: a, b or c."""
     words = [f'"{word}"' if quote else word for word in words]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def meant(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that may have been meant by another one: a close one, with the same letters if there is
+    such, or one that begins with it. Return None if there is none."""
+    known = list(known)
+    close = difflib.get_close_matches(name, known, n=3)
+    same = [it for it in close if sorted(it) == sorted(name)]
+    longer = [it for it in known if len(name) > 2 and it.startswith(name)]
+    return next(iter([*same, *close, *longer]), None)
 
 
 def interval(low: float, high: float) -> str:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable
 from typing import Any
 
 import mitsuba as mi
 
-from .messages import brief, interval, kind_of, listed, shown
+from .messages import brief, interval, kind_of, listed, meant, shown
 
 Range = tuple[float, float]
 """The lowest and the highest value that a parameter may have; the latter may be infinite."""
@@ -54,8 +53,9 @@ class PropertyReader:
             )
         if not known:
             return f"{self.plugin}: unknown parameter {brief(name)}; it has no parameters."
-        closest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
-        return f"{self.plugin}: unknown parameter {brief(name)}; did you mean {closest}? Known are {', '.join(shown)}."
+        closest = meant(name, known)
+        hint = f"; did you mean {closest}? Known are" if closest else "; known are"
+        return f"{self.plugin}: unknown parameter {brief(name)}{hint} {', '.join(shown)}."
 
     def number(self, name: str, default: float, limits: Range) -> mi.Texture:
         """Return the texture of a number."""
