@@ -15,6 +15,10 @@ from .terminal import Exit, fail
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 
 
+imported: list[str] = []
+"""The arguments of --import."""
+
+
 def main() -> None:
     """Run the command ``mi-brdfs``."""
     app()
@@ -29,6 +33,7 @@ def _import(names: list[str] | None) -> None:
     for name in names or []:
         try:
             guests.import_models(name)
+            imported.append(name)
         except (ImportError, ValueError) as error:
             fail(f"--import {name}: {error}", Exit.USAGE)
 

@@ -15,6 +15,10 @@ from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents
 from .trial import Trial, Trials, trials_of
 
 
+SEED = 11
+"""Of the samples that several checks look at."""
+
+
 @dataclass
 class Run:
     """The BSDF, what was asked of it, and what several checks look at: samples, and histograms of them."""
@@ -44,7 +48,7 @@ class Run:
         """Return samples for a direction of incidence, the same for every check."""
         key = part.name, incident.name
         if key not in self._samples:
-            self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, 11))
+            self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, SEED))
         return self._samples[key]
 
     # --- Statistical tests ------------------------------------------------------------------------------------------
