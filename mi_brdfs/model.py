@@ -175,7 +175,7 @@ class Model(Plugin):
         conserved for this instance's choices, but not that it is with both at 1 (``{"diffuse_reflectance": 1.0}``).
         Beside a Fresnel term, the latter is only a scale of that, and does not count."""
         stated = self.stated_albedo()
-        if stated is None or stated > 1 or ({"diffuse_reflectance": 1.0}, 1) in self.energy.largest:
+        if not self.energy or not stated or stated > 1 or ({"diffuse_reflectance": 1.0}, 1) in self.energy.largest:
             return ""
         if "fresnel" in self.parameters.chosen or any(FRESNEL.fullmatch(name) for name in self.textures):
             return ""

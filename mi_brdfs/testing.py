@@ -1,12 +1,12 @@
 """Tests of BSDFs, with pytest or anything else that runs ``assert`` statements.
 
-    import mitsuba as mi
-    from mi_brdfs.testing import assert_bsdf
+import mitsuba as mi
+from mi_brdfs.testing import assert_bsdf
 
-    mi.set_variant("llvm_ad_rgb")
+mi.set_variant("llvm_ad_rgb")
 
-    def test_mine():
-        assert_bsdf({"type": "mine", "alpha": 0.3})
+def test_mine():
+    assert_bsdf({"type": "mine", "alpha": 0.3})
 """
 
 from __future__ import annotations
@@ -36,12 +36,9 @@ def assert_bsdf(bsdf: dict[str, Any] | mi.BSDF, **options: Any) -> Report:
     __tracebackhide__ = True  # pytest shows the caller's line
     report = check(bsdf, **options)
     if not report.passed:
-        raise AssertionError("\n".join([f"{report.name}: {report.outcome}", *report.sentences, *_again(bsdf, report, options)]))
+        lines = [f"{report.name}: {report.outcome}", *report.sentences]
+        if failing := list(dict.fromkeys(finding.check for finding in report.failures)):
+            given = ", ".join(f"{name}={value!r}" for name, value in (options | {"only": failing}).items())
+            lines.append(f"Again: mi_brdfs.validation.check({bsdf if isinstance(bsdf, dict) else 'bsdf'}, {given})")
+        raise AssertionError("\n".join(lines))
     return report
-
-
-def _again(bsdf: dict[str, Any] | mi.BSDF, report: Report, options: dict[str, Any]) -> list[str]:
-    """Return the line of Python that makes the failing checks again."""
-    failing = list(dict.fromkeys(finding.check for finding in report.failures))
-    given = ", ".join(f"{name}={value!r}" for name, value in (options | {"only": failing}).items())
-    return [f"Again: mi_brdfs.validation.check({bsdf if isinstance(bsdf, dict) else 'bsdf'}, {given})"] if failing else []

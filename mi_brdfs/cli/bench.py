@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from .app import command
 from .interrupts import interruptible
-from .options import check_output, check_names, write_json
+from .options import check_names, check_output, write_json
 from .terminal import err, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 

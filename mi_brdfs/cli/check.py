@@ -75,7 +75,8 @@ def check(
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
     ] = None,
     junit_file: Annotated[
-        Path | None, typer.Option("--junit", metavar="FILE", help="Also write all findings to this file, as JUnit does.")
+        Path | None,
+        typer.Option("--junit", metavar="FILE", help="Also write all findings as JUnit's XML."),
     ] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check this many BSDFs in parallel.")] = 1,
     variant: TracingVariant = None,

@@ -14,7 +14,6 @@ from .directions import direction, on_side
 from .probe import BSDFProbe, contained
 from .variates import random
 
-
 RESERVED = ("path", "string", "parallel", "optimize")
 """The arguments of Mitsuba's functions that load XML, which no parameter of it may be called."""
 
@@ -52,13 +51,14 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
         Exception: what Mitsuba raises where it cannot be loaded.
     """
     parameters = parameters or {}
-    file, _, wanted = ("", "", "") if word.startswith("<") else word.partition(".xml:")
+    is_text = word.startswith("<")
+    file, _, wanted = ("", "", "") if is_text else word.partition(".xml:")
     path = Path(f"{file}.xml" if wanted else word)
-    if is_file := path.suffix == ".xml" and not word.startswith("<"):
-        if not path.is_file():
-            raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
-    if reserved := (is_file or word.startswith("<")) and next((name for name in RESERVED if name in parameters), ""):
-        raise ValueError(f"-D {reserved}: Mitsuba reserves this name; rename the parameter in the XML")
+    is_file = path.suffix == ".xml" and not is_text
+    if is_file and not path.is_file():
+        raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+    if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
+        raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
     source = BSDFSource(path.name if is_file else word, word, str(path) if is_file else word, None, parameters)
     suffix = "".join(f" {name}={value}" for name, value in parameters.items())
     loaded = source.load()
@@ -73,7 +73,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
             if wanted in ("", name):
                 yield source._replace(name=f"{path.name}:{name}{suffix}", word=f"{path}:{name}", material=k)
     elif isinstance(loaded, mi.BSDF) and not wanted:
-        yield source._replace(name=(name_of(loaded) if word.startswith("<") else source.name) + suffix)
+        yield source._replace(name=(name_of(loaded) if is_text else source.name) + suffix)
     else:
         raise ValueError(f"{word if wanted else source.name} is not a {'scene' if wanted else 'BSDF'}")
 

@@ -134,8 +134,8 @@ def _check_share(run: Run, outcome: Outcome, incident: Incident, each: Part, sam
     said = np.isin(np.flatnonzero(kept)[alone], drawn).mean()
     if said < 0.9:
         outcome.fault(
-            f"for light from {incident.name} only {said:.1%} of the samples where nothing but {each.name} draws any are "
-            "said to be its own",
+            f"for light from {incident.name} only {said:.1%} of the samples where nothing but {each.name} draws any "
+            "are said to be its own",
             1 - said,
             wi=incident.vector(int(np.flatnonzero(kept)[alone][0])),
             seed=SEED,

@@ -48,7 +48,9 @@ def albedo(run: Run) -> Findings:
             if excess[k] > largest.excess:
                 largest = largest._replace(excess=float(excess[k]), words=words)
             if limits.largest is not None and not excess[k] <= limits.largest * (1 + TOLERANCE):
-                outcome.fault(f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}", excess[k], wi=wi)
+                outcome.fault(
+                    f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}", excess[k], wi=wi
+                )
         yield _judged(part, outcome, largest, limits)
 
 
@@ -124,7 +126,7 @@ def _limits(run: Run) -> Limits:
     own = models[0] if run.probe.is_ours else None
     is_default = run.given is not None and set(run.given) == {"type"}
     default = own.energy.default if own and own.energy and is_default else None
-    sums = " ".join(dict.fromkeys(f"Of {model.plugins[0]}, {words}." for model in models if (words := _excess(model))))
+    sums = " ".join(dict.fromkeys(filter(None, map(_excess, models))))
     if run.conserves is not None:
         return Limits(1 if run.conserves else None, "it receives", "", default, sums)
     # Of several BSDFs, blended or on two sides, each may have its part.
@@ -137,12 +139,13 @@ def _limits(run: Run) -> Limits:
 
 
 def _excess(model: Model | None) -> str:
-    """Return what is wrong with the present colours of a model that do not vary, as :meth:`Model.excess` does."""
+    """Return what :meth:`Model.excess` says of the present colours that do not vary, as a sentence."""
     if model is None:
         return ""
     si = interaction([0, 0, 1])
     constant = {name: it for name, it in model.textures.items() if not it.is_spatially_varying()}
-    return model.excess({name: numbers(texture.eval(si), 1)[0] for name, texture in constant.items()})
+    words = model.excess({name: numbers(texture.eval(si), 1)[0] for name, texture in constant.items()})
+    return f"Of {model.plugins[0]}, {words}." if words else ""
 
 
 def _shown(albedo: float) -> str:

@@ -31,7 +31,7 @@ td { padding: 0.15rem 1.2rem 0.15rem 0; vertical-align: top }
 ul { margin: 0; padding-left: 1.2rem }
 .summary { list-style: none; padding: 0 }
 .summary li { margin: 0.5rem 0 }
-small { color: var(--faint) }
+.summary div { color: var(--faint); font-size: 0.85rem }
 .fail { color: var(--bad) }
 .fail { font-weight: 600 }
 .skip, .info, figcaption, footer { color: var(--faint) }
@@ -97,7 +97,7 @@ def _summary(reports: Sequence[Report]) -> str:
         told = [f"{verdict}: {', '.join(named)}" for verdict, named in verdicts.items() if named]
         items.append(
             f'<li><a href="#bsdf-{k}">{escape(report.name)}</a> <span class="{_kind(report)}">{report.outcome}</span>'
-            f"<br><small>{escape('; '.join(told))}</small></li>"
+            f"<div>{escape('; '.join(told))}</div></li>"
         )
     return f'<ul class="summary">{"".join(items)}</ul>'
 
@@ -122,7 +122,7 @@ def _section(report: Report, anchor: str) -> str:
         figures += [chart(alt, curves)] if curves else []
     rows = [
         f"<tr>{_cell(finding.verdict)}<td>{escape(finding.check)}</td><td>{escape(finding.subject)}</td>"
-        f"<td>{escape(finding.message)}{escape(f' At {finding.where}.') * bool(finding.at)}{_list(_others(finding))}</td></tr>"
+        f"<td>{escape(finding.sentence)}{_list(_others(finding))}</td></tr>"
         for finding in report.findings
     ]
     return f"""<section id="{anchor}">

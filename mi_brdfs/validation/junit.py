@@ -10,16 +10,16 @@ from .report import Finding, Report
 
 def junit(reports: Sequence[Report]) -> str:
     """Return the XML: a test suite for each report, with a test case for each finding."""
-    root = ElementTree.Element("testsuites", name="mi-brdfs check", **_counts([f for r in reports for f in r.findings]))
+    every = [finding for report in reports for finding in report.findings]
+    root = ElementTree.Element("testsuites", {"name": "mi-brdfs check"} | _counts(every))
     for report in reports:
-        suite = ElementTree.SubElement(root, "testsuite", name=_clean(report.name), **_counts(report.findings))
+        suite = ElementTree.SubElement(root, "testsuite", {"name": _clean(report.name)} | _counts(report.findings))
         for finding in report.findings:
             name = _clean(f"{finding.check}, {finding.subject}")
             case = ElementTree.SubElement(suite, "testcase", classname=_clean(report.name), name=name)
             if finding.verdict == "fail":
                 failure = ElementTree.SubElement(case, "failure", message=_clean(finding.message))
-                lines = [*finding.data.get("faults", []), f"At {finding.where}." if finding.at else ""]
-                failure.text = _clean("\n".join(line for line in lines if line))
+                failure.text = _clean("\n".join([*finding.data.get("faults", []), finding.where]))
             elif finding.verdict == "skip":
                 ElementTree.SubElement(case, "skipped", message=_clean(finding.message))
             else:

@@ -30,12 +30,10 @@ class Outcome:
         self.faults: list[Fault] = []
         self.data: dict[str, Any] = {}
 
-    def fault(
-        self, message: str, size: float = 1, *, wi: Array | None = None, wo: Array | None = None, seed: int | None = None
-    ) -> None:
-        """Add a fault, with the directions and the seed of the variates that reproduce it."""
-        directions = {name: w.tolist() for name, w in (("wi", wi), ("wo", wo)) if w is not None}
-        self.faults.append(Fault(message, size, directions | ({} if seed is None else {"seed": seed})))
+    def fault(self, message: str, size: float = 1, *, seed: int | None = None, **directions: Array) -> None:
+        """Add a fault, with the directions ``wi`` and ``wo`` and the seed of the variates that reproduce it."""
+        at: dict[str, Any] = {name: w.tolist() for name, w in directions.items()}
+        self.faults.append(Fault(message, size, at if seed is None else at | {"seed": seed}))
 
     def finding(self, message: str, remark: str = "") -> Finding:
         """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case."""

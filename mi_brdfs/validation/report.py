@@ -38,8 +38,13 @@ class Finding:
 
     @property
     def where(self) -> str:
-        """What reproduces it, in words."""
-        return ", ".join(f"{name} = {_exact(value)}" for name, value in self.at.items())
+        """What reproduces it, as a sentence."""
+        return f"At {', '.join(f'{name} = {_exact(value)}' for name, value in self.at.items())}." if self.at else ""
+
+    @property
+    def sentence(self) -> str:
+        """The message, with what reproduces it."""
+        return f"{self.message} {self.where}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ class Report:
     @property
     def sentences(self) -> list[str]:
         """What a user should read: failures with what reproduces them, notes, and why nothing was judged."""
-        told = [f"{f.check}, {f.subject}: {f.message}" + f" At {f.where}." * bool(f.at) for f in self.notable]
+        told = [f"{finding.check}, {finding.subject}: {finding.sentence}" for finding in self.notable]
         return [*told, *([self.why_not_judged] if self.why_not_judged else [])]
 
     def to_dict(self) -> dict[str, Any]:
@@ -107,7 +112,7 @@ class Report:
         return {"name": self.name, "passed": self.passed, "judged": self.judged, "findings": findings}
 
     def __str__(self) -> str:
-        rows = [(f.verdict, f.check, f.subject, f.message + f" At {f.where}." * bool(f.at)) for f in self.findings]
+        rows = [(f.verdict, f.check, f.subject, f.sentence) for f in self.findings]
         widths = [max((len(row[column]) for row in rows), default=0) for column in range(3)]
         lines = ["  ".join([*map(str.ljust, row, widths), row[3]]) for row in rows]
         return "\n".join([f"{self.name}: {self.outcome}", *lines])

@@ -14,7 +14,6 @@ from ..measure.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents
 from .trial import Trial, Trials, trials_of
 
-
 SEED = 11
 """Of the samples that several checks look at."""
 
