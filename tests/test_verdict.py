@@ -403,3 +403,16 @@ def test_command_compares(tmp_path):
     done = run("walter", "-D", "alpha=0.3", "--against", rough)
     assert done.returncode == 1 and "the largest relative difference is 0." in " ".join(done.stdout.split())
     assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_commands_warn_in_a_sentence(tmp_path):
+    scene = f"""<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+    <shape type="sphere">{PHONG}</shape><shape type="cube">{PHONG}</shape>
+    <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
+    <integer name="height" value="8"/></film></sensor></scene>"""
+    (tmp_path / "s.xml").write_text(scene)
+    command = [sys.executable, "-m", "mi_brdfs.cli", "render", "s.xml", "--spp", "1", "--variant", "scalar_rgb"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180)
+    told = "phong: diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1."
+    assert done.returncode == 0 and done.stderr.splitlines()[0] == f"mi-brdfs: {told}"
+    assert done.stderr.count("1.6") == 1

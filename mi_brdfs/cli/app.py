@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import warnings
 from collections.abc import Callable
 from typing import Annotated
 
@@ -21,6 +22,7 @@ imported: list[str] = []
 
 def main() -> None:
     """Run the command ``mi-brdfs``."""
+    warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
     app()
 
 

@@ -39,18 +39,17 @@ def albedo(run: Run) -> Findings:
             means, noises = _mean(copies)
             mean, noise = (float(value[0]) for value in _mean(luminance(copies)[:, None]))
             outcome.data[name] = {"albedo": mean, "noise": noise}
-            excess = np.nan_to_num(means - 5 * noises, nan=np.inf)
-            k = int(np.argmax(excess))
+            least = np.nan_to_num(means - 5 * noises, nan=np.inf)
+            k = int(np.argmax(least))
             alike = np.ptp(means) <= 1e-4 * abs(means[k])
             words = f"light from {name} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
             if not mean <= largest.mean:
                 largest = largest._replace(mean=mean, name=name)
-            if excess[k] > largest.excess:
-                largest = largest._replace(excess=float(excess[k]), words=words)
-            if limits.largest is not None and not excess[k] <= limits.largest * (1 + TOLERANCE):
-                outcome.fault(
-                    f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}", excess[k], wi=wi
-                )
+            if least[k] > largest.least:
+                largest = largest._replace(least=float(least[k]), words=words)
+            if limits.largest is not None and least[k] > limits.largest * (1 + TOLERANCE):
+                words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
+                outcome.fault(words, least[k], wi=wi)
         yield _judged(part, outcome, largest, limits)
 
 
@@ -59,11 +58,11 @@ TOLERANCE = 1e-3
 
 
 class Largest(NamedTuple):
-    """The largest albedo of a part: the luminance and its angle, and the channel that exceeds 1 the most, in words."""
+    """The largest albedo of a part: the luminance and its angle, and what a channel reflects at least, in words."""
 
     mean: float = 0
     name: str = ""
-    excess: float = 0
+    least: float = 0
     words: str = ""
 
 
@@ -80,12 +79,12 @@ def _judged(part: Part, outcome: Outcome, largest: Largest, limits: Limits) -> F
     message = f"At most {largest.mean:.4g}, for light from {largest.name}." if largest.name else "Black."
     if limits.largest is None and limits.default is None:
         return Finding("albedo", part.name, "info", message, outcome.data)
-    if not outcome.faults and largest.excess > 1 + TOLERANCE and limits.largest is not None:
+    gains = largest.least > 1 + TOLERANCE
+    if gains and limits.largest is not None:
         message = f"It gains energy, as {limits.page} ({_shown(limits.largest)}): {largest.words}."
-    elif not (is_whole and limits.sums):
-        return outcome.finding(message)
     found = outcome.finding(message, limits.sums if is_whole else "")
-    return replace(found, verdict="note") if is_whole and not outcome.faults else found
+    noted = is_whole and (gains or limits.sums) and not outcome.faults
+    return replace(found, verdict="note") if noted else found
 
 
 def _white_furnace(run: Run, part: Part) -> Iterator[Incident]:

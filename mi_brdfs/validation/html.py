@@ -21,7 +21,7 @@ STYLE = """
   --bad: #ff8a80; --albedo: #56b4e9; --efficiency: #e69f00 } }
 body { margin: 0 auto; padding: 1rem; max-width: 82rem; font: 1rem/1.45 system-ui, sans-serif; color: var(--ink);
   background: var(--paper) }
-h1, h2, li, td { overflow-wrap: anywhere }
+h1, h2, li, td:last-child { overflow-wrap: anywhere }
 h2 { margin-top: 3rem; border-top: 1px solid var(--line); padding-top: 1rem }
 a { color: inherit }
 table { border-collapse: collapse; font-size: 0.9rem }
