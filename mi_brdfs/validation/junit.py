@@ -25,7 +25,7 @@ def junit(reports: Sequence[Report]) -> str:
             else:
                 ElementTree.SubElement(case, "system-out").text = _clean(finding.message)
     ElementTree.indent(root)
-    return ElementTree.tostring(root, "unicode", xml_declaration=True) + "\n"
+    return ElementTree.tostring(root, "utf-8", xml_declaration=True).decode() + "\n"
 
 
 def _counts(findings: Sequence[Finding]) -> dict[str, str]:
