@@ -129,10 +129,13 @@ def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     options: dict[str, Any] = {}
     if angles is not None:
         try:
-            options["angles"] = checked_angles([float(text) for text in angles.split(",")])
+            degrees = [float(text) for text in angles.split(",")]
+        except ValueError:
+            fail(f"--angles {angles}: write degrees, such as 10,40,70", Exit.USAGE)
+        try:
+            options["angles"] = checked_angles(degrees)
         except ValueError as error:
-            text = str(error) if "angle" in str(error) else "write degrees, such as 10,40,70"
-            fail(f"--angles {angles}: {text}", Exit.USAGE)
+            fail(f"--angles {angles}: {error}", Exit.USAGE)
     if significance is not None:
         if not 0 < significance < 1:
             fail(f"--significance {significance:g}: it must be in (0, 1)", Exit.USAGE)
