@@ -27,7 +27,7 @@ llvm.check(mi.variant())
 from . import lobes, microfacet, parameters  # noqa: E402
 from .mitsuba.guests import register_installed  # noqa: E402
 from .mitsuba.registry import info, install, list_models, register  # noqa: E402
-from .model import Energy, Model  # noqa: E402
+from .model import Energy, EnergyWarning, Model  # noqa: E402
 from .preview import preview_scene  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
 
@@ -35,6 +35,7 @@ install()
 
 __all__ = [
     "Energy",
+    "EnergyWarning",
     "Model",
     "__version__",
     "info",

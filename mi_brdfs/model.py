@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from functools import cache
 from math import isfinite
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
@@ -20,6 +24,12 @@ others is 0; parameters not named take all values in their range."""
 
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
+
+
+ADDED = re.compile(r"(diffuse|specular)_reflectance(_\d+)?")
+"""The colours of lobes, whose sum is what all reflect at most."""
+FRESNEL = re.compile(r"(f0|eta|int_ior)(_\d+)?")
+"""The parameters that a Fresnel term has."""
 
 
 class Energy(NamedTuple):
@@ -45,6 +55,16 @@ class Energy(NamedTuple):
         return rows
 
 
+class EnergyWarning(UserWarning):
+    """The colours given to a model add to more than 1, up to which it conserves energy."""
+
+
+@cache
+def warn_once(text: str) -> None:
+    """Issue an :class:`EnergyWarning`, the first time that it is this one."""
+    warnings.warn(text, EnergyWarning, stacklevel=3)
+
+
 def full_name(cls: type) -> str:
     """Return the dotted name of a class: the same for all versions of it, as of a cell of a notebook run again."""
     return f"{cls.__module__}.{cls.__qualname__}"
@@ -55,7 +75,8 @@ class Plugin:
     parameters (:mod:`mi_brdfs.parameters`).
 
     An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, and all their
-    ``textures`` and ``ranges`` by property name; choices are attributes under their declared names.
+    ``textures`` and ``ranges`` by property name, with the channels of the colours that it was given or has by default
+    as ``constants``; choices are attributes under their declared names.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -68,7 +89,7 @@ class Plugin:
             raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
         for parameter in cls.declared():
             for name in {parameter.name, *parameter.names}:
-                if hasattr(Model, name) or name in ("parameters", "textures", "ranges"):
+                if hasattr(Model, name) or name in ("parameters", "textures", "ranges", "constants"):
                     raise TypeError(
                         f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model."
                     )
@@ -79,6 +100,7 @@ class Plugin:
         reader.take([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
         self.parameters = BoundParameters(declared, reader)
         self.textures, self.ranges = self.parameters.textures, self.parameters.ranges
+        self.constants = reader.constants
         vars(self).update(self.parameters.chosen)
 
     @classmethod
@@ -133,6 +155,37 @@ class Model(Plugin):
         """Return the model's lobes at a surface point, where ``p`` holds the values of the declared parameters. Their
         number and kinds depend only on the model's choices and on which parameters are given."""
         raise NotImplementedError(f"{type(self).__name__} does not define lobes.")
+
+    def stated_albedo(self) -> float | None:
+        """Return the largest albedo that the page states for the choices of this instance, or None if it states none.
+        Configurations that fix numbers do not count."""
+        stated = self.energy.largest if self.energy else []
+        return min((albedo for given, albedo in stated if self._includes(given)), default=None)
+
+    def _includes(self, given: Mapping[str, Any]) -> bool:
+        """Return whether a configuration on the page is about the choices of this instance."""
+        chosen = self.parameters.chosen
+        return all(
+            chosen.get(name) in (value if isinstance(value, tuple) else (value,)) for name, value in given.items()
+        ) and not any(isinstance(value, float) for value in given.values())
+
+    def excess(self, colours: Mapping[str, Sequence[float]]) -> str:
+        """Return what is wrong with constant colours, by property name, that add to more than 1 in a channel, or
+        nothing. ``diffuse_reflectance`` and every ``specular_reflectance`` count where the page states that energy is
+        conserved for this instance's choices, but not that it is with both at 1 (``{"diffuse_reflectance": 1.0}``).
+        Beside a Fresnel term, the latter is only a scale of that, and does not count."""
+        stated = self.stated_albedo()
+        if not self.energy or not stated or stated > 1 or ({"diffuse_reflectance": 1.0}, 1) in self.energy.largest:
+            return ""
+        if "fresnel" in self.parameters.chosen or any(FRESNEL.fullmatch(name) for name in self.textures):
+            return ""
+        added = {name: c for name, c in colours.items() if ADDED.fullmatch(name)}
+        channels = max(map(len, added.values()), default=1)
+        sums = [sum(c[k % len(c)] for c in added.values()) for k in range(channels)]
+        if not max(sums) > 1 + 1e-3:
+            return ""
+        where = f" in channel {sums.index(max(sums)) + 1}" if max(sums) - min(sums) > 1e-3 else ""
+        return f"{' + '.join(added)} = {max(sums):.4g}{where}, but energy is conserved only up to 1"
 
     def placeholders(self) -> SimpleNamespace:
         """Return stand-ins for these values, to find out which lobes the model has."""

@@ -230,7 +230,7 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     right = command(guest, "check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
     assert right.returncode == 0, right.stderr
     wrong = command(guest, "check", "chalk", "--import", "faulty.py", "--only", "reciprocity", "-j", jobs)
-    assert wrong.returncode == 1 and "chalk: reciprocity: whole: f from" in wrong.stdout
+    assert wrong.returncode == 1 and "reciprocity, whole: f from" in wrong.stdout
 
 
 @pytest.mark.parametrize(

@@ -309,7 +309,7 @@ def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):
         '<shape type="sphere"><bsdf type="toon" id="fun"/></shape></scene>'
     )
     figure = plot.albedo(loaded, str(tmp_path / "two.xml"), '<bsdf type="lambert" id="text"/>', COLOURED)
-    assert legend(figure) == ["brushed", "two.xml: wall", "two.xml: fun", "text", "lambert reflectance=0.2;0.5;0.8"]
+    assert legend(figure) == ["brushed", "two.xml:fun", "two.xml:wall", "text", "lambert reflectance=0.2;0.5;0.8"]
     assert legend(plot.albedo(loaded, labels=["mine"])) == ["mine"]
 
 
@@ -451,7 +451,7 @@ WRONG = {
     "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),
     "page": (["ward", "--kind", "sphere", "-o", "ward.png"], 2, "ward.png: sphere is written as .html"),
     "folder": (["ward", "-o", "gone/ward.png"], 2, "there is no folder gone"),
-    "unwritable": (["ward", "-o", "taken.png"], 1, "cannot write taken.png: Is a directory"),
+    "unwritable": (["ward", "-o", "taken.png"], 2, "-o taken.png: it is a folder"),
     "variant": (["ward", "--variant", "scalar_rgb"], 2, "vectorized and unpolarized"),
 }
 

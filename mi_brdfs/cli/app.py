@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import warnings
 from collections.abc import Callable
 from typing import Annotated
 
@@ -15,8 +16,13 @@ from .terminal import Exit, fail
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 
 
+imported: list[str] = []
+"""The arguments of --import."""
+
+
 def main() -> None:
     """Run the command ``mi-brdfs``."""
+    warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
     app()
 
 
@@ -29,6 +35,7 @@ def _import(names: list[str] | None) -> None:
     for name in names or []:
         try:
             guests.import_models(name)
+            imported.append(name)
         except (ImportError, ValueError) as error:
             fail(f"--import {name}: {error}", Exit.USAGE)
 

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from .app import command
 from .interrupts import interruptible
-from .options import check_folder, check_names, write_json
+from .options import check_names, check_output, write_json
 from .terminal import err, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
@@ -31,7 +31,7 @@ def bench(
     from ..bench import bench as measure
 
     check_names(only, SECTIONS, "section")
-    check_folder("--json", json_file)
+    check_output("--json", json_file)
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
     columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
+import shlex
 import signal
 import time
+import warnings
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import mitsuba as mi
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
 
 from ..mitsuba import guests
 from ..mitsuba.registry import all_models
-from .app import command
+from ..model import EnergyWarning
+from .app import command, imported
 from .errors import one_line
 from .interrupts import ending_processes, interruptible
-from .options import check_folder, check_names, write_json
-from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
+from .options import Parameters, check_names, check_output, parameters_of, write_json, write_text
+from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
@@ -30,109 +31,204 @@ if TYPE_CHECKING:
     from ..validation import Report
 
 
+class Settings(NamedTuple):
+    """What is asked of each BSDF."""
+
+    options: dict[str, Any]
+    """The keyword arguments of ``check``, or of ``compare``."""
+    other: BSDFSource | None
+    """What it is compared with, in place of the checks."""
+
+
 @command()
 def check(
     targets: Annotated[
         list[str] | None,
-        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins of the pack or others; files with a scene or BSDF."),
+        typer.Argument(
+            metavar="TYPE|FILE.xml|FILE.xml:ID|XML…",
+            help="Plugins of the pack or others; files with a scene or BSDF, or one BSDF of a scene.",
+        ),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
+    parameters: Parameters = None,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help="Run only this check; may be repeated.")
+    ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(metavar="OTHER", help="Compare values with those of this BSDF instead, given as the others are."),
+    ] = None,
+    angles: Annotated[
+        str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 0,30,60,80.")
+    ] = None,
+    conserves: Annotated[
+        bool, typer.Option("--conserves", help="Let none gain energy, whatever the page of its model says.")
+    ] = False,
+    significance: Annotated[
+        float | None,
+        typer.Option(metavar="P", help="How probable it is that a right BSDF fails a statistical test. Default: 0.01."),
+    ] = None,
     html_file: Annotated[
         Path | None, typer.Option("--html", metavar="FILE", help="Also write a report with pictures to this file.")
     ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
     ] = None,
-    only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help="Run only this check; may be repeated.")
+    junit_file: Annotated[
+        Path | None,
+        typer.Option("--junit", metavar="FILE", help="Also write all findings as JUnit's XML."),
     ] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check this many BSDFs in parallel.")] = 1,
     variant: TracingVariant = None,
 ) -> None:
     """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit with 1 if any
-    fails."""
-    from ..measure.sources import find_sources
+    fails, with 3 if nothing was judged."""
     from ..validation import CHECKS
 
-    check_names(only, CHECKS, "check")
     if bool(targets) == every:
         fail("name plugins or files to check, or give --all", Exit.USAGE)
-    check_folder("--html", html_file)
-    check_folder("--json", json_file)
+    given = parameters_of(parameters)
+    options = _options(angles, significance)
+    if against is None:
+        check_names(only, CHECKS, "check")
+        options |= {"only": only or None, "conserves": conserves or None}
+    elif only or conserves or significance is not None:
+        fail("--against compares values; --only, --conserves and --significance belong to the checks", Exit.USAGE)
+    for option, file in ("--html", html_file), ("--json", json_file), ("--junit", junit_file):
+        check_output(option, file)
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
+    warnings.simplefilter("ignore", EnergyWarning)  # the report says it
     with stdout_to_stderr():
-        found = []
-        for word in targets or [model.plugins[0] for model in all_models()]:
-            try:
-                found += find_sources(word)
-            except Exception as error:
-                text = one_line(error)
-                fail(text if text.startswith(word) else f"{word}: {text}", Exit.USAGE)
+        words = targets or [model.plugins[0] for model in all_models()]
+        sources = [source for word in words for source in _found(word, given)]
+        settings = Settings(options, None if against is None else _other(against))
         with interruptible():
-            reports = _check_all(found, only or None, chosen, min(jobs, len(found)))
+            reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
         from ..validation.html import page
 
-        html_file.write_text(page(reports), encoding="utf-8")
-    _print_reports(reports)
+        write_text(html_file, page(reports))
+    if junit_file is not None:
+        from ..validation.junit import junit
+
+        write_text(junit_file, junit(reports))
+    _print_reports(sources, reports, settings)
     err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
-    if not all(report.passed for report in reports):
+    if any(report.failures for report in reports):
         raise typer.Exit(Exit.ERROR)
+    if not any(report.judged for report in reports):
+        raise typer.Exit(Exit.NOT_JUDGED)
 
 
-def _check_all(sources: list[BSDFSource], only: list[str] | None, variant: str, jobs: int) -> list[Report]:
+def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
+    """Return the arguments that are given."""
+    from ..validation.runner import checked_angles
+
+    options: dict[str, Any] = {}
+    if angles is not None:
+        try:
+            degrees = [float(text) for text in angles.split(",")]
+        except ValueError:
+            fail(f"--angles {angles}: write degrees, such as 10,40,70", Exit.USAGE)
+        try:
+            options["angles"] = checked_angles(degrees)
+        except ValueError as error:
+            fail(f"--angles {angles}: {error}", Exit.USAGE)
+    if significance is not None:
+        if not 0 < significance < 1:
+            fail(f"--significance {significance:g}: it must be in (0, 1)", Exit.USAGE)
+        options["significance"] = significance
+    return options
+
+
+def _found(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
+    """Return the BSDFs that a word stands for, or fail with a sentence."""
+    from ..measure.sources import find_sources
+
+    try:
+        return list(find_sources(word, parameters))
+    except Exception as error:
+        text = one_line(error)
+        fail(text if text.startswith((word, "-D")) else f"{word}: {text}", Exit.USAGE)
+
+
+def _other(word: str) -> BSDFSource:
+    """Return the one BSDF to compare with."""
+    found = _found(word, {})
+    if len(found) > 1:
+        fail(f"--against {word}: name one of {', '.join(source.word for source in found)}", Exit.USAGE)
+    return found[0]
+
+
+def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs: int) -> list[Report]:
     """Return the reports on all BSDFs, made in separate processes if there are several jobs."""
     from ..validation import CHECKS
 
     subject = TextColumn("Checking {task.description}", markup=False)
     columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
-    each = len(only or CHECKS)
+    each = 1 if settings.other else len(settings.options["only"] or CHECKS)
     reports = []
     with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
         task = progress.add_task("", total=len(sources) * each)
         if jobs == 1:
             for source in sources:
                 progress.update(task, description=source.name)
-                reports.append(_check_one(source, only, on_progress=partial(progress.advance, task)))
+                reports.append(_check_one(source, settings, partial(progress.advance, task)))
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
         known = variant, guests.sources()
         pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known)
         with pool, ending_processes():
-            for future in [pool.submit(_check_one, source, only) for source in sources]:
+            for future in [pool.submit(_check_one, source, settings) for source in sources]:
                 reports.append(future.result())
                 progress.update(task, description=reports[-1].name, advance=each)
     return reports
 
 
-def _check_one(source: BSDFSource, only: list[str] | None, **given: Any) -> Report:
+def _check_one(source: BSDFSource, settings: Settings, on_progress: Any = lambda: None) -> Report:
     """Return the report on a BSDF in the active variant."""
-    from ..validation import check
+    from ..validation import check, compare
 
-    return check(source.load(), name=source.name, only=only, **given)
+    if settings.other is None:
+        return check(source.load(), name=source.name, on_progress=on_progress, **settings.options)
+    other = settings.other
+    report = compare(source.load(), other.load(), name=source.name, other_name=other.name, **settings.options)
+    on_progress()
+    return report
 
 
 def _start_job(variant: str, sources: list[str]) -> None:
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as for a shell's background job
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
+    warnings.simplefilter("ignore", EnergyWarning)
     for source in sources:
         guests.import_models(source)
     mi.set_variant(variant)
 
 
-def _print_reports(reports: list[Report]) -> None:
-    """Print a row for each report, and below them what failed."""
-    words = {"fail": ("FAIL", "red"), "pass": ("pass", "green"), "skip": ("skip", "yellow"), None: ("-", "dim")}
-    checks = list(dict.fromkeys(finding.check for report in reports for finding in report.findings))
-    table = Table("type", *checks, box=None, pad_edge=False)
-    for report in reports:
-        verdicts = [report.verdict(name) for name in checks]
-        table.add_row(report.name, *(Text(*words.get(verdict, (verdict, "dim"))) for verdict in verdicts))
-    print_table(table)
-    for report in reports:
-        for finding in report.failures:
-            out.print(f"{report.name}: {finding.check}: {finding.subject}: {finding.message}")
-        if report.why_not_judged:
-            out.print(f"{report.name}: {report.why_not_judged}")
+def _print_reports(sources: list[BSDFSource], reports: list[Report], settings: Settings) -> None:
+    """Print a block for each report, with the command that makes its failing checks again."""
+    from ..validation.text import block
+
+    for source, report in zip(sources, reports, strict=True):
+        for line, style in block(report, out.width):
+            out.print(line, style=style)
+        if report.failures and settings.other is None:
+            out.print(f"    Again: {_again(source, report, settings.options)}")
+
+
+def _again(source: BSDFSource, report: Report, options: dict[str, Any]) -> str:
+    """Return the command that makes the failing checks of a BSDF again, without XML that was given as text."""
+    words = [word for module in imported for word in ("--import", module)]
+    words += [word for name, value in source.parameters.items() for word in ("-D", f"{name}={value}")]
+    words += [word for check in dict.fromkeys(f.check for f in report.failures) for word in ("--only", check)]
+    if "angles" in options:
+        words += ["--angles", ",".join(f"{angle:g}" for angle in options["angles"])]
+    if "significance" in options:
+        words += ["--significance", f"{options['significance']:g}"]
+    words += ["--conserves"] if options["conserves"] else []
+    if source.word.startswith("<"):
+        return f"the same XML with {shlex.join(words)}"
+    return shlex.join(["mi-brdfs", "check", source.word, *words])

@@ -3,10 +3,38 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Collection
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from .terminal import Exit, fail
+
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-D",
+        "--param",
+        metavar="name=value",
+        help="Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b', or a <default> of the "
+        "XML; may be repeated.",
+    ),
+]
+
+
+def parameters_of(definitions: list[str] | None) -> dict[str, str]:
+    """Return the values of ``-D`` and ``--param`` options, as text."""
+    parameters: dict[str, str] = {}
+    for definition in definitions or []:
+        name, equals, value = definition.partition("=")
+        if not equals or not name:
+            fail(f"-D {definition}: write -D name=value", Exit.USAGE)
+        if name in parameters:
+            fail(f"-D {name} is given twice", Exit.USAGE)
+        parameters[name] = value
+    return parameters
 
 
 def check_names(names: list[str] | None, known: Collection[str], kind: str) -> None:
@@ -15,11 +43,31 @@ def check_names(names: list[str] | None, known: Collection[str], kind: str) -> N
             fail(f"--only {name}: there is no such {kind}; there are {', '.join(known)}", Exit.USAGE)
 
 
-def check_folder(option: str, file: Path | None) -> None:
-    if file is not None and not file.absolute().parent.is_dir():
+def check_output(option: str, file: Path | None) -> None:
+    """Fail if a file cannot be written: before the work whose result it is to hold."""
+    if file is None:
+        return
+    folder = file.absolute().parent
+    if not folder.is_dir():
         fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
+    if file.is_dir():
+        fail(f"{option} {file}: it is a folder", Exit.USAGE)
+    try:
+        if not file.exists():
+            tempfile.TemporaryFile(dir=folder).close()
+        elif file.is_file():
+            file.open("ab").close()
+    except OSError as error:
+        fail(f"{option} {file}: it cannot be written: {error.strerror}", Exit.USAGE)
+
+
+def write_text(file: Path | None, text: str) -> None:
+    if file is not None:
+        try:
+            file.write_text(text, encoding="utf-8")
+        except OSError as error:
+            fail(f"cannot write {file}: {error.strerror}")
 
 
 def write_json(file: Path | None, data: list | dict) -> None:
-    if file is not None:
-        file.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    write_text(file, json.dumps(data, indent=1) + "\n")

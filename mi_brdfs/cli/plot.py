@@ -10,7 +10,7 @@ import typer
 from .app import command
 from .errors import one_line
 from .interrupts import interruptible
-from .options import check_folder
+from .options import check_output
 from .terminal import Exit, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
@@ -62,7 +62,7 @@ def plot(
         file = asked.output_file(output, kind, targets)
     except ValueError as error:
         fail(str(error), Exit.USAGE)
-    check_folder("-o", output)
+    check_output("-o", output)
     set_tracing_variant(variant)
     with stdout_to_stderr(), interruptible():
         try:

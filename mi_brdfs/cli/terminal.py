@@ -22,6 +22,7 @@ class Exit(IntEnum):
 
     ERROR = 1
     USAGE = 2
+    NOT_JUDGED = 3
     INTERRUPTED = 130
 
 

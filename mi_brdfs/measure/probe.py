@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import CENTRE, Array, context, interaction, numbers, sample_arguments, vectors
+
+if TYPE_CHECKING:
+    from ..model import Model
 
 
 class Part(NamedTuple):
@@ -77,7 +80,7 @@ class BSDFProbe:
         for k in range(count):
             flags = int(self.bsdf.flags(k))
             if flags & int(mi.BSDFFlags.Smooth):
-                name = f"component {k}" if count > 1 else "whole"
+                name = self.name_of(k) if count > 1 else "whole"
                 parts.append(Part(name, context(component=k), k, flags, _sides(flags)))
         return parts
 
@@ -86,6 +89,15 @@ class BSDFProbe:
         """The components that are delta functions."""
         smooth = [part.component for part in self.components]
         return [k for k in range(self.bsdf.component_count()) if k not in smooth]
+
+    def name_of(self, component: int) -> str:
+        """Return the name of a component, with what its flags say it is."""
+        flags, kinds = int(self.bsdf.flags(component)), mi.BSDFFlags
+        words = [word for word, kind in (("diffuse", kinds.Diffuse), ("glossy", kinds.Glossy), ("delta", kinds.Delta))
+                 if flags & int(kind)]  # fmt: skip
+        ways = [word for word in ("reflection", "transmission") if flags & int(getattr(kinds, word.capitalize()))]
+        kind = "null" if flags & int(kinds.Null) else " ".join([*words, " and ".join(ways)])
+        return f"component {component} ({kind or 'of no kind'})"
 
     @cached_property
     def whole(self) -> Part:
@@ -101,6 +113,13 @@ class BSDFProbe:
         if not self.components:
             return []
         return [self.whole, *(self.components if self.bsdf.component_count() > 1 else [])]
+
+    @cached_property
+    def models(self) -> list[Model | None]:
+        """The models of the BSDFs that it is made of, itself or what it contains; None for those that have none."""
+        if self.is_ours:
+            return [self.bsdf.model]
+        return [getattr(inner, "model", None) for inner in contained(self.bsdf)] or [None]
 
     @property
     def is_ours(self) -> bool:
@@ -161,6 +180,11 @@ class BSDFProbe:
     def is_smooth(self, bs: mi.BSDFSample3f) -> mi.Bool:
         """Return whether samples are not of a delta function."""
         return (bs.sampled_type & int(mi.BSDFFlags.Smooth)) != 0 if self.deltas else mi.Bool(True)
+
+
+def contained(bsdf: mi.BSDF) -> list[mi.BSDF]:
+    """Return the BSDFs that one is made of, as one with two sides is."""
+    return [it for it in mi.traverse(bsdf).hierarchy if isinstance(it, mi.BSDF) and it is not bsdf]
 
 
 def _sides(flags: int) -> tuple[int, ...]:

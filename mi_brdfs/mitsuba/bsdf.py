@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from ..lobes import Lobe, Mixture
 from ..math import clamp, select
-from ..model import Model
+from ..model import Model, warn_once
 from ..parameters.colours import evaluate_colour
 from ..variants import is_scalar
 
@@ -33,6 +33,8 @@ class ModelBSDF:
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
         self.model = self.model_class(props)
+        if excess := self.model.excess(self.model.constants):
+            warn_once(f"{self.model.plugins[0]}: {excess}.")
         # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,
         # but not in other Python objects.
         self.textures = self.model.textures

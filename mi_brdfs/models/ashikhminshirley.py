@@ -48,7 +48,7 @@ class AshikhminShirley(Model):
     exponent = Number(100, (0, 1e6), "exponent n: the higher, the narrower the highlight", anisotropic=True)
     rotation = Rotation()
 
-    energy = Energy(0.509, [({}, 1)])
+    energy = Energy(0.509, [({}, 1), ({"diffuse_reflectance": 1.0}, 1)])
 
     def lobes(self, p):
         specular = MicrofacetLobe(

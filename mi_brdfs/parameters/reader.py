@@ -28,6 +28,8 @@ class PropertyReader:
 
     def __init__(self, plugin: str, props: mi.Properties):
         self.plugin, self.props = plugin, props
+        self.constants: dict[str, list[float]] = {}
+        """The colours read so far that are numbers or rgb, one or three channels, by property name."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.props
@@ -72,8 +74,11 @@ class PropertyReader:
     def colour(self, name: str, default: float, limits: Range) -> mi.Texture:
         """Return the texture of a colour."""
         allowed = f"a number, rgb or spectrum within {interval(*limits)} or a texture"
+        values: list[Any] | None = [default]
         if name in self and (values := self.colour_values(name)) is not None:
             self._check(name, values, limits, allowed)
+        if values is not None and not (name in self and self.props.type(name) == mi.Properties.Type.Spectrum):
+            self.constants[name] = values
         bounded = limits[1] <= 1
         return (self.props.get_texture if bounded else self.props.get_unbounded_texture)(name, default)
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..measure.sources import value_of
 from ..parameters.messages import listed
 from . import albedo, cartesian, hemisphere, polar, sphere
 
@@ -31,7 +32,7 @@ def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | d
             raise ValueError(f"--param {option}: write name=value, or name=a,b,c to draw each value")
         if name in values:
             raise ValueError(f"--param {name} is given twice; write {name}=a,b,c to draw each value")
-        values[name] = [_value(text) for text in given.split(",")]
+        values[name] = [value_of(text) for text in given.split(",")]
     sweeps = [name for name, choices in values.items() if len(choices) > 1]
     if len(sweeps) > 1:
         raise ValueError(f"--param: {' and '.join(sweeps)} have several values each; only one parameter may")
@@ -91,26 +92,3 @@ def write(figure: Any, path: Path) -> None:
         figure.write_html(path, include_plotlyjs=True)
     else:
         figure.savefig(path, dpi=DPI)
-
-
-def _value(text: str) -> Any:
-    """Return a number, true or false, a colour given as #rrggbb (sRGB) or r;g;b (linear), or else a word."""
-    if text in ("true", "false"):
-        return text == "true"
-    for number in (int, float):
-        try:
-            return number(text)
-        except ValueError:
-            continue
-    if re.fullmatch("#[0-9a-fA-F]{6}", text):
-        encoded = [int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-        return _rgb([c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded])
-    try:
-        colour = [float(part) for part in text.split(";")]
-    except ValueError:
-        return text
-    return _rgb(colour) if len(colour) == 3 else text
-
-
-def _rgb(colour: list[float]) -> dict[str, Any]:
-    return {"type": "rgb", "value": colour}

@@ -11,7 +11,7 @@ from ..measure.probe import Part, Samples
 from ..measure.variates import random
 from .incidents import SCATTERED, Incident
 from .outcome import Findings, Outcome
-from .run import Run
+from .run import SEED, Run
 
 COUNT = 4000
 
@@ -45,18 +45,26 @@ def _check_sampled(run: Run, outcome: Outcome, part: Part, incident: Incident) -
     allowed = {each.component: each.flags for each in run.probe.components}
     if part.component is not None:
         allowed = {part.component: part.flags}
+
+    def first(which: Array) -> Array:
+        return incident.vector(np.flatnonzero(chosen)[int(np.argmax(which))])
+
     for k in np.unique(index):
         if k not in allowed:
             outcome.fault(
                 f"for light from {incident.name} sampled_component is {k} in {(index == k).mean():.1%} of the samples, "
-                f"where only {', '.join(map(str, allowed))} may be drawn"
+                f"where only {', '.join(map(str, allowed))} may be drawn",
+                wi=first(index == k),
+                seed=SEED,
             )
             continue
         wrong = (kind[index == k] & ~allowed[k] != 0) | (kind[index == k] == 0)
         if wrong.any():
             outcome.fault(
-                f"for light from {incident.name} sampled_type is {kind[index == k][wrong][0]:#x} for component {k}, "
-                f"whose flags are {allowed[k]:#x}"
+                f"for light from {incident.name} sampled_type is {kind[index == k][wrong][0]:#x} for "
+                f"{run.probe.name_of(int(k))}, whose flags are {allowed[k]:#x}",
+                wi=first(index == k),
+                seed=SEED,
             )
     _check_eta(outcome, incident, samples)
     if part.component is None and len(allowed) > 1:
@@ -68,9 +76,11 @@ def _check_sampled(run: Run, outcome: Outcome, part: Part, incident: Incident) -
                 stray = (run.probe.pdf(each, incident.at(drawn), wo) <= 0).mean()
                 if stray > 1e-3:
                     outcome.fault(
-                        f"for light from {incident.name} {stray:.1%} of the samples said to be component "
-                        f"{each.component}'s lie where it draws none",
+                        f"for light from {incident.name} {stray:.1%} of the samples said to be those of {each.name} "
+                        "lie where it draws none",
                         stray,
+                        wi=incident.vector(int(drawn[0])),
+                        seed=SEED,
                     )
                 _check_share(run, outcome, incident, each, samples, drawn)
 
@@ -86,6 +96,9 @@ def _check_eta(outcome: Outcome, incident: Incident, samples: Samples) -> None:
             f"for light from {incident.of(k)} a sample towards {angles_of(samples.wo[k])} has the eta "
             f"{samples.eta[k]:.4g}, but {needed}; {wrong.sum() / samples.lit.sum():.1%} of them are wrong",
             np.inf,
+            wi=incident.vector(k),
+            wo=samples.wo[k],
+            seed=SEED,
         )
 
 
@@ -93,9 +106,9 @@ def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
     """Check that the relative index of refraction is the reciprocal of that of the other way."""
     if len(part.sides) < 2 or not part.has(mi.BSDFFlags.Transmission):
         return
-    found = []
+    found, wi = [], direction(20, 10)
     for side in part.sides:
-        samples = run.probe.sample(part, on_side(direction(20, 10), side), random(COUNT, 6))
+        samples = run.probe.sample(part, on_side(wi, side), random(COUNT, 6))
         through = samples.lit & (samples.wo[:, 2] * side < 0)
         found.append(float(np.median(samples.eta[through])) if through.any() else 1.0)
     if not abs(found[0] * found[1] - 1) < 1e-3:
@@ -103,6 +116,8 @@ def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
             f"eta is {found[0]:.4g} for light that passes from the front, but {found[1]:.4g} for light from behind, "
             "which must be its reciprocal",
             np.inf,
+            wi=wi,
+            seed=6,
         )
 
 
@@ -119,9 +134,11 @@ def _check_share(run: Run, outcome: Outcome, incident: Incident, each: Part, sam
     said = np.isin(np.flatnonzero(kept)[alone], drawn).mean()
     if said < 0.9:
         outcome.fault(
-            f"for light from {incident.name} only {said:.1%} of the samples where nothing but component "
-            f"{each.component} draws any are said to be its own",
+            f"for light from {incident.name} only {said:.1%} of the samples where nothing but {each.name} draws any "
+            "are said to be its own",
             1 - said,
+            wi=incident.vector(int(np.flatnonzero(kept)[alone][0])),
+            seed=SEED,
         )
 
 
@@ -150,6 +167,8 @@ def _check_sum(run: Run, outcome: Outcome) -> None:
                 f"for light from {incident.of(lanes[k])} eval is {whole[k].max():.4g} towards {angles_of(wo[k])}, but "
                 f"the components add up to {total[k].max():.4g}",
                 error[k],
+                wi=incident.vector(lanes[k]),
+                wo=wo[k],
             )
         low, high = np.min(pdfs, axis=0), np.max(pdfs, axis=0)
         if probe.deltas:
@@ -162,6 +181,8 @@ def _check_sum(run: Run, outcome: Outcome) -> None:
                 f"for light from {incident.of(lanes[k])} pdf is {density[k]:.4g} towards {angles_of(wo[k])}, but a "
                 f"mixture of the components' lies between {low[k]:.4g} and {high[k]:.4g}",
                 beyond[k],
+                wi=incident.vector(lanes[k]),
+                wo=wo[k],
             )
 
 
@@ -172,7 +193,7 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
     every = int(mi.BSDFFlags.All)
     kind = part.flags & every
     for words, excluding in (
-        (f"component {part.component} of a type mask without its type", context(part.component, every & ~kind)),
+        (f"{part.name} of a type mask without its type", context(part.component, every & ~kind)),
         ("a component that does not exist", context(probe.bsdf.component_count() + 7)),
     ):
         nothing = part._replace(context=excluding)
@@ -180,7 +201,12 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         samples = probe.sample(nothing, wi, random(COUNT, 3))
         for name, number in (("eval", value), ("pdf", density), ("sample's weight", samples.weight)):
             if number.any():
-                outcome.fault(f"{name} reaches {number.max():.4g} for {words}, where all must be black", number.max())
+                outcome.fault(
+                    f"{name} reaches {number.max():.4g} for {words}, where all must be black",
+                    number.max(),
+                    wi=wi,
+                    seed=3,
+                )
     alone = [each for each in probe.components if each.flags & kind]
     selected = part._replace(context=context(mask=kind))
     value, expected = probe.eval(selected, wi, wo), np.sum([probe.eval(each, wi, wo) for each in alone], axis=0)
@@ -191,6 +217,8 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
             f"with the type mask {kind:#x} eval is {value[k].max():.4g} towards {angles_of(wo[k])}, but the components "
             f"of this type make {expected[k].max():.4g}",
             error,
+            wi=wi,
+            wo=wo[k],
         )
 
 
@@ -214,6 +242,8 @@ def flags(run: Run) -> Findings:
                         f"for light from {theta}° {near.mean():.0%} of the samples lie within 10° of the mirror "
                         "direction, but it is flagged diffuse",
                         near.mean(),
+                        wi=wi,
+                        seed=2,
                     )
         varies = part.has(kinds.SpatiallyVarying)
         if not part.has(kinds.Anisotropic) and not varies:
@@ -223,6 +253,8 @@ def flags(run: Run) -> Findings:
                     f"f changes by up to {difference:.1%} as both directions turn about the normal, but it is not "
                     "flagged anisotropic",
                     difference,
+                    wi=on_side(direction(40), part.sides[0]),
+                    seed=5,
                 )
         yield outcome.finding("They fit what it does.")
 

@@ -58,6 +58,9 @@ def active(run: Run) -> Findings:
                     outcome.fault(
                         f"{name} is {value[k].max():.4g} for light from {angles_of(wi[k])} {words}, but must be 0",
                         np.inf,
+                        wi=wi[k],
+                        wo=wo[k],
+                        seed=62,
                     )
             changed = abs(value - every[name])[lit]
             if (changed > 1e-5 * abs(every[name][lit]) + 1e-12).any():
@@ -66,6 +69,9 @@ def active(run: Run) -> Findings:
                     f"{name} is {value[k].max():.4g} for light from {angles_of(wi[k])}, {words}, but "
                     f"{every[name][k].max():.4g} when all are",
                     changed.max(),
+                    wi=wi[k],
+                    wo=wo[k],
+                    seed=62,
                 )
     _check_derivatives(run, outcome, wi, wo, half)
     yield outcome.finding("Inactive lanes get no light, no weight and no derivative.")
@@ -140,6 +146,8 @@ def mode(run: Run) -> Findings:
                     f"{angles_of(wo[k])}, but must be {expected[k].max():.4g}, as {why}; {off.mean():.1%} of the pairs "
                     "are wrong",
                     off.mean(),
+                    wi=wi[k],
+                    wo=wo[k],
                 )
             lit = samples.lit
             if lit.any():
@@ -151,6 +159,9 @@ def mode(run: Run) -> Findings:
                         f"in the mode Importance a weight times pdf is {reflected[k].max():.4g} towards "
                         f"{angles_of(samples.wo[lit][k])}, but eval {value[k].max():.4g}",
                         error[k],
+                        wi=wi[np.flatnonzero(lit)[k]],
+                        wo=samples.wo[lit][k],
+                        seed=67,
                     )
         yield outcome.finding("Light may be traced from either end.")
 

@@ -107,10 +107,13 @@ def gradients(run: Run) -> Findings:
         error, size = abs(ad - fd).sum(), max(abs(fd).sum(), abs(ad).sum())
         outcome.data = {"error": float(error), "size": float(size)}
         if error > TOLERANCE * size + noise.sum():
+            k = np.nonzero(trusted)[0][int(np.argmax(abs(ad - fd)))]
             outcome.fault(
                 f"its derivatives are off by {error / size:.0%}: those of eval average {abs(ad).mean():.3g} in size, "
                 f"finite differences {abs(fd).mean():.3g}",
                 error / size,
+                wi=wi[k],
+                wo=wo[k],
             )
         agreement = "it has no influence" if size == 0 else f"they agree to {error / size:.1g}"
         yield outcome.finding(f"Finite and equal to finite differences: {agreement}.")
@@ -140,6 +143,8 @@ def _directional(run: Run) -> Finding:
                     f"the derivative of {name} for {word} is not finite for light from {angles_of(wi[k])} towards "
                     f"{angles_of(wo[k])}, and of {bad.mean():.1%} of the pairs tried",
                     bad.sum(),
+                    wi=wi[k],
+                    wo=wo[k],
                 )
     return outcome.finding("The derivatives of eval and pdf for the directions are finite.")
 

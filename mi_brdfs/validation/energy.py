@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf, isfinite, sqrt
-from typing import Any, NamedTuple
+from dataclasses import replace
+from math import isfinite, sqrt
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import luminance
+from ..measure.arrays import Array, interaction, luminance, numbers
 from ..measure.directions import direction, on_side
 from ..measure.probe import Part
 from ..measure.variates import SHIFTS, lattice, sampling_efficiency
@@ -17,41 +18,73 @@ from .outcome import Findings, Outcome
 from .report import Finding
 from .run import Run
 
+if TYPE_CHECKING:
+    from ..model import Model
+
 
 def albedo(run: Run) -> Findings:
-    """Measure what is reflected of light from one direction: the mean of the weights, over points that fill the space
-    of the variates evenly. Judged if a limit is known, in each channel of colour, to 0.1 % and the noise: for a plugin
-    of ours each component by the model's energy class, and the whole of a plugin with its default parameters by its
-    manual page."""
+    """Check that no more is reflected of light from one direction than is received, in each channel of colour, to 0.1 %
+    and the noise; or, where the page of the model states that it gains energy with these choices, no more than it
+    states, which is noted. So is it if diffuse and specular reflectances add to more than 1. With its default
+    parameters, a plugin of ours reflects what its page says. The mean of the weights is taken over points that fill the
+    space of the variates evenly; that of refracted light without the factor 1/η² of radiance."""
     points = lattice(12, 5)
-    limit, limit_reason, default = _limits(run)
+    limits = _limits(run)
     for part in run.probe.parts:
-        judged = isfinite(limit) and (run.conserves or part.component is not None or len(run.probe.parts) == 1)
-        outcome, largest = Outcome("albedo", part.name), (0.0, "")
+        outcome, largest = Outcome("albedo", part.name), Largest()
         for name, wi in _white_furnace(run, part):
-            weights = run.probe.sample(part, wi, points).weight
+            samples = run.probe.sample(part, wi, points)
+            weights = samples.weight * np.where(samples.weight.any(axis=1), samples.eta, 1)[:, None] ** 2
             copies = weights.reshape(SHIFTS, -1, weights.shape[1]).mean(axis=1)
-            copies = np.concatenate([luminance(copies)[:, None], copies], axis=1)
-            means, noises = copies.mean(axis=0), copies.std(axis=0, ddof=1) / sqrt(SHIFTS)
-            mean, noise = float(means[0]), float(noises[0])
+            means, noises = _mean(copies)
+            mean, noise = (float(value[0]) for value in _mean(luminance(copies)[:, None]))
             outcome.data[name] = {"albedo": mean, "noise": noise}
-            if mean > largest[0] or not np.isfinite(mean):
-                largest = (mean, name)
-            if judged and not (means <= limit * (1 + 1e-3) + 5 * noises).all():
-                k = int(np.argmax(np.where(np.isnan(means[1:]), np.inf, means[1:]))) + 1
-                alike = np.ptp(means[1:]) <= 1e-4 * abs(means[k])
-                outcome.fault(
-                    f"light from {name} is reflected {means[k]:.4g} times (± {noises[k]:.1g})"
-                    f"{'' if alike else f' in channel {k}'}, more than {limit_reason}",
-                    means[k],
-                )
-        if default is not None and part.component is None and not abs(largest[0] - default) <= 0.02 * default:
-            outcome.fault(f"the largest albedo is {largest[0]:.4g}, but the manual page says {default:.4g}", 0)
-        message = f"At most {largest[0]:.4g}, for light from {largest[1]}." if largest[1] else "Black."
-        if judged or default is not None or outcome.faults:
-            yield outcome.finding(message)
-        else:
-            yield Finding("albedo", part.name, "info", message, outcome.data)
+            least = np.nan_to_num(means - 5 * noises, nan=np.inf)
+            k = int(np.argmax(least))
+            alike = np.ptp(means) <= 1e-4 * abs(means[k])
+            words = f"light from {name} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
+            if not mean <= largest.mean:
+                largest = largest._replace(mean=mean, name=name)
+            if least[k] > largest.least:
+                largest = largest._replace(least=float(least[k]), words=words)
+            if limits.largest is not None and least[k] > limits.largest * (1 + TOLERANCE):
+                words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
+                outcome.fault(words, least[k], wi=wi)
+        yield _judged(part, outcome, largest, limits)
+
+
+TOLERANCE = 1e-3
+"""Of float32, relatively."""
+
+
+class Largest(NamedTuple):
+    """The largest albedo of a part: the luminance and its angle, and what a channel reflects at least, in words."""
+
+    mean: float = 0
+    name: str = ""
+    least: float = 0
+    words: str = ""
+
+
+def _mean(copies: Array) -> tuple[Array, Array]:
+    """Return ``(mean, standard error)`` of each column, of some copies of an estimate."""
+    return copies.mean(axis=0), copies.std(axis=0, ddof=1) / sqrt(len(copies))
+
+
+def _judged(part: Part, outcome: Outcome, largest: Largest, limits: Limits) -> Finding:
+    """Return the finding on a part whose faults are known."""
+    is_whole = part.component is None
+    if is_whole and limits.default is not None and not abs(largest.mean - limits.default) <= 0.02 * limits.default:
+        outcome.fault(f"the largest albedo is {largest.mean:.4g}, but its page says {limits.default:.4g}", 0)
+    message = f"At most {largest.mean:.4g}, for light from {largest.name}." if largest.name else "Black."
+    if limits.largest is None and limits.default is None:
+        return Finding("albedo", part.name, "info", message, outcome.data)
+    gains = largest.least > 1 + TOLERANCE
+    if gains and limits.largest is not None:
+        message = f"It gains energy, as {limits.page} ({_shown(limits.largest)}): {largest.words}."
+    found = outcome.finding(message, limits.sums if is_whole else "")
+    noted = is_whole and (gains or limits.sums) and not outcome.faults
+    return replace(found, verdict="note") if noted else found
 
 
 def _white_furnace(run: Run, part: Part) -> Iterator[Incident]:
@@ -73,33 +106,46 @@ def efficiency(run: Run) -> Findings:
 
 
 class Limits(NamedTuple):
-    """What a BSDF may reflect: what the manual page of a plugin of ours says of its configuration."""
+    """What a BSDF may reflect."""
 
-    largest: float
-    """The largest albedo; infinite if no limit is known, or none exists."""
+    largest: float | None
+    """The largest albedo that is allowed; None if it is not judged."""
     reason: str
     """The same in words."""
+    page: str
+    """Who says so if it is more than 1."""
     default: float | None
-    """The largest albedo of the default parameters, if it has these and they are known."""
+    """The largest albedo of the default parameters, if it has these and its page states it."""
+    sums: str
+    """What is wrong with reflectances that add to more than 1."""
 
 
 def _limits(run: Run) -> Limits:
-    model = getattr(run.probe.bsdf, "model", None)
-    energy = getattr(model, "energy", None)
+    models = run.probe.models
+    own = models[0] if run.probe.is_ours else None
     is_default = run.given is not None and set(run.given) == {"type"}
-    measured = energy.default if energy is not None and is_default else None
+    default = own.energy.default if own and own.energy and is_default else None
+    sums = " ".join(dict.fromkeys(filter(None, map(_excess, models))))
     if run.conserves is not None:
-        return Limits(1 if run.conserves else inf, "it receives", measured)
-    if energy is None:
-        return Limits(inf, "", None)
-    largest = min((albedo for given, albedo in energy.largest if _applies(given, model)), default=inf)
-    reason = "it receives" if largest <= 1 else f"the {largest:g} times that the manual page states"
-    return Limits(max(largest, 1), reason, measured)
+        return Limits(1 if run.conserves else None, "it receives", "", default, sums)
+    # Of several BSDFs, blended or on two sides, each may have its part.
+    stated = {model: (model.stated_albedo() if model else None) or 1 for model in models}
+    brightest = max(stated, key=lambda model: stated[model])
+    largest = max(stated[brightest], 1)
+    page = "its page says" if own or brightest is None else f"the page of {brightest.plugins[0]} says"
+    reason = f"the {_shown(largest)} that {page}" if largest > 1 else "it receives"
+    return Limits(largest, reason, page, default, sums)
 
 
-def _applies(given: dict[str, Any], model: Any) -> bool:
-    """Return whether a configuration on the page includes the model's. One that fixes numbers is taken not to."""
-    chosen = model.parameters.chosen
-    return all(
-        chosen.get(name) in (value if isinstance(value, tuple) else (value,)) for name, value in given.items()
-    ) and not any(isinstance(value, float) for value in given.values())
+def _excess(model: Model | None) -> str:
+    """Return what :meth:`Model.excess` says of the present colours that do not vary, as a sentence."""
+    if model is None:
+        return ""
+    si = interaction([0, 0, 1])
+    constant = {name: it for name, it in model.textures.items() if not it.is_spatially_varying()}
+    words = model.excess({name: numbers(texture.eval(si), 1)[0] for name, texture in constant.items()})
+    return f"Of {model.plugins[0]}, {words}." if words else ""
+
+
+def _shown(albedo: float) -> str:
+    return f"{albedo:.2f}" if isfinite(albedo) else "no limit"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from typing import get_args
 
 import mitsuba as mi
 
@@ -20,17 +21,20 @@ STYLE = """
   --bad: #ff8a80; --albedo: #56b4e9; --efficiency: #e69f00 } }
 body { margin: 0 auto; padding: 1rem; max-width: 82rem; font: 1rem/1.45 system-ui, sans-serif; color: var(--ink);
   background: var(--paper) }
-h1, h2, li, th:first-child, td:last-child { overflow-wrap: anywhere }
+h1, h2, li, td:last-child { overflow-wrap: anywhere }
 h2 { margin-top: 3rem; border-top: 1px solid var(--line); padding-top: 1rem }
 a { color: inherit }
-.wide { overflow-x: auto }
 table { border-collapse: collapse; font-size: 0.9rem }
-th, td { padding: 0.15rem 0.6rem; text-align: left; vertical-align: top }
-thead th { border-bottom: 1px solid var(--line) }
+tr { border-top: 1px solid var(--line) }
+td { padding: 0.15rem 1.2rem 0.15rem 0; vertical-align: top }
+@media (max-width: 48rem) { td { display: inline-block } td:last-child { display: block } }
 ul { margin: 0; padding-left: 1.2rem }
+.summary { list-style: none; padding: 0 }
+.summary li { margin: 0.5rem 0 }
+.summary div { color: var(--faint); font-size: 0.85rem }
 .fail { color: var(--bad) }
-td.fail, span.fail { font-weight: 600 }
-.skip, .info, .none, figcaption, footer { color: var(--faint) }
+.fail { font-weight: 600 }
+.skip, .info, figcaption, footer { color: var(--faint) }
 figure { margin: 1rem 0 }
 figcaption { font-size: 0.9rem }
 .rows { display: grid; gap: 0.5rem 2rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 32rem), 1fr)) }
@@ -58,8 +62,10 @@ path, circle { fill: none; vector-effect: non-scaling-stroke }
 
 def page(reports: Sequence[Report]) -> str:
     """Return the page, as text."""
-    failed = sum(not report.passed for report in reports)
+    failed = sum(bool(report.failures) for report in reports)
+    unjudged = sum(not report.judged for report in reports)
     heading = f"{len(reports)} BSDF{'s' if len(reports) != 1 else ''} checked, {failed or 'none'} failed"
+    heading += f", {unjudged} not judged" if unjudged else ""
     sections = "\n".join(_section(report, f"bsdf-{k}") for k, report in enumerate(reports, 1))
     return f"""<!doctype html>
 <html lang="en">
@@ -83,18 +89,25 @@ def page(reports: Sequence[Report]) -> str:
 
 
 def _summary(reports: Sequence[Report]) -> str:
-    """Return a table with a row for each report, a column for each check."""
-    checks = list(dict.fromkeys(finding.check for report in reports for finding in report.findings))
-    heads = "".join(f'<th scope="col">{escape(check)}</th>' for check in checks)
-    rows = []
+    """Return a list with an item for each report: the outcome, and the checks by their verdicts."""
+    items = []
     for k, report in enumerate(reports, 1):
-        cells = "".join(_cell(report.verdict(check)) for check in checks)
-        rows.append(f'<tr><th scope="row"><a href="#bsdf-{k}">{escape(report.name)}</a></th>{cells}</tr>')
-    return _table(rows, f'<thead><tr><th scope="col">BSDF</th>{heads}</tr></thead>')
+        checks = dict.fromkeys(finding.check for finding in report.findings)
+        verdicts = {verdict: [it for it in checks if report.verdict(it) == verdict] for verdict in get_args(Verdict)}
+        told = [f"{verdict}: {', '.join(named)}" for verdict, named in verdicts.items() if named]
+        items.append(
+            f'<li><a href="#bsdf-{k}">{escape(report.name)}</a> <span class="{_kind(report)}">{report.outcome}</span>'
+            f"<div>{escape('; '.join(told))}</div></li>"
+        )
+    return f'<ul class="summary">{"".join(items)}</ul>'
 
 
-def _cell(verdict: Verdict | None) -> str:
-    return f'<td class="{verdict or "none"}">{"FAIL" if verdict == "fail" else verdict or "-"}</td>'
+def _kind(report: Report) -> str:
+    return "fail" if report.failures else "" if report.judged else "skip"
+
+
+def _cell(verdict: Verdict) -> str:
+    return f'<td class="{verdict}">{"FAIL" if verdict == "fail" else verdict}</td>'
 
 
 def _section(report: Report, anchor: str) -> str:
@@ -109,7 +122,7 @@ def _section(report: Report, anchor: str) -> str:
         figures += [chart(alt, curves)] if curves else []
     rows = [
         f"<tr>{_cell(finding.verdict)}<td>{escape(finding.check)}</td><td>{escape(finding.subject)}</td>"
-        f"<td>{escape(finding.message)}{_list(_others(finding))}</td></tr>"
+        f"<td>{escape(finding.sentence)}{_list(_others(finding))}</td></tr>"
         for finding in report.findings
     ]
     return f"""<section id="{anchor}">
@@ -117,15 +130,15 @@ def _section(report: Report, anchor: str) -> str:
 {_outcome(report)}
 {"".join(figures)}
 <details><summary>All findings</summary>
-{_table(rows)}
+<table><tbody>
+{"".join(rows)}
+</tbody></table>
 </details>
 </section>"""
 
 
 def _outcome(report: Report) -> str:
-    if not report.passed:
-        return _list([f"{f.check}, {f.subject}: {f.message}" for f in report.failures], "fail")
-    return f"<p>{escape(report.why_not_judged or 'Passed.')}</p>"
+    return f'<p class="{_kind(report)}">{report.outcome.capitalize()}.</p>{_list(report.sentences)}'
 
 
 def _others(finding: Finding) -> list[str]:
@@ -133,10 +146,6 @@ def _others(finding: Finding) -> list[str]:
     return [fault for fault in finding.data.get("faults", []) if not finding.message.startswith(fault)]
 
 
-def _list(sentences: Sequence[str], kind: str = "") -> str:
+def _list(sentences: Sequence[str]) -> str:
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
-    return f'<ul class="{kind}">{items}</ul>' if items else ""
-
-
-def _table(rows: Sequence[str], head: str = "") -> str:
-    return f'<div class="wide"><table>{head}<tbody>\n{"".join(rows)}\n</tbody></table></div>'
+    return f"<ul>{items}</ul>" if items else ""

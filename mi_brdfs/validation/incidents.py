@@ -28,6 +28,10 @@ class Incident(NamedTuple):
         """Return the directions of some lanes, shape (3,) if they all have the same."""
         return self.wi if self.wi.ndim == 1 else np.ascontiguousarray(self.wi[lanes])
 
+    def vector(self, lane: int = 0) -> Array:
+        """Return the direction of a lane."""
+        return self.wi if self.wi.ndim == 1 else self.wi[lane]
+
     def of(self, lane: int) -> str:
         """Return the direction of a lane in words."""
         return self.name if self.wi.ndim == 1 else angles_of(self.wi[lane])

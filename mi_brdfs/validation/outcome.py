@@ -18,6 +18,8 @@ class Fault(NamedTuple):
     message: str
     size: float
     """How wrong it is: the largest of several faults is told."""
+    at: dict[str, Any]
+    """What reproduces it: :attr:`Finding.at`."""
 
 
 class Outcome:
@@ -28,18 +30,21 @@ class Outcome:
         self.faults: list[Fault] = []
         self.data: dict[str, Any] = {}
 
-    def fault(self, message: str, size: float = 1) -> None:
-        """Add a fault."""
-        self.faults.append(Fault(message, size))
+    def fault(self, message: str, size: float = 1, *, seed: int | None = None, **directions: Array) -> None:
+        """Add a fault, with the directions ``wi`` and ``wo`` and the seed of the variates that reproduce it."""
+        at: dict[str, Any] = {name: w.tolist() for name, w in directions.items()}
+        self.faults.append(Fault(message, size, at if seed is None else at | {"seed": seed}))
 
-    def finding(self, message: str) -> Finding:
-        """Return the finding, with ``message`` if nothing is wrong."""
+    def finding(self, message: str, remark: str = "") -> Finding:
+        """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case."""
+        remark = f" {remark}" if remark else ""
         if not self.faults:
-            return Finding(self.check, self.subject, "pass", message, self.data)
+            return Finding(self.check, self.subject, "pass", message + remark, self.data)
         worst = max(self.faults, key=lambda fault: fault.size)
         more = len(self.faults) - 1
-        text = worst.message + (f" (and {more} more like it)" if more else "") + "."
-        return Finding(self.check, self.subject, "fail", text, self.data | {"faults": [f.message for f in self.faults]})
+        text = worst.message + (f" (and {more} more like it)" if more else "") + "." + remark
+        data = self.data | {"faults": [fault.message for fault in self.faults]}
+        return Finding(self.check, self.subject, "fail", text, data, worst.at)
 
 
 Findings = Iterator[Finding]

@@ -5,10 +5,16 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
+import numpy as np
+
 from .trial import Trial
 
-Verdict = Literal["fail", "pass", "skip", "info"]
+Verdict = Literal["fail", "note", "pass", "skip", "info"]
 """The gravest first."""
+
+
+INSTEAD = "Check a rough BSDF in its place, as roughconductor is for conductor."
+"""What to do where a BSDF has delta functions only."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +26,25 @@ class Finding:
     subject: str
     """What was checked: the whole, or one of its components or parameters."""
     verdict: Verdict
-    """``fail``, ``pass``, ``skip`` if it could not be checked, or ``info`` if there is nothing to judge."""
+    """``fail``, ``note`` if it passes but the user should know of it, ``pass``, ``skip`` if it could not be checked, or
+    ``info`` if there is nothing to judge."""
     message: str
     """One sentence: what is wrong and by how much, or how good it is."""
     data: dict[str, Any] = field(default_factory=dict)
     """The numbers behind it."""
+    at: dict[str, Any] = field(default_factory=dict)
+    """What reproduces a failure, as far as it has this: the directions ``wi`` and ``wo`` of the local frame, and the
+    ``seed`` of the uniform variates, ``numpy.random.default_rng(seed).random((n, 3), dtype="float32")``."""
+
+    @property
+    def where(self) -> str:
+        """What reproduces it, as a sentence."""
+        return f"At {', '.join(f'{name} = {_exact(value)}' for name, value in self.at.items())}." if self.at else ""
+
+    @property
+    def sentence(self) -> str:
+        """The message, with what reproduces it."""
+        return f"{self.message} {self.where}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -37,9 +57,14 @@ class Report:
     """The histograms that the checks of the sampler were made of."""
 
     @property
+    def judged(self) -> bool:
+        """Whether anything was judged."""
+        return any(finding.verdict in ("pass", "note", "fail") for finding in self.findings)
+
+    @property
     def passed(self) -> bool:
-        """Whether nothing failed."""
-        return not self.failures
+        """Whether something was judged, and nothing failed."""
+        return self.judged and not self.failures
 
     @property
     def failures(self) -> list[Finding]:
@@ -49,9 +74,22 @@ class Report:
     @property
     def why_not_judged(self) -> str:
         """A sentence for the user if nothing passed or failed, and else none."""
-        if any(finding.verdict in ("pass", "fail") for finding in self.findings):
+        if self.judged:
             return ""
-        return " ".join(["Nothing was judged.", *dict.fromkeys(finding.message for finding in self.findings)])
+        told = list(dict.fromkeys(finding.message for finding in self.findings))
+        if all(finding.check == "components" for finding in self.findings):
+            told.append(INSTEAD)
+        return " ".join(["Nothing was judged.", *told])
+
+    @property
+    def notable(self) -> list[Finding]:
+        """The findings that a user should read: failures first, then notes."""
+        return [*self.failures, *(finding for finding in self.findings if finding.verdict == "note")]
+
+    @property
+    def outcome(self) -> str:
+        """The verdict on the BSDF in a word or two."""
+        return "passed" if self.passed else "FAILED" if self.judged else "not judged"
 
     def verdict(self, check: str) -> Verdict | None:
         """Return the gravest verdict of a check, or None if it was not made."""
@@ -62,12 +100,26 @@ class Report:
         """Return the findings of one check."""
         return [finding for finding in self.findings if finding.check == check]
 
+    @property
+    def sentences(self) -> list[str]:
+        """What a user should read: failures with what reproduces them, notes, and why nothing was judged."""
+        told = [f"{finding.check}, {finding.subject}: {finding.sentence}" for finding in self.notable]
+        return [*told, *([self.why_not_judged] if self.why_not_judged else [])]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the report in types that JSON has."""
-        return {"name": self.name, "passed": self.passed, "findings": [asdict(finding) for finding in self.findings]}
+        findings = [asdict(finding) for finding in self.findings]
+        return {"name": self.name, "passed": self.passed, "judged": self.judged, "findings": findings}
 
     def __str__(self) -> str:
-        rows = [(f.verdict, f.check, f.subject, f.message) for f in self.findings]
+        rows = [(f.verdict, f.check, f.subject, f.sentence) for f in self.findings]
         widths = [max((len(row[column]) for row in rows), default=0) for column in range(3)]
         lines = ["  ".join([*map(str.ljust, row, widths), row[3]]) for row in rows]
-        return "\n".join([f"{self.name}: {'passed' if self.passed else 'failed'}", *lines])
+        return "\n".join([f"{self.name}: {self.outcome}", *lines])
+
+
+def _exact(value: Any) -> str:
+    """Return a direction, in the digits of float32, or another value."""
+    if isinstance(value, list):
+        return f"[{', '.join(str(np.float32(number)) for number in value)}]"
+    return str(value)

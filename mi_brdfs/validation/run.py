@@ -14,6 +14,9 @@ from ..measure.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents
 from .trial import Trial, Trials, trials_of
 
+SEED = 11
+"""Of the samples that several checks look at."""
+
 
 @dataclass
 class Run:
@@ -44,7 +47,7 @@ class Run:
         """Return samples for a direction of incidence, the same for every check."""
         key = part.name, incident.name
         if key not in self._samples:
-            self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, 11))
+            self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, SEED))
         return self._samples[key]
 
     # --- Statistical tests ------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import mitsuba as mi
@@ -12,6 +12,7 @@ from ..measure.probe import BSDFProbe
 from ..measure.sources import name_of
 from ..variants import is_measurable
 from . import components, contract, derivatives, energy, recompiles, sampling, spectral, textures, values
+from .against import against
 from .outcome import Findings, told
 from .report import Finding, Report
 from .run import Run
@@ -45,14 +46,19 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
 
 VARIANT = "llvm_ad_rgb"
 """What a plugin dict is checked in where the active variant does not do."""
+ANGLES: tuple[float, ...] = (0, 30, 60, 80)
+"""Of incidence, in degrees, by default."""
+SIGNIFICANCE = 0.01
+"""By default."""
+DELTA = "A delta function, which cannot be evaluated or tested."
 
 
 def check(
     bsdf: dict[str, Any] | mi.BSDF,
     *,
     name: str | None = None,
-    angles: Iterable[float] = (0, 30, 60, 80),
-    significance: float = 0.01,
+    angles: Iterable[float] = ANGLES,
+    significance: float = SIGNIFICANCE,
     only: Iterable[str] | None = None,
     conserves: bool | None = None,
     on_progress: Callable[[], None] = lambda: None,
@@ -66,36 +72,90 @@ def check(
     Args:
         bsdf: a plugin dict, or a loaded BSDF, which must belong to the active variant.
         name: what the report calls it; by default its type.
-        angles: of incidence, in degrees.
-        significance: the probability that a BSDF without faults fails one of the statistical tests of this call.
+        angles: of incidence, in degrees, in [0, 90).
+        significance: the probability, in (0, 1), that a BSDF without faults fails one of the statistical tests of this
+            call.
         only: the names of the checks to run, by default all of :data:`CHECKS`.
-        conserves: judge whether the whole reflects at most what it receives; by default plugins of ours are judged by
-            the class that their manual page states, and others are not.
+        conserves: whether to judge that at most what is received is reflected. By default a model may gain the energy
+            that its manual page states, and nothing else may gain any.
         on_progress: called after each check.
 
     Raises:
-        ValueError: for an unknown name of a check, or a loaded BSDF that cannot be checked in the active variant.
+        ValueError: for an unknown name of a check, an angle or a significance out of range, or a loaded BSDF that
+            cannot be checked in the active variant.
     """
     wanted = list(CHECKS) if only is None else list(only)
     if unknown := [word for word in wanted if word not in CHECKS]:
         raise ValueError(f"There is no check {unknown[0]!r}; there are {', '.join(CHECKS)}.")
-    loaded = not isinstance(bsdf, dict)
-    if loaded and not is_measurable(mi.variant()):
-        raise ValueError(f"A loaded BSDF of {mi.variant()} cannot be checked: load it in {VARIANT} or another "
-                         "vectorized and unpolarized variant, or give its dict.")  # fmt: skip
-    with nullcontext() if is_measurable(mi.variant()) else mi.variant_context(VARIANT):
-        probe = BSDFProbe(bsdf if loaded else mi.load_dict(bsdf))
-        name = name or (bsdf["type"] if not loaded else name_of(probe.bsdf))
-        run = Run(probe, tuple(angles), significance, conserves, None if loaded else bsdf)
-        findings = [
-            Finding("components", f"component {k}", "skip", "A delta function, which cannot be evaluated or tested.")
-            for k in probe.deltas
-        ]
+    angles = checked_angles(angles)
+    if not 0 < significance < 1:
+        raise ValueError(f"The significance must be in (0, 1), not {significance:g}.")
+    with _measurable(bsdf):
+        probe, given = _probe(bsdf), bsdf if isinstance(bsdf, dict) else None
+        run = Run(probe, angles, significance, conserves, given)
+        findings = [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
         for word in wanted:
             if probe.parts:
                 findings += _found(word, run)
             on_progress()
-        return Report(name, findings, list(run.shown_trials()))
+        return Report(name or _name(bsdf), findings, list(run.shown_trials()))
+
+
+def compare(
+    bsdf: dict[str, Any] | mi.BSDF,
+    other: dict[str, Any] | mi.BSDF,
+    *,
+    name: str | None = None,
+    other_name: str | None = None,
+    angles: Iterable[float] = ANGLES,
+) -> Report:
+    """Compare what ``eval`` returns for two BSDFs: at the angles of incidence and all over, towards directions all over
+    and those that each draws. They are the same if the largest relative difference is at most what float32 rounds by:
+    1e-4, or more for narrow lobes (1.9e-3 for α = 1e-3). What is less than a millionth of the largest value counts as
+    that much.
+
+    The arguments are those of :func:`check`. The report has one finding, ``against``.
+
+    Raises:
+        ValueError: as :func:`check` does.
+    """
+    angles = checked_angles(angles)
+    with _measurable(bsdf, other):
+        run = Run(_probe(bsdf), angles, SIGNIFICANCE, None, None)
+        return Report(name or _name(bsdf), [against(run, _probe(other), other_name or _name(other))])
+
+
+def checked_angles(angles: Iterable[float]) -> tuple[float, ...]:
+    """Return angles of incidence, in degrees.
+
+    Raises:
+        ValueError: if there are none, or one is not in [0, 90).
+    """
+    checked = tuple(angles)
+    if not checked:
+        raise ValueError("There is no angle of incidence; give one or more, in degrees.")
+    for angle in checked:
+        if not 0 <= angle < 90:
+            raise ValueError(f"An angle of incidence must be in [0, 90) degrees, not {angle:g}.")
+    return checked
+
+
+def _measurable(*bsdfs: dict[str, Any] | mi.BSDF) -> AbstractContextManager:
+    """Return a context in whose variant some BSDFs can be measured."""
+    if is_measurable(mi.variant()):
+        return nullcontext()
+    if not all(isinstance(bsdf, dict) for bsdf in bsdfs):
+        raise ValueError(f"A loaded BSDF of {mi.variant()} cannot be checked: load it in {VARIANT} or another "
+                         "vectorized and unpolarized variant, or give its dict.")  # fmt: skip
+    return mi.variant_context(VARIANT)
+
+
+def _probe(bsdf: dict[str, Any] | mi.BSDF) -> BSDFProbe:
+    return BSDFProbe(mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
+
+
+def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:
+    return str(bsdf["type"]) if isinstance(bsdf, dict) else name_of(bsdf)
 
 
 def _found(word: str, run: Run) -> Findings:

@@ -12,7 +12,7 @@ from ..measure.directions import angles_of
 from ..measure.probe import Samples
 from .outcome import Findings, Outcome
 from .report import Finding
-from .run import Run
+from .run import SEED, Run
 
 
 def chi2(run: Run) -> Findings:
@@ -31,6 +31,8 @@ def chi2(run: Run) -> Findings:
                     f"(p = {trial.test.p_value:.2g}, χ² = {trial.test.statistic:.0f} for {trial.test.degrees} degrees "
                     f"of freedom): {trial.deviation}",
                     trial.test.statistic / max(trial.test.degrees, 1),
+                    wi=trial.incident.wi,
+                    seed=trial.seed,
                 )
         if not any(trial.share or trial.integral for trial in own):
             yield Finding("chi2", part.name, "skip", "It draws nothing.")
@@ -54,6 +56,8 @@ def pdf(run: Run) -> Findings:
                     f"for light from {name} pdf integrates to {trial.integral:.4g}, but "
                     f"{'all' if trial.share == 1 else f'{100 * trial.share:.2f} % of the'} samples are drawn",
                     excess,
+                    wi=trial.incident.wi,
+                    seed=trial.seed,
                 )
         yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.")
 
@@ -73,7 +77,13 @@ def weight(run: Run) -> Findings:
                 if not (typical <= tolerance and largest <= max(0.1, 30 * tolerance)):
                     k = int(np.argmax(error))
                     k = np.flatnonzero(samples.lit)[k]
-                    outcome.fault(f"for light from {incident.of(k)} {_told(name, samples, k)}", largest)
+                    outcome.fault(
+                        f"for light from {incident.of(k)} {_told(name, samples, k)}",
+                        largest,
+                        wi=incident.vector(k),
+                        wo=samples.wo[k],
+                        seed=SEED,
+                    )
         yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.")
 
 

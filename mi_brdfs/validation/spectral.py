@@ -62,6 +62,8 @@ def spectral(run: Run) -> Findings:
                 f"in grey{words}, eval for light from {angles_of(wi[k])} towards {angles_of(wo[k])} is "
                 f"{got[words][k, channel]:.4g} in {other}, but {wanted[k]:.4g} in {rgb}",
                 typical,
+                wi=wi[k],
+                wo=wo[k],
             )
     yield outcome.finding(f"Grey is the same in {rgb} and {other}, to {worst:.1g}.")
 

@@ -37,6 +37,8 @@ class Trial:
     """How many of the samples are drawn in each cell."""
     count: int = COUNT
     """How many samples there are."""
+    seed: int = 0
+    """That of their variates."""
 
     @property
     def axis(self) -> Array:
@@ -128,9 +130,11 @@ def _trials(
     cos, sin = np.cos(turn), np.sin(turn)
     made = partitions(density, pilots, list(wis @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]), COUNT, cells)
     found = []
-    for incident, partition, samples in zip(incidents, made, drawn(count, 1), strict=True):
+    at_once = max(1, COUNT // count)
+    for k, (incident, partition, samples) in enumerate(zip(incidents, made, drawn(count, 1), strict=True)):
         # What is rejected may look as if it were drawn: let the integral decide whether black samples count.
         integral = partition.integrals.sum()
         counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
-        found.append(Trial(part.name, incident, partition, partition.histogram(samples.wo[counted]), count))
+        counts = partition.histogram(samples.wo[counted])
+        found.append(Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once)))
     return found

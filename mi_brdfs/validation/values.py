@@ -14,7 +14,7 @@ from ..measure.variates import random
 from .incidents import SCATTERED
 from .outcome import Findings, Outcome, relative
 from .report import Finding
-from .run import Run
+from .run import SEED, Run
 
 
 def _pairs(part: Part) -> tuple[Array, Array]:
@@ -50,21 +50,26 @@ def finite(run: Run) -> Findings:
                     f"{name} is {_shown(values[k])} for light from {angles_of(wi[k])} towards {angles_of(wo[k])}, and "
                     f"{bad.mean():.1%} of the pairs tried are negative or not finite",
                     bad.sum(),
+                    wi=wi[k],
+                    wo=wo[k],
                 )
         corners = np.array([0, 2**-24, 0.5, 1 - 2**-24], np.float32)
         u = np.stack(np.meshgrid(corners, corners, corners), axis=-1).reshape(-1, 3)
         u = np.concatenate([u, random(2000, 4)])
         for side in part.sides:
             for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
-                samples = run.probe.sample(part, on_side(direction(theta, 30), side), u)
+                w = on_side(direction(theta, 30), side)
+                samples = run.probe.sample(part, w, u)
                 length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
                 bad = _bad(samples.weight) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
                 if bad.any():
                     k = int(np.argmax(bad))
                     outcome.fault(
                         f"for light from {theta:g}° a sample has the weight {_shown(samples.weight[k])}, the density "
-                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}",
+                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}, for the variates "
+                        f"{u[k].tolist()}",
                         bad.sum(),
+                        wi=w,
                     )
         yield outcome.finding(f"{len(wi)} pairs of directions, to 0.0001° above the horizon.")
 
@@ -96,6 +101,8 @@ def horizon(run: Run) -> Findings:
                         f"{name} is {values[k]:.4g} for light from {angles_of(wi[where][k])} towards "
                         f"{angles_of(wo[where][k])}, {words} the horizon, where the flags allow nothing",
                         np.inf,
+                        wi=wi[where][k],
+                        wo=wo[where][k],
                     )
             for incident in run.views(part):
                 samples = run.samples(part, incident)
@@ -106,6 +113,9 @@ def horizon(run: Run) -> Findings:
                         f"for light from {incident.name} {lost.mean():.2%} of the samples go {words} the horizon with "
                         f"a weight, where the flags allow nothing",
                         lost.sum(),
+                        wi=incident.vector(int(np.argmax(lost))),
+                        wo=samples.wo[int(np.argmax(lost))],
+                        seed=SEED,
                     )
         for side in (1, -1):
             if side not in run.probe.whole.sides:
@@ -130,6 +140,8 @@ def _check_blind(run: Run, outcome: Outcome, part: Part, side: int) -> None:
                 f"{name} is {values[k]:.4g} for light from {angles_of(wi[k])} towards {angles_of(towards)}, but its "
                 f"flags say that it cannot be seen from {'the front' if side > 0 else 'behind'}",
                 np.inf,
+                wi=wi[k],
+                wo=towards,
             )
 
 
@@ -154,9 +166,10 @@ def support(run: Run) -> Findings:
                 k = int(np.argmax(np.where(missed, value, 0)))
                 outcome.fault(
                     f"for light from {incident.of(k % SCATTERED)} eval is {value[k]:.4g} towards {angles_of(wo[k])}, "
-                    "but pdf is 0: "
-                    "this light is never sampled",
+                    "but pdf is 0: this light is never sampled",
                     missed.sum(),
+                    wi=incident.vector(k % SCATTERED),
+                    wo=wo[k],
                 )
         yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
 
@@ -194,6 +207,9 @@ def eval_pdf(run: Run) -> Findings:
                         f"for light from {incident.of(lanes[which[k[0]]])} {name} gives {got[k]:.6g} where {of} is "
                         f"{expected[k]:.6g}",
                         error.max(),
+                        wi=incident.vector(lanes[which[k[0]]]),
+                        wo=wo[which[k[0]]],
+                        seed=6,
                     )
         yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
 
@@ -226,6 +242,8 @@ def reciprocity(run: Run) -> Findings:
                     f"f from {angles_of(wi[k])} to {angles_of(wo[k])} is {f:.4g}, but {g:.4g} from there back, and "
                     f"{off.mean():.1%} of the pairs differ",
                     off.mean(),
+                    wi=wi[k],
+                    wo=wo[k],
                 )
         yield outcome.finding(f"f(wi, wo) = f(wo, wi) to {worst:.1g}, within {tolerance:.1g}.")
 
@@ -249,7 +267,8 @@ def continuity(run: Run) -> Findings:
         for side in part.sides:
             for where, crossing in _crossings(np.degrees(step)):
                 crossing = [on_side(w, side) for w in crossing]
-                for word, (at, *around) in _both_ways(run, part, crossing, _companions(run, part, crossing[0])):
+                others = _companions(run, part, crossing[0])
+                for word, (at, *around) in _both_ways(run, part, crossing, others):
                     mean, farther = (around[0] + around[1]) / 2, (around[2] + around[3]) / 2
                     scale = np.maximum(np.maximum(at, mean), 1e-6 * np.max(at) + 1e-12)
                     jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), np.nan_to_num(abs(at - mean) / scale), 0)
@@ -257,20 +276,24 @@ def continuity(run: Run) -> Findings:
                     worst = max(worst, typical)
                     if typical > tolerance:
                         k = int(np.argmax(jump))
+                        wi, wo = (crossing[0], others[k])[:: 1 if word == "from" else -1]
                         outcome.fault(
                             f"eval jumps at light {word} {where}: it is {at[k]:.4g}, but {mean[k]:.4g} around it",
                             typical,
+                            wi=wi,
+                            wo=wo,
                         )
             for phi in (0, 77):
                 heights = [on_side(direction(90 - np.degrees(STEP) * times, phi), side) for times in OCTAVES]
-                for word, values in _both_ways(run, part, heights, on_side(hemisphere(1000, 23), side)):
-                    _check_octaves(outcome, word, np.nan_to_num(values))
+                others = on_side(hemisphere(1000, 23), side)
+                for word, values in _both_ways(run, part, heights, others):
+                    _check_octaves(outcome, word, np.nan_to_num(values), heights, others)
         yield outcome.finding(
             f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
         )
 
 
-def _check_octaves(outcome: Outcome, word: str, values: Array) -> None:
+def _check_octaves(outcome: Outcome, word: str, values: Array, heights: list[Array], others: Array) -> None:
     """Add a fault for values that change far more while the height above the horizon halves than while it halves before
     and after: a power of the height changes alike."""
     high, low = np.maximum(values[:-1], values[1:]), np.minimum(values[:-1], values[1:])
@@ -282,9 +305,12 @@ def _check_octaves(outcome: Outcome, word: str, values: Array) -> None:
         octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
         upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
         factor = np.exp(change[octave, k])
+        wi, wo = (heights[octave], others[k])[:: 1 if word == "from" else -1]
         outcome.fault(
             f"eval jumps by the factor {factor:.3g} for light {word} {upper:.3g}° to {lower:.3g}° above the horizon",
             factor,
+            wi=wi,
+            wo=wo,
         )
 
 

@@ -1,0 +1,418 @@
+"""What the checker's verdict says: of energy, of what was not judged, and of what reproduces a failure."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import warnings
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from mutants import MUTANTS
+
+import mi_brdfs
+from mi_brdfs.measure.arrays import interaction, vectors
+from mi_brdfs.measure.sources import find_sources, value_of
+from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.model import warn_once
+from mi_brdfs.testing import assert_bsdf
+from mi_brdfs.validation import Finding, Report, check, compare
+from mi_brdfs.validation.junit import junit
+from mi_brdfs.validation.text import block
+
+BRIGHT = {"diffuse_reflectance": 0.8, "specular_reflectance": 0.8}
+PHONG = (
+    '<bsdf type="phong"><float name="diffuse_reflectance" value="0.8"/>'
+    '<float name="specular_reflectance" value="0.8"/></bsdf>'
+)
+WHITE = {"type": "burley", "base_color": 1.0}
+
+
+def albedo(bsdf, **options):
+    """The finding on the energy of the whole."""
+    return check(bsdf, only=["albedo"], **options).of("albedo")[0]
+
+
+# --- Energy ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_what_gains_energy_fails():
+    """Though its page says that it does not, in each channel."""
+    warn_once.cache_clear()
+    with pytest.warns(mi_brdfs.EnergyWarning):
+        found = albedo({"type": "phong"} | BRIGHT)
+    assert found.verdict == "fail" and found.message.startswith("it gains energy: light from 0° is reflected 1.6 times")
+    assert "diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1." in found.message
+    red = {"type": "rgb", "value": [0.9, 0.1, 0.1]}
+    with pytest.warns(mi_brdfs.EnergyWarning):
+        found = albedo({"type": "phong", "diffuse_reflectance": red})
+    assert found.verdict == "fail" and "reflected 1.1 times in channel 1" in found.message
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_what_gains_as_much_as_its_page_says_is_noted():
+    """Also on two sides. Unless energy is to be conserved."""
+    words = "It gains energy, as {} says (1.89): light from 89° is reflected 1.19"
+    for bsdf, who in ((WHITE, "its page"), ({"type": "twosided", "inner": WHITE}, "the page of burley")):
+        found = albedo(bsdf)
+        assert found.verdict == "note" and found.message.startswith(words.format(who)), found
+        assert albedo(bsdf, conserves=True).verdict == "fail"
+    assert albedo(WHITE, conserves=False).verdict == "info"
+    assert (
+        "as its page says (no limit)" in albedo({"type": "schlick", "variant": "plain"} | {"roughness": 1e-3}).message
+    )
+    assert albedo({"type": "burley"}).verdict == "pass"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_no_page_says_that_mitsubas_bsdfs_gain():
+    assert albedo({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}}).verdict == "fail"
+    assert albedo({"type": "twosided", "inner": {"type": "diffuse", "reflectance": 1.0}}).verdict == "pass"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_radiance_that_is_refracted_gains_none():
+    """Its solid angle grows by η² as it leaves a dielectric."""
+    report = check({"type": "roughdielectric", "distribution": "ggx", "alpha": 0.3}, only=["albedo"])
+    assert report.passed, report
+    assert 0.85 < max(each["albedo"] for name, each in report.findings[0].data.items() if "behind" in name) <= 1.001
+
+
+def third_party(albedo):
+    """A Lambertian BSDF that knows nothing of this package."""
+
+    class Bright(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)]
+            self.m_flags = self.m_components[0]
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            active &= si.wi.z > 0
+            bs.wo = mi.warp.square_to_cosine_hemisphere(sample2)
+            bs.pdf = mi.warp.square_to_cosine_hemisphere_pdf(bs.wo)
+            bs.eta, bs.sampled_type, bs.sampled_component = 1.0, self.m_flags, 0
+            return bs, dr.select(active & (bs.pdf > 0), mi.Spectrum(albedo), 0)
+
+        def eval(self, ctx, si, wo, active=True):
+            up = active & (si.wi.z > 0) & (wo.z > 0)
+            return dr.select(up, mi.Spectrum(albedo * dr.inv_pi * wo.z), 0)
+
+        def pdf(self, ctx, si, wo, active=True):
+            return dr.select(active & (si.wi.z > 0) & (wo.z > 0), wo.z * dr.inv_pi, 0)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    mi.register_bsdf(f"bright{albedo:g}", Bright)
+    return {"type": f"bright{albedo:g}"}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_bsdf_of_others_may_gain_nothing():
+    only = ["albedo", "weight", "pdf", "finite", "support"]
+    assert check(third_party(1.0), only=only).passed
+    report = check(third_party(1.6), only=only)
+    assert [finding.check for finding in report.failures] == ["albedo"]
+    assert "it gains energy: light from 0° is reflected 1.6 times" in report.failures[0].message
+
+
+# --- The warning ----------------------------------------------------------------------------------------------------
+
+
+def warnings_of(*bsdfs):
+    """The sentences of loading some."""
+    warn_once.cache_clear()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for bsdf in bsdfs:
+            mi.load_dict(bsdf)
+    return [str(each.message) for each in caught if each.category is mi_brdfs.EnergyWarning]
+
+
+RGB = {"type": "rgb", "value": [0.1, 0.85, 0.1]}
+EXCEEDS = {
+    "phong": ({"type": "phong"} | BRIGHT, "phong: diffuse_reflectance + specular_reflectance = 1.6, but "),
+    "a channel": ({"type": "ward", "diffuse_reflectance": RGB}, "specular_reflectance = 1.05 in channel 2, but"),
+    "lobes": (
+        {"type": "lafortune", "specular_reflectance_1": 0.5, "specular_reflectance_2": 0.1},
+        "diffuse_reflectance + specular_reflectance_1 + specular_reflectance_2 = 1.1, but",
+    ),
+    "F = 1": ({"type": "walter", "diffuse_reflectance": 0.5}, "specular_reflectance = 1.5, but"),
+}
+HARMLESS = {
+    "up to 1": {"type": "phong", "diffuse_reflectance": 0.8},
+    "a texture": {"type": "phong", "diffuse_reflectance": {"type": "checkerboard"}, "specular_reflectance": 0.9},
+    "coupled": {"type": "ashikhminshirley"} | BRIGHT,
+    "Fresnel": {"type": "walter", "diffuse_reflectance": 0.5, "f0": 0.04},
+    "a material": {"type": "cooktorrance", "diffuse_reflectance": 0.1, "material": "Au"},
+    "no albedos": {"type": "phong", "normalization": "none"} | BRIGHT,
+}
+
+
+@pytest.mark.parametrize("name", EXCEEDS)
+def test_colours_that_add_to_more_than_one_warn(name):
+    """Once in a process, in any variant."""
+    bsdf, words = EXCEEDS[name]
+    (sentence,) = warnings_of(bsdf, bsdf)
+    assert words in sentence and sentence.endswith("energy is conserved only up to 1.")
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+def test_others_do_not_warn(name):
+    assert not warnings_of(HARMLESS[name])
+
+
+def test_defaults_and_examples_do_not_warn():
+    for model in own_models():
+        assert not warnings_of({"type": model.plugins[0]}, model.example()), model
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_check_speaks_of_the_colours_of_now():
+    """Not of those that were given."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mi_brdfs.EnergyWarning)
+        bsdf = mi.load_dict({"type": "walter", "alpha": 1.0, "diffuse_reflectance": 0.3})
+    found = albedo(bsdf)
+    assert found.verdict == "note" and found.message.startswith("At most 0.9")  # rough facets lose light
+    assert "diffuse_reflectance + specular_reflectance = 1.3, but" in found.message
+    params = mi.traverse(bsdf)
+    params["specular_reflectance.value"] = mi.Float(0.7)
+    params.update()
+    assert albedo(bsdf).verdict == "pass"
+
+
+# --- What reproduces a failure --------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_failures_say_what_reproduces_them():
+    """The value that a sentence tells is that at its directions."""
+    (mutant,) = (each for each in MUTANTS if each.name == "energy gained in blue")
+    found = albedo(mutant.register())
+    assert found.verdict == "fail" and np.linalg.norm(found.at["wi"]) == pytest.approx(1, abs=1e-6)
+    report = check({"type": "roughplastic"}, only=["finite"])
+    assert [finding.subject for finding in report.failures] == ["component 1 (diffuse reflection)"]
+    (finding,) = report.failures
+    context = mi.BSDFContext()
+    context.component = 1
+    wi, wo = (np.array(finding.at[name], np.float32) for name in ("wi", "wo"))
+    pdf = mi.load_dict({"type": "roughplastic"}).pdf(context, interaction(wi), vectors(wo))
+    assert f"pdf is {pdf[0]:.4g} for" in finding.message and pdf[0] < 0
+    assert f"At wi = [{', '.join(map(str, wi))}], wo = [" in report.sentences[0]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_each_fault_of_directions_has_them():
+    few = [each for each in MUTANTS if {"weight", "chi2", "reciprocity", "horizon"} & set(each.caught_by)][::12]
+    for mutant in few:
+        for finding in check(mutant.register(), only=mutant.caught_by).failures:
+            if finding.check in ("weight", "chi2", "reciprocity", "horizon"):
+                assert len(finding.at["wi"]) == 3, finding
+                assert ("seed" in finding.at) == (finding.check in ("weight", "chi2")) or finding.check == "horizon"
+
+
+# --- Comparison -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_bsdfs_are_compared():
+    rough = {"type": "roughconductor", "distribution": "ggx", "material": "none", "alpha": 0.3}
+    same = compare({"type": "walter", "alpha": 0.3}, rough)
+    assert same.passed and same.findings[0].data["difference"] < 1e-5
+    assert "The largest relative difference is" in same.findings[0].message
+    (fault,) = compare({"type": "walter", "alpha": 0.301}, rough, name="x").failures
+    wi, wo = (np.array(fault.at[name], np.float32) for name in ("wi", "wo"))
+    ours, theirs = (
+        mi.load_dict(bsdf).eval(mi.BSDFContext(), interaction(wi), vectors(wo))[0][0]
+        for bsdf in ({"type": "walter", "alpha": 0.301}, rough)
+    )
+    assert f"{ours:.6g}, but {theirs:.6g} of roughconductor" in fault.message
+    assert fault.data["difference"] == pytest.approx(abs(ours / theirs - 1), rel=0.02)
+    assert "The largest relative difference" not in compare({"type": "conductor"}, rough).why_not_judged
+    back = compare({"type": "ward"}, {"type": "twosided", "inner": {"type": "ward"}})
+    assert "behind" in back.failures[0].message
+    black = {"reflectance": 0.0}
+    assert compare({"type": "lambert"} | black, {"type": "diffuse"} | black).passed
+
+
+# --- Tests of users -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_assert_bsdf():
+    assert assert_bsdf({"type": "ward"}, only=["weight"]).passed
+    with pytest.raises(AssertionError) as raised:
+        assert_bsdf({"type": "roughplastic"}, only=["finite", "weight"], angles=(30,))
+    lines = str(raised.value).splitlines()
+    assert lines[0] == "roughplastic: FAILED" and "finite, component 1 (diffuse reflection): pdf is" in lines[1]
+    again = lines[-1].removeprefix("Again: ")
+    report = eval(again, {"mi_brdfs": SimpleNamespace(validation=SimpleNamespace(check=check))})
+    assert [f"finite, {finding.subject}: {finding.sentence}" for finding in report.failures] == lines[1:-1]
+    with pytest.raises(AssertionError, match=r"conductor: not judged\nNothing was judged"):
+        assert_bsdf({"type": "conductor"})
+    with pytest.raises(ValueError, match=r"in \[0, 90\) degrees, not 95"):
+        assert_bsdf({"type": "ward"}, angles=(5, 95))
+    with pytest.raises(ValueError, match=r"in \(0, 1\), not 0"):
+        assert_bsdf({"type": "ward"}, significance=0)
+
+
+# --- Files and the terminal -----------------------------------------------------------------------------------------
+
+FINDINGS = [
+    Finding("weight", "whole", "fail", "one is 2 (and 1 more like it).", {"faults": ["one is 2", "one is 1"]},
+            {"wi": [0.0, 0.0, 1.0], "seed": 11}),
+    Finding("albedo", "whole", "note", "It gains energy, as its page says (1.60)."),
+    Finding("spectral", "whole", "skip", "It takes\x1b two < variants."),
+    Finding("efficiency", "whole", "info", "η = 1."),
+    *(Finding(f"a_check_with_a_name_{k}", "whole", "pass", "Right.") for k in range(12)),
+]  # fmt: skip
+
+
+def test_junit():
+    root = ElementTree.fromstring(junit([Report("a & <b>", FINDINGS), Report("x", FINDINGS[1:])]))
+    assert root.attrib == {"name": "mi-brdfs check", "tests": "31", "failures": "1", "skipped": "2"}
+    suite, other = root
+    assert suite.attrib == {"name": "a & <b>", "tests": "16", "failures": "1", "skipped": "1"}
+    failed, noted, skipped, *_ = suite
+    assert failed.attrib == {"classname": "a & <b>", "name": "weight, whole"}
+    assert failed[0].tag == "failure" and failed[0].get("message") == FINDINGS[0].message
+    assert failed[0].text.splitlines() == ["one is 2", "one is 1", "At wi = [0.0, 0.0, 1.0], seed = 11."]
+    assert noted[0].tag == "system-out" and skipped[0].get("message") == "It takes\ufffd two < variants."
+    assert other.get("failures") == "0"
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_a_block_fits_the_terminal(width):
+    """Words stay whole, except an id that is longer than a line."""
+    name = f"scene.xml:{'a' * 100}"
+    lines = [line for line, _ in block(Report(name, FINDINGS), width)]
+    assert max(map(len, lines)) <= width
+    text = "".join(lines[:2] if width < 100 else lines[:1])
+    assert text == f"{name}: FAILED" or text.replace(":FAILED", ": FAILED") == f"{name}: FAILED"
+    words = {word for line in lines for word in line.replace(",", " ").split()}
+    assert {finding.check for finding in FINDINGS} <= words
+    assert " ".join(" ".join(lines).split()).endswith(
+        "weight, whole: one is 2 (and 1 more like it). At wi = [0.0, 0.0, 1.0], seed = 11. "
+        "albedo, whole: It gains energy, as its page says (1.60)."
+    )
+
+
+def test_values_of_parameters():
+    assert [value_of(text) for text in ("true", "2", "0.5", "ggx")] == [True, 2, 0.5, "ggx"]
+    assert value_of("1;0.5;0") == {"type": "rgb", "value": [1, 0.5, 0]}
+    assert value_of("#ff0000") == {"type": "rgb", "value": [1, 0, 0]}
+
+
+SCENE = """<scene version="3.0.0"><default name="n" value="10"/>
+<bsdf type="phong" id="plastic"><float name="exponent" value="$n"/></bsdf>
+<shape type="sphere"><ref id="plastic"/></shape>
+<shape type="cube"><ref id="plastic"/></shape>
+<shape type="sphere"><bsdf type="twosided"><bsdf type="ward"/></bsdf></shape>
+<shape type="disk"><bsdf type="ward"/></shape>
+<shape type="disk"><bsdf type="ward"><float name="alpha" value="0.3"/></bsdf></shape>
+<shape type="rectangle"><emitter type="area"/></shape>
+<shape type="rectangle"><bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf><emitter type="area"/></shape>
+<shape type="rectangle"><bsdf type="lambert" id="lit"/><emitter type="area"/></shape>
+<shape type="sphere"><bsdf type="null"/></shape>
+</scene>"""
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_materials_of_a_scene(tmp_path):
+    """Each once, by its id or else its class, without the black ones of lamps."""
+    path = tmp_path / "s.xml"
+    path.write_text(SCENE)
+    names = ["TwoSidedBRDF of Ward", "Ward 1", "Ward 2", "lit", "plastic"]
+    assert [source.name for source in find_sources(str(path))] == [f"s.xml:{name}" for name in names]
+    (one,) = find_sources(f"{path}:plastic", {"n": "70"})
+    assert (one.name, one.word) == ("s.xml:plastic n=70", f"{path}:plastic")
+    assert mi.traverse(one.load())["exponent.value"] == 70
+    alphas = [mi.traverse(next(find_sources(f"{path}:Ward {k}")).load())["alpha.value"][0] for k in (1, 2)]
+    assert sorted(alphas) == pytest.approx([0.1, 0.3])
+    with pytest.raises(ValueError, match="no such material; there are TwoSidedBRDF of Ward, Ward 1"):
+        list(find_sources(f"{path}:gold"))
+
+
+# --- The command ----------------------------------------------------------------------------------------------------
+
+
+def run(*arguments, columns=80, **options):
+    command = [sys.executable, "-m", "mi_brdfs.cli", "check", *map(str, arguments)]
+    env = {**os.environ, "COLUMNS": str(columns)}
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, env=env, **options)
+
+
+def test_command_says_that_colours_gain_energy():
+    done = run(PHONG)
+    text = " ".join(done.stdout.split())
+    assert done.returncode == 1 and "Warning" not in done.stderr
+    assert "it gains energy: light from 0° is reflected 1.6 times" in text
+    assert "diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1." in text
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_command_on_a_file_of_others(tmp_path):
+    (tmp_path / "bright.py").write_text(
+        "import mi_brdfs\n\n\nclass Bright(mi_brdfs.Model):\n"
+        '    """A Lambertian that reflects too much."""\n\n'
+        "    def lobes(self, p):\n        return (mi_brdfs.lobes.LambertLobe(1.6),)\n"
+    )
+    done = run("bright", "--import", tmp_path / "bright.py", "--only", "albedo")
+    assert done.returncode == 1 and "reflected 1.6 times" in done.stdout
+    again = done.stdout.splitlines()[-1].partition("Again: mi-brdfs check ")[2]
+    assert run(*shlex.split(again)).stdout == done.stdout
+
+
+def test_command_on_what_cannot_be_judged(tmp_path):
+    done = run("conductor", "--json", tmp_path / "x.json")
+    assert done.returncode == 3 and done.stdout.startswith("conductor: not judged\n")
+    assert "Nothing was judged" in done.stdout and "Check a rough BSDF in its place" in done.stdout
+    (report,) = json.loads((tmp_path / "x.json").read_text())
+    assert not report["judged"] and not report["passed"]
+    assert run("conductor", "lambert", "--only", "flags").returncode == 0
+
+
+def test_command_with_its_options(tmp_path):
+    given = ["burley", "-D", "base_color=1.0", "--param", "roughness=1", "--only", "albedo", "--angles", "5,83"]
+    done = run(*given, "--junit", tmp_path / "x.xml", "--significance", "0.05")
+    assert done.returncode == 0 and "burley base_color=1.0 roughness=1: passed" in done.stdout
+    assert "It gains energy, as its page says (1.89)" in " ".join(done.stdout.split())
+    assert ElementTree.parse(tmp_path / "x.xml").getroot().get("failures") == "0"
+    done = run(*given, "--conserves")
+    again = done.stdout.splitlines()[-1].strip()
+    assert done.returncode == 1 and again == (
+        "Again: mi-brdfs check burley -D base_color=1.0 -D roughness=1 --only albedo --angles 5,83 --conserves"
+    )
+
+
+def test_command_compares(tmp_path):
+    rough = '<bsdf type="roughconductor"><string name="distribution" value="ggx"/></bsdf>'
+    (tmp_path / "s.xml").write_text(SCENE)
+    same = run("ward", "-D", "alpha=0.1", "--against", f"{tmp_path}/s.xml:TwoSidedBRDF of Ward", "--angles", "10")
+    assert same.returncode == 1 and "behind" in same.stdout  # which one side does not reflect from
+    assert run("phong", "-D", "exponent=10", "--against", f"{tmp_path}/s.xml:plastic").returncode == 0
+    done = run("walter", "-D", "alpha=0.3", "--against", rough)
+    assert done.returncode == 1 and "the largest relative difference is 0." in " ".join(done.stdout.split())
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_commands_warn_in_a_sentence(tmp_path):
+    scene = f"""<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+    <shape type="sphere">{PHONG}</shape><shape type="cube">{PHONG}</shape>
+    <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
+    <integer name="height" value="8"/></film></sensor></scene>"""
+    (tmp_path / "s.xml").write_text(scene)
+    command = [sys.executable, "-m", "mi_brdfs.cli", "render", "s.xml", "--spp", "1", "--variant", "scalar_rgb"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180)
+    told = "phong: diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1."
+    assert done.returncode == 0 and done.stderr.splitlines()[0] == f"mi-brdfs: {told}"
+    assert done.stderr.count("1.6") == 1
