@@ -5,8 +5,10 @@ dict scenes. :func:`list_models` names them, :func:`info` returns a manual page,
 shows a material. :func:`ranges` and :func:`project` keep optimised parameters valid.
 """
 
+import importlib
 import re
 import warnings
+from types import ModuleType
 
 from .mitsuba import llvm
 
@@ -32,6 +34,20 @@ from .preview import preview_scene  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
 
 install()
+
+_LAZY = ("bench", "gallery", "plot", "testing", "validation")
+"""Modules that are imported when they are used: some need extras, and all take time."""
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in _LAZY:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})
+
 
 __all__ = [
     "Energy",

@@ -11,10 +11,13 @@ From Python::
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,8 +42,10 @@ class Picture:
     """The same image with channel names, ready to be written as an EXR."""
     spp: int
     """Samples per pixel finished."""
-    total: int
-    """Samples per pixel requested, rounded up as the sampler needs."""
+    total: int | None
+    """Samples per pixel requested, rounded up as the sampler needs; None if only the time was."""
+    interrupted: bool = False
+    """Whether Ctrl-C ended it."""
 
 
 def render(
@@ -48,7 +53,8 @@ def render(
     spp: int | None = None,
     seed: int = 0,
     sensor: int = 0,
-    on_pass: Callable[[int, int], None] = lambda done, total: None,
+    on_pass: Callable[[int, int | None], None] = lambda done, total: None,
+    seconds: float | None = None,
 ) -> Picture:
     """Render ``scene`` in passes of about a second and combine them without bias.
 
@@ -57,13 +63,15 @@ def render(
     mean of a pixel's samples, as ``shading`` does, has methods ``sums`` and ``put`` like those of :class:`FilmPasses`,
     so that its passes add up first.
 
-    ``spp`` defaults to the scene's own number. ``on_pass(done, total)`` is called after each pass. The first Ctrl-C
-    lets the running pass end (scalar variants may drop it) and returns the finished passes
-    (``picture.spp < picture.total``). A second one, or one before any pass has finished, raises KeyboardInterrupt.
+    ``spp`` defaults to the scene's own number. With ``seconds``, the pass in which they end is the last; then there is
+    no limit to the samples unless ``spp`` is given. ``on_pass(done, total)`` is called after each pass. The first
+    Ctrl-C lets the running pass end (scalar variants may drop it) and returns the finished passes
+    (``picture.interrupted``). A second one, or one before any pass has finished, raises KeyboardInterrupt.
 
-    The result depends on scene, variant, ``spp``, ``seed`` and, in LLVM variants, the number of threads, but never on
-    timing: the size of a pass follows from the size of the image, and pass ``k`` uses a seed computed from ``seed``
-    and ``k``. Two runs agree up to the order in which floats are added. Samplers that stratify do so within a pass.
+    The result depends on scene, variant, ``spp``, ``seed`` and, in LLVM variants, the number of threads, and on timing
+    only as to the number of passes, with ``seconds``: the size of a pass follows from the size of the image, and pass
+    ``k`` uses a seed computed from ``seed`` and ``k``. Two runs agree up to the order in which floats are added.
+    Samplers that stratify do so within a pass.
     """
     camera = scene.sensors()[sensor]
     film, sampler, integrator = camera.film(), camera.sampler(), scene.integrator()
@@ -73,8 +81,14 @@ def render(
     own_count = sampler.sample_count()
     try:
         particles = isinstance(integrator, mi.AdjointIntegrator)
-        passes = _pass_sizes(sampler, spp or own_count, _samples_per_pass() // _pixel_count(film, particles))
-        total, done, raw = sum(passes), 0, 0
+        limit = _samples_per_pass() // _pixel_count(film, particles)
+        passes: Iterable[int]
+        if seconds is not None and spp is None:
+            passes, total = itertools.repeat(_rounded(sampler, _power_of_2(limit))), None
+        else:
+            passes = _pass_sizes(sampler, spp or own_count, limit)
+            total = sum(passes)
+        done, raw, start = 0, 0, time.perf_counter()
         with ctrl_c() as interrupt:
             for index, count in enumerate(passes):
                 passed = source.sums(scene, camera, seed=_pass_seed(seed, index), spp=count)
@@ -85,14 +99,14 @@ def render(
                 dr.sync_thread()
                 done += count
                 on_pass(done, total)
-                if interrupt.pressed:
+                if interrupt.pressed or (seconds is not None and time.perf_counter() - start >= seconds):
                     break
     finally:
         sampler.set_sample_count(own_count)
     if not done:
         raise KeyboardInterrupt
     source.put(film, raw, done)
-    return Picture(film.develop(), film.bitmap(), done, total)
+    return Picture(film.develop(), film.bitmap(), done, total, interrupt.pressed and done != total)
 
 
 class FilmPasses:
@@ -112,6 +126,42 @@ class FilmPasses:
         """Fill a film with the sums over ``count`` samples per pixel."""
         film.clear()
         film.put_block(mi.ImageBlock(sums / count if self.averaged else sums, film.crop_offset(), border=False))
+
+
+def crop(sensor: mi.Sensor, x: int, y: int, width: int, height: int) -> None:
+    """Let a sensor take only the part of its picture that is ``width`` x ``height`` pixels from (x, y) on, counted from
+    the left and the top.
+
+    Raises:
+        ValueError: if that is not within the picture.
+    """
+    across, down = sensor.film().size()
+    if min(x, y) < 0 or min(width, height) < 1 or x + width > across or y + height > down:
+        raise ValueError(f"it is not within the picture, which has {across} x {down} pixels")
+    parameters = mi.traverse(sensor)
+    parameters["film.crop_offset"], parameters["film.crop_size"] = [x, y], [width, height]
+    parameters.update()
+
+
+def denoised(picture: Picture) -> Picture:
+    """Return a picture whose colours are denoised by Intel's Open Image Denoise; alpha and AOVs are as before. Films
+    with a box filter give the best result, as pixels then share no samples.
+
+    Raises:
+        ImportError: without the extra that brings it.
+        ValueError: if the film has no RGB channels.
+    """
+    try:
+        import mitsuba_oidn
+    except ImportError as error:
+        raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
+    names = [field.name for field in picture.bitmap.struct_()]
+    if names[:3] != ["R", "G", "B"]:
+        raise ValueError("only films with the pixel format rgb or rgba can be denoised")
+    pixels = np.array(picture.bitmap, np.float32).reshape(*reversed(picture.bitmap.size()), -1)
+    pixels[..., :3] = mitsuba_oidn.denoise(np.ascontiguousarray(pixels[..., :3]), hdr=True)
+    bitmap = mi.Bitmap(pixels, picture.bitmap.pixel_format(), names)
+    return dataclasses.replace(picture, image=mi.TensorXf(pixels), bitmap=bitmap)
 
 
 def tonemap(image: np.ndarray) -> np.ndarray:
@@ -177,15 +227,20 @@ def _pixel_count(film: mi.Film, particles: bool) -> int:
 def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> list[int]:
     """Return the samples per pixel of each pass: powers of two up to ``limit`` and a rest, rounded as the sampler
     does."""
-
-    def rounded(count: int) -> int:
-        sampler.set_sample_count(count)
-        return sampler.sample_count()
-
-    full = rounded(min(spp, 1 << max(limit, 1).bit_length() - 1))
+    full = _rounded(sampler, min(spp, _power_of_2(limit)))
     sizes = [full] * (spp // full)
     rest = spp - sum(sizes)
-    return [*sizes, rounded(rest)] if rest else sizes
+    return [*sizes, _rounded(sampler, rest)] if rest else sizes
+
+
+def _power_of_2(limit: int) -> int:
+    """Return the largest power of two that is no larger."""
+    return 1 << max(limit, 1).bit_length() - 1
+
+
+def _rounded(sampler: mi.Sampler, count: int) -> int:
+    sampler.set_sample_count(count)
+    return sampler.sample_count()
 
 
 def _pass_seed(seed: int, index: int) -> int:

@@ -47,7 +47,7 @@ def folder(tmp_path):
 
 
 def command(*arguments):
-    return [sys.executable, "-m", "mi_brdfs.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "mi_brdfs", *map(str, arguments)]
 
 
 def run(*arguments, cwd=None, library=None):

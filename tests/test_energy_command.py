@@ -97,7 +97,7 @@ RIGHT = "0.39, [({}, 1.3)]"
 
 def energy(folder, *words, glow=RIGHT):
     (folder / "guests.py").write_text(GUESTS.replace("GLOW", glow))
-    words = [sys.executable, "-m", "mi_brdfs.cli", "energy", *words, "--import", "guests.py"]
+    words = [sys.executable, "-m", "mi_brdfs", "energy", *words, "--import", "guests.py"]
     return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=180)
 
 

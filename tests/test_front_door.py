@@ -198,7 +198,7 @@ def guest(tmp_path):
 
 
 def command(folder, *arguments):
-    words = [sys.executable, "-m", "mi_brdfs.cli", *map(str, arguments)]
+    words = [sys.executable, "-m", "mi_brdfs", *map(str, arguments)]
     return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=180)
 
 

@@ -240,7 +240,7 @@ def test_what_is_finished_is_kept(tmp_path):
 
 
 def start(*arguments, **options):
-    command = [sys.executable, "-m", "mi_brdfs.cli", "gallery", *map(str, arguments)]
+    command = [sys.executable, "-m", "mi_brdfs", "gallery", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 

@@ -49,7 +49,7 @@ def test_formulas(variant, bsdf, reference):
 
 def command(folder, *words):
     done = subprocess.run(
-        [sys.executable, "-m", "mi_brdfs.cli", *words], cwd=folder, capture_output=True, text=True, timeout=300
+        [sys.executable, "-m", "mi_brdfs", *words], cwd=folder, capture_output=True, text=True, timeout=300
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

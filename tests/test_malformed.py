@@ -357,7 +357,7 @@ FILES = {
 
 
 def command_line(folder, *arguments):
-    command = [sys.executable, "-m", "mi_brdfs.cli", *arguments]
+    command = [sys.executable, "-m", "mi_brdfs", *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
 
 

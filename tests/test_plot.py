@@ -401,7 +401,7 @@ def test_values_of_parameters():
 
 def test_the_command_in_a_process_of_its_own(folder):
     words = ["plot", "ward", "--param", "alpha=0.1,0.4", "--param", "variant=ward-duer", "--scale", "log"]
-    done = subprocess.run([sys.executable, "-m", "mi_brdfs.cli", *words], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-m", "mi_brdfs", *words], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout, done.stderr) == (0, "ward-polar.png\n", "")
     width, height = mi.Bitmap(str(folder / "ward-polar.png")).size()
     assert width > 800 and height > 800

@@ -213,7 +213,7 @@ def test_variants():
 
 
 def run(*arguments, cwd=None):
-    command = [sys.executable, "-m", "mi_brdfs.cli", "check", *map(str, arguments)]
+    command = [sys.executable, "-m", "mi_brdfs", "check", *map(str, arguments)]
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=180)
 
 
@@ -244,7 +244,7 @@ def test_command_in_several_processes(tmp_path):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_ends_the_command_at_once(jobs):
     """Also if only the first of its processes receives the signal."""
-    command = [sys.executable, "-m", "mi_brdfs.cli", "check", "--all", "-j", str(jobs)]
+    command = [sys.executable, "-m", "mi_brdfs", "check", "--all", "-j", str(jobs)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(8)
     process.send_signal(signal.SIGINT)
@@ -254,7 +254,7 @@ def test_ctrl_c_ends_the_command_at_once(jobs):
 
 def test_a_job_in_the_background_ignores_ctrl_c():
     """Of a shell, which has it ignore the signal: it is meant for what runs in the foreground."""
-    command = [sys.executable, "-m", "mi_brdfs.cli", "check", "lambert", "diffuse", "--only", "pdf", "-j", "2"]
+    command = [sys.executable, "-m", "mi_brdfs", "check", "lambert", "diffuse", "--only", "pdf", "-j", "2"]
     background = ["sh", "-c", f"trap '' INT; echo; exec {shlex.join(command)}"]
     process = subprocess.Popen(
         background, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True

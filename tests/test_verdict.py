@@ -346,7 +346,7 @@ def test_materials_of_a_scene(tmp_path):
 
 
 def run(*arguments, columns=80, **options):
-    command = [sys.executable, "-m", "mi_brdfs.cli", "check", *map(str, arguments)]
+    command = [sys.executable, "-m", "mi_brdfs", "check", *map(str, arguments)]
     env = {**os.environ, "COLUMNS": str(columns)}
     return subprocess.run(command, capture_output=True, text=True, timeout=180, env=env, **options)
 
@@ -411,7 +411,7 @@ def test_commands_warn_in_a_sentence(tmp_path):
     <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/>
     <integer name="height" value="8"/></film></sensor></scene>"""
     (tmp_path / "s.xml").write_text(scene)
-    command = [sys.executable, "-m", "mi_brdfs.cli", "render", "s.xml", "--spp", "1", "--variant", "scalar_rgb"]
+    command = [sys.executable, "-m", "mi_brdfs", "render", "s.xml", "--spp", "1", "--variant", "scalar_rgb"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180)
     told = "phong: diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1."
     assert done.returncode == 0 and done.stderr.splitlines()[0] == f"mi-brdfs: {told}"

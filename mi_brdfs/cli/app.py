@@ -8,13 +8,16 @@ import warnings
 from collections.abc import Callable
 from typing import Annotated
 
+import mitsuba as mi
 import typer
 
+from .. import __version__
 from ..mitsuba import guests
-from .terminal import Exit, fail
+from .terminal import Exit, fail, out
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
-
+app = typer.Typer(
+    no_args_is_help=True, pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
+)
 
 imported: list[str] = []
 """The arguments of --import."""
@@ -26,8 +29,18 @@ def main() -> None:
     app()
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        out.print(f"mi-brdfs {__version__}, Mitsuba {mi.__version__}")
+        raise typer.Exit
+
+
 @app.callback()
-def _describe() -> None:
+def _describe(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
     """Classical BRDFs for Mitsuba 3: list and check them, see what works on this machine, render scenes."""
 
 
@@ -61,6 +74,7 @@ def command(name: str | None = None) -> Callable:
 
         signature = inspect.signature(function, eval_str=True)
         option = inspect.Parameter("imports", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Imports)
+        importing.__doc__ = " ".join((function.__doc__ or "").split())  # lines end where the terminal's do
         importing.__signature__ = signature.replace(parameters=[*signature.parameters.values(), option])
         importing.__annotations__ = {**inspect.get_annotations(function, eval_str=True), "imports": Imports}
         return app.command(name)(importing)

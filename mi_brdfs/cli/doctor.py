@@ -20,7 +20,8 @@ def doctor() -> None:
     for it in findings:
         table.add_row(it.backend, Text(it.state, colours.get(it.state, "red")), it.detail)
         table.add_row("", "", Text(" ".join(it.variants), "dim"))
-    out.print(", ".join(f"{name} {version}" for name, version in doctor_module.versions().items()))
+    for name, version in doctor_module.versions().items():
+        out.print(f"{name} {version}")
     print_table(table)
     out.print(doctor_module.next_step(findings))
     if not doctor_module.any_fast(findings):

@@ -11,6 +11,7 @@ from rich.text import Text
 from .. import info as manual
 from .app import command
 from .errors import one_line
+from .manual import folded, is_underline
 from .terminal import fail, out
 
 
@@ -21,22 +22,19 @@ def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or ali
         page = manual(type)
     except ValueError as error:
         fail(one_line(error))
-    out.print(_styled(page))
+    page = re.sub(r":\w+:`([^`]+)`", r"\1", page)
+    out.print(_styled(folded(page, out.width) if out.is_terminal else page))
 
 
 def _styled(page: str) -> Text:
     """Return a manual page for the terminal: literals and headings styled instead of in reStructuredText markup."""
-    lines = re.sub(r":\w+:`([^`]+)`", r"\1", page).splitlines()
+    lines = page.splitlines()
     text = Text()
     for line, following in zip(lines, [*lines[1:], ""], strict=True):
-        if _underlines(line):
+        if is_underline(line):
             continue
-        heading = bool(line.strip()) and _underlines(following)
+        heading = bool(line.strip()) and is_underline(following)
         for index, part in enumerate(line.split("``")):
             text.append(part, "bold" if heading else "cyan" if index % 2 else "")
         text.append("\n")
     return text
-
-
-def _underlines(line: str) -> bool:
-    return re.fullmatch(r"(=|-|~){3,}", line.strip()) is not None

@@ -14,5 +14,5 @@ def list_() -> None:
     """List the BRDFs: type, aliases, summary."""
     table = Table("type", "aliases", "summary", box=None, pad_edge=False)
     for model in all_models():
-        table.add_row(model.plugins[0], " ".join(model.plugins[1:]), model.summary())
+        table.add_row(model.plugins[0], " ".join(model.plugins[1:]), model.summary().replace("``", ""))
     print_table(table)

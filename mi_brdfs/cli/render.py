@@ -2,101 +2,96 @@
 
 from __future__ import annotations
 
-import tempfile
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import mitsuba as mi
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from .app import command
 from .errors import one_line
-from .interrupts import answer_ctrl_c
-from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .options import parameters_of
+from .picture import AnyVariant, Denoise, Output, Seconds, Seed, output_files, render_to
+from .terminal import Exit, fail
 from .variants import set_variant
 
-if TYPE_CHECKING:
-    from ..render import Picture
-
 LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: a -D parameter cannot have these names
-DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 @command()
 def render(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.xml", help="The scene file.")],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="An .exr, .png or .jpg; the EXR and a display image are always both written."
-        ),
-    ] = None,
-    variant: Annotated[
-        str | None,
-        typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
-    ] = None,
+    output: Output = None,
+    variant: AnyVariant = None,
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: the scene's.")] = None,
+    seconds: Seconds = None,
     define: Annotated[
-        list[str] | None, typer.Option("-D", metavar="name=value", help="Set a <default> parameter of the scene.")
+        list[str] | None,
+        typer.Option("-D", "--param", metavar="name=value", help="Set a <default> parameter of the scene."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="A different seed gives different noise.")] = 0,
+    sensor: Annotated[
+        str, typer.Option(metavar="NUMBER|ID", help="Which of the scene's sensors, counted from 0, or its id.")
+    ] = "0",
+    crop: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,WIDTH,HEIGHT", help="Render this part of the picture, in pixels from the top left."),
+    ] = None,
+    denoise: Denoise = False,
+    seed: Seed = 0,
 ) -> None:
     """Render a scene progressively; Ctrl-C keeps the finished passes."""
-    parameters = _parameters(define or [])
-    exr, display = _output_files(output or Path(scene.stem + ".exr"))
-    chosen = set_variant(variant)
-    start = time.perf_counter()
-    try:
-        with stdout_to_stderr():
-            picture = _render(_load(scene, parameters), spp, seed)
-        seconds = time.perf_counter() - start
-        written = _write(picture, exr, display)
-    except KeyboardInterrupt:
-        err.print("Interrupted; nothing is finished, nothing was written.")
-        raise typer.Exit(Exit.INTERRUPTED) from None
-    for path in written:
-        out.print(str(path))
-    if picture.spp < picture.total:
-        err.print(f"Interrupted; the image has the {picture.spp} of {picture.total} samples per pixel finished so far.")
-        raise typer.Exit(Exit.INTERRUPTED)
-    err.print(f"{picture.spp} samples per pixel in {seconds:.1f} s, {chosen}.")
-
-
-def _parameters(definitions: list[str]) -> dict[str, str]:
-    parameters = {}
-    for definition in definitions:
-        name, equals, value = definition.partition("=")
-        if not equals or not name:
-            fail(f"-D {definition}: write -Dname=value", Exit.USAGE)
+    parameters = parameters_of(define)
+    for name in parameters:
         if name in LOAD_FILE_ARGUMENTS:
             fail(f"-D {name}: Mitsuba reserves this name; rename the parameter in the scene", Exit.USAGE)
-        parameters[name] = value
-    return parameters
+    window = _window(crop)
+    files = output_files(output or Path(scene.stem + ".exr"))
+    set_variant(variant)
+
+    def load() -> tuple[mi.Scene, int]:
+        loaded = _load(scene, parameters, box_filter=denoise)
+        index = _index(loaded, sensor)
+        if window:
+            _crop(loaded.sensors()[index], window)
+        return loaded, index
+
+    render_to(files, load, denoise, spp=spp, seed=seed, seconds=seconds)
 
 
-def _output_files(output: Path) -> tuple[Path, Path]:
-    """Return the paths of the EXR and the display image for ``output``, if they can be written."""
-    suffix = output.suffix.lower()
-    if suffix != ".exr" and suffix not in DISPLAY_SUFFIXES:
-        fail(f"{output}: unknown image format; use .exr, .png or .jpg", Exit.USAGE)
-    files = (output, output.with_suffix(".png")) if suffix == ".exr" else (output.with_suffix(".exr"), output)
-    for file in files:
-        if file.is_dir():
-            fail(f"{file} is a folder")
+def _window(text: str | None) -> list[int] | None:
+    if text is None:
+        return None
     try:
-        tempfile.TemporaryFile(dir=output.parent).close()
-    except OSError as error:
-        fail(f"cannot write to the folder {output.parent}: {error.strerror}")
-    return files
+        x, y, width, height = (int(number) for number in text.split(","))
+    except ValueError:
+        fail(f"--crop {text}: write four whole numbers, X,Y,WIDTH,HEIGHT", Exit.USAGE)
+    return [x, y, width, height]
 
 
-def _load(path: Path, parameters: dict[str, str]) -> mi.Scene:
+def _crop(sensor: mi.Sensor, window: list[int]) -> None:
+    from ..render import crop
+
+    try:
+        crop(sensor, *window)
+    except ValueError as error:
+        fail(f"--crop {','.join(map(str, window))}: {error}", Exit.USAGE)
+
+
+def _index(scene: mi.Scene, sensor: str) -> int:
+    ids = [it.id() for it in scene.sensors()]
+    if sensor in ids:
+        return ids.index(sensor)
+    if not sensor.isdecimal() or int(sensor) >= len(ids):
+        known = ", ".join(f"{k} ({name})" if name else str(k) for k, name in enumerate(ids))
+        fail(f"--sensor {sensor}: there is no such sensor; there are {known}", Exit.USAGE)
+    return int(sensor)
+
+
+def _load(path: Path, parameters: dict[str, str], box_filter: bool) -> mi.Scene:
     if not path.is_file():
         fail(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     try:
-        scene = mi.load_file(str(path), **parameters)
+        scene = (_load_with_box_filter if box_filter else mi.load_file)(str(path), **parameters)
     except Exception as error:
         fail(one_line(error))
     if not isinstance(scene, mi.Scene):
@@ -108,39 +103,18 @@ def _load(path: Path, parameters: dict[str, str]) -> mi.Scene:
     return scene
 
 
-def _render(scene: mi.Scene, spp: int | None, seed: int) -> Picture:
-    from ..render import render  # imports numpy
-
-    columns = [
-        TextColumn("Rendering"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("samples per pixel,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-    ]
-    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("", total=None)
-        with answer_ctrl_c(lambda: err.print("Stopping; Ctrl-C again aborts at once.")):
-            try:
-                return render(
-                    scene, spp, seed, on_pass=lambda done, total: progress.update(task, completed=done, total=total)
-                )
-            except Exception as error:
-                fail(one_line(error))
-
-
-def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
-    from ..render import display_image, write
-
-    image = display_image(picture.bitmap)
-    files = [(picture.bitmap, exr), (image, display)]
-    if image is None:
-        err.print(f"The film has no RGB, XYZ or luminance channels, so there is no {display.name}.")
-        files.pop()
-    try:
-        for bitmap, path in files:
-            write(bitmap, path)
-    except Exception as error:
-        fail(f"cannot write {path}: {one_line(error)}")
-    return [path for _, path in files]
+def _load_with_box_filter(path: str, **parameters: str) -> mi.Object:
+    """Load a file with box filters in place of its films': a denoiser expects pixels that share no samples."""
+    config = mi.parser.ParserConfig(mi.variant())
+    state = mi.parser.parse_file(config, path, **parameters)
+    mi.parser.transform_all(config, state)
+    for node in state.nodes:
+        if node.type == mi.ObjectType.ReconstructionFilter:
+            node.props = mi.Properties("box")
+    for node in state.nodes:
+        children = [node.props[name] for name in node.props.keys()]
+        places = [it.index() for it in children if isinstance(it, mi.Properties.ResolvedReference)]
+        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in places)
+        if node.type == mi.ObjectType.Film and not filtered:
+            node.props["rfilter"] = mi.load_dict({"type": "box"})
+    return mi.parser.instantiate(config, state)

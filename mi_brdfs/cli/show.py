@@ -1,0 +1,65 @@
+"""``mi-brdfs show``"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import mitsuba as mi
+import typer
+
+from ..preview import STAGES, preview_scene
+from .app import command
+from .errors import one_line
+from .options import Parameters, parameters_of
+from .picture import AnyVariant, Denoise, Output, Seconds, Seed, output_files, render_to
+from .terminal import Exit, fail
+from .variants import set_variant
+
+
+@command()
+def show(
+    material: Annotated[
+        str,
+        typer.Argument(
+            metavar="TYPE|FILE.xml|FILE.xml:ID|XML",
+            help="A plugin of the pack or another; a file with a BSDF, or one BSDF of a scene.",
+        ),
+    ],
+    parameters: Parameters = None,
+    stage: Annotated[str, typer.Option(metavar="STAGE", help=f"The light: {', '.join(STAGES)}.")] = "studio",
+    output: Output = None,
+    size: Annotated[int, typer.Option(min=16, help="Width and height of the picture, in pixels.")] = 512,
+    spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: 128, or as --time says.")] = None,
+    seconds: Seconds = None,
+    denoise: Denoise = False,
+    variant: AnyVariant = None,
+    seed: Seed = 0,
+) -> None:
+    """Render one material on the stage; Ctrl-C keeps the finished passes."""
+    given = parameters_of(parameters)
+    if stage not in STAGES:
+        fail(f"--stage {stage}: there is no such stage; there are {', '.join(STAGES)}", Exit.USAGE)
+    name = "bsdf" if material.startswith("<") else re.sub(r"[^\w-]+", "_", Path(material).name.replace(".xml", ""))
+    files = output_files(output or Path(f"{name[:100]}.exr"))
+    set_variant(variant)
+
+    def load() -> tuple[mi.Scene, int]:
+        from ..measure.sources import find_sources  # imports numpy
+
+        try:
+            found = list(find_sources(material, given))
+            scene = preview_scene(found[0].load(), stage)
+        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
+            fail(one_line(error), Exit.USAGE)
+        if len(found) > 1:
+            words = ", ".join(it.word for it in found)
+            fail(f"{material} has several materials; show one of {words}", Exit.USAGE)
+        film = scene["sensor"]["film"]
+        film |= {"width": size, "height": size}
+        if denoise:
+            film["rfilter"] = {"type": "box"}
+        return mi.load_dict(scene), 0
+
+    render_to(files, load, denoise, spp=spp, seed=seed, seconds=seconds)
