@@ -77,7 +77,7 @@ def test_flags_tell_anisotropy_textures_and_reciprocity():
         ({"type": "kurt", "alpha_1": 0.1, "alpha_u_2": 0.1, "alpha_v_2": 0.4}, [False, False, True]),
         ({"type": "burley", "anisotropic": 0.5, "clearcoat": 1.0}, [False, True, False]),
         ({"type": "ashikhminshirley", "exponent_u": 10, "exponent_v": 40}, [False, True]),
-        ({"type": "microfacet", "diffuse_reflectance": 0.5, "alpha_u": 0.1, "alpha_v": 0.4}, [False, True]),
+        ({"type": "microfacet", "diffuse_reflectance": 0.5, "f0": 0.5, "alpha_u": 0.1, "alpha_v": 0.4}, [False, True]),
     ],
 )
 def test_anisotropy_belongs_to_a_lobe(bsdf, anisotropic):

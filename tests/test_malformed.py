@@ -375,7 +375,7 @@ def test_ids_are_no_markup(tmp_path):
     body = '<shape type="sphere"><bsdf type="lambert" id="[/red]"/></shape>'
     (tmp_path / "[b].xml").write_text(f'<scene version="3.0.0">{body}</scene>')
     done = command_line(tmp_path, "check", "--only", "finite", "[b].xml")
-    assert done.returncode == 0 and "[b].xml: [/red]" in done.stdout, done.stderr
+    assert done.returncode == 0 and "[b].xml:[/red]: passed" in done.stdout, done.stderr
 
 
 # --- What is left behind --------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ def picture(bsdf, folder):
     params["faces"] = [0, 1, 2, 0, 2, 3]
     params.update()
     mesh.add_attribute("vertex_number", 1, [0.3] * 4)
-    mesh.add_attribute("vertex_colour", 3, [0.2, 0.4, 0.6] * 4)
+    mesh.add_attribute("vertex_colour", 3, [0.2, 0.4, 0.5] * 4)
     mesh.write_ply(str(folder / "square.ply"))
     scene = {
         "type": "scene",
@@ -40,7 +40,7 @@ def picture(bsdf, folder):
     [("walter", ["alpha"], ["specular_reflectance", "diffuse_reflectance"]), ("burley", ["roughness"], ["base_color"])],
 )
 def test_attributes_of_meshes_are_parameters(plugin, numbers, colours, tmp_path):
-    attribute, colour = {"type": "mesh_attribute"}, {"type": "rgb", "value": [0.2, 0.4, 0.6]}
+    attribute, colour = {"type": "mesh_attribute"}, {"type": "rgb", "value": [0.2, 0.4, 0.5]}
     of_mesh = dict.fromkeys(numbers, attribute | {"name": "vertex_number"})
     of_mesh |= dict.fromkeys(colours, attribute | {"name": "vertex_colour"})
     uniform = dict.fromkeys(numbers, 0.3) | dict.fromkeys(colours, colour)

@@ -19,6 +19,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from ..mitsuba import guests
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
+from ..parameters.messages import printable
 from .app import command, imported
 from .errors import one_line
 from .interrupts import ending_processes, interruptible
@@ -216,7 +217,7 @@ def _print_reports(sources: list[BSDFSource], reports: list[Report], settings: S
         for line, style in block(report, out.width):
             out.print(line, style=style)
         if report.failures and settings.other is None:
-            out.print(f"    Again: {_again(source, report, settings.options)}")
+            out.print(printable(f"    Again: {_again(source, report, settings.options)}"))
 
 
 def _again(source: BSDFSource, report: Report, options: dict[str, Any]) -> str:

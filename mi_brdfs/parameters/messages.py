@@ -41,8 +41,13 @@ def shown(value: Any) -> str:
 
 def brief(text: str) -> str:
     """Return a scene author's text on one line, of at most 80 characters, without terminal control characters."""
-    text = "".join(character if character.isprintable() else "�" for character in " ".join(text.split()))
+    text = printable(" ".join(text.split()))
     return text if len(text) <= 80 else f"{text[:80]}…"
+
+
+def printable(text: str) -> str:
+    """Return a text on one line, without characters that control a terminal or that XML may not have."""
+    return "".join(character if character.isprintable() else "�" for character in text)
 
 
 def listed(words: Iterable[str], last: str = "or", quote: bool = False) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from ..parameters.messages import printable
 from .report import Finding, Report
 
 
@@ -13,17 +14,17 @@ def junit(reports: Sequence[Report]) -> str:
     every = [finding for report in reports for finding in report.findings]
     root = ElementTree.Element("testsuites", {"name": "mi-brdfs check"} | _counts(every))
     for report in reports:
-        suite = ElementTree.SubElement(root, "testsuite", {"name": _clean(report.name)} | _counts(report.findings))
+        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(report.name)} | _counts(report.findings))
         for finding in report.findings:
-            name = _clean(f"{finding.check}, {finding.subject}")
-            case = ElementTree.SubElement(suite, "testcase", classname=_clean(report.name), name=name)
+            name = printable(f"{finding.check}, {finding.subject}")
+            case = ElementTree.SubElement(suite, "testcase", classname=printable(report.name), name=name)
             if finding.verdict == "fail":
-                failure = ElementTree.SubElement(case, "failure", message=_clean(finding.message))
-                failure.text = _clean("\n".join([*finding.data.get("faults", []), finding.where]))
+                failure = ElementTree.SubElement(case, "failure", message=printable(finding.message))
+                failure.text = "\n".join(map(printable, [*finding.data.get("faults", []), finding.where]))
             elif finding.verdict == "skip":
-                ElementTree.SubElement(case, "skipped", message=_clean(finding.message))
+                ElementTree.SubElement(case, "skipped", message=printable(finding.message))
             else:
-                ElementTree.SubElement(case, "system-out").text = _clean(finding.message)
+                ElementTree.SubElement(case, "system-out").text = printable(finding.message)
     ElementTree.indent(root)
     return ElementTree.tostring(root, "utf-8", xml_declaration=True).decode() + "\n"
 
@@ -32,8 +33,3 @@ def _counts(findings: Sequence[Finding]) -> dict[str, str]:
     verdicts = [finding.verdict for finding in findings]
     counts = {"tests": len(verdicts), "failures": verdicts.count("fail"), "skipped": verdicts.count("skip")}
     return {name: str(count) for name, count in counts.items()}
-
-
-def _clean(text: str) -> str:
-    """Return text without the characters that XML may not have."""
-    return "".join(character if character.isprintable() or character == "\n" else "\ufffd" for character in text)

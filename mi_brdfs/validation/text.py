@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import get_args
 
+from ..parameters.messages import printable
 from .report import Report, Verdict
 
 STYLES = {"FAILED": "bold red", "passed": "bold green", "not judged": "bold yellow", "fail": "red", "note": "yellow"}
@@ -24,5 +25,5 @@ def block(report: Report, width: int) -> Iterator[tuple[str, str]]:
 
 
 def _folded(text: str, width: int, indent: str, style: str) -> Iterator[tuple[str, str]]:
-    for line in textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False):
+    for line in textwrap.wrap(printable(text), width, subsequent_indent=indent, break_on_hyphens=False):
         yield line, style
