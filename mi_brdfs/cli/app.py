@@ -26,7 +26,7 @@ imported: list[str] = []
 def main() -> None:
     """Run the command ``mi-brdfs``."""
     warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
-    app()
+    app(prog_name="mi-brdfs")
 
 
 def _print_version(wanted: bool) -> None:

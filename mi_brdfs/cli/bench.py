@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from ..bench import SECTIONS
 from .app import command
 from .interrupts import interruptible
 from .options import check_names, check_output, write_json
@@ -19,7 +20,8 @@ from .variants import TracingVariant, set_tracing_variant
 @command()
 def bench(
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="SECTION", help="Measure only this section; may be repeated.")
+        list[str] | None,
+        typer.Option("--only", metavar="SECTION", help=f"Measure only one of {', '.join(SECTIONS)}; may be repeated."),
     ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures to this file.")
@@ -27,7 +29,6 @@ def bench(
     variant: TracingVariant = None,
 ) -> None:
     """Measure efficiency, time and noise against Mitsuba's BSDFs: about ten minutes on an idle machine."""
-    from ..bench import SECTIONS
     from ..bench import bench as measure
 
     check_names(only, SECTIONS, "section")

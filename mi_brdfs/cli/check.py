@@ -20,6 +20,7 @@ from ..mitsuba import guests
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
 from ..parameters.messages import printable
+from ..validation import CHECKS
 from .app import command, imported
 from .errors import one_line
 from .interrupts import ending_processes, interruptible
@@ -53,7 +54,8 @@ def check(
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
     parameters: Parameters = None,
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help="Run only this check; may be repeated.")
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help=f"Run only this check, of {', '.join(CHECKS)}; may be repeated."),
     ] = None,
     against: Annotated[
         str | None,
@@ -84,8 +86,6 @@ def check(
 ) -> None:
     """Check BSDFs: sampling, density, energy, reciprocity, components, textures, derivatives. Exit with 1 if any
     fails, with 3 if nothing was judged."""
-    from ..validation import CHECKS
-
     if bool(targets) == every:
         fail("name plugins or files to check, or give --all", Exit.USAGE)
     given = parameters_of(parameters)

@@ -1,0 +1,145 @@
+"""``mi-brdfs show``, and what ``render`` and ``show`` do with a picture besides."""
+
+import re
+import subprocess
+import sys
+import time
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="direct"/>
+  <sensor type="perspective" id="front">
+    <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="32"/></film>
+    <transform name="to_world"><lookat origin="0, 0, 6" target="0, 0, 0" up="0, 1, 0"/></transform>
+  </sensor>
+  <sensor type="perspective" id="away">
+    <film type="hdrfilm"><integer name="width" value="20"/><integer name="height" value="20"/>
+      <rfilter type="tent"/></film>
+    <transform name="to_world"><lookat origin="0, 0, 6" target="0, 0, 9" up="0, 1, 0"/></transform>
+  </sensor>
+  <shape type="sphere"><bsdf type="ward" id="ball"/></shape>
+  <shape type="sphere"><point name="center" value="0.9, 0, 0"/><bsdf type="lambert" id="moon"/></shape>
+  <emitter type="constant"/>
+  <emitter type="point"><point name="position" value="3, 3, 5"/><rgb name="intensity" value="30"/></emitter>
+</scene>
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "scene.xml").write_text(SCENE)
+    return tmp_path
+
+
+def run(folder, *words):
+    command = [sys.executable, "-m", "mi_brdfs", *map(str, words)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=180)
+
+
+def image(file):
+    return np.array(mi.Bitmap(str(file)))
+
+
+@pytest.mark.parametrize(
+    "words, name",
+    [
+        (["ward", "--param", "alpha=.3", "-D", "specular_reflectance=#ff0000", "-Ddiffuse_reflectance=0"], "ward"),
+        (["scene.xml:moon", "--stage", "point"], "scene_moon"),
+        (['<bsdf type="lambert"/>', "--stage", "lamp"], "bsdf"),
+    ],
+)
+def test_it_shows_a_material(folder, words, name):
+    done = run(folder, "show", *words, "--size", 32, "--spp", 4)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [f"{name}.exr", f"{name}.png"]
+    picture = image(folder / f"{name}.exr")
+    assert picture.shape == (32, 32, 3)
+    r, g, b = picture[10:18, 12:20].mean(axis=(0, 1))
+    assert r > 0.02 and ((r > 50 * g and r > 50 * b) if name == "ward" else abs(r - g) < 0.3 * r)
+
+
+@pytest.mark.parametrize(
+    "words, text",
+    [
+        (["wrad"], 'there is no plugin "wrad"; did you mean "ward"?'),
+        (["ward", "--stage", "opera"], "--stage opera: there is no such stage; there are studio, lamp, point"),
+        (["ward", "-Dalpha"], "-D alpha: write -D name=value"),
+        (["ward", "--param", "alpha=7"], "ward: alpha = 7 is not allowed; it must be a number in"),
+        (["scene.xml"], "scene.xml has several materials; show one of scene.xml:ball, scene.xml:moon"),
+        (["gone.xml"], "gone.xml: no such file"),
+    ],
+)
+def test_it_says_what_is_wrong(folder, words, text):
+    done = run(folder, "show", *words, "--size", 16, "--spp", 1)
+    assert done.returncode == 2 and done.stdout == ""
+    assert text in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+def test_a_part_of_the_picture(folder):
+    """With as many samples, it is that of the whole, within its noise."""
+    words = "render", "scene.xml", "--variant", "llvm_ad_rgb", "--spp", 1024
+    run(folder, *words, "-o", "whole.exr")
+    done = run(folder, *words, "-o", "part.exr", "--crop", "20,8,16,12")
+    assert done.returncode == 0, done.stderr
+    whole, part = image(folder / "whole.exr")[8:20, 20:36], image(folder / "part.exr")
+    assert part.shape == (12, 16, 3)
+    # 4 % is five times the standard deviation of a pixel of 1024 samples whose own deviation is a quarter of its mean.
+    np.testing.assert_allclose(part, whole, rtol=0.04)
+    assert whole.std() > 0.1 * whole.mean()
+
+
+def test_one_of_several_sensors(folder):
+    by_id = run(folder, "render", "scene.xml", "--sensor", "away", "--spp", 4, "-o", "id.exr")
+    by_number = run(folder, "render", "scene.xml", "--sensor", "1", "--spp", 4, "-o", "number.exr")
+    assert by_id.returncode == by_number.returncode == 0, by_id.stderr
+    for name in "id", "number":
+        np.testing.assert_allclose(image(folder / f"{name}.exr"), np.ones((20, 20, 3)), rtol=1e-5)  # the sky alone
+
+
+@pytest.mark.parametrize(
+    "words, text",
+    [
+        (["--sensor", "2"], "--sensor 2: there is no such sensor; there are 0 (front), 1 (away)"),
+        (["--sensor", "side"], "--sensor side: there is no such sensor"),
+        (["--crop", "1,2,3"], "--crop 1,2,3: write four whole numbers, X,Y,WIDTH,HEIGHT"),
+        (["--crop", "40,0,16,8"], "--crop 40,0,16,8: it is not within the picture, which has 48 x 32 pixels"),
+    ],
+)
+def test_no_such_part(folder, words, text):
+    done = run(folder, "render", "scene.xml", "--variant", "scalar_rgb", *words)
+    assert done.returncode == 2 and text in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
+def test_time_ends_it(folder):
+    """Samples are taken until then, without a limit; one given still holds."""
+    start = time.perf_counter()
+    done = run(folder, "render", "scene.xml", "--variant", "llvm_ad_rgb", "--time", 2)
+    assert done.returncode == 0 and 2 < time.perf_counter() - start < 60
+    spp = int(re.match(r"(\d+) samples per pixel in [\d.]+ s", done.stderr)[1])
+    assert spp > 1024
+    done = run(folder, "render", "scene.xml", "--variant", "llvm_ad_rgb", "--time", 60, "--spp", 8)
+    assert done.stderr.startswith("8 samples per pixel")
+
+
+def test_denoising(folder):
+    """Neighbours within a ball differ less, and the picture is as bright; the film's filter, which would spread the
+    noise, is replaced."""
+    pytest.importorskip("mitsuba_oidn")
+    words = "render", "scene.xml", "--variant", "llvm_ad_rgb"
+    run(folder, *words, "--spp", 8, "-o", "few.exr")
+    done = run(folder, *words, "--spp", 8, "--denoise", "-o", "clean.exr")
+    assert done.returncode == 0, done.stderr
+    few, clean = (image(folder / f"{name}.exr")[12:20, 18:26] for name in ("few", "clean"))
+    assert np.diff(clean, axis=1).std() < 0.5 * np.diff(few, axis=1).std()
+    np.testing.assert_allclose(clean.mean(), few.mean(), rtol=0.03)
+    assert run(folder, *words, "--sensor", "away", "--denoise", "--spp", 4).returncode == 0
+
+
+def test_the_name_of_the_package_is_the_command():
+    for words in (["--version"], ["-h"], ["render", "-h"]):
+        done = subprocess.run([sys.executable, "-m", "mi_brdfs", *words], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stderr
+        assert (f"Mitsuba {mi.__version__}" if words == ["--version"] else "Usage: mi-brdfs") in done.stdout
