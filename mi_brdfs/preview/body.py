@@ -24,12 +24,12 @@ BEVEL = 0.004
 
 def turned_body(bsdf: dict | mi.BSDF) -> mi.Mesh:
     """Return the body, with u around its axis and v along it."""
-    foot, knob = _smooth(FOOT, 48), _smooth(KNOB, 36)
+    foot, knob = _smooth(FOOT, 72), _smooth(KNOB, 56)
     low, high = np.arcsin((np.array([foot[-1, 1], knob[0, 1]]) - CENTRE) / RADIUS)
-    elevation = np.linspace(low, high, 200)
+    elevation = np.linspace(low, high, 260)
     radius = RADIUS - DEPTH / (1 + ((elevation - GROOVE) / GROOVE_WIDTH) ** 6)
     ball = np.stack([radius * np.cos(elevation), CENTRE + radius * np.sin(elevation)], axis=-1)
-    positions, normals, uv = _revolve(np.concatenate([foot[:-1], ball, knob[1:]]), 288)
+    positions, normals, uv = _revolve(np.concatenate([foot[:-1], ball, knob[1:]]), 384)
     rings = slice(len(foot) - 1, 1 - len(knob))
     _cut(positions[rings], normals[rings])
     return _mesh(positions, normals, uv, bsdf)
