@@ -237,7 +237,10 @@ def test_the_body_of_a_lobe():
     for trace, expected in (wi, direction(30)), (mirror, direction(30, 180)):
         end = points(trace)[1]
         np.testing.assert_allclose(end / np.linalg.norm(end), expected, atol=1e-6)
-    assert figure.layout.scene.aspectmode == "data"
+    assert {line.mode for line in figure.data[2:]} == {"lines"}
+    shape = {axis: figure.layout.scene.aspectratio[axis] / np.ptp(figure.layout.scene[f"{axis}axis"].range)
+             for axis in "xyz"}  # fmt: skip
+    np.testing.assert_allclose(list(shape.values()), shape["x"], rtol=1e-6)
 
 
 @pytest.mark.parametrize("azimuth", [0, 130])
@@ -254,21 +257,107 @@ def test_the_scales_of_a_body_are_behind_buttons():
     figure = plot.sphere("lambert", SHEET, resolution=8, samples=8)
     linear, log = figure.layout.updatemenus[0].buttons
     assert [linear.label, log.label] == ["linear", "log"]
-    visible = tuple(trace.visible for trace in figure.data)
-    assert visible == linear.args[1] == tuple(not each for each in log.args[1])
-    names = [trace.name for trace in figure.data if trace.type == "surface" and trace.visible]
-    assert names == ["lambert", "wrap domain=sphere reflectance=0.6", "wrap domain=sphere reflectance=0.6"]
-    top, log_top = (max(points(figure.data[k])[..., 2].max() for k in (start, start + 2))
-                    for start in (0, len(figure.data) // 2))  # fmt: skip
+    visible = [trace.visible for trace in figure.data]
+    assert visible == linear.args[0]["visible"] == [not each for each in log.args[0]["visible"]]
+    surfaces = [trace for trace in figure.data if trace.type == "surface" and trace.visible]
+    assert [trace.name for trace in surfaces] == ["lambert", *["wrap domain=sphere reflectance=0.6"] * 2]
+    assert [trace.scene for trace in surfaces] == ["scene", "scene2", "scene2"]
+    half = len(figure.data) // 2
+    top, log_top = (max(points(figure.data[k])[..., 2].max() for k in (start, start + 5)) for start in (0, half))
     assert top == pytest.approx(0.5 / np.pi, rel=1e-3) and log_top > 2  # two decades, at least
+    for button, highest in (linear, top), (log, log_top):
+        ranges = button.args[1]
+        assert set(ranges) == {f"scene{k}.{axis}axis.range" for k in ("", "2") for axis in "xyz"}
+        assert all(limits[1] == pytest.approx(1.05 * highest, rel=2e-3) for limits in ranges.values())
 
 
-def test_the_page_needs_no_network(tmp_path):
-    command.write(plot.sphere("lambert", resolution=8, samples=8), tmp_path / "a.html")
+def test_bodies_are_beside_each_other_each_below_its_name():
+    figure = plot.sphere(*["lambert"] * 4, scale="linear", labels=list("abcd"), resolution=8, samples=8)
+    domains = [figure.layout[name].domain for name in ("scene", "scene2", "scene3", "scene4")]
+    assert [domain.x[0] for domain in domains] == pytest.approx([0, 1 / 3, 2 / 3, 0])
+    assert [domain.y[1] for domain in domains] == [1, 1, 1, 0.5]
+    notes = figure.layout.annotations
+    assert [note.text for note in notes] == list("abcd")
+    assert [note.x for note in notes] == pytest.approx([np.mean(domain.x) for domain in domains])
+    assert [note.y for note in notes] == [domain.y[1] for domain in domains]
+    shown = [trace.name for trace in figure.data if trace.showlegend]
+    assert shown == ["sampled", "ω<sub>i</sub>", "mirror", "surface"]
+    assert "45°" in figure.layout.title.text and "[1/sr], luminance" in figure.layout.title.text
+
+
+def test_a_page_is_small_and_needs_no_network(tmp_path):
+    """Pages share the library in a file beside them, and are as wide as a phone."""
+    for name in "ab":
+        command.write(plot.sphere("lambert", resolution=8, samples=8), tmp_path / f"{name}.html")
     page = (tmp_path / "a.html").read_text(encoding="utf-8")
-    assert "Plotly.newPlot" in page and len(page) > 1e6
-    assert not re.search(r"<script[^>]*\ssrc=|<link|@import", page.partition("Plotly.newPlot")[0][:2000])
-    assert not re.search(r"<script[^>]*\ssrc=\W?http", page)
+    (library,) = tmp_path.glob("plotly-*.min.js")
+    assert re.findall(r"<script[^>]*\ssrc=[^>]*>", page) == [f'<script src="{library.name}">']
+    assert not re.search(r"<link|@import", page)
+    assert "Plotly.newPlot" in page and len(page) < 1e5 and "<title>lambert</title>" in page
+    assert 'name="viewport" content="width=device-width' in page
+    assert library.stat().st_size > 1e6 and len(list(tmp_path.iterdir())) == 3
+
+
+# --- One's own way --------------------------------------------------------------------------------------------------
+
+
+def test_each_curve_over_its_maximum():
+    given = [{"type": "phong", "exponent": n} for n in (10, 1000)]
+    for kind, reach in ((plot.cartesian, lambda x, y: y), (plot.polar, np.hypot)):
+        figure = kind(*given, angles=(30,), scale="linear", normalize=True)
+        assert [reach(*xy).max() for xy in curves(figure).values()] == pytest.approx([1, 1])
+        label = figure.axes[0].get_ylabel() or figure.axes[0].get_xlabel()
+        assert "/ maximum" in label and "1/sr" not in label
+    bodies = [
+        points(trace) for trace in plot.sphere(*given, scale="linear", normalize=True).data if trace.type == "surface"
+    ]
+    assert [np.linalg.norm(body, axis=-1).max() for body in bodies] == pytest.approx([1, 1], rel=1e-3)
+
+
+def test_red_green_and_blue():
+    """In a row for each angle, a style for each BSDF, and without the word luminance."""
+    figure = plot.cartesian(COLOURED, "lambert", angles=(0, 60), scale="linear", rgb=True)
+    drawn = curves(figure)
+    assert list(drawn)[:3] == [f"lambert reflectance=0.2;0.5;0.8, {name}" for name in ("red", "green", "blue")]
+    peaks = [value.max() for _, value in drawn.values()]
+    assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5, 0.5, 0.5]) / np.pi, rel=1e-3)
+    lines = [line for line in figure.axes[0].lines if line.get_label()[0] != "_"]
+    assert len({line.get_color() for line in lines}) == 3 and len({line.get_linestyle() for line in lines}) == 2
+    assert len(figure.axes) == 2 and "luminance" not in figure.axes[0].get_ylabel()
+    assert [value[0] for _, value in curves(plot.albedo(COLOURED, rgb=True)).values()] == pytest.approx([0.2, 0.5, 0.8])
+    with mi.variant_context("llvm_ad_spectral"), pytest.raises(ValueError, match="rgb curves need an rgb variant"):
+        plot.polar("lambert", rgb=True)
+
+
+def test_units_are_said():
+    assert plot.cartesian("lambert").axes[0].get_ylabel() == r"$f\,\cos\theta_o$ [1/sr], luminance"
+    assert "[1/sr]" in plot.polar("lambert").axes[0].get_xlabel()
+    assert "[1/sr]" in plot.hemisphere("lambert", resolution=8).axes[-1].get_ylabel()
+    assert plot.albedo("lambert").axes[0].get_ylabel() == "directional albedo, luminance"
+
+
+def test_what_bsdfs_have_in_common_is_above_the_legend():
+    sweep = [{"type": "ward", "alpha": alpha, "variant": "ward-duer"} for alpha in (0.1, 0.25)]
+    for figure in plot.polar(*sweep), plot.albedo(*sweep, "lambert"), plot.hemisphere(*sweep, resolution=8):
+        assert figure.legends[0].get_title().get_text() == "ward with variant=ward-duer"
+    assert plot.sphere(*sweep, resolution=8).layout.legend.title.text == "ward with variant=ward-duer"
+    assert plot.polar(sweep[0]).legends[0].get_title().get_text() == ""
+
+
+def test_marks_are_beside_the_lobes():
+    """Those of the mirror direction, which peaks are close to."""
+    for theta in 0, 40, 80:
+        ax = plot.polar(MIRROR, angles=(theta,), scale="linear").axes[0]
+        (mark,) = [line for line in ax.lines if line.get_marker() not in ("None", "")]
+        x, y = mark.get_data()
+        lobe = np.hypot(*curve(ax.figure))
+        assert np.hypot(x, y)[0] > 1.05 * lobe.max()
+        assert np.degrees(np.arctan2(x, y))[0] == pytest.approx(theta)
+        ax = plot.cartesian(MIRROR, angles=(theta,), scale="linear").axes[0]
+        (mark,) = [line for line in ax.lines if line.get_marker() not in ("None", "")]
+        assert mark.get_xdata()[0] == theta and mark.get_ydata()[0] > 1  # of the axes' height
+    for ax in plot.hemisphere(MIRROR, resolution=8).axes[:3]:
+        assert all(line.get_ydata()[0] > 0.1 for line in ax.lines)
 
 
 # --- Several BSDFs --------------------------------------------------------------------------------------------------
@@ -409,15 +498,15 @@ def test_the_command_in_a_process_of_its_own(folder):
 
 
 def test_the_command_passes_on_what_it_is_told(folder, monkeypatch):
-    def kind(*bsdfs, angles=(), azimuth=0, scale="both"):
-        told.append((bsdfs, list(angles), azimuth, scale))
+    def kind(*bsdfs, angles=(), azimuth=0, scale="both", normalize=False, rgb=False):
+        told.append((bsdfs, list(angles), azimuth, scale, normalize, rgb))
         return plot.albedo("lambert")
 
     told = []
     monkeypatch.setitem(command.KINDS, "polar", kind)
-    done = run("ward", "lambert", "--angles", "10,60.5", "--azimuth", 30, "--scale", "log", "-o", "a.svg")
+    done = run("ward", "lambert", "--angles", "10,60.5", "--azimuth", 30, "--scale", "log", "--rgb", "-o", "a.svg")
     assert done.exit_code == 0 and done.stdout == "a.svg\n"
-    assert told == [(("ward", "lambert"), [10, 60.5], 30, "log")]
+    assert told == [(("ward", "lambert"), [10, 60.5], 30, "log", False, True)]
     assert "<svg" in (folder / "a.svg").read_text()
 
 
@@ -425,7 +514,10 @@ def test_each_kind_has_its_file(folder):
     assert run("lambert", "--kind", "albedo").stdout == "lambert-albedo.png\n"
     assert run("lambert", "toon", "--kind", "sphere", "--angles", "20").stdout == "lambert-toon-sphere.html\n"
     assert run('<bsdf type="lambert"/>', "--kind", "cartesian", "-o", "b.pdf").stdout == "b.pdf\n"
-    assert {file.name for file in folder.iterdir()} == {"lambert-albedo.png", "lambert-toon-sphere.html", "b.pdf"}
+    names = {file.name for file in folder.iterdir()}
+    assert {name for name in names if not name.endswith(".js")} == {
+        "lambert-albedo.png", "lambert-toon-sphere.html", "b.pdf",
+    }  # fmt: skip
     assert pyplot.get_fignums() == []
 
 
@@ -448,6 +540,8 @@ WRONG = {
     "one angle": (["ward", "--kind", "sphere", "--angles", "1,2"], 2, "sphere shows one angle"),
     "scale": (["ward", "--scale", "cubic"], 2, "no scale 'cubic'"),
     "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale does not apply to albedo"),
+    "no maximum": (["ward", "--kind", "hemisphere", "--normalize"], 2, "--normalize does not apply to hemisphere"),
+    "no channels": (["ward", "--kind", "sphere", "--rgb"], 2, "--rgb does not apply to sphere"),
     "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),
     "page": (["ward", "--kind", "sphere", "-o", "ward.png"], 2, "ward.png: sphere is written as .html"),
     "folder": (["ward", "-o", "gone/ward.png"], 2, "there is no folder gone"),

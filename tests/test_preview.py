@@ -9,7 +9,7 @@ import mi_brdfs
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.preview import STAGES
 from mi_brdfs.preview.body import ANGLE, AZIMUTH, BEVEL, CENTRE, ELEVATION, RADIUS
-from mi_brdfs.preview.studio import studio
+from mi_brdfs.preview.studio import environment
 
 GOLD = {"type": "walter", "material": "Au", "alpha": 0.1}
 
@@ -57,9 +57,9 @@ def test_gold_looks_like_gold_and_no_picture_is_blown_out():
 
 
 def test_the_studio_is_the_same_every_time():
-    once = studio()
-    studio.cache_clear()
-    np.testing.assert_array_equal(studio(), once)
+    once = environment()
+    environment.cache_clear()
+    np.testing.assert_array_equal(environment(), once)
     assert once.shape == (256, 512, 3) and once.dtype == np.float32 and once.min() > 0.05 and once.max() < 5
 
 

@@ -26,20 +26,22 @@ class Label(NamedTuple):
 
 
 def labels_of(path: Path) -> list[Label]:
-    """Return a label below each shape that has an id, or in its middle if the picture cuts it off."""
+    """Return a label below each shape that has an id, or in its middle if it reaches the picture's edge or if another
+    one with a label is below it."""
     scene = mi.load_file(str(path), optimize=False)
     width, height = scene.sensors()[0].film().size()
     y, x = np.mgrid[:height, :width]
     at = mi.Point2f((x.ravel() + 0.5) / width, (y.ravel() + 0.5) / height)
     ray, _ = scene.sensors()[0].sample_ray(0, 0, at, mi.Point2f(0.5))
     seen = scene.ray_intersect(ray).shape
+    named = [shape for shape in scene.shapes() if shape.id() and not shape.id().startswith("_")]  # not Mitsuba's names
+    areas = [np.array(seen == mi.ShapePtr(shape)).reshape(height, width) for shape in named]
+    anything, margin = np.any(areas, axis=0), 0.01 * width
     labels = []
-    for shape in scene.shapes():
-        if not shape.id() or shape.id().startswith("_"):  # Mitsuba's own name for one without
-            continue
-        where = np.array(seen == mi.ShapePtr(shape)).reshape(height, width)
+    for shape, where in zip(named, areas, strict=True):
         rows, columns = np.flatnonzero(where.any(axis=1)), np.flatnonzero(where.any(axis=0))
-        inside = rows[0] == 0 or columns[0] == 0 or rows[-1] == height - 1 or columns[-1] == width - 1
+        inside = min(rows[0], columns[0], height - 1 - rows[-1], width - 1 - columns[-1]) < margin
+        inside = inside or anything[min(rows[-1] + 2, height - 1), (columns[0] + columns[-1]) // 2]
         middle = [float(each[where].mean()) for each in (x, y)]
         below = (columns[0] + columns[-1]) / 2, rows[-1] + 0.01 * height
         at_x, at_y = middle if inside else below

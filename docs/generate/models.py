@@ -16,6 +16,7 @@ from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
+from mi_brdfs.preview import body, studio
 
 from .made import ROOT, Page, Picture, code
 
@@ -50,7 +51,7 @@ def pages() -> list[Page]:
 
 def pictures() -> list[Picture]:
     """Return two portraits and the main sweep of each model, and the overview of all thumbnails."""
-    stage = "".join(map(code, (preview, preview.body, preview.studio)))
+    stage = "".join(map(code, (preview, body, studio)))
     found = []
     for model in own_models():
         name = model.plugins[0]

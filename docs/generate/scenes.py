@@ -21,8 +21,9 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 import numpy as np
 from PIL import Image
 
+from . import labels
 from .labels import labelled, labels_of
-from .made import ROOT, Page, Picture
+from .made import ROOT, Page, Picture, code
 
 SCENES = sorted((ROOT / "scenes").glob("*.xml"))
 README = ROOT / "scenes" / "README.md"
@@ -56,11 +57,11 @@ def pictures() -> list[Picture]:
     for path in SCENES:
         large = LARGE / f"{path.stem}.jpg"
         found += [
-            Picture(large, partial(read, path), partial(_draw, path)),
+            Picture(large, partial(sources, path), partial(_draw, path)),
             Picture(PICTURES / large.name, partial(_bytes, large), partial(_reduce, large)),
         ]
     first = FIRST_LIGHT.with_suffix(".xml")
-    return [*found, Picture(FIRST_LIGHT, partial(read, first), partial(_draw_first, first))]
+    return [*found, Picture(FIRST_LIGHT, partial(sources, first), partial(_draw_first, first))]
 
 
 def readme() -> str:
@@ -77,6 +78,11 @@ def picture(path: Path, spp: int | None = None) -> Image.Image:
 
 def _bytes(path: Path) -> list[bytes]:
     return [path.read_bytes()] if path.is_file() else []
+
+
+def sources(path: Path) -> list[str | bytes]:
+    """Return what a picture of a scene is made from: the scene, and how labels are placed."""
+    return [*read(path), code(labels)]
 
 
 def _draw(scene: Path, path: Path) -> None:

@@ -15,7 +15,7 @@ from PIL import Image
 
 from .labels import Label, labelled, labels_of
 from .made import ROOT, Picture
-from .scenes import read
+from .scenes import sources
 
 SCENES = sorted((ROOT / "scenes" / "shading").glob("*.xml"))
 PICTURES = ROOT / "docs" / "scenes" / "shading"
@@ -36,7 +36,7 @@ def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
 
 
 def pictures() -> list[Picture]:
-    return [Picture(PICTURES / f"{path.stem}.jpg", partial(read, path), partial(_draw, path)) for path in SCENES]
+    return [Picture(PICTURES / f"{path.stem}.jpg", partial(sources, path), partial(_draw, path)) for path in SCENES]
 
 
 def _draw(scene: Path, path: Path) -> None:

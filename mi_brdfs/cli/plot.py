@@ -46,6 +46,12 @@ def plot(
         str | None,
         typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian, sphere. Default: both."),
     ] = None,
+    normalize: Annotated[
+        bool, typer.Option("--normalize", help="Divide each curve by its maximum, for polar, cartesian, sphere.")
+    ] = False,
+    rgb: Annotated[
+        bool, typer.Option("--rgb", help="Draw red, green and blue, not the luminance, for polar, cartesian, albedo.")
+    ] = False,
     variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
@@ -58,7 +64,9 @@ def plot(
         fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
     try:
         bsdfs = asked.asked_for(targets, parameters or [])
-        options = asked.options_of(kind, angles, azimuth, scale)
+        options = asked.options_of(
+            kind, angles, azimuth=azimuth, scale=scale, normalize=normalize or None, rgb=rgb or None
+        )
         file = asked.output_file(output, kind, targets)
     except ValueError as error:
         fail(str(error), Exit.USAGE)

@@ -21,6 +21,7 @@ a { color: inherit }
 nav p { margin: 0.3rem 0; color: var(--faint) }
 nav a { margin-right: 0.6rem; color: var(--ink); display: inline-block; padding: 0.2rem 0 }
 img { max-width: 100%; height: auto }
+@media (max-width: 45rem) { .sheet { display: block; overflow-x: auto } .sheet img { max-width: 44rem } }
 pre { overflow-x: auto; padding: 0.6rem 0.8rem; background: #f5f5f5; font-size: 0.85rem }
 """
 
@@ -57,7 +58,7 @@ def page(sections: list[Section], quality: str) -> str:
 tangent dp_du runs around the body. Diffuse and cartoon models are shown under a point light from the left; the curve
 below a picture is the luminance across its middle, beside that of the first one. Pictures are larger behind their
 links.</p>
-<a href="overview.png"><img src="overview.png"
+<a class="sheet" href="overview.png"><img src="overview.png"
 alt="A picture of each model: {", ".join(section.model.plugins[0] for section in sections)}"></a>
 <nav>
 {links}
@@ -82,7 +83,11 @@ def _section(section: Section) -> str:
     name, *aliases = section.model.plugins
     also = f", also <code>{'</code>, <code>'.join(aliases)}</code>" if aliases else ""
     alt = "; ".join(f"{heading}: {', '.join(captions)}" for heading, captions in section.rows)
-    image = f'<a href="{name}.png"><img src="{name}.png" alt="{escape(alt)}" loading="lazy"></a>' if alt else ""
+    image = (
+        f'<a class="sheet" href="{name}.png"><img src="{name}.png" alt="{escape(alt)}" loading="lazy"></a>'
+        if alt
+        else ""
+    )
     return f"""<section id="{name}">
 <h2>{name} <span>{section.year}{also}</span></h2>
 <p>{_code(section.model.summary())}</p>

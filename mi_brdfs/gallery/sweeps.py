@@ -127,7 +127,7 @@ SWEEPS: dict[str, list[Sweep]] = {
     ],
     "phong": [
         sweep("exponent", 5, 20, 80, 320, 2000, diffuse_reflectance=BLUE),
-        sweep("specular_reflectance", 0.0, 0.1, 0.2, 0.4, 0.8, diffuse_reflectance=BLUE),
+        sweep("specular_reflectance", 0.0, 0.1, 0.2, 0.4, 0.6, diffuse_reflectance=BLUE),
         sweep("normalization", "energy", "none", "original", diffuse_reflectance=BLUE, exponent=10),
     ],
     "roughdiffuse": [

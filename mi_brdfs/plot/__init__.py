@@ -6,7 +6,13 @@ several to compare, and returns a Matplotlib figure (``figure.savefig("ward.pdf"
 a Plotly figure (``figure.write_html("ward.html")``). They need ``pip install 'mi_brdfs[plot]'``.
 """
 
-from .figures import albedo, cartesian, hemisphere, polar
+try:
+    import matplotlib  # noqa: F401
+except ImportError:
+    raise ImportError("plots need Matplotlib: pip install 'mi_brdfs[plot]'") from None
+
+from .maps import albedo, hemisphere
+from .planar import cartesian, polar
 from .sphere import sphere
 
 __all__ = ["albedo", "cartesian", "hemisphere", "polar", "sphere"]

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..measure.sources import value_of
 from ..parameters.messages import listed
-from . import albedo, cartesian, hemisphere, polar, sphere
+from . import albedo, cartesian, hemisphere, page, polar, sphere
 
 KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo, sphere)}
 """The functions by the value of ``--kind``."""
@@ -48,8 +48,8 @@ def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | d
     return dicts
 
 
-def options_of(kind: str, angles: str | None, azimuth: float | None, scale: str | None) -> dict[str, Any]:
-    """Return the arguments of a kind of figure from the options given.
+def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
+    """Return the arguments of a kind of figure from the options given, which are not None.
 
     Raises:
         ValueError: if it does not take one of them.
@@ -58,7 +58,7 @@ def options_of(kind: str, angles: str | None, azimuth: float | None, scale: str 
         numbers = None if angles is None else [float(text) for text in angles.split(",")]
     except ValueError:
         raise ValueError(f"--angles {angles}: write degrees, such as 10,40,70") from None
-    options: dict[str, Any] = {"angles": numbers, "azimuth": azimuth, "scale": scale}
+    options = {"angles": numbers, **options}
     taken = inspect.signature(KINDS[kind]).parameters
     if numbers and "angle" in taken:
         if len(numbers) > 1:
@@ -87,8 +87,8 @@ def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
 
 
 def write(figure: Any, path: Path) -> None:
-    """Write a figure; a Plotly figure as a page that needs no network."""
+    """Write a figure; a Plotly figure as a page, with the library in a file beside it."""
     if path.suffix.lower() in PAGES:
-        figure.write_html(path, include_plotlyjs=True)
+        page.write(figure, path)
     else:
         figure.savefig(path, dpi=DPI)

@@ -73,9 +73,43 @@ def with_smooth_part(found: list[Named]) -> list[Named]:
     return [it._replace(label=f"{it.label} without its delta lobe") if it.probe.deltas else it for it in found]
 
 
-def quantity(name: str) -> str:
-    """Return the label of the quantity plotted, with how colours are reduced to it."""
-    return name + (", luminance" if mi.is_rgb else ", mean of the spectrum" if mi.is_spectral else "")
+def channels_of(rgb: bool) -> list[tuple[int | None, str]]:
+    """Return the index and the name of each channel to draw, or (None, "") for the luminance.
+
+    Raises:
+        ValueError: if the active variant has no channels.
+    """
+    if not rgb:
+        return [(None, "")]
+    if not mi.is_rgb:
+        raise ValueError(f"{mi.variant()} has no red, green and blue: rgb curves need an rgb variant")
+    return list(enumerate(("red", "green", "blue")))
+
+
+def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool = False) -> str:
+    """Return the label of the quantity plotted, with its unit and how colours are reduced to it."""
+    measured = f"{name} / maximum" if normalize else f"{name} [{unit}]" if unit else name
+    return measured + (
+        "" if rgb else ", luminance" if mi.is_rgb else ", mean of the spectrum" if mi.is_spectral else ""
+    )
+
+
+def constants(bsdfs: Sequence[Any]) -> list[str]:
+    """Return what dicts of the same type have in common, a line for each type: their labels tell the rest."""
+    kinds: dict[Any, list[dict[str, str]]] = {}
+    for given in bsdfs:
+        if isinstance(given, dict):
+            kinds.setdefault(given.get("type"), []).append(_told(given))
+    lines = []
+    for kind, several in kinds.items():
+        same = {n: v for n, v in several[0].items() if all(values.get(n) == v for values in several)}
+        if len(several) > 1 and same:
+            lines.append(" ".join([str(kind), "with", *(f"{name}={value}" for name, value in same.items())]))
+    return lines
+
+
+def _told(given: dict) -> dict[str, str]:
+    return {name: _shown(value) for name, value in given.items() if name != "type"}
 
 
 def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
@@ -94,11 +128,7 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]
 def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:
     """Return a label for each dict, by its identity: the type, and the parameters that not all dicts of this type
     share. The only one of its type shows them all."""
-    told = [
-        (given, {name: _shown(value) for name, value in given.items() if name != "type"})
-        for given in bsdfs
-        if isinstance(given, dict)
-    ]
+    told = [(given, _told(given)) for given in bsdfs if isinstance(given, dict)]
     labels = {}
     for given, values in told:
         others = [theirs for other, theirs in told if other is not given and other.get("type") == given.get("type")]

@@ -48,9 +48,13 @@ def in_plane(theta: ArrayLike, azimuth: float) -> Array:
     return direction(-np.asarray(theta), np.full(np.shape(theta), azimuth)).T
 
 
-def value(probe: BSDFProbe, wi: Array, wo: Array) -> Array:
-    """Return the luminance of f |cosθ_o|, shape (N,)."""
-    return luminance(probe.eval(probe.whole, wi, wo)) if len(wo) else np.zeros(0)
+def value(probe: BSDFProbe, wi: Array, wo: Array, channel: int | None = None) -> Array:
+    """Return f |cosθ_o|, its luminance or a channel of it, shape (N,)."""
+    return _reduced(probe.eval(probe.whole, wi, wo), channel) if len(wo) else np.zeros(0)
+
+
+def _reduced(colours: Array, channel: int | None) -> Array:
+    return luminance(colours) if channel is None else colours[..., channel]
 
 
 def drawn(probe: BSDFProbe, wi: Array, count: int) -> Array:
@@ -80,7 +84,7 @@ def dim(values: Iterable[Array]) -> float:
 # --- Curves ---------------------------------------------------------------------------------------------------------
 
 
-def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float) -> Curve:
+def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float, channel: int | None = None) -> Curve:
     """Return the lobe in the plane of incidence, in both half-spaces if the BSDF transmits, with the finest steps where
     it bends most: straight lines between its points stay within 0.2 % of the peak and 2 % of the value."""
     wi = direction(theta_i, azimuth)
@@ -96,7 +100,7 @@ def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float) -> C
     for start, end in pieces:
         inside = seeds[(seeds > start) & (seeds < end)]
         theta = np.unique(np.concatenate([np.linspace(start, end, 2 * round(end - start) + 1), inside]))
-        curves.append(_refined(lambda angles: value(probe, wi, in_plane(angles, azimuth)), theta))
+        curves.append(_refined(lambda angles: value(probe, wi, in_plane(angles, azimuth), channel), theta))
     return Curve(*(np.concatenate(column) for column in zip(*curves, strict=True)))
 
 
@@ -124,7 +128,7 @@ def _refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
     return Curve(np.concatenate(points)[order], np.concatenate(values)[order])
 
 
-def albedo(probe: BSDFProbe, azimuth: float) -> Curve:
+def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None) -> Curve:
     """Return the fraction of light reflected or transmitted over the angle of incidence, delta functions included.
 
     It is the mean weight of samples of the BSDF's own sampler, with the same variates at each angle, so that the curve
@@ -135,7 +139,7 @@ def albedo(probe: BSDFProbe, azimuth: float) -> Curve:
     part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
     samples = probe.sample(part, wi, np.tile(points, (len(theta), 1)))
-    weight = luminance(samples.weight) * samples.eta**2  # refraction compresses radiance, but not energy
+    weight = _reduced(samples.weight, channel) * samples.eta**2  # refraction compresses radiance, but not energy
     return Curve(theta, weight.reshape(len(theta), -1).mean(axis=1))
 
 

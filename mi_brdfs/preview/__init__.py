@@ -9,8 +9,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..parameters.messages import listed
-from .body import CENTRE, body
-from .studio import studio
+from .body import CENTRE, turned_body
+from .studio import environment
 
 
 def preview_scene(bsdf: dict | mi.BSDF, stage: str = "studio") -> dict:
@@ -44,7 +44,7 @@ def preview_scene(bsdf: dict | mi.BSDF, stage: str = "studio") -> dict:
             "film": {"type": "hdrfilm", "width": 512, "height": 512},
             "sampler": {"type": "independent", "sample_count": 128},
         },
-        "body": body(bsdf),
+        "body": turned_body(bsdf),
         "ground": _ground(),
         **STAGES[stage](),
     }
@@ -53,7 +53,7 @@ def preview_scene(bsdf: dict | mi.BSDF, stage: str = "studio") -> dict:
 def _studio() -> dict[str, dict]:
     # The environment's y is up, the scene's z.
     to_world = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
-    return {"studio": {"type": "envmap", "bitmap": mi.Bitmap(studio()), "to_world": to_world}}
+    return {"studio": {"type": "envmap", "bitmap": mi.Bitmap(environment()), "to_world": to_world}}
 
 
 def _lamps() -> dict[str, dict]:

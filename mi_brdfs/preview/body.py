@@ -22,7 +22,7 @@ AZIMUTH, ELEVATION, ANGLE = np.radians(-78), np.radians(50), np.radians(17)
 BEVEL = 0.004
 
 
-def body(bsdf: dict | mi.BSDF) -> mi.Mesh:
+def turned_body(bsdf: dict | mi.BSDF) -> mi.Mesh:
     """Return the body, with u around its axis and v along it."""
     foot, knob = _smooth(FOOT, 72), _smooth(KNOB, 56)
     low, high = np.arcsin((np.array([foot[-1, 1], knob[0, 1]]) - CENTRE) / RADIUS)

@@ -34,7 +34,7 @@ LIGHTS = [
 
 
 @cache
-def studio() -> np.ndarray:
+def environment() -> np.ndarray:
     """Return the radiance in all directions, linear rgb, shape (256, 512, 3), float32. Rows run from the zenith to the
     nadir; columns from behind the body over the right, the camera's side and the left."""
     polar, azimuth = (np.arange(HEIGHT)[:, None] + 0.5) * np.pi / HEIGHT, (np.arange(WIDTH) + 0.5) * 2 * np.pi / WIDTH

@@ -1,0 +1,130 @@
+"""Figures of all directions of one angle of incidence, and of all angles of incidence: Matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+
+import mitsuba as mi
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+
+from . import lobes
+from .given import channels_of, check_angles, constants, named, quantity, with_smooth_part
+from .lobes import largest
+from .style import (
+    CHANNELS,
+    FAINT,
+    INK,
+    LETTERS,
+    QUANTITY,
+    SMALL,
+    TEXT,
+    WIDTH,
+    add_legend,
+    calm,
+    incidence,
+    look,
+    new_figure,
+    set_title,
+)  # fmt: skip
+
+DOTTED = 0, (1, 2)
+# Beside what they mark: their tips touch it.
+WI = {"marker": "v", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
+MIRROR = {"marker": "v", "markersize": 6}
+ABOVE = 0.11
+
+
+def hemisphere(
+    *bsdfs: str | dict | mi.BSDF,
+    angles: Sequence[float] = (10, 40, 70),
+    azimuth: float = 0,
+    labels: Sequence[str] | None = None,
+    resolution: int = 320,
+) -> Figure:
+    """Draw the luminance of f cosθ_o for all wo, in false colours on a logarithmic scale of at most five decades.
+
+    The distance from the middle of a disc is the angle θ_o. wi, at the tip of a hollow mark, is on the left at any
+    azimuth; the mirror direction, at the tip of a full one, on the right. There is a column for each angle of incidence
+    and a row for each BSDF, and another for its transmission. Each pixel is the mean over its area, so that narrower
+    lobes keep their total brightness. ``resolution`` is the number of pixels across a disc; everything else is as in
+    :func:`polar`.
+    """
+    check_angles(angles)
+    found = with_smooth_part(named(bsdfs, labels))
+    rows = [(it, side) for it in found for side in ((1, -1) if lobes.transmits(it.probe) else (1,))]
+    pictures = [[lobes.disc(it.probe, theta, azimuth, side, resolution) for theta in angles] for it, side in rows]
+    top = largest(picture for row in pictures for picture in row)
+    middles = [line for row in pictures for picture in row for line in (picture[resolution // 2],
+                                                                        picture[:, resolution // 2])]  # fmt: skip
+    norm = LogNorm(np.clip(lobes.dim(middles), 1e-5 * top, 1e-2 * top), top)
+    size = min((WIDTH - 0.8) / len(angles), 3)
+    figure = new_figure(size * len(angles) + 0.8, (size + 0.1) * len(rows) + 0.6)
+    axes = figure.subplots(len(rows), len(angles), squeeze=False)
+    for (it, side), line, row in zip(rows, axes, pictures, strict=True):
+        for ax, theta, picture in zip(line, angles, row, strict=True):
+            _draw_disc(ax, np.maximum(picture, norm.vmin), norm, theta, side > 0)
+        if len(rows) > 1:
+            label = it.label if side > 0 else f"{it.label}, below"
+            line[0].set_ylabel(fill(label, int(LETTERS * size)), fontsize=TEXT, color=INK)
+    for ax, theta in zip(axes[0], angles, strict=True):
+        ax.set_title(incidence(theta), fontsize=TEXT, color=INK)
+    if len(rows) == 1:
+        set_title(figure, found[0].label)
+    bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, shrink=0.8, aspect=25, pad=0.02)
+    bar.set_label(quantity(QUANTITY), fontsize=TEXT, color=INK)
+    bar.ax.tick_params(labelsize=SMALL, labelcolor=INK)
+    bar.outline.set_visible(False)
+    marks = [Line2D([], [], linestyle="", color=INK, **mark) for mark in (WI, MIRROR)]
+    add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
+    return figure
+
+
+def albedo(
+    *bsdfs: str | dict | mi.BSDF,
+    azimuth: float = 0,
+    labels: Sequence[str] | None = None,
+    rgb: bool = False,
+) -> Figure:
+    """Draw the directional albedo over the angle of incidence: the luminance, or with ``rgb`` each channel, of all
+    reflected and transmitted light, delta functions included. It is the mean weight of 8192 samples of the BSDF's own
+    sampler, with the same variates at each angle. Everything else is as in :func:`polar`."""
+    found = named(bsdfs, labels)
+    figure = new_figure(6, 3.8)
+    ax = figure.subplots()
+    ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
+    handles = []
+    for k, it in enumerate(found):
+        for channel, name in channels_of(rgb):
+            label = f"{it.label}, {name}" if name else it.label
+            curve = lobes.albedo(it.probe, azimuth, channel)
+            handles += ax.plot(*curve, label=label, **look(k, CHANNELS.get(name)))
+    calm(ax)
+    ax.set_xlim(0, 90)
+    ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])
+    ax.set_ylim(0, 1.05 * max(1, largest(handle.get_ydata() for handle in handles)))
+    ax.set_xlabel(r"$\theta_i$", fontsize=TEXT)
+    ax.set_ylabel(quantity("directional albedo", unit="", rgb=rgb), fontsize=TEXT)
+    add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
+    return figure
+
+
+def _draw_disc(ax: Axes, picture: np.ndarray, norm: LogNorm, theta_i: float, above: bool) -> None:
+    shown = ax.imshow(picture, "viridis", norm, extent=(-1, 1, -1, 1), origin="lower")
+    shown.set_clip_path(Circle((0, 0), 1, transform=ax.transData))
+    outline = [withStroke(linewidth=1.8, foreground="#00000060")]
+    for angle in (30, 60, 90):
+        ax.add_patch(Circle((0, 0), angle / 90, fill=False, color=FAINT if angle == 90 else "#ffffff80", linewidth=0.6))
+    for angle in (30, 60):
+        ax.text(0, -angle / 90, f"{angle}°", fontsize=7, color="white", ha="center", va="center", path_effects=outline)
+    for x, mark in ((-theta_i / 90, WI), (theta_i / 90, MIRROR)) if above else ():
+        ax.plot(x, ABOVE, color="white", path_effects=outline, **mark)
+    ax.set(xlim=(-1.03, 1.03), ylim=(-1.03, 1.03), xticks=[], yticks=[], aspect="equal")
+    ax.set_frame_on(False)

@@ -1,0 +1,228 @@
+"""Figures of the plane of incidence: Matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import mitsuba as mi
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from . import lobes
+from .given import channels_of, check_angles, constants, named, quantity, scales_of, with_smooth_part
+from .lobes import Curve, decades, largest
+from .style import (
+    CHANNELS,
+    FAINT,
+    GRID,
+    INK,
+    QUANTITY,
+    SMALL,
+    TEXT,
+    WIDTH,
+    add_legend,
+    calm,
+    incidence,
+    look,
+    new_figure,
+    set_title,
+)  # fmt: skip
+
+MIRROR = {"marker": "v", "markersize": 5}
+THIN = {"linewidth": 0.8}
+
+
+def polar(
+    *bsdfs: str | dict | mi.BSDF,
+    angles: Sequence[float] = (10, 40, 70),
+    azimuth: float = 0,
+    scale: str = "both",
+    labels: Sequence[str] | None = None,
+    normalize: bool = False,
+    rgb: bool = False,
+) -> Figure:
+    """Draw the lobes in the plane of incidence, as the radius over the angle to the normal, which points up.
+
+    The radius is the luminance of f cosθ_o, in 1/sr. wi is an arrow, on the left; triangles at the rim are the mirror
+    directions. One BSDF gets one panel, with a colour for each angle; several get a row for each angle, and a colour
+    each. Transmission, if any, is below the surface. Delta functions are left out.
+
+    Args:
+        bsdfs: plugin names, plugin dicts, loaded BSDFs of the active variant, XML texts, or paths of XML files, each of
+            whose materials counts once.
+        angles: of incidence, in degrees, in [0, 90).
+        azimuth: of incidence, in degrees from dp_du.
+        scale: of the radius, "linear", "log" or "both" side by side.
+        labels: the names in the legend. By default the type of a dict with the parameters that distinguish it, and the
+            id or class of a loaded BSDF; what the others have in common is above the legend.
+        normalize: divide each curve by its maximum, to compare shapes.
+        rgb: draw red, green and blue in place of the luminance, in a row for each angle.
+
+    Returns:
+        A figure that notebooks show and pyplot does not manage: ``figure.savefig(path)`` writes it.
+
+    Raises:
+        ValueError: if something is not a BSDF or has delta functions only, if angles or scale are wrong, or if the
+            variant is scalar or polarized, or has no channels that ``rgb`` could draw.
+        Exception: whatever Mitsuba raises if a BSDF cannot be loaded.
+    """
+    return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, azimuth, scale, labels, normalize, rgb)
+
+
+def cartesian(
+    *bsdfs: str | dict | mi.BSDF,
+    angles: Sequence[float] = (10, 40, 70),
+    azimuth: float = 0,
+    scale: str = "both",
+    labels: Sequence[str] | None = None,
+    normalize: bool = False,
+    rgb: bool = False,
+) -> Figure:
+    """Draw the luminance of f cosθ_o in the plane of incidence over the signed angle θ_o, negative on the side of wi;
+    transmission lies beyond ±90°. Triangles at the top are the mirror directions. Everything else is as in
+    :func:`polar`."""
+    return _planar(_draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels, normalize, rgb)
+
+
+class LabelledCurve(NamedTuple):
+    """A curve of a panel."""
+
+    label: str
+    theta_i: float
+    curve: Curve
+    look: dict[str, Any]
+
+
+def _planar(
+    draw: Callable,
+    heights: tuple[float, float],
+    bsdfs: Sequence[Any],
+    angles: Sequence[float],
+    azimuth: float,
+    scale: str,
+    labels: Sequence[str] | None,
+    normalize: bool,
+    rgb: bool,
+) -> Figure:
+    """Draw a row of panels for the BSDF or for each angle, and a column for each scale. ``heights`` are those of a
+    panel of width 1, without and with transmission."""
+    check_angles(angles)
+    scales = scales_of(scale)
+    found = with_smooth_part(named(bsdfs, labels))
+    channels = channels_of(rgb)
+    whole = any(lobes.transmits(it.probe) for it in found)
+    by_angle = rgb or len(found) > 1
+
+    def lines(theta: float, at: int) -> list[LabelledCurve]:
+        curves = []
+        for k, it in enumerate(found):
+            for channel, name in channels:
+                own = f"{it.label}, {name}" if name else it.label
+                curve = lobes.in_plane_of_incidence(it.probe, theta, azimuth, channel)
+                if normalize:
+                    curve = curve._replace(value=curve.value / largest([curve.value]))
+                style = look(k if by_angle else at, CHANNELS.get(name))
+                curves.append(LabelledCurve(own if by_angle else incidence(theta), theta, curve, style))
+        return curves
+
+    each = [lines(theta, k) for k, theta in enumerate(angles)]
+    if by_angle:
+        panels = dict(zip(map(incidence, angles), each, strict=True))
+    else:
+        panels = {found[0].label: [only for (only,) in each]}
+    width = WIDTH if len(scales) > 1 else 0.6 * WIDTH
+    height = width / len(scales) * heights[whole]
+    figure = new_figure(width, height * len(panels) + 0.8)
+    axes = figure.subplots(len(panels), len(scales), squeeze=False)
+    text = quantity(QUANTITY, normalize=normalize, rgb=rgb)
+    for k, (title, curves) in enumerate(panels.items()):
+        for ax, name in zip(axes[k], scales, strict=True):
+            calm(ax)
+            draw(ax, curves, name == "log", whole, text)
+            if len(panels) > 1:
+                ax.set_title(title, fontsize=TEXT, color=INK)
+            if k < len(panels) - 1:
+                ax.set_xlabel("")
+    if len(panels) == 1:
+        set_title(figure, title)
+    marks = {"mirror direction": Line2D([], [], linestyle="", **MIRROR, color=FAINT)}
+    if draw is _draw_polar:
+        marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
+    handles = [Line2D([], [], **curve.look) for curve in curves]
+    names = [curve.label for curve in curves]
+    add_legend(figure, [*handles, *marks.values()], [*names, *marks], constants(bsdfs))
+    return figure
+
+
+def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str) -> None:
+    low, high = _range(lines) if log else (0, largest(line.curve.value for line in lines))
+    end = 1.06 * (high - low)
+    if log:
+        powers = range(low, int(np.floor(high)) + 1)
+        rings = {power - low: f"$10^{{{power}}}$" for power in powers}
+    else:
+        rings = {ring: f"{ring:g}" for ring in MaxNLocator(4).tick_values(0, end) if ring <= end}
+    turns = np.arange(-150, 181, 30) if whole else np.arange(-90, 91, 30)
+    round_ = np.linspace(-180, 180, 361) if whole else np.linspace(-90, 90, 181)
+    for k, (ring, number) in enumerate(rings.items()):
+        ax.plot(*_at(round_, ring), color=GRID, linewidth=0.6)
+        if k % (1 + len(rings) // 6) == 0 and ring < 0.95 * end and (ring > 0 or not whole):
+            ax.text(ring, -0.035 * end, number, color=INK, fontsize=SMALL - 1, ha="center", va="top")
+    ax.plot(*_at(round_, end), color=FAINT, linewidth=0.6)
+    for turn in turns:
+        ax.plot(*_at(turn, np.array([0, end])), color=GRID, linewidth=0.6)
+        ax.text(*_at(turn, 1.13 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
+    for line in lines:
+        colour = _shade(line, lines)
+        arrow = {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0, "color": colour, **THIN}
+        ax.annotate("", _at(-line.theta_i, end), (0, 0), arrowprops=arrow)
+        # Outside the rim, where no lobe is, and pointing inwards.
+        inwards = MIRROR | {"marker": (3, 0, 180 - line.theta_i)}
+        ax.plot(*_at(line.theta_i, 1.035 * end), color=colour, **inwards)
+    for line in lines:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            radius = np.maximum(np.log10(line.curve.value) - low, 0) if log else line.curve.value
+        ax.plot(*_at(line.curve.theta, radius), label=line.label, **line.look)
+    ax.plot([-end, end], [0, 0], color=INK, linewidth=1.5)
+    ax.set(xlim=(-1.2 * end, 1.2 * end), ylim=((-1.2 if whole else -0.15) * end, 1.2 * end), xticks=[], yticks=[])
+    ax.set_aspect("equal")
+    ax.spines[:].set_visible(False)
+    ax.set_xlabel(f"{text}, {'log' if log else 'linear'} radius", fontsize=TEXT, color=INK)
+
+
+def _at(theta: Any, radius: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the point at an angle to the vertical, in degrees, and a distance."""
+    return radius * np.sin(np.radians(theta)), radius * np.cos(np.radians(theta))
+
+
+def _draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str) -> None:
+    end = 180 if whole else 90
+    if log:
+        low, high = _range(lines)
+        ax.set_yscale("log")
+        ax.set_ylim(10.0**low, 10 ** (high + 0.05 * (high - low)))
+    else:
+        ax.set_ylim(0, 1.05 * largest(line.curve.value for line in lines))
+    for line in lines:
+        above = {"transform": ax.get_xaxis_transform(), "clip_on": False}
+        ax.plot(line.theta_i, 1.025, color=_shade(line, lines), **MIRROR, **above)
+        ax.plot(*line.curve, label=line.label, **line.look)
+    ax.set_xlim(-end, end)
+    turns = range(-end, end + 1, end // 3)
+    ax.set_xticks(turns, [f"{turn}°".replace("-", "−") for turn in turns])
+    ax.set_xlabel(r"$\theta_o$", fontsize=TEXT, color=INK)
+    ax.set_ylabel(text, fontsize=TEXT, color=INK)
+
+
+def _shade(line: LabelledCurve, lines: list[LabelledCurve]) -> str:
+    """Return the colour of the marks of an angle of incidence: the curve's, unless all curves share the angle."""
+    return FAINT if all(line.theta_i == other.theta_i for other in lines) else line.look["color"]
+
+
+def _range(lines: list[LabelledCurve]) -> tuple[int, float]:
+    even = np.linspace(-lobes.GRAZING, lobes.GRAZING, 181)
+    return decades([np.interp(even, *line.curve) for line in lines], largest(line.curve.value for line in lines))

@@ -1,0 +1,72 @@
+"""What Matplotlib figures look like."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from io import BytesIO
+from textwrap import fill
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow, too pale for lines.
+COLOURS = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"
+# Styles too, so that coinciding curves are both visible; their number is coprime to that of the colours.
+STYLES = "-", (0, (4, 2)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5))
+CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}
+INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
+TEXT, SMALL = 9, 8
+LETTERS = 12
+"""The approximate number of letters per inch."""
+WIDTH = 8
+QUANTITY = r"$f\,\cos\theta_o$"
+
+
+class _Figure(Figure):
+    """A figure that notebooks show without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        png = BytesIO()
+        self.savefig(png, format="png")
+        return png.getvalue()
+
+
+def new_figure(width: float, height: float) -> Figure:
+    return _Figure(figsize=(width, height), dpi=144, layout="constrained", facecolor="white")
+
+
+def calm(ax: Axes) -> None:
+    """Make everything except the data thin, grey and small."""
+    ax.set_axisbelow(True)
+    ax.grid(color=GRID, linewidth=0.6)
+    ax.tick_params(which="both", labelsize=SMALL, labelcolor=INK, color=FAINT, length=0)
+    for spine in ax.spines.values():
+        spine.set(color=FAINT, linewidth=0.6)
+
+
+def set_title(figure: Figure, text: str) -> None:
+    figure.suptitle(fill(text, int(LETTERS * figure.get_figwidth())), fontsize=TEXT + 1, color=INK)
+
+
+def add_legend(figure: Figure, handles: list, labels: list[str], constants: Sequence[str] = ()) -> None:
+    """Add a legend below the figure, with the constants above its entries."""
+    room = LETTERS * figure.get_figwidth()
+    labels = [fill(label, int(room) - 10) for label in labels]
+    # A formula is about two letters wide, and a handle six.
+    widths = [max(map(len, re.sub(r"\$.*?\$", "xx", label).splitlines())) + 6 for label in labels]
+    columns = len(labels) if sum(widths) < room else max(1, int(room / max(widths)))
+    heading = "\n".join(fill(text, int(room)) for text in constants)
+    added = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=TEXT,
+                          labelcolor=INK, title=heading or None, title_fontsize=TEXT)  # fmt: skip
+    added.get_title().set_color(INK)
+
+
+def look(k: int, colour: str | None = None) -> dict[str, Any]:
+    """Return the style of the k-th curve, and its colour unless one is given."""
+    return {"color": colour or COLOURS[k % len(COLOURS)], "linestyle": STYLES[k % len(STYLES)], "linewidth": 1.6}
+
+
+def incidence(theta: float) -> str:
+    return rf"$\theta_i$ = {theta:g}°"
