@@ -27,7 +27,7 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site") / "html"
     command = [sys.executable, ROOT / "docs" / "website", folder]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{folder / 'index.html'}\n", "")
     return folder
 
 
@@ -97,6 +97,14 @@ def test_reference_pages_are_the_manual_pages(site, model):
     assert not missing
     with_math = (site / "reference" / f"{model.plugins[0]}.html").read_text(encoding="utf-8")
     assert "<math" in with_math or model.plugins[0] == "roughdiffuse"
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    command = [sys.executable, ROOT / "docs" / "website", tmp_path]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (2, f"{tmp_path} is neither empty nor a site\n")
+    assert (tmp_path / "mine.txt").is_file()
 
 
 def test_without_the_extra_the_command_says_so(tmp_path):

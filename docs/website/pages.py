@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from generate import models, scenes
 from generate.made import ROOT
 
+from mi_brdfs.gallery import by_family
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Plugin
@@ -135,31 +136,29 @@ def _scenes() -> str:
 def _scene(path: Path) -> str:
     first, *others = scenes.paragraphs(path)
     lines = "\n".join(f"* {line}" for line in others)
-    picture = f"![{path.stem}](../docs/scenes/{path.stem}.jpg)"
+    picture = f"[![{path.stem}](../docs/scenes/{path.stem}.jpg)](../docs/scenes/large/{path.stem}.jpg)"
     command = f"```sh\nmi-brdfs render scenes/{path.name}\n```"
     return "\n\n".join(filter(None, [f"## {path.stem}", picture, first, lines, command]))
 
 
 def _gallery() -> str:
-    parts = ["# Gallery", "One example per model, which leads to its page, and below the effect of its main parameter."]
+    parts = ["# Gallery", "One picture per model, which leads to its page, and below the effect of its main parameter."]
     parts.append(_thumbnails())
-    for model in own_models():
-        name = model.plugins[0]
-        parts += [f"## {name}", models.strip_picture(model)]
+    for model in by_family(own_models()):
+        parts += [f"## {model.plugins[0]}", models.strip_picture(model)]
     return "\n\n".join(parts) + "\n"
 
 
 def _thumbnails() -> str:
     """Return the examples of all models, with links to their pages."""
-    names = [model.plugins[0] for model in own_models()]
+    names = [model.plugins[0] for model in by_family(own_models())]
     cells = [f"[![{name}](../../docs/thumbnails/{name}.png)](#{name})\n[`{name}`](#{name})" for name in names]
     return "::::{container} pictures\n" + "\n\n".join(cells) + "\n::::"
 
 
 def _reference() -> str:
     names = [model.plugins[0] for model in own_models()] + ["shading"]
-    note = "In formulas wi is set as $\\omega_i$ and wo as $\\omega_o$."
-    introduction = models.INTRODUCTION.rstrip() + " " + note
+    introduction = with_formulas(models.INTRODUCTION, ()).rstrip() + " In a terminal, $\\omega_i$ is wi."
     listed = "\n".join(f"* [`{name}`](#{name}): {_summary(name)}" for name in names)
     return "\n\n".join([introduction, _thumbnails(), listed, _hidden(names)]) + "\n"
 

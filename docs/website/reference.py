@@ -25,7 +25,7 @@ def with_formulas(page: str, parameters: Collection[str]) -> str:
 def _paragraph(text: str, parameters: Collection[str]) -> str:
     if text.startswith("    "):
         return display(text, parameters)
-    if text.lstrip("\n").startswith(("#", "![")):
+    if text.lstrip("\n").startswith(("#", "![", "[![")):
         return text
     if text.lstrip("\n").startswith("|"):
         return "\n".join(_row(line, parameters) for line in text.split("\n"))
