@@ -26,6 +26,12 @@ def test_nothing_is_stale(made):
     assert not made.is_stale(), "run python docs/generate"
 
 
+def test_the_reference_has_no_words_of_guests():
+    """Which may be installed here."""
+    page = models.reference()
+    assert "epd" in page and "student-t" not in page and "regolith" not in page
+
+
 def test_digests_are_of_the_pictures():
     assert set(made.read_digests()) == {name(each) for each in EVERYTHING if isinstance(each, Picture)}
 

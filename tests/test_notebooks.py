@@ -149,12 +149,40 @@ def test_a_model_is_written_on_public_names():
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_committed_form(path):
-    """Sources are reviewable as text, without outputs, and plain Python."""
+    """Sources are reviewable as text, and plain Python; all cells were run in order, without errors, and what they show
+    is small and says nothing of the machine."""
     text, notebook = path.read_text(encoding="utf-8"), read_notebook(path)
     assert text == json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
     assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
     for cell in notebook["cells"]:
         assert "".join(cell["source"]).splitlines(keepends=True) == cell["source"]
-    for cell in code_cells(notebook):
-        assert not cell["outputs"] and cell["execution_count"] is None
+    cells = code_cells(notebook)
+    assert [cell["execution_count"] for cell in cells] == [*range(1, len(cells) + 1)]
+    for cell in cells:
         compile("".join(cell["source"]), cell["id"], "exec")
+        for output in cell["outputs"]:
+            assert output["output_type"] in ("stream", "display_data", "execute_result")
+            assert output.get("name") != "stderr" and set(output.get("data", {})) <= {
+                "text/plain",
+                "image/png",
+                "image/jpeg",
+            }
+    assert len(text) < 1_000_000 and not re.search(r"/(home|root|tmp|Users)/|student-t|regolith", text)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_exercises_have_solutions(path):
+    """Each begins with its number; they follow one another before the links at the end."""
+    cells = read_notebook(path)["cells"]
+    (exercises,) = [text for cell in cells if (text := "".join(cell["source"])).startswith("## Exercises\n")]
+    tagged = ["solution" in cell["metadata"].get("tags", ()) for cell in cells]
+    solutions = ["".join(cell["source"]) for cell, is_one in zip(cells, tagged, strict=True) if is_one]
+    numbers = [re.match(r"\*\*Solution (\d)\.\*\* ", text) for text in solutions]
+    assert [found[1] for found in numbers if found] == re.findall(r"^(\d)\. ", exercises, re.MULTILINE) != []
+    assert numbers[0] and not any(tagged[tagged.index(True) + len(solutions) :])
+
+
+def test_every_notebook_has_its_place():
+    """In the list that says in which order to read them."""
+    listed = re.findall(r"^\d\. \[.*?\]\((\w+)\.ipynb\)", (FOLDER / "README.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(listed) == [path.stem for path in NOTEBOOKS]

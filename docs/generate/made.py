@@ -33,8 +33,8 @@ class Page:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, stale once its sources have changed. Sources exclude the code of models and integrators: tests render
-    the pictures anew and compare."""
+    """A picture, or a notebook with its pictures, stale once its sources have changed. Sources exclude the code of
+    models and integrators: tests render the pictures anew and compare."""
 
     path: Path
     sources: Callable[[], Iterable[str | bytes]]

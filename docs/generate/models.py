@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
+from mi_brdfs.models.microfacet import BROUGHT, Microfacet
 from mi_brdfs.preview import body, studio
 
 from .made import ROOT, Page, Picture, code
@@ -89,7 +92,8 @@ def _draw_gallery(path: Path) -> None:
 def reference() -> str:
     """Return the text of the plugin reference."""
     models = own_models()
-    parts = [INTRODUCTION, _overview(models), *map(_model, models), _integrator(), CHAPTER.read_text(encoding="utf-8")]
+    pages = [*map(model_page, models), integrator_page(), CHAPTER.read_text(encoding="utf-8")]
+    parts = [INTRODUCTION, _overview(models), *pages]
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
 
@@ -128,7 +132,8 @@ def _picture(model: type[Model]) -> str:
     return f"[![{name}]({folder}/{name}.png)]({folder}/large/{name}.jpg)"
 
 
-def _strip(model: type[Model]) -> str:
+def strip_picture(model: type[Model]) -> str:
+    """Return the link to the picture of a model's main sweep."""
     name, main = model.plugins[0], main_sweep(model)
     file = f"../../docs/sweeps/{name}.jpg"
     return f"[![{main.heading(name)}: {', '.join(map(shown, main.values))}]({file})]({file})"
@@ -141,11 +146,13 @@ def _overview(models: list[type[Model]]) -> str:
     return _table([[""] * PICTURES_PER_LINE, *lines])
 
 
-def _model(model: type[Model]) -> str:
-    return _page(model, _picture(model), _strip(model), _table(model.energy.rows()), ENERGY_NOTE)
+def model_page(model: type[Model]) -> str:
+    """Return a model's part of the reference."""
+    return _page(model, _picture(model), strip_picture(model), _table(model.energy.rows()), ENERGY_NOTE)
 
 
-def _integrator() -> str:
+def integrator_page() -> str:
+    """Return the part of the reference on ``shading``."""
     picture = "![shading](../../docs/scenes/shading/phong.jpg)"
     return _page(Shading, f"{picture}\n\nShaded above, path-traced below: one of the [scenes](../../scenes/shading).")
 
@@ -164,10 +171,28 @@ def _page(plugin: type[Plugin], picture: str, strip: str = "", *more: str) -> st
             f"```xml\n{xml}\n```",
             f"```python\n{dictionary}\n```",
             *([strip] if strip else []),
-            _table(plugin.parameter_rows()),
+            _table(own_rows(plugin)),
             *more,
         ]
     )
+
+
+def own_rows(plugin: type[Plugin]) -> list:
+    """Return a plugin's table of parameters without the words that installed packages of others bring to the kit."""
+    with _own_words():
+        return plugin.parameter_rows()
+
+
+@contextmanager
+def _own_words() -> Iterator[None]:
+    choices = {choice.name: choice for choice in (Microfacet.distribution, Microfacet.shadowing)}
+    before = {choice: dict(choice.words) for choice in choices.values()}
+    for name, word in BROUGHT:
+        if name in choices:
+            choices[name].words.pop(word)
+    yield
+    for choice, words in before.items():
+        choice.words = words
 
 
 def _table(rows: list) -> str:

@@ -101,14 +101,16 @@ def _reduce(large: Path, path: Path) -> None:
 
 
 def _row(path: Path) -> str:
-    paragraphs = _comment(path).split("\n\n")
-    lines = [" ".join(paragraphs[0].split())]
-    for paragraph in paragraphs[1:]:
-        # A line `what: models` may continue in lines that are indented further.
-        lines += [" ".join(line.split()) for line in re.split(r"\n(?=\S)", paragraph)]
-    text = "<br>".join([f"**{path.stem}**", *lines, f"`mi-brdfs render scenes/{path.name}`"])
+    text = "<br>".join([f"**{path.stem}**", *paragraphs(path), f"`mi-brdfs render scenes/{path.name}`"])
     large, small = (f"../docs/{folder}/{path.stem}.jpg" for folder in ("scenes/large", "scenes"))
     return f"| [![{path.stem}]({small})]({large}) | {text} |"
+
+
+def paragraphs(path: Path) -> list[str]:
+    """Return what a scene's opening comment says: its first paragraph, and the lines `what: models` of the others."""
+    first, *others = _comment(path).split("\n\n")
+    lines = [line for paragraph in others for line in re.split(r"\n(?=\S)", paragraph)]
+    return [" ".join(line.split()) for line in (first, *lines)]
 
 
 def _comment(path: Path) -> str:

@@ -1,0 +1,49 @@
+"""Build the site with Sphinx from the pages of :mod:`website.pages`."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.util.docutils import docutils_namespace, patch_docutils
+
+import mi_brdfs
+
+from .pages import write_pages
+
+HERE = Path(__file__).parent
+SETTINGS = {
+    "project": "mi_brdfs",
+    "author": "The mi_brdfs authors",
+    "copyright": "the mi_brdfs authors",
+    "version": mi_brdfs.__version__,
+    "release": mi_brdfs.__version__,
+    "extensions": ["myst_parser", "website.mathml"],
+    "myst_enable_extensions": ["colon_fence", "dollarmath"],
+    "myst_heading_anchors": 3,
+    "html_theme": "furo",
+    "html_title": "mi_brdfs",
+    "html_static_path": [str(HERE / "static")],
+    "html_css_files": ["site.css"],
+    "html_copy_source": False,
+    "html_show_sphinx": False,
+    "html_permalinks_icon": "#",
+    "nitpicky": True,
+}
+
+
+def build(folder: Path) -> int:
+    """Build the site into a folder, which is made anew; return the exit status, which is not 0 after a warning."""
+    with tempfile.TemporaryDirectory() as scratch, patch_docutils(), docutils_namespace():
+        source = Path(scratch) / "source"
+        write_pages(source)
+        shutil.rmtree(folder, ignore_errors=True)
+        app = Sphinx(
+            source, None, folder, Path(scratch) / "doctrees", "html", SETTINGS,
+            status=None, warning=sys.stderr, warningiserror=True, keep_going=True,
+        )  # fmt: skip
+        app.build()
+        return app.statuscode

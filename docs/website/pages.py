@@ -1,0 +1,218 @@
+"""Write the sources of the site: the repository's own pages, divided and linked anew."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path, PurePosixPath
+
+from generate import models, scenes
+from generate.made import ROOT
+
+from mi_brdfs.gallery import by_family
+from mi_brdfs.integrators.shading import Shading
+from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.model import Plugin
+
+from . import notebooks
+from .reference import with_formulas
+
+GUIDE = {
+    "index": ["", "First light", "Models", "Noise and speed"],
+    "guide/python": ["From Python"],
+    "guide/command_line": ["From the command line"],
+    "guide/mitsuba_06": ["Scenes of Mitsuba 0.6"],
+    "guide/questions": ["Questions"],
+    "development": ["What is tested", "Adding a model", "Licence"],
+}
+"""The sections of README.md by page."""
+
+FILES = {
+    "mi_brdfs/models/README.md": "reference/index",
+    "docs/folklore.md": "folklore",
+    "docs/bench.md": "bench",
+    "docs/extending.md": "extending",
+    "scenes/README.md": "scenes",
+    "scenes/shading": "shading",
+    "scenes/shading/README.md": "shading",
+    "notebooks": "notebooks/index",
+    "notebooks/README.md": "notebooks/index",
+}
+"""Pages by file or folder of the repository."""
+
+CONTENTS = """
+```{{toctree}}
+:hidden:
+:caption: {caption}
+
+{pages}
+```
+"""
+
+
+def write_pages(folder: Path) -> None:
+    """Write all pages, and the pictures and files that they show, into a folder."""
+    for page, (origin, text) in _pages(folder).items():
+        path = folder / f"{page}.md"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(_linked(text, PurePosixPath(origin), folder), encoding="utf-8")
+
+
+def _pages(folder: Path) -> dict[str, tuple[str, str]]:
+    """Return the text of each page with the file that its links start from."""
+    pages = {page: ("README.md", text) for page, text in _guide().items()}
+    for file, page in FILES.items():
+        if (ROOT / file).is_file():
+            pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
+    pages["folklore"] = ("docs/folklore.md", pages["folklore"][1].replace("## What", "# What", 1))
+    shading = re.sub(r"^## \[(\w+)\]\((.*)\)$", r"## \1\n\n[\2](\2)", pages["shading"][1], flags=re.MULTILINE)
+    pages["shading"] = ("scenes/shading/README.md", shading)
+    pages["scenes"] = ("scenes/README.md", _scenes())
+    pages["gallery"] = ("mi_brdfs/models/README.md", _gallery())
+    pages["reference/index"] = ("mi_brdfs/models/README.md", _reference())
+    for model in own_models():
+        pages[f"reference/{model.plugins[0]}"] = ("mi_brdfs/models/README.md", _model(model, models.model_page))
+    pages["reference/shading"] = ("mi_brdfs/models/README.md", _model(Shading, lambda _: models.integrator_page()))
+    index = pages["notebooks/index"][1]
+    pages["notebooks/index"] = ("notebooks/README.md", f"{index}\n{_hidden(notebook_order())}\n")
+    for name in notebook_order():
+        path = ROOT / "notebooks" / f"{name}.ipynb"
+        pages[f"notebooks/{name}"] = (
+            f"notebooks/{name}.ipynb",
+            notebooks.markdown(path, folder / "notebooks" / "pictures"),
+        )
+    return pages
+
+
+# --- Texts ----------------------------------------------------------------------------------------------------------
+
+
+def _guide() -> dict[str, str]:
+    """Return the pages made of README.md; each of its sections is on one of them."""
+    text = re.sub(r"<!-- .*? -->\n\n?", "", (ROOT / "README.md").read_text(encoding="utf-8"))
+    start, *parts = re.split(r"^## ", text, flags=re.MULTILINE)
+    sections = {"": start} | {part.split("\n")[0]: f"## {part}" for part in parts}
+    placed = [name for names in GUIDE.values() for name in names]
+    if sorted(placed) != sorted(sections):
+        raise ValueError(f"README.md and GUIDE differ: {set(placed) ^ set(sections)}")
+    pages = {page: "".join(sections[name] for name in names) for page, names in GUIDE.items()}
+    for page, names in GUIDE.items():
+        if len(names) == 1:
+            pages[page] = pages[page].removeprefix("#")
+    pages["development"] = f"# Development\n\n{pages['development']}"
+    pages["index"] += "".join(_contents())
+    return pages
+
+
+def _contents() -> Iterator[str]:
+    for caption, pages in {
+        "Guide": [page for page in GUIDE if page.startswith("guide/")],
+        "Gallery": ["gallery", "scenes", "shading"],
+        "Notebooks": ["notebooks/index"],
+        "Reference": ["reference/index", "folklore"],
+        "More": ["extending", "bench", "development"],
+    }.items():
+        yield CONTENTS.format(caption=caption, pages="\n".join(pages))
+
+
+def notebook_order() -> list[str]:
+    """Return the names of the notebooks in the order of notebooks/README.md."""
+    return re.findall(r"\((\w+)\.ipynb\)", (ROOT / "notebooks" / "README.md").read_text(encoding="utf-8"))
+
+
+def _hidden(names: list[str]) -> str:
+    """Return an entry in the contents for each page of a folder."""
+    return "```{toctree}\n:hidden:\n\n" + "\n".join(names) + "\n```"
+
+
+def _scenes() -> str:
+    """Return the page of the scenes, with a section for each instead of a table."""
+    introduction = scenes.INTRODUCTION
+    return "\n\n".join([introduction, *map(_scene, scenes.SCENES)]) + "\n"
+
+
+def _scene(path: Path) -> str:
+    first, *others = scenes.paragraphs(path)
+    lines = "\n".join(f"* {line}" for line in others)
+    picture = f"[![{path.stem}](../docs/scenes/{path.stem}.jpg)](../docs/scenes/large/{path.stem}.jpg)"
+    command = f"```sh\nmi-brdfs render scenes/{path.name}\n```"
+    return "\n\n".join(filter(None, [f"## {path.stem}", picture, first, lines, command]))
+
+
+def _gallery() -> str:
+    parts = ["# Gallery", "One picture per model, which leads to its page, and below the effect of its main parameter."]
+    parts.append(_thumbnails())
+    for model in by_family(own_models()):
+        parts += [f"## {model.plugins[0]}", models.strip_picture(model)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _thumbnails() -> str:
+    """Return the examples of all models, with links to their pages."""
+    names = [model.plugins[0] for model in by_family(own_models())]
+    cells = [f"[![{name}](../../docs/thumbnails/{name}.png)](#{name})\n[`{name}`](#{name})" for name in names]
+    return "::::{container} pictures\n" + "\n\n".join(cells) + "\n::::"
+
+
+def _reference() -> str:
+    names = [model.plugins[0] for model in own_models()] + ["shading"]
+    introduction = with_formulas(models.INTRODUCTION, ()).rstrip() + " In a terminal, $\\omega_i$ is wi."
+    listed = "\n".join(f"* [`{name}`](#{name}): {_summary(name)}" for name in names)
+    return "\n\n".join([introduction, _thumbnails(), listed, _hidden(names)]) + "\n"
+
+
+def _summary(name: str) -> str:
+    plugin = {model.plugins[0]: model for model in own_models()}.get(name, Shading)
+    return re.sub(r"``(.+?)``", r"`\1`", plugin.summary())
+
+
+def _model(plugin: type[Plugin], page: Callable[[type[Plugin]], str]) -> str:
+    parameters = {word for row in models.own_rows(plugin)[1:] for word in re.findall(r"\w+", row[0])}
+    return with_formulas(page(plugin).removeprefix("#"), parameters) + "\n"
+
+
+# --- Links ----------------------------------------------------------------------------------------------------------
+
+
+IMAGE = re.compile(r"(!\[[^\]]*\])\((?!\w+:|/)([^)\s]+)\)")
+LINK = re.compile(r"((?<!!)\[(?:[^\[\]]|!\[[^\]]*\]\([^)]*\))*\])\((?!\w+:|/)([^)\s]+)\)")
+
+
+def _linked(text: str, origin: PurePosixPath, folder: Path) -> str:
+    """Return a page with its relative links leading to pages of the site, or to copies of the repository's files."""
+
+    def copied(file: str) -> str:
+        (folder / "files" / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / file, folder / "files" / file)
+        return f"/files/{file}"
+
+    def image(match: re.Match) -> str:
+        return f"{match[1]}({copied(_path(origin, match[2]))})"
+
+    def link(match: re.Match) -> str:
+        target, _, fragment = match[2].partition("#")
+        file = _path(origin, target) if target else origin.as_posix()
+        if place := _place(file, fragment):
+            return f"{match[1]}(/{place})"
+        return f"{match[1]}({copied(file)})" if target else match[0]
+
+    parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
+    for k in range(0, len(parts), 2):
+        parts[k] = LINK.sub(link, IMAGE.sub(image, parts[k]))
+    return "".join(parts)
+
+
+def _path(origin: PurePosixPath, target: str) -> str:
+    """Return where a link leads that stands in a file."""
+    return os.path.normpath(origin.parent / target).replace("\\", "/")
+
+
+def _place(file: str, fragment: str) -> str | None:
+    """Return the page, with an anchor, for a file of the repository, or None if the site has none."""
+    if file == "mi_brdfs/models/README.md" and fragment:
+        return "folklore.md" if fragment == "what-the-folklore-gets-wrong" else f"reference/{fragment}.md"
+    if file.endswith(".ipynb"):
+        return f"{file.removesuffix('.ipynb')}.md"
+    return f"{FILES[file]}.md" + (f"#{fragment}" if fragment else "") if file in FILES else None

@@ -1,0 +1,116 @@
+"""The site builds without a warning, all of its links lead somewhere, and it needs no network."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from urllib.parse import unquote
+
+import pytest
+from generate import models
+from generate.made import ROOT
+from generate.notebooks import NOTEBOOKS
+
+import mi_brdfs
+from mi_brdfs.mitsuba.registry import own_models
+
+needs_site = pytest.mark.skipif(
+    any(importlib.util.find_spec(name) is None for name in ("sphinx", "furo", "myst_parser")),
+    reason="the site's extra is not installed: pip install -e '.[site]'",
+)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, built by its command."""
+    folder = tmp_path_factory.mktemp("site") / "html"
+    command = [sys.executable, ROOT / "docs" / "website", folder]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{folder / 'index.html'}\n", "")
+    return folder
+
+
+class Page(HTMLParser):
+    """The links, the files that a page loads, and its anchors."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.links, self.loads, self.anchors, self.text = [], [], {""}, []
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        self.anchors.add(given.get("id") or "")
+        if tag == "a" and given.get("href"):
+            self.links.append(given["href"])
+        if tag in ("img", "script", "link", "iframe", "source"):
+            self.loads += [given[name] for name in ("src", "href") if given.get(name)]
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@needs_site
+def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
+    pages = {path: Page(path) for path in site.rglob("*.html")}
+    assert len(pages) > 45
+    for path, page in pages.items():
+        for target in set(page.loads) - {"#"}:
+            assert not re.match(r"\w+:|//", target) and (path.parent / target.split("?")[0]).is_file(), (path, target)
+        for target in page.links:
+            if re.match(r"\w+:", target):
+                assert target.startswith(("https://", "http://")), (path, target)
+                continue
+            file, _, anchor = unquote(target).partition("#")
+            to = (path.parent / file).resolve() if file else path
+            assert to.is_file(), (path, target)
+            assert to.suffix != ".html" or anchor in pages.get(to, page).anchors, (path, target)
+
+
+@needs_site
+def test_nothing_is_fetched_by_styles_or_scripts(site):
+    for path in [*site.rglob("*.css"), *site.rglob("*.js")]:
+        assert not re.search(r"(url\(|import |src=)[\"']?(https?:)?//", path.read_text(encoding="utf-8")), path
+
+
+@needs_site
+def test_every_part_is_there(site):
+    for name in (*(model.plugins[0] for model in own_models()), "shading"):
+        assert (site / "reference" / f"{name}.html").is_file()
+    for path in NOTEBOOKS:
+        page = (site / "notebooks" / f"{path.stem}.html").read_text(encoding="utf-8")
+        assert page.count("<details>") >= 2 and "<img" in page
+    for name in "index", "gallery", "scenes", "shading", "folklore", "bench", "extending", "development":
+        assert (site / f"{name}.html").is_file()
+
+
+@needs_site
+@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
+def test_reference_pages_are_the_manual_pages(site, model):
+    """Word for word, apart from the formulas, which are the same ones in MathML."""
+    shown = re.sub(r"\s+", " ", "".join(Page(site / "reference" / f"{model.plugins[0]}.html").text)).replace("’", "'")
+    for row in models.own_rows(model)[1:]:
+        assert all(cell in shown for cell in row[:4]), row
+    words = re.findall(r"[A-Za-z]{4,}", mi_brdfs.info(model.plugins[0]).split("\nParameters\n")[0])
+    missing = {word for word in words if word not in shown} - {"Example", "Cmax"}
+    assert not missing
+    with_math = (site / "reference" / f"{model.plugins[0]}.html").read_text(encoding="utf-8")
+    assert "<math" in with_math or model.plugins[0] == "roughdiffuse"
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    command = [sys.executable, ROOT / "docs" / "website", tmp_path]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (2, f"{tmp_path} is neither empty nor a site\n")
+    assert (tmp_path / "mine.txt").is_file()
+
+
+def test_without_the_extra_the_command_says_so(tmp_path):
+    program = str(ROOT / "docs" / "website")
+    code = (
+        "import runpy, sys; sys.modules['sphinx'] = None; sys.argv = ['website']; runpy.run_path(%r, None, '__main__')"
+    )
+    done = subprocess.run([sys.executable, "-c", code % program], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 2 and "pip install 'mi_brdfs[site]'" in done.stderr and done.stderr.count("\n") == 1
