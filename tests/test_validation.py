@@ -299,7 +299,6 @@ def test_command_on_a_scene(pytestconfig):
         (["ward", "--angles", "5;10"], "write degrees, such as 10,40,70"),
         (["ward", "--significance", "1"], "--significance 1: it must be in (0, 1)"),
         (["ward", "-D", "alpha"], "-D alpha: write -D name=value"),
-        (["ward", "-D", "alpha=1", "--param", "alpha=.2"], "-D alpha is given twice"),
         (["ward", "-D", "alpa=1"], "ward: unknown parameter alpa; did you mean alpha?"),
         (["ward", "--against", "scenes/first_light.xml"], "name one of scenes/first_light.xml:Lambert 1, "),
         (["ward", "--against", "phong", "--only", "pdf"], "--against compares values; --only"),

@@ -382,7 +382,8 @@ def test_command_on_what_cannot_be_judged(tmp_path):
 
 
 def test_command_with_its_options(tmp_path):
-    given = ["burley", "-D", "base_color=1.0", "--param", "roughness=1", "--only", "albedo", "--angles", "5,83"]
+    given = ["burley", "-D", "base_color=1.0", "-D", "roughness=0", "--param", "roughness=1", "--only", "albedo"]
+    given += ["--angles", "5,83"]
     done = run(*given, "--junit", tmp_path / "x.xml", "--significance", "0.05")
     assert done.returncode == 0 and "burley base_color=1.0 roughness=1: passed" in done.stdout
     assert "It gains energy, as its page says (1.89)" in " ".join(done.stdout.split())

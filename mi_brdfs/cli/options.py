@@ -25,14 +25,12 @@ Parameters = Annotated[
 
 
 def parameters_of(definitions: list[str] | None) -> dict[str, str]:
-    """Return the values of ``-D`` and ``--param`` options, as text."""
+    """Return the values of ``-D`` and ``--param`` options, as text. Of one name, the last counts."""
     parameters: dict[str, str] = {}
     for definition in definitions or []:
         name, equals, value = definition.partition("=")
         if not equals or not name:
             fail(f"-D {definition}: write -D name=value", Exit.USAGE)
-        if name in parameters:
-            fail(f"-D {name} is given twice", Exit.USAGE)
         parameters[name] = value
     return parameters
 
