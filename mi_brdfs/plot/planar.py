@@ -144,7 +144,7 @@ def _planar(
             calm(ax)
             draw(ax, curves, name == "log", whole, text)
             if len(panels) > 1:
-                ax.set_title(title, fontsize=TEXT, color=INK)
+                ax.set_title(title, fontsize=TEXT, color=INK, pad=10)
             if k < len(panels) - 1:
                 ax.set_xlabel("")
     if len(panels) == 1:
@@ -175,7 +175,7 @@ def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, te
     ax.plot(*_at(round_, end), color=FAINT, linewidth=0.6)
     for turn in turns:
         ax.plot(*_at(turn, np.array([0, end])), color=GRID, linewidth=0.6)
-        ax.text(*_at(turn, 1.13 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
+        ax.text(*_at(turn, 1.16 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
     for line in lines:
         colour = _shade(line, lines)
         arrow = {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0, "color": colour, **THIN}
@@ -188,7 +188,7 @@ def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, te
             radius = np.maximum(np.log10(line.curve.value) - low, 0) if log else line.curve.value
         ax.plot(*_at(line.curve.theta, radius), label=line.label, **line.look)
     ax.plot([-end, end], [0, 0], color=INK, linewidth=1.5)
-    ax.set(xlim=(-1.2 * end, 1.2 * end), ylim=((-1.2 if whole else -0.15) * end, 1.2 * end), xticks=[], yticks=[])
+    ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-1.25 if whole else -0.15) * end, 1.25 * end), xticks=[], yticks=[])
     ax.set_aspect("equal")
     ax.spines[:].set_visible(False)
     ax.set_xlabel(f"{text}, {'log' if log else 'linear'} radius", fontsize=TEXT, color=INK)
