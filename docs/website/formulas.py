@@ -322,8 +322,8 @@ def symbol(name: str) -> str:
 STRONG = re.compile(
     rf"[=^√/·<>∝→≠|_{BIG}{''.join(SUPERSCRIPTS)}{''.join(GREEK)}Ē]|\w\+\w|\b(\d-[A-Z]|[a-z]-[a-z])\b|\b[A-Za-z]\("
 )
-INITIAL = r"(^|[.,A-Z]|\band|-)\s*$"
-"""What stands before the initial of a name."""
+INITIAL = re.compile(r"\.[-\s]*[A-Z]")
+"""What follows the initial of a name."""
 ENDS = re.compile(r"[.,;:)]")
 
 
@@ -368,7 +368,7 @@ def _longest(text: str, first: int, words: list[tuple[int, int]], parameters, di
             break
     for end in sorted(set(ends), reverse=True):
         piece = text[first:end]
-        if _is_formula(piece, text[:first], text[end : end + 1], display):
+        if _is_formula(piece, text[end : end + 4], display):
             try:
                 return end, read(piece)
             except ValueError:
@@ -388,10 +388,11 @@ def _is_mathematical(word: str, parameters: Collection[str]) -> bool:
                                               if name[0] not in GREEK else name[0]])  # fmt: skip
 
 
-def _is_formula(piece: str, before: str, following: str, display: bool) -> bool:
+def _is_formula(piece: str, following: str, display: bool) -> bool:
     """Return whether a piece of text is meant as a formula: it has a sign or a letter that words do not have."""
     if re.fullmatch(r"[A-Za-z]'?", piece):
-        return piece not in "aAI" and following != "'" and (following != "." or not re.search(INITIAL, before))
+        name = piece.isupper() and INITIAL.match(following)
+        return piece not in "aAI" and not following.startswith("'") and not name
     if piece in PAIRS:
         return True
     if re.search(r"\(\d{4}\)", piece):  # a year
