@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 import reference
 from scipy import special
-from website.formulas import FRACTIONS, SUPERSCRIPTS, Node, Number, Symbol, find, read, tex
+from website.formulas import FRACTIONS, SUPERSCRIPTS, Node, Number, Symbol, read
 from website.reference import with_formulas
+from website.search import find
+from website.tex import tex
 
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
