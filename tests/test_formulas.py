@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 import reference
 from scipy import special
-from website.formulas import FRACTIONS, SUPERSCRIPTS, Node, Number, Symbol, find, read, tex
+from website.formulas import FRACTIONS, SUPERSCRIPTS, Node, Number, Symbol, read
 from website.reference import with_formulas
+from website.search import find
+from website.tex import tex
 
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
@@ -67,7 +69,7 @@ def test_what_is_no_formula_is_refused(text):
         ("J. F. Blinn, Journal 5(2), 2000, pp. 1-3.", []),
         ("A surface of albedo a, in a (dark) room.", []),
         ("is at most ρs (F = 1), and 2.9 ρs for n = 10.", ["ρs", "F = 1", "2.9 ρs", "n = 10"]),
-        ("by a factor of 4/π, with h = (wi+wo)/|wi+wo| and F.", ["4/π", "h = (wi+wo)/|wi+wo|"]),
+        ("by a factor of 4/π, with h = (wi+wo)/|wi+wo| and F.", ["4/π", "h = (wi+wo)/|wi+wo|", "F"]),
         ("V-cavity, half-vector, f-number, 30 %, 89.9°, mi_brdfs.lobes", []),
     ],
 )

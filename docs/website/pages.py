@@ -129,14 +129,14 @@ def _hidden(names: list[str]) -> str:
 
 def _scenes() -> str:
     """Return the page of the scenes, with a section for each instead of a table."""
-    introduction = scenes.INTRODUCTION
-    return "\n\n".join([introduction, *map(_scene, scenes.SCENES)]) + "\n"
+    return "\n\n".join([scenes.INTRODUCTION, *map(_scene, scenes.SCENES)]) + "\n"
 
 
 def _scene(path: Path) -> str:
     first, *others = scenes.paragraphs(path)
     lines = "\n".join(f"* {line}" for line in others)
-    picture = f"[![{path.stem}](../docs/scenes/{path.stem}.jpg)](../docs/scenes/large/{path.stem}.jpg)"
+    large = f"../docs/scenes/large/{path.stem}.jpg"
+    picture = f"[![{path.stem}]({large})]({large})"
     command = f"```sh\nmi-brdfs render scenes/{path.name}\n```"
     return "\n\n".join(filter(None, [f"## {path.stem}", picture, first, lines, command]))
 

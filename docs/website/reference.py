@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 
-from .formulas import Expression, Node, find, tex
+from .formulas import Expression, Node
+from .search import find
+from .tex import tex
 
 PROTECTED = re.compile(r"`[^`]*`|!?\[[^\]]*\]\([^)]*\)|https?://\S+|doi:\S+|<br>")
 JOINER = "\u2060"
