@@ -215,11 +215,11 @@ def test_efficiencies_that_miss_their_targets():
         "uniform": {"each lobe", "that of diffuse"},
         "uniform / diffuse": set(),
         "boastful": {"0.9 of its lobes' mean"},
-        "boastful, component 0": set(),
-        "boastful, component 1": set(),
+        "boastful, component 0 (diffuse reflection)": set(),
+        "boastful, component 1 (glossy reflection)": set(),
         "phong": set(),
-        "phong, component 0": set(),
-        "phong, component 1": set(),
+        "phong, component 0 (diffuse reflection)": set(),
+        "phong, component 1 (glossy reflection)": set(),
         "another model": set(),
     }
     assert figures["uniform", "gain"].value == pytest.approx(0.75, abs=1e-3)

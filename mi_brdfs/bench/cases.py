@@ -27,12 +27,19 @@ class Case:
     comparable."""
 
     @property
+    def other(self) -> Plugin:
+        """The built-in, of a case that has one."""
+        if self.builtin is None:
+            raise ValueError(f"{self.name} has no built-in to be compared with")
+        return self.builtin
+
+    @property
     def beside(self) -> str:
         """Return the names of both."""
-        return f"{self.name} / {self.builtin['type']}" + ("" if self.same else ", another model")
+        return f"{self.name} / {self.other['type']}" + ("" if self.same else ", another model")
 
 
-def case(name: str, builtin: Plugin | None = None, same: bool = False, **given) -> Case:
+def case(name: str, builtin: Plugin | None = None, same: bool = False, **given: Any) -> Case:
     return Case(name, {"type": name.split()[0], **given}, builtin, same)
 
 
@@ -40,16 +47,16 @@ def rgb(*value: float) -> Plugin:
     return {"type": "rgb", "value": list(value)}
 
 
-def diffuse(**given) -> Plugin:
+def diffuse(**given: Any) -> Plugin:
     return {"type": "diffuse", **given}
 
 
-def conductor(distribution: str, **given) -> Plugin:
+def conductor(distribution: str, **given: Any) -> Plugin:
     material = {} if "material" in given else {"material": "none"}
     return {"type": "roughconductor", "distribution": distribution, **material, **given}
 
 
-def principled(**given) -> Plugin:
+def principled(**given: Any) -> Plugin:
     """Return Mitsuba's ``principled`` with the defaults of ``burley``."""
     given.setdefault("spec_tint", 0.0)
     return {"type": "principled", "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0, **given}

@@ -28,7 +28,7 @@ def first(run: BenchRun) -> Iterator[Figure]:
 
     Targets: 1.15 for one model, 1.5 for all of them.
     """
-    singles = [(case.name, [case.bsdf], [case.builtin], case.builtin["type"]) for case in pairs(run.cases)]
+    singles = [(case.name, [case.bsdf], [case.other], case.other["type"]) for case in pairs(run.cases)]
     models = defaults(run.cases)
     scenes = [*singles, (ALL, models, built_ins(len(models)), f"{len(models)} built-ins")]
     for name, ours, theirs, beside in run.steps(scenes):

@@ -16,7 +16,7 @@ import mitsuba as mi
 from ..mitsuba import guests
 
 
-def in_new_process(function: Callable, *arguments) -> Any:
+def in_new_process(function: Callable, *arguments: Any) -> Any:
     """Return a function's result from a process that knows the same models (:func:`mi_brdfs.mitsuba.guests.source`),
     but no kernels of earlier runs: these are cached in the user's home folder, so the process gets an empty one.
     Arguments and result must be of JSON's types."""
@@ -31,7 +31,7 @@ def in_new_process(function: Callable, *arguments) -> Any:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def answer():
+def answer() -> None:
     """Carry out the call given as the argument of the new process."""
     sys.path[:], sources, variant, module, name, arguments = json.loads(sys.argv[1])
     for source in sources:

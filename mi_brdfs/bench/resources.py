@@ -94,7 +94,8 @@ def cycles(run: BenchRun) -> Iterator[Figure]:
 def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[float]], list[float]]:
     """Return ``(seconds, memory)``: the time of each BSDF in each round after the first, which compiles, and the
     megabytes that the process holds before the first and after each of these rounds."""
-    seconds, memory = [], []
+    seconds: list[list[float]] = []
+    memory: list[float] = []
     for seed in range(rounds + 1):
         seconds.append([])
         for bsdf in bsdfs:

@@ -36,5 +36,5 @@ class BenchRun:
         """Return the pictures of a case and its built-in in one of the scenes, rendered once for all sections."""
         key = case.name, scene
         if key not in self._renders:
-            self._renders[key] = alternate(case.bsdf, case.builtin, scene)
+            self._renders[key] = alternate(case.bsdf, case.other, scene)
         return self._renders[key]

@@ -47,10 +47,10 @@ def bench(
     if not is_measurable(variant):
         raise ValueError(f"Measuring needs a vectorized and unpolarized variant, not {variant}.")
     run = BenchRun(on_progress, all_cases())
-    figures = []
+    figures: list[Figure] = []
     for run.section in (name for name in SECTIONS if name in wanted):
         figures += SECTIONS[run.section](run)
     setup = versions() | {"variant": variant, "threads": str(dr.thread_count())}
-    if variant.startswith("llvm"):
-        setup["llvm"] = llvm.dotted(llvm.version())
+    if variant.startswith("llvm") and (found := llvm.version()):
+        setup["llvm"] = llvm.dotted(found)
     return Results(figures, setup, {case.name: asdict(case) for case in run.cases})

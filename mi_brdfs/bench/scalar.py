@@ -30,10 +30,10 @@ def scalar(run: BenchRun) -> Iterator[Figure]:
     try:
         with mi.variant_context("scalar_rgb"):
             for case in run.steps([case for case in pairs(run.cases) if case.name in AT_MOST]):
-                seconds = np.array([[_seconds(bsdf, seed) for bsdf in (case.bsdf, case.builtin)]
+                seconds = np.array([[_seconds(bsdf, seed) for bsdf in (case.bsdf, case.other)]
                                     for seed in range(sizes.SCALAR_PAIRS)]).T  # fmt: skip
                 median, interval = median_interval(seconds[0] / seconds[1])
-                target = Target("≤", AT_MOST[case.name], case.builtin["type"])
+                target = Target("≤", AT_MOST[case.name], case.other["type"])
                 yield Figure("scalar", case.name, "time", median, 1, "×", interval, (target,))
                 samples = sizes.SCALAR_PICTURE**2 * sizes.SCALAR_SPP
                 for name, of_one in zip(("ours", "built-in"), seconds, strict=True):

@@ -42,7 +42,7 @@ def _row(sections: Sections, case: Case) -> list[str]:
     ]
     plugin, *words = case.name.split(maxsplit=1)
     name = f"`{plugin}` {words[0] if words else ''}".strip()
-    return [f"{name} / `{case.builtin['type']}`", ours, theirs, *cells] if any([ours, *cells]) else []
+    return [f"{name} / `{case.other['type']}`", ours, theirs, *cells] if any([ours, *cells]) else []
 
 
 def _range(sections: Sections, subject: str) -> str:

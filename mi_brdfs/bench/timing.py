@@ -26,7 +26,7 @@ def time(run: BenchRun) -> Iterator[Figure]:
         for scene in (SPHERE, BOX):
             renders = run.renders(case, scene)
             median, interval = median_interval(renders.slower)
-            target = Target("≤", 1.05, case.builtin["type"])
+            target = Target("≤", 1.05, case.other["type"])
             yield Figure("time", case.beside, scene, median, 2, "×", interval, (target,))
             for name, seconds in zip(("ours", "built-in"), renders.seconds, strict=True):
                 yield Figure("time", case.beside, f"{scene}, {name}", 1e3 * float(np.median(seconds)), 0, " ms")
@@ -49,7 +49,7 @@ def variance(run: BenchRun) -> Iterator[Figure]:
             if not noise[1].any():
                 continue  # nothing to compare
             bound = ALONE_AT_MOST.get(case.name) if scene == ALONE else 1.0
-            targets = (Target("≤", bound, case.builtin["type"]),) if case.same and bound else ()
+            targets = (Target("≤", bound, case.other["type"]),) if case.same and bound else ()
             value, interval = time_variance(renders.slower, noise)
             yield Figure("variance", case.beside, scene, value, 2, "×", interval, targets)
             ours, theirs = noise.mean(axis=1)

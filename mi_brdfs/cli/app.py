@@ -6,7 +6,7 @@ import functools
 import inspect
 import warnings
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 import mitsuba as mi
 import typer
@@ -68,14 +68,15 @@ def command(name: str | None = None) -> Callable:
 
     def add(function: Callable) -> Callable:
         @functools.wraps(function)
-        def importing(*args, imports: Imports = None, **kwargs):
+        def importing(*args: Any, imports: Imports = None, **kwargs: Any) -> Any:
             _import(imports)
             return function(*args, **kwargs)
 
         signature = inspect.signature(function, eval_str=True)
         option = inspect.Parameter("imports", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Imports)
         importing.__doc__ = " ".join((function.__doc__ or "").split())  # lines end where the terminal's do
-        importing.__signature__ = signature.replace(parameters=[*signature.parameters.values(), option])
+        parameters = [*signature.parameters.values(), option]
+        importing.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         importing.__annotations__ = {**inspect.get_annotations(function, eval_str=True), "imports": Imports}
         return app.command(name)(importing)
 

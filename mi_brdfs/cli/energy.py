@@ -122,9 +122,12 @@ def _print_comparison(measured: list[Measured]) -> bool:
     table = Table("type", "configuration", "stated", "found", "", box=None, pad_edge=False)
     faults = []
     for model, default, found in measured:
-        name, (_, of_default, *others) = model.plugins[0], model.energy.rows()
-        compared = [(of_default[0], model.energy.default, default, 0.0, "")]
-        for row, (_, stated), (_, it) in zip(others, model.energy.largest, found, strict=True):
+        name, energy = model.plugins[0], model.energy
+        if energy is None:
+            continue
+        _, of_default, *others = energy.rows()
+        compared = [(of_default[0], energy.default, default, 0.0, "")]
+        for row, (_, stated), (_, it) in zip(others, energy.largest, found, strict=True):
             compared.append((row[0], stated, it.albedo, it.noise, f", at {it.place}"))
         for words, stated, albedo, noise, place in compared:
             problem = fault(stated, albedo, noise)

@@ -25,10 +25,13 @@ def _block(lines: list[str], width: int) -> Iterator[str]:
     else:
         for item in _items(lines):
             hanging = "  " if item.startswith("* ") else ""
-            yield from textwrap.wrap(item, width, subsequent_indent=hanging, **WHOLE_WORDS)
+            yield from _wrapped(item, width, others=hanging)
 
 
-WHOLE_WORDS = {"break_long_words": False, "break_on_hyphens": False}
+def _wrapped(text: str, width: int, first: str = "", others: str = "") -> list[str]:
+    return textwrap.wrap(
+        text, width, initial_indent=first, subsequent_indent=others, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _items(lines: list[str]) -> Iterator[str]:
@@ -49,10 +52,10 @@ def _table(lines: list[str], width: int) -> Iterator[str]:
     titles, *rows = ([line[start:end].strip() for start, end in zip(starts, [*starts[1:], None], strict=True)]
                      for line in lines)  # fmt: skip
     for first, *others, last in rows:
-        yield from textwrap.wrap(first, width, subsequent_indent="  ", **WHOLE_WORDS)
+        yield from _wrapped(first, width, others="  ")
         said = ", ".join(f"{title} {cell}" for title, cell in zip(titles[1:], others, strict=False) if cell)
         for text in (said, last):
-            yield from textwrap.wrap(text, width, initial_indent="    ", subsequent_indent="    ", **WHOLE_WORDS)
+            yield from _wrapped(text, width, "    ", "    ")
 
 
 def is_underline(line: str) -> bool:

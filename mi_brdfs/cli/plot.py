@@ -24,6 +24,7 @@ def plot(
     parameters: Annotated[
         list[str] | None,
         typer.Option(
+            "-D",
             "--param",
             metavar="name=value",
             help="Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws "
