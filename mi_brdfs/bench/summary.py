@@ -9,7 +9,7 @@ from .cases import Case
 from .figure import MISSED, Figure
 from .scenes import BOX, SPHERE
 
-HEAD = ["", "η", "η of the built-in", "time: sphere", "box", "time × variance: sphere", "box"]
+HEAD = ["", "η", "η of the built-in", "time: sphere", "time: box", "time × variance: sphere", "time × variance: box"]
 
 Sections = dict[str, list[Figure]]
 
