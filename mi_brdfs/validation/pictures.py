@@ -128,14 +128,14 @@ def _panels(alt: str, trial: Trial, view: View) -> str:
         for k, (title, data) in enumerate(panels)
     )
     scale, right = 2 * PIXELS + GAP, 3 * PIXELS + 2 * GAP
-    return f"""<svg class="panels" viewBox="0 0 {right} {PIXELS + 54}" role="img"
+    return f"""<svg class="panels" viewBox="0 0 {right} {PIXELS + 58}" role="img"
 aria-label="{escape(alt)}, {side}: the samples drawn, their pdf, and the difference">
 {drawing}
 <g transform="translate(0 {PIXELS + 34})">
 <rect width="{scale}" height="6" fill="url(#density)"/>
-<text y="16">{brief_number(low)} per sr</text><text y="16" x="{scale}" class="end">{brief_number(high)} per sr</text>
+<text y="19">{brief_number(low)} per sr</text><text y="19" x="{scale}" class="end">{brief_number(high)} per sr</text>
 <rect x="{scale + GAP}" width="{PIXELS}" height="6" fill="url(#deviation)"/>
-<text y="16" x="{scale + GAP}">−5σ</text><text y="16" x="{right}" class="end">5σ</text>
+<text y="19" x="{scale + GAP}">−5σ</text><text y="19" x="{right}" class="end">5σ</text>
 </g></svg>"""
 
 
