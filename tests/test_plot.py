@@ -266,9 +266,16 @@ def test_the_scales_of_a_body_are_behind_buttons():
     top, log_top = (max(points(figure.data[k])[..., 2].max() for k in (start, start + 5)) for start in (0, half))
     assert top == pytest.approx(0.5 / np.pi, rel=1e-3) and log_top > 2  # two decades, at least
     for button, highest in (linear, top), (log, log_top):
-        ranges = button.args[1]
+        ranges = dict(button.args[1])
+        assert ("logarithmic" in ranges.pop("title.text")) == (button is log)
         assert set(ranges) == {f"scene{k}.{axis}axis.range" for k in ("", "2") for axis in "xyz"}
         assert all(limits[1] == pytest.approx(1.05 * highest, rel=2e-3) for limits in ranges.values())
+
+
+def test_a_body_too_small_to_see_beside_another_is_first_shown_on_the_logarithmic_scale():
+    figure = plot.sphere("lambert", {"type": "ward", "alpha": 0.05}, resolution=8, samples=8)
+    assert {trace.meta for trace in figure.data if trace.visible} == {"log"}
+    assert figure.layout.updatemenus[0].active == 1 and "logarithmic" in figure.layout.title.text
 
 
 def test_bodies_are_beside_each_other_each_below_its_name():

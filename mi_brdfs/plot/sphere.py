@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 COLUMNS, LETTERS = 3, 36
 """The most bodies beside each other, and letters in a line above one."""
+UNLIKE = 10
+"""The ratio of two peaks from which the lower body is too small to see on a linear scale."""
 
 
 def sphere(
@@ -35,7 +37,7 @@ def sphere(
 
     Several are beside each other, on one scale. Points are directions drawn by the BSDF's sampler; the thick line is
     wi, the dotted one the mirror direction, the circle the surface. With the scale "both", buttons switch between the
-    two.
+    two; the logarithm is shown first if one peak is ten times another.
 
     Args:
         angle: of incidence, in degrees, in [0, 90).
@@ -61,8 +63,9 @@ def sphere(
     drawn = [lobes.drawn(it.probe, wi, samples) for it in found]
     # A little outside the body, which would hide half of each.
     points = [lobes.Mesh(1.005 * wo, lobes.value(it.probe, wi, wo)) for it, wo in zip(found, drawn, strict=True)]
+    peaks = [lobes.largest(mesh.value for mesh in body) for body in bodies]
+    first = "log" if "log" in scales and not normalize and max(peaks) > UNLIKE * min(peaks) else scales[0]
     if normalize:
-        peaks = [lobes.largest(mesh.value for mesh in body) for body in bodies]
         bodies = [[_over(mesh, peak) for mesh in body] for body, peak in zip(bodies, peaks, strict=True)]
         points = [_over(mesh, peak) for mesh, peak in zip(points, peaks, strict=True)]
     values = [mesh.value for body in bodies for mesh in body]
@@ -71,13 +74,17 @@ def sphere(
 
     traces: list[dict[str, Any]] = []
     ranges: dict[str, dict[str, list[float]]] = {}
+    headings: dict[str, str] = {}
     for name in scales:
         low, high = lobes.decades(values, peak) if name == "log" else (None, peak)
         reach = 1.05 * (high - (low or 0))
+        headings[name] = f"θ<sub>i</sub> = {angle:g}°, radius {quantity('f cosθ<sub>o</sub>', normalize=normalize)}"
+        if low is not None:
+            headings[name] += f"<br>logarithmic, from 10<sup>{low}</sup> in the middle"
         ranges[name] = {"xaxis": [-reach, reach], "yaxis": [-reach, reach],
                         "zaxis": [-reach if whole else -0.15 * reach, reach]}  # fmt: skip
         for k, it in enumerate(found):
-            place = {"scene": _scene(k), "visible": name == scales[0], "hoverinfo": "skip", "meta": name}
+            place = {"scene": _scene(k), "visible": name == first, "hoverinfo": "skip", "meta": name}
             colour = COLOURS[k % len(COLOURS)]
             for mesh in bodies[k]:
                 traces.append({"type": "surface", "name": it.label, "showscale": False, "showlegend": False,
@@ -90,16 +97,15 @@ def sphere(
 
     layout: dict[str, Any] = {}
     for k in range(len(found)):
-        axes = {axis: {"visible": False, "range": limits} for axis, limits in ranges[scales[0]].items()}
+        axes = {axis: {"visible": False, "range": limits} for axis, limits in ranges[first].items()}
         ratio = {"x": 1, "y": 1, "z": 1 if whole else 0.575}
         camera = {"eye": _eye(azimuth, 1.5 if whole else 1.1), "center": {"x": 0, "y": 0, "z": -0.05}}
         layout[_scene(k)] = {**axes, "aspectmode": "manual", "aspectratio": ratio, "camera": camera}
     names = ["<br>".join(wrap(it.label, LETTERS)) for it in found]
-    heading = f"θ<sub>i</sub> = {angle:g}°, radius {quantity('f cosθ<sub>o</sub>', normalize=normalize)}"
     figure = Figure(traces)
     figure.update_layout(
-        title={"text": heading,
-               "font": {"size": 15}, "x": 0.02, "xanchor": "left", "y": 1, "yanchor": "top", "pad": {"t": 12}},
+        title={"text": headings[first],
+               "font": {"size": 15}, "x": 0.02, "xanchor": "left", "y": 1, "yanchor": "top", "pad": {"t": 24}},
         font={"color": INK},
         legend={"itemsizing": "constant", "orientation": "h", "x": 0.5, "xanchor": "center", "y": 0, "yanchor": "top",
                 "title": {"text": "<br>".join(constants(bsdfs)), "side": "top center"}},
@@ -114,9 +120,11 @@ def sphere(
     if len(scales) > 1:
         buttons = [{"label": name, "method": "update",
                     "args": [{"visible": [each["meta"] == name for each in traces]},
+                             {"title.text": headings[name]} |
                              {f"{_scene(k)}.{axis}.range": limits for k in range(len(found))
                               for axis, limits in ranges[name].items()}]} for name in scales]  # fmt: skip
-        menu = {"type": "buttons", "direction": "right", "buttons": buttons, "pad": {"b": 4},
+        menu = {"type": "buttons", "direction": "right", "buttons": buttons, "active": scales.index(first),
+                "pad": {"b": 4},
                 "x": 0.02, "y": 1, "xanchor": "left", "yanchor": "bottom"}  # fmt: skip
         figure.update_layout(updatemenus=[menu])
     return figure
