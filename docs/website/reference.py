@@ -9,10 +9,11 @@ from .formulas import Expression, Node
 from .search import find
 from .tex import tex
 
-PROTECTED = re.compile(r"`[^`]*`|!?\[[^\]]*\]\([^)]*\)|https?://\S+|doi:\S+|<br>")
+PROTECTED = re.compile(r"`[^`]*`|!?\[[^\]]*\]\([^)]*\)|(?:https?://|doi:)\S*[^\s.,;)]|<br>")
 JOINER = "\u2060"
 """Keeps a formula and the punctuation after it on a line."""
 DOI = re.compile(r"\bdoi:(\S+?)(?=[.,;)]*(?:\s|$))")
+URL = re.compile(r"(?<![(<])(https?://\S+?)(?=[.,;)]*(?:\s|$))")
 
 
 def with_formulas(page: str, parameters: Collection[str]) -> str:
@@ -41,7 +42,7 @@ def _row(line: str, parameters: Collection[str]) -> str:
 
 
 def _linked(text: str) -> str:
-    return DOI.sub(r"[doi:\1](https://doi.org/\1)", text)
+    return DOI.sub(r"[doi:\1](https://doi.org/\1)", URL.sub(r"<\1>", text))
 
 
 def _inline(text: str, parameters: Collection[str]) -> str:
