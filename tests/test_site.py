@@ -86,6 +86,17 @@ def test_every_part_is_there(site):
 
 
 @needs_site
+def test_wide_tables_name_the_column_in_each_cell_and_links_show_pictures(site):
+    """A phone shows a row of such a table as a list, and a picture would else be stored, not shown."""
+    pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
+    assert '<td data-heading="default"><p>0.1</p></td>' in pages[site / "reference" / "ward.html"]
+    for path, text in pages.items():
+        for table in re.findall(r"<table.*?</table>", text, re.DOTALL):
+            assert table.count("<th ") < 4 or table.count("<td data-heading=") == table.count("<td"), path
+        assert not re.search(r'download=""[^>]*\.(jpg|png)"', text), path
+
+
+@needs_site
 @pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_reference_pages_are_the_manual_pages(site, model):
     """Word for word, apart from the formulas, which are the same ones in MathML."""

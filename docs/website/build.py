@@ -21,7 +21,7 @@ SETTINGS = {
     "copyright": "the mi_brdfs authors",
     "version": mi_brdfs.__version__,
     "release": mi_brdfs.__version__,
-    "extensions": ["myst_parser", "website.mathml"],
+    "extensions": ["myst_parser", "website.mathml", "website.finish"],
     "myst_enable_extensions": ["colon_fence", "dollarmath"],
     "myst_heading_anchors": 3,
     "html_theme": "furo",
