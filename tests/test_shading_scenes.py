@@ -214,7 +214,7 @@ def test_same_picture_for_any_seed_and_samples(name):
 def test_picture_shows_the_scene(path):
     """Rendered anew with few samples, the picture differs by its noise, and as JPEG has it."""
     stored = np.array(mi.Bitmap(str(shading.PICTURES / f"{path.stem}.jpg")), np.float64) / 255
-    now = np.array(shading.picture(path, spp=64), np.float64) / 255
+    now = np.array(shading.picture(path, spp=32), np.float64) / 255
     assert abs(stored - now).mean() < 0.02, f"stale: run python docs/generate {path.stem}"
 
 

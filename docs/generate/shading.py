@@ -12,6 +12,7 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 
 import numpy as np
 from PIL import Image
+from PIL.ImageOps import invert
 
 from .labels import Label, labelled, labels_of
 from .made import ROOT, Picture
@@ -19,20 +20,23 @@ from .scenes import sources
 
 SCENES = sorted((ROOT / "scenes" / "shading").glob("*.xml"))
 PICTURES = ROOT / "docs" / "scenes" / "shading"
-FINER, SAMPLES, QUALITY = 3, 1024, 88
+LARGER, FINER, SAMPLES, QUALITY = 2, 3, 256, 88
 
 
 def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
-    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one, with labels."""
-    scene = mi.load_file(str(path))
-    width, height = scene.sensors()[0].film().size()
+    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one, with labels, for which
+    both are larger than the scene says."""
+    width, height = (LARGER * int(size) for size in mi.load_file(str(path)).sensors()[0].film().size())
+    scene = mi.load_file(str(path), width=str(width), height=str(height))
     fine = mi.load_file(str(path), width=str(FINER * width), height=str(FINER * height))
     shaded = np.array(mi.render(fine, spp=1)).reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
     traced = np.array(mi.render(scene, integrator=mi.load_dict({"type": "path", "max_depth": 5}), spp=spp))
     image = Image.fromarray(np.array(display_image(mi.Bitmap(np.concatenate([shaded, traced])))))
     names = [label._replace(y=label.y / 2) for label in labels_of(path)]
     halves = [Label(text, 0, y, False) for text, y in (("shaded", 0), ("path-traced", 0.5))]
-    return labelled(image, [*names, *halves])
+    if np.array(image)[0].mean() < 128:
+        return labelled(image, [*names, *halves])
+    return invert(labelled(invert(image), [*names, *halves]))  # black letters on the light ground
 
 
 def pictures() -> list[Picture]:
