@@ -71,6 +71,7 @@ def test_what_is_no_formula_is_refused(text):
         ("is at most ρs (F = 1), and 2.9 ρs for n = 10.", ["ρs", "F = 1", "2.9 ρs", "n = 10"]),
         ("by a factor of 4/π, with h = (wi+wo)/|wi+wo| and F.", ["4/π", "h = (wi+wo)/|wi+wo|", "F"]),
         ("V-cavity, half-vector, f-number, 30 %, 89.9°, mi_brdfs.lobes", []),
+        ("For the correlated form: E. Heitz, Understanding masking.", []),
     ],
 )
 def test_formulas_are_found_in_text(text, found):
