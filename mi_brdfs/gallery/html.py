@@ -22,7 +22,8 @@ nav p { margin: 0.3rem 0; color: var(--faint) }
 nav a { margin-right: 0.6rem; color: var(--ink); display: inline-block; padding: 0.2rem 0 }
 img { max-width: 100%; height: auto }
 @media (max-width: 45rem) { .sheet { display: block; overflow-x: auto } .sheet img { max-width: 44rem } }
-pre { overflow-x: auto; white-space: pre-wrap; padding: 0.6rem 0.8rem; background: #f5f5f5; font-size: 0.85rem }
+p + pre { white-space: pre-wrap }
+pre { overflow-x: auto; padding: 0.6rem 0.8rem; background: #f5f5f5; font-size: 0.85rem }
 """
 
 
