@@ -60,7 +60,8 @@ def _show(name: str) -> None:
     """Print a preset as a dict and in XML, and where it comes from."""
     values, origin = preset(name), provenance(name)
     items = [f"    {key!r}: {value!r}," for key, value in values.items()]
-    facts = [f"{origin.source}, doi:{origin.doi}.", f"{origin.convention}.", *origin.defects]
+    facts = [f"Source: {origin.source}, doi:{origin.doi}.", f"Formula: {origin.convention}."]
+    facts += [f"Note: {defect}" for defect in origin.defects]
     width = min(out.width, 100) if out.is_terminal else 100
     out.print("\n".join(["{", *items, "}"]))
     out.print(f'\n<bsdf type="{values["type"]}">\n    <string name="preset" value="{name}"/>\n</bsdf>\n')

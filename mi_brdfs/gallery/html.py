@@ -34,6 +34,8 @@ class Section(NamedTuple):
     portrait: dict
     rows: list[tuple[str, list[str]]]
     """Headings and captions of the contact sheet."""
+    presets: list[str]
+    """The published materials that are shown."""
 
 
 def page(sections: list[Section], quality: str) -> str:
@@ -88,10 +90,17 @@ def _section(section: Section) -> str:
         if alt
         else ""
     )
+    shown = ", ".join(map(escape, section.presets))
+    wall = (
+        f'<a class="sheet" href="{name}_presets.jpg"><img src="{name}_presets.jpg" alt="{shown}" loading="lazy"></a>'
+        if shown
+        else ""
+    )
     return f"""<section id="{name}">
 <h2>{name} <span>{section.year}{also}</span></h2>
 <p>{_code(section.model.summary())}</p>
 {image}
+{wall}
 <p>The picture in the overview shows</p>
 <pre>{escape(str(section.portrait))}</pre>
 <details><summary>Reference</summary>
