@@ -2,21 +2,19 @@
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from generate import presets as generator
-from support import call, direction, hemisphere
+from support import call, direction, hemisphere, lattice
 from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.published import provenance
-from mi_brdfs.validation import check
+from mi_brdfs.testing import assert_bsdf
 
 ROOT = Path(__file__).parent.parent
 FITS = Path(os.environ.get("MI_BRDFS_DATA", ROOT.parent / "shared" / "data")) / "fits"
@@ -69,10 +67,7 @@ def test_numbers_are_those_of_the_paper(name):
     diffuse, specular, *others = PRINTED[name]
     scale = SCALE if name.startswith("ngan") else 1
     values = numbers_of(name)
-    if "ashikhmin" in name:
-        scale_of_lobe = scale * (others[0] + 1) / (others[0] + 2)
-    else:
-        scale_of_lobe = scale
+    scale_of_lobe = scale * (others[0] + 1) / (others[0] + 2) if "ashikhmin" in name else scale
     np.testing.assert_allclose(values.pop("diffuse_reflectance"), np.multiply(diffuse, scale), rtol=1e-6)
     lobe = values.pop("a") if "a" in values else values.pop("specular_reflectance")
     np.testing.assert_allclose(lobe, np.multiply(specular, scale_of_lobe), rtol=1e-6)
@@ -174,11 +169,15 @@ def _power(h, n):
     return np.exp(0.5 * n * np.log1p(-(h[:, 0] ** 2 + h[:, 1] ** 2)))
 
 
+def width(name):
+    """About the slope at which a lobe ends."""
+    it = numbers_of(name)
+    return float(it.get("alpha") or (2 / it.get("exponent", it.get("b"))) ** 0.5)
+
+
 def pairs(name):
     """Directions about the mirror direction, as far as the lobe is wide, and all over: (wi, wo), float32."""
-    it = numbers_of(name)
-    width = it.get("alpha") or (2 / it.get("exponent", it.get("b"))) ** 0.5
-    tangents = np.outer(np.minimum(width, 1) * np.array([0, 0.3, 1, 2, 3.5]), [1]).ravel()
+    tangents = min(width(name), 1) * np.array([0, 0.3, 1, 2, 3.5])
     phis, thetas = np.radians([10, 130, 250]), np.radians([0, 20, 45, 70, 85])
     theta, tan, phi = (grid.ravel() for grid in np.meshgrid(thetas, tangents, phis))
     wi = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=1)
@@ -206,3 +205,211 @@ def test_each_evaluates_to_its_formula(group):
         checked = expected > 1e-6 * expected.max()
         assert checked.mean() > 0.4
         np.testing.assert_allclose(value[checked], expected[checked], rtol=1e-4, err_msg=name)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_albedo():
+    """Below one up to 89.9°, or as much as the page of the plugin states, for the materials that say so."""
+    points, ctx = lattice(5, 1), mi.BSDFContext()
+    angles = [0, 45, 70, 80, 85, 89, 89.9]
+    wi = np.repeat([direction(theta, 17) for theta in angles], len(points), axis=0)
+    uniform = np.tile(points, (len(angles), 1))
+    gains = {}
+    for name in mi_brdfs.presets():
+        bsdf = mi.load_dict(mi_brdfs.preset(name))
+        weight = call(bsdf.sample, ctx, wi, uniform[:, :1], uniform[:, 1:])[2]
+        albedo = weight.reshape(len(angles), len(points), -1).mean(axis=1)
+        assert albedo.max() < max(bsdf.model.stated_albedo(), 1), name
+        assert albedo[:5].max() < 0.9, name
+        if albedo.max() > 1:
+            gains.setdefault(name.rpartition("/")[0], {})[name] = albedo.max()
+    (paint,) = gains.pop("low/cook-torrance-e1")
+    assert paint.endswith("white-paint") and "white-paint" in provenance(paint).defects[-1]
+    (duer,) = gains.values()
+    words = provenance(next(iter(duer))).defects[-1]
+    assert f"the albedo of {len(duer)} materials" in words and f"up to {max(duer.values()):.1f}" in words
+
+
+NARROWEST = [min(of_set(group), key=width) for group in COUNTS]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", NARROWEST)
+def test_check_of_the_narrowest_of_each_set(name):
+    assert_bsdf(mi_brdfs.preset(name), only=["finite", "support", "eval_pdf", "weight", "albedo"])
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "name", ["ngan/ward-duer/gold-metallic-paint", "low/ashikhmin-shirley-e1/aluminium", "low/microfacet/beige-fabric"]
+)
+def test_check(name):
+    assert_bsdf(mi_brdfs.preset(name))
+
+
+# --- Names ----------------------------------------------------------------------------------------------------------
+
+
+def test_names():
+    ward = mi_brdfs.presets("ward")
+    assert len(ward) == 172 and set(ward) < set(mi_brdfs.presets())
+    assert all(mi_brdfs.preset(name)["type"] == "ward" for name in ward)
+    origin = provenance("low/smooth/chrome")
+    assert "Löw" in origin.source and origin.doi == "10.1145/2077341.2077350" and "cosθ_d" in origin.convention
+
+
+def test_presets_are_the_users_own():
+    name = "ngan/ward/blue-acrylic"
+    mi_brdfs.preset(name)["diffuse_reflectance"]["value"][0] = 9
+    changed = mi_brdfs.preset(name)
+    changed["type"] = "roughconductor"
+    assert (
+        mi_brdfs.preset(name)["type"] == "ward" and mi_brdfs.preset(name)["diffuse_reflectance"]["value"][0] == 0.0138
+    )
+
+
+@pytest.mark.parametrize(
+    "name, sentence",
+    [
+        ("ngan/ward/blu-acrylic", "There is no preset 'ngan/ward/blu-acrylic'; did you mean 'ngan/ward/blue-acrylic'?"),
+        ("ngan/wardd/chrome", "did you mean 'ngan/ward/chrome'?"),
+        ("chrome", "did you mean 'ngan/ward/chrome'?"),
+        ("ngan/ward/qqq", "There is no preset 'ngan/ward/qqq'; mi_brdfs.presets() lists them."),
+        ("ngan/lafortune/chrome", "rounding moves and scales the lobes"),
+        ("low/ashikhmin-shirley-e1/white-paint", "the scale of its specular lobe is 1.29, above 1."),
+        ("", "mi_brdfs.presets() lists them."),
+    ],
+)
+def test_wrong_names(name, sentence):
+    with pytest.raises(ValueError) as error:
+        mi_brdfs.preset(name)
+    assert sentence in str(error.value)
+    with pytest.raises(ValueError, match=r"There is no model 'wrd'; did you mean 'ward'\?"):
+        mi_brdfs.presets("wrd")
+
+
+# --- As a parameter -------------------------------------------------------------------------------------------------
+
+
+def scene(bsdf):
+    return mi.load_string(f'<scene version="3.0.0"><shape type="sphere">{bsdf}</shape></scene>').shapes()[0].bsdf()
+
+
+def described(given, name):
+    """A plugin dict with a preset, loaded, without the line that names it."""
+    return str(mi.load_dict(given)).replace(f"  preset = {name},\n", "")
+
+
+@pytest.mark.parametrize("name", [of_set(group)[7] for group in COUNTS])
+def test_parameter(variant, name):
+    """A plugin with a preset is the one with its values, in every variant; ``traverse`` has them all."""
+    values = mi_brdfs.preset(name)
+    given = {"type": values["type"], "preset": name}
+    assert described(given, name) == str(mi.load_dict(values))
+    keys = [[*mi.traverse(mi.load_dict(bsdf)).keys()] for bsdf in (given, values)]
+    assert keys[0] == keys[1] != []
+
+
+def test_xml_with_others_on_top(variant):
+    """Given parameters win: also over what they exclude, but not over the others."""
+    name = "ngan/ward/blue-acrylic"
+    params = mi.traverse(
+        scene(f"""
+        <bsdf type="ward"><string name="preset" value="{name}"/><float name="alpha" value="0.3"/></bsdf>""")
+    )
+    expected = mi.traverse(mi.load_dict(mi_brdfs.preset(name) | {"alpha": 0.3}))
+    assert {key: str(value) for key, value in params} == {key: str(value) for key, value in expected}
+
+
+ON_TOP = [
+    ("ngan/ward/chrome", {"alpha_u": 0.3, "alpha_v": 0.2}, ["alpha"]),
+    ("ngan/ward/chrome", {"diffuse_reflectance": {"type": "checkerboard"}}, []),
+    ("ngan/ward/chrome", {"variant": "balanced"}, []),
+    ("low/cook-torrance-e2/chrome", {"material": "Au"}, ["int_ior", "ext_ior"]),
+    ("low/cook-torrance-e2/chrome", {"int_ior": 2.5}, []),
+    ("ngan/cook-torrance/chrome", {"int_ior": 1.5}, ["f0"]),
+    ("ngan/ashikhmin-shirley/chrome", {"distribution": "ggx", "shadowing": "smith"}, ["exponent"]),
+    ("ngan/ashikhmin-shirley/chrome", {"distribution": "blinn"}, []),
+    ("ngan/ashikhmin-shirley/chrome", {"exponent": 5}, []),
+    ("low/microfacet/chrome", {"variant": "smooth"}, ["normalization"]),
+    ("low/microfacet/chrome", {"normalization": "unit", "a": 0.5}, []),
+]
+
+
+@pytest.mark.parametrize("name, given, replaced", ON_TOP)
+def test_others_on_top(variant, name, given, replaced):
+    values = {key: value for key, value in mi_brdfs.preset(name).items() if key not in replaced} | given
+    assert described({"type": values["type"], "preset": name, **given}, name) == str(mi.load_dict(values))
+
+
+@pytest.mark.parametrize(
+    "plugin, name, sentence",
+    [
+        (
+            "ward",
+            "ngan/ward/chrme",
+            'ward: preset = "ngan/ward/chrme" is unknown; did you mean "ngan/ward/chrome"? It ',
+        ),
+        ("ward", "chrome", 'is unknown; did you mean "ngan/ward/chrome"? It must be'),
+        ("low", "chrome", 'is unknown; did you mean "low/microfacet/chrome"? It must be'),
+        (
+            "ward",
+            "low/smooth/chrome",
+            'ward: preset = "low/smooth/chrome" is a material of the plugin low; it must be a ',
+        ),
+        ("ward", 3.5, "ward: preset = 3.5 is a number; it must be a name."),
+        ("ward", "", 'ward: preset = "" is unknown; it must be a material that `mi-brdfs presets --model ward` lists.'),
+    ],
+)
+def test_wrong_parameters(llvm_rgb, plugin, name, sentence):
+    with pytest.raises(RuntimeError) as error:
+        mi.load_dict({"type": plugin, "preset": name})
+    assert sentence in str(error.value)
+
+
+# --- On the command line --------------------------------------------------------------------------------------------
+
+
+def run(*words):
+    done = CliRunner().invoke(app, ["presets", *words])
+    return done.exit_code, done.output
+
+
+def test_command_lists():
+    status, text = run("--model", "ward", "--like", "Acrylic")
+    assert status == 0 and len(text.splitlines()) == 9
+    first = "ngan/ward/blue-acrylic"
+    assert next(line for line in text.splitlines() if first in line).split() == [
+        first,
+        "ward",
+        "#1f365b",
+        "α",
+        "0.0162",
+    ]
+
+
+def test_command_shows_one():
+    status, text = run("ngan/ward-duer/chrome")
+    assert status == 0
+    given = text[: text.index("}\n\n") + 1]
+    assert eval(given) == mi_brdfs.preset("ngan/ward-duer/chrome")
+    with mi.variant_context("llvm_ad_rgb"):
+        xml = text[text.index("<bsdf") : text.index("</bsdf>")] + "</bsdf>"
+        assert "ngan/ward-duer/chrome" in str(scene(xml))
+    origin = provenance("ngan/ward-duer/chrome")
+    said = " ".join(text.split())
+    assert all(words in said for words in [origin.source, origin.doi, origin.convention, *origin.defects])
+
+
+@pytest.mark.parametrize(
+    "words, sentence",
+    [
+        (["ngan/ward/chrme"], "did you mean 'ngan/ward/chrome'?"),
+        (["--model", "lambert"], "there is no preset of lambert"),
+        (["--like", "zz"], "there is no preset with 'zz' in its name"),
+    ],
+)
+def test_command_refuses(words, sentence):
+    status, text = run(*words)
+    assert status == 2 and sentence in " ".join(text.split())
