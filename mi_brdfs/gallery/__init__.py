@@ -40,7 +40,7 @@ __all__ = ["gallery"]
 
 SIZE, SPP = 256, 16
 PER_ROW = 6
-PRESETS_PER_ROW = 10
+PRESETS_PER_ROW = 8
 ACROSS = 3
 """How many rows of pixels in the middle of a picture make its profile."""
 
