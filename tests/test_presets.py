@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import mitsuba as mi
@@ -252,11 +254,18 @@ def test_check(name):
 
 
 def test_names():
+    """As many as README says."""
+    assert f"names {len(mi_brdfs.presets())} real materials" in (ROOT / "README.md").read_text(encoding="utf-8")
     ward = mi_brdfs.presets("ward")
     assert len(ward) == 172 and set(ward) < set(mi_brdfs.presets())
     assert all(mi_brdfs.preset(name)["type"] == "ward" for name in ward)
     origin = provenance("low/smooth/chrome")
     assert "Löw" in origin.source and origin.doi == "10.1145/2077341.2077350" and "cosθ_d" in origin.convention
+
+
+def test_they_are_read_when_used():
+    code = "import mi_brdfs.published as it; assert not it._data.cache_info().currsize; assert it.presets()"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
 def test_presets_are_the_users_own():
