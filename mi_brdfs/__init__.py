@@ -2,7 +2,8 @@
 
 ``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
 dict scenes. :func:`list_models` names them, :func:`info` returns a manual page, :func:`preview_scene` a scene that
-shows a material. :func:`ranges` and :func:`project` keep optimised parameters valid.
+shows a material. :func:`presets` names published materials, :func:`preset` returns one. :func:`ranges` and
+:func:`project` keep optimised parameters valid.
 """
 
 import importlib
@@ -31,6 +32,7 @@ from .mitsuba.guests import register_installed  # noqa: E402
 from .mitsuba.registry import info, install, list_models, register  # noqa: E402
 from .model import Energy, EnergyWarning, Model  # noqa: E402
 from .preview import preview_scene  # noqa: E402
+from .published import preset, presets  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
 
 install()
@@ -59,6 +61,8 @@ __all__ = [
     "lobes",
     "microfacet",
     "parameters",
+    "preset",
+    "presets",
     "preview_scene",
     "project",
     "ranges",

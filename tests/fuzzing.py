@@ -10,7 +10,7 @@ from typing import NamedTuple
 from hypothesis import Phase, given, settings
 
 from mi_brdfs.models.microfacet import BROUGHT
-from mi_brdfs.parameters import Choice, Colour, Flag, FresnelSet, Number, OneOf, PerLobe, Rotation
+from mi_brdfs.parameters import Choice, Colour, Flag, FresnelSet, Number, OneOf, PerLobe, Preset, Rotation
 
 
 def examples(count, drawn):
@@ -118,3 +118,9 @@ def _(fresnel: FresnelSet):
 @alternatives.register
 def _(rotation: Rotation):
     return [Options({}, (Quantity(rotation.name, (-1e4, 1e4), 0),)), Options({})]
+
+
+@alternatives.register
+def _(preset: Preset):
+    """Without one: what it gives is what other parameters are given as."""
+    return [Options({})]

@@ -239,6 +239,30 @@ def test_what_is_finished_is_kept(tmp_path):
     assert 'alt="wrap: wrap, with reflectance = (0.6, 0.35, 0.2): 0"' in text and 'id="eon"' not in text
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_wall_of_presets(tmp_path, monkeypatch):
+    """Under the names of their sets, half as large; as far as it goes."""
+    names = [*mi_brdfs.presets("ward")[:10], "ngan/ward-duer/chrome", "ngan/ward-duer/nickel"]
+    monkeypatch.setattr("mi_brdfs.gallery.presets", lambda type: names)
+
+    def press_ctrl_c(type, done, total):
+        assert total == 6 + len(names)
+        if done == total - 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        gallery(["lambert"], tmp_path, 1, 64, press_ctrl_c, with_presets=True)
+    text = (tmp_path / "index.html").read_text()
+    assert f'src="lambert_presets.jpg" alt="{", ".join(names[:-1])}"' in text
+    entry = Entry(find_model("lambert"), with_presets=True)
+    entry.shots = [shot(entry.bsdfs[0], size=32, spp=4)] * (6 + len(names) - 1)
+    rows = entry.wall()
+    assert [row.headings for row in rows] == [{0: "ngan/ward"}, {}, {0: "ngan/ward-duer"}]
+    assert [caption for row in rows for caption in row.captions] == [name.rpartition("/")[2] for name in names[:-1]]
+    width, height = mi.Bitmap(str(tmp_path / "lambert_presets.jpg")).size()
+    assert width > 8 * 32 and height > 3 * 32
+
+
 def start(*arguments, **options):
     command = [sys.executable, "-m", "mi_brdfs", "gallery", *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)

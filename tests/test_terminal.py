@@ -17,6 +17,8 @@ COMMANDS = {
     "list": ["list"],
     "info": ["info", "ward"],
     "info of the kit": ["info", "microfacet"],
+    "presets": ["presets"],
+    "a preset": ["presets", "ngan/cook-torrance/chrome"],
     "doctor": ["doctor"],
     "show": ["show", "lambert", "--size", "16", "--spp", "2"],
     "render": ["render", "scene.xml"],

@@ -27,6 +27,9 @@ def gallery(
         int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; the pictures are denoised.")
     ] = 16,
     size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 256,
+    presets: Annotated[
+        bool, typer.Option("--presets", help="Also render each model's published materials: TYPE_presets.jpg.")
+    ] = False,
     variant: Annotated[
         str | None,
         typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
@@ -51,7 +54,7 @@ def gallery(
             progress.update(task, description=type, completed=done, total=of)
 
         try:
-            render_gallery(types or (), output, spp, size, advance)
+            render_gallery(types or (), output, spp, size, advance, presets)
         except ValueError as error:
             fail(one_line(error), Exit.USAGE)
         except OSError as error:

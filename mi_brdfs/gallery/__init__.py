@@ -29,6 +29,7 @@ from ..measure.arrays import luminance
 from ..mitsuba.registry import find_models
 from ..model import Model
 from ..preview import preview_scene
+from ..published import preset, presets
 from ..render import ctrl_c, display_image, write
 from .families import by_family, portrait, stage_of, year
 from .html import Section, page
@@ -39,6 +40,7 @@ __all__ = ["gallery"]
 
 SIZE, SPP = 256, 16
 PER_ROW = 6
+PRESETS_PER_ROW = 8
 ACROSS = 3
 """How many rows of pixels in the middle of a picture make its profile."""
 
@@ -49,6 +51,7 @@ def gallery(
     spp: int = SPP,
     size: int = SIZE,
     on_picture: Callable[[str, int, int], None] = lambda type, done, total: None,
+    with_presets: bool = False,
 ) -> Path:
     """Render models in the preview scene, each with sweeps of its main parameters, and write an HTML page that shows
     them, with an overview and a contact sheet of each model. Ctrl-C keeps the finished pictures, and is raised.
@@ -59,6 +62,7 @@ def gallery(
         spp: samples per pixel, rounded up to a power of 4; the pictures are denoised.
         size: width and height of a picture, in pixels.
         on_picture: called as ``on_picture(type, done, total)`` after each picture.
+        with_presets: also render each model's published materials, half as large, into ``TYPE_presets.jpg``.
 
     Returns:
         The path of the page.
@@ -67,15 +71,16 @@ def gallery(
         ValueError: if there is no such model; the message has the closest name.
         OSError: if the folder cannot be created or written to.
     """
-    entries = [Entry(model) for model in by_family(find_models(types))]
+    entries = [Entry(model, with_presets) for model in by_family(find_models(types))]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    done, total = 0, sum(len(entry.bsdfs) for entry in entries)
+    done, total = 0, sum(len(entry.bsdfs) + len(entry.presets) for entry in entries)
     try:
         for entry in entries:
-            for bsdf in entry.bsdfs:
+            for bsdf in [*entry.bsdfs, *map(preset, entry.presets)]:
+                half = len(entry.shots) >= len(entry.bsdfs)
                 with ctrl_c() as interrupt:  # a render cannot be interrupted
-                    image = shot(bsdf, entry.stage, size, spp)
+                    image = shot(bsdf, entry.stage, size // 2 if half else size, spp)
                 if interrupt.pressed:
                     raise KeyboardInterrupt
                 entry.shots.append(image)
@@ -147,10 +152,11 @@ def sweep_row(sweep: Sweep, type: str, stage: str, shots: list[Shot]) -> Row:
 class Entry:
     """A model with the plugin dicts to show, its portrait and then its sweeps, and the pictures finished so far."""
 
-    def __init__(self, model: type[Model]):
+    def __init__(self, model: type[Model], with_presets: bool = False):
         self.model, self.type, self.stage = model, model.plugins[0], stage_of(model)
         self.sweeps = sweeps_of(model)
         self.bsdfs = [portrait(model), *(bsdf for sweep in self.sweeps for bsdf in sweep.bsdfs(self.type))]
+        self.presets = presets(self.type) if with_presets else []
         self.shots: list[Shot] = []
 
     def rows(self) -> list[Row]:
@@ -161,14 +167,27 @@ class Entry:
         ]
         return [row for row in rows if row.pictures]
 
+    def wall(self) -> list[Row]:
+        """Return the published materials in rows under the names of their sets, as far as there are pictures."""
+        rows, shots = [], self.shots[len(self.bsdfs) :]
+        named = ((name.rpartition("/"), shot.picture) for name, shot in zip(self.presets, shots, strict=False))
+        for group, members in groupby(named, key=lambda each: each[0][0]):
+            pictures = [(name[2], picture) for name, picture in members]
+            for first in range(0, len(pictures), PRESETS_PER_ROW):
+                names, images = zip(*pictures[first : first + PRESETS_PER_ROW], strict=True)
+                rows.append(Row({} if first else {0: group}, list(images), list(names)))
+        return rows
+
     def write(self, folder: Path) -> None:
-        """Write the contact sheet unless it is empty."""
-        if rows := self.rows():
-            _save(sheet(rows), folder / f"{self.type}.png")
+        """Write the contact sheet and the wall of presets unless they are empty."""
+        for rows, name in ((self.rows(), f"{self.type}.png"), (self.wall(), f"{self.type}_presets.jpg")):
+            if rows:
+                _save(sheet(rows), folder / name)
 
     def section(self) -> Section:
         rows = [(row.headings[0], row.captions) for row in self.rows()]
-        return Section(self.model, year(self.model), self.bsdfs[0], rows)
+        names = self.presets[: max(len(self.shots) - len(self.bsdfs), 0)]
+        return Section(self.model, year(self.model), self.bsdfs[0], rows, names)
 
 
 def _save(image: Image.Image, path: Path) -> None:

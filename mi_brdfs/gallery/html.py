@@ -21,7 +21,8 @@ a { color: inherit }
 nav p { margin: 0.3rem 0; color: var(--faint) }
 nav a { margin-right: 0.6rem; color: var(--ink); display: inline-block; padding: 0.2rem 0 }
 img { max-width: 100%; height: auto }
-@media (max-width: 45rem) { .sheet { display: block; overflow-x: auto } .sheet img { max-width: 44rem } }
+@media (max-width: 45rem) { .sheet { display: block; overflow-x: auto } .sheet img { max-width: 44rem }
+  .wall img { max-width: none } }
 p + pre { white-space: pre-wrap }
 pre { overflow-x: auto; padding: 0.6rem 0.8rem; background: #f5f5f5; font-size: 0.85rem }
 """
@@ -35,6 +36,8 @@ class Section(NamedTuple):
     portrait: dict
     rows: list[tuple[str, list[str]]]
     """Headings and captions of the contact sheet."""
+    presets: list[str]
+    """The published materials that are shown."""
 
 
 def page(sections: list[Section], quality: str) -> str:
@@ -84,21 +87,24 @@ def _section(section: Section) -> str:
     name, *aliases = section.model.plugins
     also = f", also <code>{'</code>, <code>'.join(aliases)}</code>" if aliases else ""
     alt = "; ".join(f"{heading}: {', '.join(captions)}" for heading, captions in section.rows)
-    image = (
-        f'<a class="sheet" href="{name}.png"><img src="{name}.png" alt="{escape(alt)}" loading="lazy"></a>'
-        if alt
-        else ""
-    )
+    image = _picture(f"{name}.png", "sheet", alt)
+    wall = _picture(f"{name}_presets.jpg", "sheet wall", ", ".join(section.presets))
     return f"""<section id="{name}">
 <h2>{name} <span>{section.year}{also}</span></h2>
 <p>{_code(section.model.summary())}</p>
 {image}
+{wall}
 <p>The picture in the overview shows</p>
 <pre>{escape(str(section.portrait))}</pre>
 <details><summary>Reference</summary>
 <pre>{escape(section.model.manual())}</pre>
 </details>
 </section>"""
+
+
+def _picture(file: str, kind: str, alt: str) -> str:
+    """Return a picture and what is larger behind it, if it shows anything."""
+    return f'<a class="{kind}" href="{file}"><img src="{file}" alt="{escape(alt)}" loading="lazy"></a>' if alt else ""
 
 
 def _code(text: str) -> str:

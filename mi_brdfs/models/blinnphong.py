@@ -5,7 +5,7 @@ from ..microfacet.distributions import Blinn
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, Shadowing
 from ..model import Energy, Model
-from ..parameters import Choice, Number, Reflectance
+from ..parameters import Choice, Number, Preset, Reflectance
 
 
 class BlinnPhong(Model):
@@ -53,6 +53,7 @@ class BlinnPhong(Model):
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")
     normalization = Choice(("energy", "approximate", "ndf", "none", "original"), "scale of the specular lobe")
+    preset = Preset()
 
     energy = Energy(
         0.7,

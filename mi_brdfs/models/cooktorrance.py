@@ -5,7 +5,7 @@ from ..math import clamp
 from ..microfacet.distributions import GGX, Beckmann, Blinn
 from ..microfacet.shadowing import VCavity
 from ..model import Energy, Model
-from ..parameters import Choice, FresnelSet, Number, Reflectance
+from ..parameters import Choice, FresnelSet, Number, Preset, Reflectance
 
 
 class CookTorrance(Model):
@@ -55,6 +55,7 @@ class CookTorrance(Model):
     fresnel = FresnelSet()
     distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")
     normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
+    preset = Preset()
 
     energy = Energy(1, [({"normalization": "modern"}, 1), ({"normalization": "tog82"}, 4)])
 

@@ -8,7 +8,7 @@ from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
 from ..microfacet.tails import ABC
 from ..model import Energy, Model
-from ..parameters import Choice, Colour, Number, OneOf, Reflectance
+from ..parameters import Choice, Colour, Number, OneOf, Preset, Reflectance
 
 
 class Low(Model):
@@ -60,6 +60,7 @@ class Low(Model):
         {"microfacet": {"normalization": Choice(("fit", "paper", "unit"), "scale of the lobe")}, "smooth": {}},
         "which of the paper's two models",
     )
+    preset = Preset()
 
     energy = Energy(
         0.069,

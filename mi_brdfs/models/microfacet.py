@@ -20,7 +20,7 @@ from ..microfacet.shadowing import (
 from ..microfacet.tails import ABC, EPD, GTR, HemiEPD
 from ..microfacet.term import Term
 from ..model import Energy, Model, full_name
-from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Reflectance, Rotation
+from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Preset, Reflectance, Rotation
 from ..parameters import fresnel as fresnel_parameters
 from ..parameters.messages import listed
 
@@ -161,6 +161,7 @@ class Microfacet(Model):
     shadowing = OneOf({word: it.parameters for word, it in SHADOWING.items()}, "shadowing term G")
     fresnel = FresnelSet()
     rotation = Rotation()
+    preset = Preset()
     energy = Energy(
         1,
         [

@@ -7,7 +7,7 @@ from ..microfacet.fresnel import Unit
 from ..microfacet.laws import log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.shadowing import Kelemen, Shadowing
 from ..model import Energy, Model
-from ..parameters import Choice, Number, Reflectance, Rotation
+from ..parameters import Choice, Number, Preset, Reflectance, Rotation
 
 
 class Ward(Model):
@@ -58,6 +58,7 @@ class Ward(Model):
                    anisotropic=True, lone_default=True)  # fmt: skip
     variant = Choice(("balanced", "ward", "ward-duer", "approximate"), "scale of the specular lobe")
     rotation = Rotation()
+    preset = Preset()
 
     energy = Energy(
         0.698,

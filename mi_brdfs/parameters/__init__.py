@@ -19,6 +19,7 @@ from .colours import Colour, Reflectance
 from .fresnel import FresnelSet
 from .groups import OneOf, PerLobe
 from .parameter import Parameter, ParameterRow
+from .preset import Preset
 from .reader import ParameterError, PropertyReader, Range
 from .scalars import Choice, Flag, Number, Rotation, Spelling
 
@@ -33,6 +34,7 @@ __all__ = [
     "ParameterError",
     "ParameterRow",
     "PerLobe",
+    "Preset",
     "PropertyReader",
     "Range",
     "Reflectance",

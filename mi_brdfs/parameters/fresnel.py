@@ -55,6 +55,10 @@ class FresnelSet(Parameter):
         common = [name for names in self.SETS.values() for name in names]
         return [*common, *OTHERS.names] if TERMS else common
 
+    def rivals(self, name: str) -> list[str]:
+        own = next(names for names in self.SETS.values() if name in names)
+        return [other for other in self.names if other not in own]
+
     def bind(self, reader: PropertyReader) -> FresnelSet:
         textures = self._textures(reader)
         if TERMS and (other := next((name for name in OTHERS.names if name in reader), None)):

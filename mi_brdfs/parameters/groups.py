@@ -39,6 +39,9 @@ class OneOf(Parameter):
         own = [name for declared in self.words.values() for p in declared.values() for name in p.names]
         return list(dict.fromkeys([self.name, *own]))
 
+    def rivals(self, name: str) -> list[str]:
+        return [] if name == self.name else [self.name]
+
     def bind(self, reader: PropertyReader) -> OneOf:
         word = reader.choice(self.name, tuple(self.words))
         declared = self.words[word].values()

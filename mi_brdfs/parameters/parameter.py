@@ -70,6 +70,10 @@ class Parameter:
         """These names as messages list them."""
         return self.names
 
+    def rivals(self, name: str) -> list[str]:
+        """Return the names that one of its names gives way to, where it comes from a preset."""
+        return []
+
     def bind(self, reader: PropertyReader) -> Parameter | str | bool:
         """Return a copy that holds what a plugin was given; a choice or a flag returns its value instead."""
         raise NotImplementedError(f"{type(self).__name__} does not define bind.")

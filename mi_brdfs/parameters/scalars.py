@@ -59,6 +59,9 @@ class Number(Parameter):
     def names(self) -> list[str]:
         return [self.name + self.number, *self.pair, *([self.other] if self.spelling else [])]
 
+    def rivals(self, name: str) -> list[str]:
+        return [other for other in self.names if other != name]
+
     def bind(self, reader: PropertyReader) -> Number:
         single, given = self.names[0], [name for name in self.pair if name in reader]
         if self.default is None and not any(name in reader for name in self.names):

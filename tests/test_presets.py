@@ -1,0 +1,424 @@
+"""The published materials: their numbers, their formulas, and how they are named."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from generate import presets as generator
+from support import call, direction, hemisphere, lattice
+from typer.testing import CliRunner
+
+import mi_brdfs
+from mi_brdfs.cli import app
+from mi_brdfs.published import provenance
+from mi_brdfs.testing import assert_bsdf
+
+ROOT = Path(__file__).parent.parent
+FITS = Path(os.environ.get("MI_BRDFS_DATA", ROOT.parent / "shared" / "data")) / "fits"
+SETS = {name.rpartition("/")[0]: None for name in mi_brdfs.presets()}
+COUNTS = {
+    "ngan/ward": 86, "ngan/ward-duer": 86, "ngan/blinn-phong": 86, "ngan/cook-torrance": 86,
+    "ngan/ashikhmin-shirley": 86, "low/cook-torrance-e1": 99, "low/cook-torrance-e2": 100,
+    "low/ashikhmin-shirley-e1": 98, "low/ashikhmin-shirley-e2": 99, "low/microfacet": 100, "low/smooth": 100,
+}  # fmt: skip
+
+
+def of_set(name):
+    return [it for it in mi_brdfs.presets() if it.startswith(f"{name}/")]
+
+
+def numbers_of(name):
+    """A preset's own numbers, without the words."""
+    values = {k: v for k, v in mi_brdfs.preset(name).items() if not isinstance(v, str)}
+    return {k: np.array(v["value"] if isinstance(v, dict) else v) for k, v in values.items()}
+
+
+# --- What the papers print ------------------------------------------------------------------------------------------
+
+SCALE = np.array([1, 1.15, 1.66])
+PRINTED = {
+    "ngan/ward/blue-acrylic": [(0.0138, 0.0326, 0.0636), (0.00774, 0.00547, 0.00339), 0.0162],
+    "ngan/ward-duer/alum-bronze": [(0.0856, 0.0585, 0.0291), (0.032, 0.0189, 0.00986), 0.0374],
+    "ngan/blinn-phong/aluminium": [(0.0335, 0.028, 0.0244), (0.0243, 0.0187, 0.00893), 24300],
+    "ngan/cook-torrance/white-acrylic": [(0.313, 0.258, 0.155), (0.0722, 0.0506, 0.0326), 0.0119, 0.0368],
+    "ngan/ashikhmin-shirley/alum-bronze": [(0.0877, 0.0598, 0.0297), (0.108, 0.0637, 0.0337), 1350, 0.249],
+    "low/cook-torrance-e1/aventurnine": [(0.0583, 0.0617, 0.0561), (0.01616, 0.02572, 0.01951), 0.00529, 1.8879, 1],
+    "low/cook-torrance-e2/beige-fabric": [(0.2369, 0.1635, 0.1388), (0.11193, 0.10243, 0.09277), 0.92236, 1.90712, 1],
+    "low/ashikhmin-shirley-e1/black-fabric": [
+        (0.0152, 0.0099, 0.0094), (0.16304, 0.14245, 0.14328), 4.859023, 1.14084, 1,
+    ],
+    "low/ashikhmin-shirley-e2/aluminium": [
+        (0.0376, 0.0408, 0.0455), (0.20298, 0.18764, 0.18682), 2947.816779, 3.75647, 1,
+    ],
+    "low/microfacet/alum-bronze": [
+        (0.0245, 0.0223, 0.0162), (51.71455, 37.93269, 27.37309), 10482.133785, 0.816737, 2.23652,
+    ],
+    "low/smooth/aluminium": [(0, 0.0001, 0.0033), (778.91415, 750.01196, 766.87554), 75544.810541, 1.045481, 6.59476],
+}  # fmt: skip
+"""Of a material in each set: the albedo of the diffuse lobe, the colour of the other one, its width, …"""
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_numbers_are_those_of_the_paper(name):
+    """In Ngan's colours but for the scale of MERL's channels; the kit's exponent n has the factor n+2 for n+1."""
+    diffuse, specular, *others = PRINTED[name]
+    scale = SCALE if name.startswith("ngan") else 1
+    values = numbers_of(name)
+    scale_of_lobe = scale * (others[0] + 1) / (others[0] + 2) if "ashikhmin" in name else scale
+    np.testing.assert_allclose(values.pop("diffuse_reflectance"), np.multiply(diffuse, scale), rtol=1e-6)
+    lobe = values.pop("a") if "a" in values else values.pop("specular_reflectance")
+    np.testing.assert_allclose(lobe, np.multiply(specular, scale_of_lobe), rtol=1e-6)
+    np.testing.assert_allclose(sorted(map(float, values.values())), sorted(others), rtol=1e-6)
+
+
+def test_every_material_that_fits_is_there():
+    assert {name: len(of_set(name)) for name in SETS} == COUNTS
+    data = json.loads((ROOT / "mi_brdfs" / "published.json").read_text(encoding="utf-8"))
+    left_out = {
+        f"{name}/{material}": why for name, it in data["sets"].items() for material, why in it["left_out"].items()
+    }
+    assert left_out == {
+        "low/cook-torrance-e1/white-fabric2": "its roughness is 2.094, above 2",
+        "low/ashikhmin-shirley-e1/polyethylene": "the scale of its specular lobe is 1.125, above 1",
+        "low/ashikhmin-shirley-e1/white-paint": "the scale of its specular lobe is 1.29, above 1",
+        "low/ashikhmin-shirley-e2/polyethylene": "the scale of its specular lobe is 1.119, above 1",
+    }
+    assert all(
+        np.allclose(it.get("scale", 1), SCALE if name.startswith("ngan") else 1) for name, it in data["sets"].items()
+    )
+
+
+@pytest.mark.skipif(not FITS.is_dir(), reason="MI_BRDFS_DATA has no fits")
+def test_data_file_is_generated():
+    assert generator.text_of(FITS) == generator.FILE.read_text(encoding="utf-8")
+
+
+def test_conventions_of_ngan_agree():
+    """The exponents of Blinn and Phong belong to the half vector: about the mirror direction they would be a quarter of
+    those of Ashikhmin and Shirley. What narrow lobes of Cook and Torrance reflect towards the mirror direction is what
+    those of Ashikhmin and Shirley do: with 1/π for 1/4, 1.27 times that."""
+    materials = [it.rpartition("/")[2] for it in of_set("ngan/ward")]
+    exponents, reflected = [], []
+    for material in materials:
+        phong, cook, ashikhmin = (
+            numbers_of(f"ngan/{model}/{material}") for model in ("blinn-phong", "cook-torrance", "ashikhmin-shirley")
+        )
+        exponents.append(phong["exponent"] / ashikhmin["exponent"])
+        if cook["alpha"] < 0.1:
+            colours = (it["specular_reflectance"][1] * it["f0"] for it in (cook, ashikhmin))
+            reflected.append(np.divide(*colours))
+    assert 0.7 < np.median(exponents) < 2
+    assert len(reflected) > 40 and abs(np.median(reflected) - 1) < 0.05
+
+
+# --- Values ---------------------------------------------------------------------------------------------------------
+
+
+def schlick(f0, c):
+    return f0 + (1 - f0) * (1 - c) ** 5
+
+
+def dielectric(n, c):
+    g = np.sqrt(n * n - 1 + c * c)
+    return 0.5 * ((g - c) / (g + c)) ** 2 * (1 + ((c * (g + c) - 1) / (c * (g - c) + 1)) ** 2)
+
+
+def beckmann(alpha, h):
+    tan2 = (h[:, 0] ** 2 + h[:, 1] ** 2) / h[:, 2] ** 2
+    return np.exp(-tan2 / alpha**2) / (np.pi * alpha**2 * h[:, 2] ** 4)
+
+
+def published(name, i, o):
+    """What a set's paper says of the specular lobe, without its colour: in float64, of unit vectors and half vectors as
+    they are given."""
+    it = numbers_of(name)
+    m = i + o
+    h = m / np.linalg.norm(m, axis=1, keepdims=True)
+    ci, co, ch, d = i[:, 2], o[:, 2], h[:, 2], (i * h).sum(1)
+    groove = np.minimum(1, 2 * ch * np.minimum(ci, co) / d)
+    group = name.rpartition("/")[0]
+    fresnel = schlick(it["f0"], d) if "f0" in it else dielectric(it["int_ior"], d) if "int_ior" in it else 1
+    if group.startswith("ngan/ward"):
+        tan2 = (m[:, 0] ** 2 + m[:, 1] ** 2) / m[:, 2] ** 2
+        cosines = np.sqrt(ci * co) if group == "ngan/ward" else ci * co
+        return np.exp(-tan2 / it["alpha"] ** 2) / (4 * np.pi * it["alpha"] ** 2 * cosines)
+    if group == "ngan/blinn-phong":
+        return (it["exponent"] + 2) / (2 * np.pi) * _power(h, it["exponent"])
+    if group == "ngan/cook-torrance":
+        return fresnel * beckmann(it["alpha"], h) * groove / (4 * ci * co)
+    if group.startswith("low/cook-torrance"):
+        unnormalised = np.pi * beckmann(it["alpha"], h)
+        return fresnel * unnormalised * groove / (np.pi * ci * co)
+    if "ashikhmin-shirley" in group:
+        n = it["exponent"]
+        to_paper = (n + 2) / (n + 1)  # the colour is the kit's
+        return to_paper * (n + 1) / (8 * np.pi) * _power(h, n) * fresnel / (d * np.maximum(ci, co))
+    if group == "low/microfacet":
+        versine = (h[:, 0] ** 2 + h[:, 1] ** 2) / (1 + ch)
+        return fresnel * groove / (np.pi * ci * co * (1 + it["b"] * versine) ** it["c"])
+    assert group == "low/smooth"
+    apart = ((i - o)[:, :2] ** 2).sum(1)
+    fresnel = dielectric(it["int_ior"], np.sqrt(1 - apart / 4))
+    return fresnel / (1 + it["b"] * (m[:, :2] ** 2).sum(1)) ** it["c"]
+
+
+def _power(h, n):
+    return np.exp(0.5 * n * np.log1p(-(h[:, 0] ** 2 + h[:, 1] ** 2)))
+
+
+def width(name):
+    """About the slope at which a lobe ends."""
+    it = numbers_of(name)
+    return float(it.get("alpha") or (2 / it.get("exponent", it.get("b"))) ** 0.5)
+
+
+def pairs(name):
+    """Directions about the mirror direction, as far as the lobe is wide, and all over: (wi, wo), float32."""
+    tangents = min(width(name), 1) * np.array([0, 0.3, 1, 2, 3.5])
+    phis, thetas = np.radians([10, 130, 250]), np.radians([0, 20, 45, 70, 85])
+    theta, tan, phi = (grid.ravel() for grid in np.meshgrid(thetas, tangents, phis))
+    wi = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=1)
+    h = np.stack([tan * np.cos(phi), tan * np.sin(phi), np.ones_like(tan)], axis=1)
+    h /= np.linalg.norm(h, axis=1, keepdims=True)
+    wo = 2 * (wi * h).sum(1)[:, None] * h - wi
+    wi, wo = (np.concatenate([a, hemisphere(30, seed)]).astype(np.float32) for a, seed in ((wi, 1), (wo, 2)))
+    above = wo[:, 2] > 0.02
+    return wi[above], wo[above]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("group", COUNTS)
+def test_each_evaluates_to_its_formula(group):
+    """Within 1e-4 of every channel where f is above 1e-6 of its peak."""
+    ctx = mi.BSDFContext()
+    for name in of_set(group):
+        wi, wo = pairs(name)
+        values = mi_brdfs.preset(name)
+        (value,) = call(mi.load_dict(values).eval, ctx, wi, wo)
+        i, o = wi.astype(np.float64), wo.astype(np.float64)
+        colour = np.array(values["a" if "a" in values else "specular_reflectance"]["value"])
+        f = np.array(values["diffuse_reflectance"]["value"]) / np.pi + published(name, i, o)[:, None] * colour
+        expected = f * o[:, 2:]
+        checked = expected > 1e-6 * expected.max()
+        assert checked.mean() > 0.4
+        np.testing.assert_allclose(value[checked], expected[checked], rtol=1e-4, err_msg=name)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_albedo():
+    """Below one up to 89.9°, or as much as the page of the plugin states, for the materials that say so."""
+    points, ctx = lattice(5, 1), mi.BSDFContext()
+    angles = [0, 45, 70, 80, 85, 89, 89.9]
+    wi = np.repeat([direction(theta, 17) for theta in angles], len(points), axis=0)
+    uniform = np.tile(points, (len(angles), 1))
+    gains = {}
+    for name in mi_brdfs.presets():
+        bsdf = mi.load_dict(mi_brdfs.preset(name))
+        weight = call(bsdf.sample, ctx, wi, uniform[:, :1], uniform[:, 1:])[2]
+        albedo = weight.reshape(len(angles), len(points), -1).mean(axis=1)
+        assert albedo.max() < max(bsdf.model.stated_albedo(), 1), name
+        assert albedo[:5].max() < 0.9, name
+        if albedo.max() > 1:
+            gains.setdefault(name.rpartition("/")[0], {})[name] = albedo.max()
+    (paint,) = gains.pop("low/cook-torrance-e1")
+    assert paint.endswith("white-paint") and "white-paint" in provenance(paint).defects[-1]
+    (duer,) = gains.values()
+    words = provenance(next(iter(duer))).defects[-1]
+    assert f"the albedo of {len(duer)} materials" in words and f"up to {max(duer.values()):.1f}" in words
+
+
+NARROWEST = [min(of_set(group), key=width) for group in COUNTS]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", NARROWEST)
+def test_check_of_the_narrowest_of_each_set(name):
+    assert_bsdf(mi_brdfs.preset(name), only=["finite", "support", "eval_pdf", "weight", "albedo"])
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "name", ["ngan/ward-duer/gold-metallic-paint", "low/ashikhmin-shirley-e1/aluminium", "low/microfacet/beige-fabric"]
+)
+def test_check(name):
+    assert_bsdf(mi_brdfs.preset(name))
+
+
+# --- Names ----------------------------------------------------------------------------------------------------------
+
+
+def test_names():
+    """As many as README says."""
+    assert f"names {len(mi_brdfs.presets())} real materials" in (ROOT / "README.md").read_text(encoding="utf-8")
+    ward = mi_brdfs.presets("ward")
+    assert len(ward) == 172 and set(ward) < set(mi_brdfs.presets())
+    assert all(mi_brdfs.preset(name)["type"] == "ward" for name in ward)
+    origin = provenance("low/smooth/chrome")
+    assert "Löw" in origin.source and origin.doi == "10.1145/2077341.2077350" and "cosθ_d" in origin.convention
+
+
+def test_they_are_read_when_used():
+    code = "import mi_brdfs.published as it; assert not it._data.cache_info().currsize; assert it.presets()"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_presets_are_the_users_own():
+    name = "ngan/ward/blue-acrylic"
+    mi_brdfs.preset(name)["diffuse_reflectance"]["value"][0] = 9
+    changed = mi_brdfs.preset(name)
+    changed["type"] = "roughconductor"
+    assert (
+        mi_brdfs.preset(name)["type"] == "ward" and mi_brdfs.preset(name)["diffuse_reflectance"]["value"][0] == 0.0138
+    )
+
+
+@pytest.mark.parametrize(
+    "name, sentence",
+    [
+        ("ngan/ward/blu-acrylic", "There is no preset 'ngan/ward/blu-acrylic'; did you mean 'ngan/ward/blue-acrylic'?"),
+        ("ngan/wardd/chrome", "did you mean 'ngan/ward/chrome'?"),
+        ("chrome", "did you mean 'ngan/ward/chrome'?"),
+        ("ngan/ward/qqq", "There is no preset 'ngan/ward/qqq'; mi_brdfs.presets() lists them."),
+        ("ngan/lafortune/chrome", "rounding moves and scales the lobes"),
+        ("low/ashikhmin-shirley-e1/white-paint", "the scale of its specular lobe is 1.29, above 1."),
+        ("", "mi_brdfs.presets() lists them."),
+    ],
+)
+def test_wrong_names(name, sentence):
+    with pytest.raises(ValueError) as error:
+        mi_brdfs.preset(name)
+    assert sentence in str(error.value)
+    with pytest.raises(ValueError, match=r"There is no model 'wrd'; did you mean 'ward'\?"):
+        mi_brdfs.presets("wrd")
+
+
+# --- As a parameter -------------------------------------------------------------------------------------------------
+
+
+def scene(bsdf):
+    return mi.load_string(f'<scene version="3.0.0"><shape type="sphere">{bsdf}</shape></scene>').shapes()[0].bsdf()
+
+
+def described(given, name):
+    """A plugin dict with a preset, loaded, without the line that names it."""
+    return str(mi.load_dict(given)).replace(f"  preset = {name},\n", "")
+
+
+@pytest.mark.parametrize("name", [of_set(group)[7] for group in COUNTS])
+def test_parameter(variant, name):
+    """A plugin with a preset is the one with its values, in every variant; ``traverse`` has them all."""
+    values = mi_brdfs.preset(name)
+    given = {"type": values["type"], "preset": name}
+    assert described(given, name) == str(mi.load_dict(values))
+    keys = [[*mi.traverse(mi.load_dict(bsdf)).keys()] for bsdf in (given, values)]
+    assert keys[0] == keys[1] != []
+
+
+def test_xml_with_others_on_top(variant):
+    """Given parameters win: also over what they exclude, but not over the others."""
+    name = "ngan/ward/blue-acrylic"
+    params = mi.traverse(
+        scene(f"""
+        <bsdf type="ward"><string name="preset" value="{name}"/><float name="alpha" value="0.3"/></bsdf>""")
+    )
+    expected = mi.traverse(mi.load_dict(mi_brdfs.preset(name) | {"alpha": 0.3}))
+    assert {key: str(value) for key, value in params} == {key: str(value) for key, value in expected}
+
+
+ON_TOP = [
+    ("ngan/ward/chrome", {"alpha_u": 0.3, "alpha_v": 0.2}, ["alpha"]),
+    ("ngan/ward/chrome", {"diffuse_reflectance": {"type": "checkerboard"}}, []),
+    ("ngan/ward/chrome", {"variant": "balanced"}, []),
+    ("low/cook-torrance-e2/chrome", {"material": "Au"}, ["int_ior", "ext_ior"]),
+    ("low/cook-torrance-e2/chrome", {"int_ior": 2.5}, []),
+    ("ngan/cook-torrance/chrome", {"int_ior": 1.5}, ["f0"]),
+    ("ngan/ashikhmin-shirley/chrome", {"distribution": "ggx", "shadowing": "smith"}, ["exponent"]),
+    ("ngan/ashikhmin-shirley/chrome", {"distribution": "blinn"}, []),
+    ("ngan/ashikhmin-shirley/chrome", {"exponent": 5}, []),
+    ("low/microfacet/chrome", {"variant": "smooth"}, ["normalization"]),
+    ("low/microfacet/chrome", {"normalization": "unit", "a": 0.5}, []),
+]
+
+
+@pytest.mark.parametrize("name, given, replaced", ON_TOP)
+def test_others_on_top(variant, name, given, replaced):
+    values = {key: value for key, value in mi_brdfs.preset(name).items() if key not in replaced} | given
+    assert described({"type": values["type"], "preset": name, **given}, name) == str(mi.load_dict(values))
+
+
+@pytest.mark.parametrize(
+    "plugin, name, sentence",
+    [
+        (
+            "ward",
+            "ngan/ward/chrme",
+            'ward: preset = "ngan/ward/chrme" is unknown; did you mean "ngan/ward/chrome"? It ',
+        ),
+        ("ward", "chrome", 'is unknown; did you mean "ngan/ward/chrome"? It must be'),
+        ("low", "chrome", 'is unknown; did you mean "low/microfacet/chrome"? It must be'),
+        (
+            "ward",
+            "low/smooth/chrome",
+            'ward: preset = "low/smooth/chrome" is a material of the plugin low; it must be a ',
+        ),
+        ("ward", 3.5, "ward: preset = 3.5 is a number; it must be a name."),
+        ("ward", "", 'ward: preset = "" is unknown; it must be a material that `mi-brdfs presets --model ward` lists.'),
+    ],
+)
+def test_wrong_parameters(llvm_rgb, plugin, name, sentence):
+    with pytest.raises(RuntimeError) as error:
+        mi.load_dict({"type": plugin, "preset": name})
+    assert sentence in str(error.value)
+
+
+# --- On the command line --------------------------------------------------------------------------------------------
+
+
+def run(*words):
+    done = CliRunner().invoke(app, ["presets", *words])
+    return done.exit_code, done.output
+
+
+def test_command_lists():
+    status, text = run("--model", "ward", "--like", "Acrylic")
+    assert status == 0 and len(text.splitlines()) == 9
+    first = "ngan/ward/blue-acrylic"
+    assert next(line for line in text.splitlines() if first in line).split() == [
+        first,
+        "ward",
+        "#1f365b",
+        "α",
+        "0.0162",
+    ]
+
+
+def test_command_shows_one():
+    status, text = run("ngan/ward-duer/chrome")
+    assert status == 0
+    given = text[: text.index("}\n\n") + 1]
+    assert eval(given) == mi_brdfs.preset("ngan/ward-duer/chrome")
+    with mi.variant_context("llvm_ad_rgb"):
+        xml = text[text.index("<bsdf") : text.index("</bsdf>")] + "</bsdf>"
+        assert "ngan/ward-duer/chrome" in str(scene(xml))
+    origin = provenance("ngan/ward-duer/chrome")
+    said = " ".join(text.split())
+    assert all(words in said for words in [origin.source, origin.doi, origin.convention, *origin.defects])
+
+
+@pytest.mark.parametrize(
+    "words, sentence",
+    [
+        (["ngan/ward/chrme"], "did you mean 'ngan/ward/chrome'?"),
+        (["--model", "lambert"], "there is no preset of lambert"),
+        (["--like", "zz"], "there is no preset with 'zz' in its name"),
+    ],
+)
+def test_command_refuses(words, sentence):
+    status, text = run(*words)
+    assert status == 2 and sentence in " ".join(text.split())
