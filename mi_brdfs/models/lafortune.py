@@ -86,7 +86,8 @@ class LafortuneLobe(PowerLobe):
         """Return ``(C∘wi, its length)``, the length relative to that of wi, which may differ from one by a rounding
         error."""
         v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
-        return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), TINY))
+        # At less than SMALL, the derivatives of its power leave the range of float32.
+        return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), SMALL * SMALL))
 
     def frame(self, wi) -> AxisFrame:
         v, length = self._stretched(wi)
