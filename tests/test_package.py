@@ -1,7 +1,7 @@
 """The package as installed: versions, import time, style."""
 
 import importlib.metadata
-import statistics
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,8 +13,9 @@ import mi_brdfs
 ROOT = Path(__file__).parent.parent
 
 
-def python(code: str) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+def python(code: str, **environment: str) -> subprocess.CompletedProcess:
+    env = os.environ | environment
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=env)
 
 
 def test_version():
@@ -40,17 +41,18 @@ def test_mitsuba_versions(version, outcome):
     assert (done.returncode != 0) == ("ImportError" in outcome)
 
 
-def test_import_is_fast():
-    """At most 0.2 s over Mitsuba's own, of the processor's time, which other processes disturb least, and in the median
-    of alternating pairs."""
-    extra = []
-    for _ in range(7):
-        measured = [
-            float(python(f"import time; t = time.process_time(); import {name}; print(time.process_time() - t)").stdout)
-            for name in ("mitsuba", "mi_brdfs")
-        ]
-        extra.append(measured[1] - measured[0])
-    assert statistics.median(extra) < 0.2
+def test_import_is_fast(tmp_path):
+    """At most 0.2 s over Mitsuba's own, of the processor's time, with modules that are compiled, as those of an
+    installed package are. Other processes only add to it, so the least of several counts."""
+    compiled = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}
+
+    def seconds(name):
+        code = f"import time; t = time.process_time(); import {name}; print(time.process_time() - t)"
+        return float(python(code, **compiled).stdout)
+
+    seconds("mi_brdfs")  # compiles
+    mitsuba, ours = zip(*((seconds("mitsuba"), seconds("mi_brdfs")) for _ in range(7)), strict=True)
+    assert min(ours) - min(mitsuba) < 0.2, (mitsuba, ours)
 
 
 def test_style():
