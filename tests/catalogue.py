@@ -40,8 +40,15 @@ BOTH = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.5}
 _files = [
     importlib.import_module(f"rows.{path.stem}") for path in sorted((Path(__file__).parent / "rows").glob("[a-z]*.py"))
 ]
+
+
+def first_of_each(names):
+    """The first name or row of each plugin, by plugin."""
+    return {str(name).split()[0]: name for name in reversed(names)}
+
+
 ROWS = [row for file in _files for row in file.ROWS]
-FIRST_ROWS = {row.name.split()[0]: row for row in reversed(ROWS)}
+FIRST_ROWS = first_of_each(ROWS)
 """One of each plugin."""
 EXTREME = [row for file in _files for row in getattr(file, "EXTREME", [])]
 SMOOTH = {name: bsdf for file in _files for name, bsdf in file.SMOOTH.items()}
@@ -50,5 +57,5 @@ SMOOTH = {name: bsdf for file in _files for name, bsdf in file.SMOOTH.items()}
 def mostly_slow(names):
     """The names or rows as parameters of a test that takes its time: but for the first of each plugin they are slow."""
     names = list(names)
-    first = {str(name).split()[0]: name for name in reversed(names)}.values()
+    first = first_of_each(names).values()
     return [pytest.param(name, id=str(name), marks=[] if name in first else pytest.mark.slow) for name in names]

@@ -10,6 +10,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from ..bench import SECTIONS
+from ..bench import bench as measure
 from .app import command
 from .interrupts import interruptible
 from .options import check_names, check_output, write_json
@@ -29,8 +30,6 @@ def bench(
     variant: TracingVariant = None,
 ) -> None:
     """Measure efficiency, time and noise against Mitsuba's BSDFs: about ten minutes on an idle machine."""
-    from ..bench import bench as measure
-
     check_names(only, SECTIONS, "section")
     check_output("--json", json_file)
     chosen = set_tracing_variant(variant)

@@ -125,14 +125,15 @@ def check(
 
 def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     """Return the arguments that are given."""
+    from ..measure.sources import degrees_of
     from ..validation.runner import checked_angles
 
     options: dict[str, Any] = {}
     if angles is not None:
         try:
-            degrees = [float(text) for text in angles.split(",")]
-        except ValueError:
-            fail(f"--angles {angles}: write degrees, such as 10,40,70", Exit.USAGE)
+            degrees = degrees_of(angles)
+        except ValueError as error:
+            fail(f"--angles {error}", Exit.USAGE)
         try:
             options["angles"] = checked_angles(degrees)
         except ValueError as error:
@@ -165,8 +166,6 @@ def _other(word: str) -> BSDFSource:
 
 def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs: int) -> list[Report]:
     """Return the reports on all BSDFs, made in separate processes if there are several jobs."""
-    from ..validation import CHECKS
-
     subject = TextColumn("Checking {task.description}", markup=False)
     columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     each = 1 if settings.other else len(settings.options["only"] or CHECKS)

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from .app import command
 from .errors import one_line
 from .terminal import Exit, err, fail, out, stdout_to_stderr
-from .variants import set_variant
+from .variants import AnyVariant, set_variant
 
 
 @command()
@@ -30,10 +30,7 @@ def gallery(
     presets: Annotated[
         bool, typer.Option("--presets", help="Also render each model's published materials: TYPE_presets.jpg.")
     ] = False,
-    variant: Annotated[
-        str | None,
-        typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
-    ] = None,
+    variant: AnyVariant = None,
 ) -> None:
     """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps the
     finished pictures."""

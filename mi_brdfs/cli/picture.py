@@ -26,10 +26,6 @@ Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", help="An .exr, .png or .jpg; the EXR and a display image are always both written."),
 ]
-AnyVariant = Annotated[
-    str | None,
-    typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
-]
 Seconds = Annotated[
     float | None,
     typer.Option("--time", metavar="SECONDS", min=0, help="End with the pass in which this time is over."),

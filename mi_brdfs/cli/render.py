@@ -11,9 +11,9 @@ import typer
 from .app import command
 from .errors import one_line
 from .options import parameters_of
-from .picture import AnyVariant, Denoise, Output, Seconds, Seed, output_files, render_to
+from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail
-from .variants import set_variant
+from .variants import AnyVariant, set_variant
 
 LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: a -D parameter cannot have these names
 

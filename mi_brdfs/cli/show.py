@@ -13,9 +13,9 @@ from ..preview import STAGES, preview_scene
 from .app import command
 from .errors import one_line
 from .options import Parameters, parameters_of
-from .picture import AnyVariant, Denoise, Output, Seconds, Seed, output_files, render_to
+from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail
-from .variants import set_variant
+from .variants import AnyVariant, set_variant
 
 
 @command()

@@ -11,6 +11,12 @@ from ..mitsuba import llvm
 from ..variants import is_measurable
 from .terminal import Exit, err, fail
 
+AnyVariant = Annotated[
+    str | None,
+    typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
+]
+"""The option --variant of commands that render."""
+
 TracingVariant = Annotated[
     str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
 ]

@@ -103,6 +103,18 @@ def value_of(text: str) -> Any:
     return _rgb(colour) if len(colour) == 3 else text
 
 
+def degrees_of(text: str) -> list[float]:
+    """Return angles in degrees that are given as 10,40,70.
+
+    Raises:
+        ValueError: if they are no numbers.
+    """
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"{text}: write degrees, such as 10,40,70") from None
+
+
 def _rgb(colour: list[float]) -> dict[str, Any]:
     return {"type": "rgb", "value": colour}
 

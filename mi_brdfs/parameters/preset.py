@@ -42,7 +42,7 @@ class Preset(Parameter):
         wanted = f"it must be a material that `mi-brdfs presets --model {plugin}` lists"
         known = presets()
         if name not in known:
-            near = closest(name, [it for it in known if preset(it)["type"] == plugin]) or closest(name, known)
+            near = closest(name, presets(plugin)) or closest(name, known)
             hint = f'did you mean "{near}"? {wanted[0].upper()}{wanted[1:]}' if near else wanted
             raise reader.error(self.name, f"= {shown(name)} is unknown; {hint}")
         values = preset(name)

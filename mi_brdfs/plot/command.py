@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..measure.sources import value_of
+from ..measure.sources import degrees_of, value_of
 from ..parameters.messages import listed
 from . import albedo, cartesian, hemisphere, page, polar, sphere
 
@@ -55,9 +55,9 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
         ValueError: if it does not take one of them.
     """
     try:
-        numbers = None if angles is None else [float(text) for text in angles.split(",")]
-    except ValueError:
-        raise ValueError(f"--angles {angles}: write degrees, such as 10,40,70") from None
+        numbers = None if angles is None else degrees_of(angles)
+    except ValueError as error:
+        raise ValueError(f"--angles {error}") from None
     options = {"angles": numbers, **options}
     taken = inspect.signature(KINDS[kind]).parameters
     if numbers and "angle" in taken:
