@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
-from .parameters import Parameter, ParameterRow, Preset, PropertyReader
+from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
 
 ENERGY_NOTE = """\
@@ -98,8 +98,7 @@ class Plugin:
         reader = PropertyReader(self.plugins[0], props)
         declared = self.declared()
         for parameter in declared:
-            if isinstance(parameter, Preset):
-                parameter.fill_in(reader, declared)
+            parameter.fill_in(reader, declared)
         reader.take([n for p in declared for n in p.names], [n for p in declared for n in p.shown])
         self.parameters = BoundParameters(declared, reader)
         self.textures, self.ranges = self.parameters.textures, self.parameters.ranges

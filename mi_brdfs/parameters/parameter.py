@@ -74,6 +74,9 @@ class Parameter:
         """Return the names that one of its names gives way to, where it comes from a preset."""
         return []
 
+    def fill_in(self, reader: PropertyReader, declared: Iterable[Parameter]) -> None:
+        """Give the properties that this one stands for, before any parameter is bound; most stand for none."""
+
     def bind(self, reader: PropertyReader) -> Parameter | str | bool:
         """Return a copy that holds what a plugin was given; a choice or a flag returns its value instead."""
         raise NotImplementedError(f"{type(self).__name__} does not define bind.")
