@@ -1,0 +1,48 @@
+"""One spelling for NumPy and for Dr.Jit: formulas of directions are written once, and used on files by the one and in
+kernels by the other."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from ..math import TINY
+
+NUMPY = SimpleNamespace(
+    sqrt=lambda x: np.sqrt(np.maximum(x, 0)),
+    atan2=np.arctan2,
+    acos=lambda x: np.arccos(np.clip(x, -1, 1)),
+    select=np.where,
+    minimum=np.minimum,
+    maximum=np.maximum,
+    floor=np.floor,
+)
+DRJIT = SimpleNamespace(
+    sqrt=lambda x: dr.sqrt(dr.maximum(x, TINY)),
+    # Both arguments at 0 have no derivative: there the first one counts as constant.
+    atan2=lambda y, x: dr.atan2(dr.select(abs(x) + abs(y) > 0, y, 0), dr.select(abs(x) + abs(y) > 0, x, 1)),
+    acos=lambda x: dr.safe_acos(x),
+    select=dr.select,
+    minimum=dr.minimum,
+    maximum=dr.maximum,
+    floor=dr.floor,
+)
+
+
+def vector(x: Any, y: Any, z: Any) -> SimpleNamespace:
+    """Return a vector of NumPy arrays or Dr.Jit floats, by component."""
+    return SimpleNamespace(x=x, y=y, z=z)
+
+
+def components(w: np.ndarray) -> SimpleNamespace:
+    """Return an array of vectors, shape (…, 3), by component."""
+    w = np.asarray(w, dtype=np.float64)
+    return vector(w[..., 0], w[..., 1], w[..., 2])
+
+
+def stacked(w: SimpleNamespace) -> np.ndarray:
+    """Return a vector by component as an array of shape (…, 3)."""
+    return np.stack(np.broadcast_arrays(w.x, w.y, w.z), axis=-1)

@@ -1,0 +1,71 @@
+"""Files as bytes: what is read is checked against the file's size first, and every complaint names file and offset."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .measurement import FileError
+
+
+def checked(path: str | Path) -> Path:
+    """Return the path of a file that is there, can be read, is a file and has something in it.
+
+    Raises:
+        FileError: if not.
+    """
+    path = Path(path)
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path}: {reason(error)}.") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise FileError(f"{path} is a directory; give a file in it.")
+    if not stat.S_ISREG(status.st_mode):
+        raise FileError(f"{path} is not a regular file.")
+    if not os.access(path, os.R_OK):
+        raise FileError(f"{path}: Permission denied.")
+    if not status.st_size:
+        raise FileError(f"{path} is empty.")
+    return path
+
+
+def reason(error: Exception) -> str:
+    """Return why the system refused a file."""
+    return (isinstance(error, OSError) and error.strerror) or str(error)
+
+
+class BinaryFile:
+    """Reads a little-endian binary file from its start on."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.size, self.offset = path, path.stat().st_size, 0
+
+    @property
+    def left(self) -> int:
+        """The bytes behind the offset."""
+        return self.size - self.offset
+
+    def error(self, problem: str, offset: int | None = None) -> FileError:
+        return FileError(f"{self.path}: at byte {self.offset if offset is None else offset}, {problem}.")
+
+    def take(self, dtype: Any, count: int, what: str) -> np.ndarray:
+        """Return the next ``count`` numbers, and move behind them.
+
+        Raises:
+            FileError: if the file ends before; ``what`` says in plural what is missing.
+        """
+        dtype = np.dtype(dtype).newbyteorder("<")
+        needed = int(count) * dtype.itemsize
+        if needed > self.left:
+            raise self.error(
+                f"{needed:,} bytes of {what} should follow, but the file ends after {self.left:,}; "
+                "it is truncated, or of another format"
+            )
+        values = np.fromfile(self.path, dtype=dtype, count=int(count), offset=self.offset)
+        self.offset += needed
+        return values
