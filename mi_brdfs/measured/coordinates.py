@@ -39,9 +39,10 @@ class Coordinates:
         ``xp`` has the functions of the one or the other (:mod:`mi_brdfs.measured.arrays`)."""
         raise NotImplementedError
 
-    def scale(self, wi: Any, wo: Any, xp: SimpleNamespace) -> Any:
-        """Return by what the grid's values are multiplied to be f: 1 unless an adaptive table says otherwise."""
-        return 1
+    def locate_scaled(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[tuple[Any, ...], Any]:
+        """Return ``(places, scale)``: the values on the axes, and by what the grid's values are multiplied to be f,
+        which is 1 unless a table is adaptive."""
+        return self.locate(wi, wo, xp), 1
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         """Return ``(wi, wo)``, by component, for values on the axes: one of the pairs that lie there."""

@@ -87,8 +87,8 @@ class Grid:
         (N, channels)."""
         places = np.meshgrid(*(axis.nodes for axis in self.axes), indexing="ij")
         wi, wo = self.coordinates.directions(*(place.ravel() for place in places))
-        scale = np.reshape(self.coordinates.scale(wi, wo, NUMPY), (-1, 1))
-        return stacked(wi), stacked(wo), scale * self.values.reshape(-1, self.values.shape[-1])
+        _, scale = self.coordinates.locate_scaled(wi, wo, NUMPY)
+        return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * self.values.reshape(-1, self.values.shape[-1])
 
     def evaluate(
         self,
@@ -98,8 +98,7 @@ class Grid:
         extrapolate: Extrapolation = "hold",
     ) -> np.ndarray:
         """Return f, with negative and missing values as 0, for directions of shape (N, 3): shape (N, channels)."""
-        directions = components(wi), components(wo)
-        places = self.coordinates.locate(*directions, NUMPY)
+        places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
         values = usable(self.values)
         inside = np.ones(len(wi), dtype=bool)
         below, shares = [], []
@@ -121,7 +120,7 @@ class Grid:
             result[used] += weight[used, None] * values[tuple(k[used] for k in index)]
         if extrapolate == "zero":
             result = np.where(inside[:, None], result, 0)
-        return result * np.reshape(self.coordinates.scale(*directions, NUMPY), (-1, 1))
+        return result * np.reshape(scale, (-1, 1))
 
 
 @dataclass(frozen=True)
