@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from ..math import TINY
+from ..math import EPSILON, TINY
 
 NUMPY = SimpleNamespace(
     sqrt=lambda x: np.sqrt(np.maximum(x, 0)),
@@ -20,11 +20,18 @@ NUMPY = SimpleNamespace(
     maximum=np.maximum,
     floor=np.floor,
 )
+
+
+def _atan2(y: Any, x: Any) -> Any:
+    """Return dr.atan2, and a constant where both are so small that its derivative would divide by 0."""
+    far = abs(x) + abs(y) > EPSILON
+    return dr.atan2(dr.select(far, y, 0), dr.select(far, x, 1))
+
+
 DRJIT = SimpleNamespace(
     sqrt=lambda x: dr.sqrt(dr.maximum(x, TINY)),
-    # Both arguments at 0 have no derivative: there the first one counts as constant.
-    atan2=lambda y, x: dr.atan2(dr.select(abs(x) + abs(y) > 0, y, 0), dr.select(abs(x) + abs(y) > 0, x, 1)),
-    acos=lambda x: dr.safe_acos(x),
+    atan2=_atan2,
+    acos=dr.safe_acos,
     select=dr.select,
     minimum=dr.minimum,
     maximum=dr.maximum,

@@ -21,6 +21,8 @@ class Coordinates:
 
     names: tuple[str, ...]
     """The axes, in the order of the array's."""
+    poles: tuple[tuple[int, int], ...] = ()
+    """Pairs of axes, of a polar angle and of an azimuth that means nothing where that is 0."""
     reciprocal = False
     """Whether exchanging the two directions changes nothing."""
 
@@ -44,6 +46,10 @@ class Coordinates:
         which is 1 unless a table is adaptive."""
         return self.locate(wi, wo, xp), 1
 
+    def prepared(self) -> Coordinates:
+        """Return these coordinates with what kernels of the active variant read."""
+        return self
+
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         """Return ``(wi, wo)``, by component, for values on the axes: one of the pairs that lie there."""
         raise NotImplementedError
@@ -62,6 +68,7 @@ class HalfDifference(Coordinates):
 
     def __init__(self, reciprocal: bool = True, anisotropic: bool = False) -> None:
         self.reciprocal, self._anisotropic = reciprocal, anisotropic
+        self.poles = () if anisotropic else ((0, 2), (1, 2))
         self.names = ("sqrt_theta_h", "theta_d", "phi_d", *(("phi_h",) if anisotropic else ()))
 
     @property
@@ -96,6 +103,15 @@ class HalfDifference(Coordinates):
         return at_h(d.x, d.y, d.z), at_h(-d.x, -d.y, d.z)
 
 
+class PolarAngle(Coordinates):
+    """The angle θi alone, for what depends on nothing else."""
+
+    names = ("theta_i",)
+
+    def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
+        return (polar_angle(wi, xp),)
+
+
 class Spherical(Coordinates):
     """Polar angles ``(θi, θo, Δφ)`` with Δφ = φo - φi, and φi behind them if ``anisotropic``.
 
@@ -104,6 +120,7 @@ class Spherical(Coordinates):
 
     def __init__(self, mirrored: bool, anisotropic: bool = False) -> None:
         self._mirrored, self._anisotropic = mirrored, anisotropic
+        self.poles = () if anisotropic else ((0, 2), (1, 2))
         self.names = ("theta_i", "theta_o", "delta_phi", *(("phi_i",) if anisotropic else ()))
 
     @property
@@ -137,6 +154,7 @@ class SpecularPolar(Coordinates):
 
     def __init__(self, mirrored: bool, anisotropic: bool = False) -> None:
         self._mirrored, self._anisotropic = mirrored, anisotropic
+        self.poles = ((2, 1),)
         self.names = ("theta_i", "azimuth", "radial", *(("phi_i",) if anisotropic else ()))
 
     @property

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -47,11 +47,16 @@ class Axis:
         """The nodes, and behind them the first one, a period later, if the axis goes round."""
         return self.nodes if self.period is None else np.append(self.nodes, self.nodes[0] + self.period)
 
-    def position(self, x: np.ndarray) -> np.ndarray:
-        """Return where values lie among the nodes: k at node k, and between two nodes in proportion."""
+    def steps(self, x: np.ndarray, interpolation: Interpolation) -> list[tuple[np.ndarray, np.ndarray | float]]:
+        """Return ``(index, share)`` of the two nodes that places are interpolated between, or of the nearest one."""
+        nodes = self.looped
         if self.period is not None:
-            x = self.nodes[0] + np.mod(x - self.nodes[0], self.period)
-        return np.interp(x, self.looped, np.arange(len(self.looped)))
+            x = nodes[0] + np.mod(x - nodes[0], self.period)
+        position = np.interp(x, nodes, np.arange(len(nodes)))
+        if interpolation == "nearest" or len(nodes) == 1:
+            return [((position + 0.5).astype(np.int64) % len(self.nodes), 1.0)]
+        k = np.minimum(position.astype(np.int64), len(nodes) - 2)
+        return [(k, k + 1 - position), ((k + 1) % len(self.nodes), position - k)]
 
     def measured(self, x: np.ndarray) -> np.ndarray:
         """Return whether values lie in the measured range, up to rounding."""
@@ -90,6 +95,23 @@ class Grid:
         _, scale = self.coordinates.locate_scaled(wi, wo, NUMPY)
         return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * self.values.reshape(-1, self.values.shape[-1])
 
+    @cached_property
+    def closed(self) -> Grid:
+        """The grid with values at its poles that do not depend on the azimuth: the mean over it of the nodes at the
+        pole, or of the innermost ones if cells begin there."""
+        axes, values = list(self.axes), self.values
+        for polar, azimuth in self.coordinates.poles:
+            axis = axes[polar]
+            if axis.low > 0:
+                continue
+            innermost = np.take(values, [0], axis=polar)
+            mean = np.broadcast_to(np.nanmean(innermost, axis=azimuth, keepdims=True), innermost.shape)
+            at_pole = axis.nodes[0] == 0
+            rest = np.delete(values, 0, axis=polar) if at_pole else values
+            values = np.concatenate([mean.astype(values.dtype), rest], axis=polar)
+            axes[polar] = axis if at_pole else replace(axis, nodes=np.append(0, axis.nodes))
+        return replace(self, axes=tuple(axes), values=values)
+
     def evaluate(
         self,
         wi: np.ndarray,
@@ -97,30 +119,23 @@ class Grid:
         interpolation: Interpolation = "trilinear",
         extrapolate: Extrapolation = "hold",
     ) -> np.ndarray:
-        """Return f, with negative and missing values as 0, for directions of shape (N, 3): shape (N, channels)."""
+        """Return f, with negative and missing values as 0, for directions of shape (…, 3): shape (…, channels)."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
-        values = usable(self.values)
-        inside = np.ones(len(wi), dtype=bool)
-        below, shares = [], []
-        for axis, place in zip(self.axes, places, strict=True):
-            inside &= axis.measured(place)
-            position = axis.position(place)
-            if interpolation == "nearest":
-                position = np.floor(position + 0.5)
-            k = np.minimum(position.astype(np.int64), max(len(axis.looped) - 2, 0))
-            below.append(k)
-            shares.append(position - k)
-        result = np.zeros((len(wi), values.shape[-1]))
-        for corner in itertools.product((0, 1), repeat=len(self.axes)):
-            index, weight = [], np.ones(len(wi))
-            for axis, k, share, step in zip(self.axes, below, shares, corner, strict=True):
-                index.append((k + step) % len(axis.nodes))
-                weight = weight * (share if step else 1 - share)
-            used = weight > 0
-            result[used] += weight[used, None] * values[tuple(k[used] for k in index)]
+        grid = self if interpolation == "nearest" else self.closed
+        values = usable(grid.values).reshape(-1, self.values.shape[-1])
+        inside = np.ones((), dtype=bool)
+        corners: list[tuple[Any, Any]] = [(0, 1.0)]
+        for axis, place in zip(grid.axes, places, strict=True):
+            inside = inside & axis.measured(place)
+            corners = [
+                (index * len(axis.nodes) + k, weight * share)
+                for index, weight in corners
+                for k, share in axis.steps(place, interpolation)
+            ]
+        result = sum(weight[..., None] * values.take(index, axis=0) for index, weight in corners)
         if extrapolate == "zero":
-            result = np.where(inside[:, None], result, 0)
-        return result * np.reshape(scale, (-1, 1))
+            result = np.where(inside[..., None], result, 0)
+        return result * np.asarray(scale)[..., None]
 
 
 @dataclass(frozen=True)

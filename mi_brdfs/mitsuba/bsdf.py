@@ -225,8 +225,8 @@ class ModelBSDF:
         return kind(0)
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
-        for name, texture in self.textures.items():
-            callback.put(name, texture, mi.ParamFlags.Differentiable)
+        for name, value in {**self.textures, **self.model.arrays}.items():
+            callback.put(name, value, mi.ParamFlags.Differentiable)
 
     def to_string(self) -> str:
         return self.model.described()

@@ -16,6 +16,7 @@ import mitsuba as mi
 
 from .. import models
 from ..integrators.shading import Shading
+from ..measured.tabulated import Tabulated
 from ..microfacet.distributions import Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import Shadowing
@@ -30,6 +31,8 @@ from .integrator import integrator_class
 Registered = TypeVar("Registered", bound=type[Model] | type[Term])
 
 MODELS: dict[str, type[Model]] = {}
+DATA: dict[str, type[Model]] = {name: Tabulated for name in Tabulated.plugins}
+"""The plugins that render data, which are BSDFs but no models: they have no formula, and need a file."""
 INTEGRATORS: dict[str, type[Plugin]] = {name: Shading for name in Shading.plugins}
 _variants: dict[str, dict[str, type[Plugin]]] = {}
 """The registered classes, by variant and name."""
@@ -96,7 +99,7 @@ def _owner(name: str, model: type[Model]) -> str | None:
     if name in MODELS:
         owner = full_name(MODELS[name])
         return None if owner == full_name(model) else owner
-    return "Mitsuba" if name in _builtins() else "mi_brdfs" if name in INTEGRATORS else None
+    return "Mitsuba" if name in _builtins() else "mi_brdfs" if name in DATA | INTEGRATORS else None
 
 
 def models_in(module: ModuleType) -> list[type[Model]]:
@@ -136,7 +139,7 @@ def list_models() -> list[str]:
 
 def plugin_names() -> set[str]:
     """Return the names of all plugins, of the pack, of guests, and of Mitsuba."""
-    return {*MODELS, *INTEGRATORS, *_builtins()}
+    return {*MODELS, *DATA, *INTEGRATORS, *_builtins()}
 
 
 def all_models() -> list[type[Model]]:
@@ -173,7 +176,7 @@ def info(name: str) -> str:
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
     """
-    return _find(name, MODELS | INTEGRATORS).manual()
+    return _find(name, MODELS | DATA | INTEGRATORS).manual()
 
 
 def _find(name: str, plugins: dict) -> Any:
@@ -221,7 +224,7 @@ def _register_in(variant: str) -> None:
     """Register in a variant all classes whose current version is not registered there."""
     module = importlib.import_module(f"mitsuba.{variant}")
     known = _variants.setdefault(variant, {})
-    for name, plugin in (MODELS | INTEGRATORS).items():
+    for name, plugin in (MODELS | DATA | INTEGRATORS).items():
         if known.get(name) is plugin:
             continue
         if issubclass(plugin, Model):

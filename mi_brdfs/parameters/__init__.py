@@ -16,6 +16,7 @@ textured and optimised ones are limited to it where they are evaluated.
 """
 
 from .colours import Colour, Reflectance
+from .file import File
 from .fresnel import FresnelSet
 from .groups import OneOf, PerLobe
 from .parameter import Parameter, ParameterRow
@@ -26,6 +27,7 @@ from .scalars import Choice, Flag, Number, Rotation, Spelling
 __all__ = [
     "Choice",
     "Colour",
+    "File",
     "Flag",
     "FresnelSet",
     "Number",

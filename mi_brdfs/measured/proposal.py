@@ -1,0 +1,110 @@
+"""The density from which a table's directions are drawn."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..math import choose, select
+from .arrays import DRJIT, stacked, vector
+from .coordinates import TWO_PI, polar_angle, spherical, wrapped
+from .measurement import Extrapolation, Grid, Interpolation
+
+COSINE_SHARE = 0.02
+"""The share of directions drawn in proportion to the cosine, wherever the table is zero or coarser than its nodes."""
+NODES_I = np.radians([*np.linspace(0, 80, 21), 82, 84, 86, 87, 88, 89])
+"""The angles θi at which the density is tabulated, and between which it is interpolated."""
+AZIMUTHS_I = np.linspace(0, TWO_PI, 37)
+"""The azimuths φi at which that of an anisotropic table is."""
+NODES_U, NODES_V = 129, 65
+
+
+class Proposal:
+    """A density tabulated over the half vector, for angles θi, and φi where the table is anisotropic.
+
+    Over (u, v) in the unit square with θh = π/2 u² and φh - φi = 2π v, it is in proportion to
+
+        f cosθo |∂ωo/∂(u, v)| ∝ f cosθo 4 (wi·h) sinθh u
+
+    at the nodes, with f the mean of the channels' values or their luminance; between nodes it is bilinear, and linear
+    in θi and φi. Mitsuba's ``MarginalContinuous2D`` draws from it exactly and returns its density.
+    """
+
+    def __init__(self, brightness: Grid, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
+        self.anisotropic = brightness.anisotropic
+        density = _tabulated(brightness, interpolation, extrapolate)
+        # A slice without light cannot be normalized: make it even.
+        dark = density.sum(axis=(-1, -2), keepdims=True) <= 0
+        density = np.where(dark, 1, density).astype(np.float32)
+        if self.anisotropic:
+            self.warp = mi.MarginalContinuous2D2(density, [AZIMUTHS_I, NODES_I])
+        else:
+            self.warp = mi.MarginalContinuous2D1(density, [NODES_I])
+
+    def pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
+        """Return the density of :meth:`sample` per solid angle of wo."""
+        x, y, z = wi.x + wo.x, wi.y + wo.y, wi.z + wo.z
+        across = DRJIT.sqrt(x * x + y * y)
+        u = DRJIT.sqrt(DRJIT.atan2(across, z) * (2 / dr.pi))
+        turn = DRJIT.atan2(y * wi.x - x * wi.y, x * wi.x + y * wi.y) * dr.inv_two_pi
+        v = turn - dr.floor(turn)
+        # As in half_vectors, where 4 (wi·h) sinθh = 2 |(x, y)|.
+        solid_angle = 4 * dr.square(dr.pi) * u * across
+        table = self.warp.eval(mi.Point2f(v, u), self._given(wi)) / dr.maximum(solid_angle, 1e-12)
+        return (1 - COSINE_SHARE) * table + COSINE_SHARE * dr.inv_pi * wo.z
+
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+        """Draw a direction wo."""
+        cosine, _ = choose(u, COSINE_SHARE)
+        disk = mi.warp.square_to_cosine_hemisphere(v)
+        place, _ = self.warp.sample(v, self._given(wi))
+        theta, phi = dr.square(place.y) * (dr.pi / 2), place.x * dr.two_pi + dr.atan2(wi.y, wi.x)
+        (sin, cos), (sin_phi, cos_phi) = dr.sincos(theta), dr.sincos(phi)
+        h = mi.Vector3f(sin * cos_phi, sin * sin_phi, cos)
+        return select(cosine, disk, 2 * dr.dot(wi, h) * h - wi)
+
+    def _given(self, wi: mi.Vector3f) -> list[mi.Float]:
+        """Return the parameters of the slice for wi."""
+        theta = polar_angle(wi, DRJIT)
+        return [wrapped(DRJIT.atan2(wi.y, wi.x), TWO_PI, DRJIT), theta] if self.anisotropic else [theta]
+
+
+def _tabulated(brightness: Grid, interpolation: Interpolation, extrapolate: Extrapolation) -> np.ndarray:
+    """Return the density at the nodes, not normalized: shape ([azimuths,] angles θi, u, v)."""
+    u, v = np.meshgrid(np.linspace(0, 1, NODES_U), np.linspace(0, 1, NODES_V), indexing="ij")
+    slices = []
+    for phi in AZIMUTHS_I[:-1] if brightness.anisotropic else [0.0]:
+        for theta in NODES_I:
+            wi, wo, solid_angle = half_vectors(theta, phi, u, v)
+            f = brightness.evaluate(wi, wo, interpolation, extrapolate)[..., 0]
+            slices.append(f * np.maximum(wo[..., 2], 0) * solid_angle)
+    if not brightness.anisotropic:
+        return np.stack(slices)
+    turned = np.stack(slices).reshape(len(AZIMUTHS_I) - 1, len(NODES_I), *u.shape)
+    return np.concatenate([turned, turned[:1]])
+
+
+def half_vectors(theta: float, phi: float, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``(wi, wo, |∂ωo/∂(u, v)|)`` for θi, φi, and places in the unit square with θh = π/2 u² and
+    φh - φi = 2π v. wo may lie below the horizon."""
+    wi, h = spherical(theta, phi), spherical(np.square(u) * (np.pi / 2), phi + TWO_PI * v)
+    cos = wi.x * h.x + wi.y * h.y + wi.z * h.z
+    wo = stacked(vector(2 * cos * h.x - wi.x, 2 * cos * h.y - wi.y, 2 * cos * h.z - wi.z))
+    # dωo = 4 (wi·h) sinθh dθh dφh, with dθh = π u du and dφh = 2π dv.
+    solid_angle = 4 * np.maximum(cos, 0) * np.hypot(h.x, h.y) * 2 * np.pi**2 * u
+    return np.broadcast_to(stacked(wi), wo.shape), wo, solid_angle
+
+
+def albedos(grid: Grid, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation) -> np.ndarray:
+    """Return ∫ f cosθo dωo for each channel at angles θi, by the midpoint rule over the half vector, and the mean over
+    φi where the table is anisotropic: shape (angles, channels)."""
+    u, v = np.meshgrid((np.arange(64) + 0.5) / 64, (np.arange(16) + 0.5) / 16, indexing="ij")
+    azimuths = AZIMUTHS_I[:-1:3] if grid.anisotropic else [0.0]
+    result = np.zeros((len(thetas), grid.values.shape[-1]))
+    for k, theta in enumerate(thetas):
+        for phi in azimuths:
+            wi, wo, solid_angle = half_vectors(theta, phi, u, v)
+            f = grid.evaluate(wi, wo, interpolation, extrapolate)
+            result[k] += np.mean(f * (np.maximum(wo[..., 2], 0) * solid_angle)[..., None], axis=(0, 1))
+    return result / len(azimuths)

@@ -1,0 +1,137 @@
+"""The plugin that renders a measured file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from weakref import WeakValueDictionary
+
+import mitsuba as mi
+import numpy as np
+
+from ..lobes import Lobe
+from ..model import Model
+from ..parameters import Choice, Colour, File, Flag, Rotation
+from .colour import Channels
+from .coordinates import PolarAngle
+from .formats import read
+from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement, usable
+from .proposal import NODES_I, Proposal, albedos
+from .table import Table
+
+
+class Tabulated(Model):
+    """A measured BRDF from a file.
+
+    Reads MERL's ``.binary`` and every other format that ``mi-brdfs measured -h`` lists; which one, it finds from what
+    the file contains. A relative name is looked for where Mitsuba looks for textures: beside the scene.
+
+        f(wi, wo) = scale · table(wi, wo)
+
+    ``trilinear`` interpolates linearly between the neighbouring nodes of the file's own grid: half and difference
+    angles for MERL, angles about the mirror direction for goniometers, adaptive coordinates for RGL; four-dimensional
+    where the file is anisotropic. ``nearest`` takes the nearest node's value: MERL's own look-up. Negative values and
+    missing ones count as 0. What lies outside the measured range has the value at its border with ``hold``, and is 0
+    with ``zero``. What a file calls the incident direction is wi, as in Mitsuba's ``measured``.
+
+    Linear sRGB values are rgb. In spectral variants they weigh three spectra that sum to 1, so that white stays white.
+    Values at several wavelengths are interpolated between them in spectral variants; rgb variants show them under
+    daylight (D65). A single wavelength is grey.
+
+    The energy is the file's: nothing keeps a measurement from reflecting more than it receives. Reciprocal where the
+    format is (MERL with half a turn of φd), else as good as the measurement. One-sided.
+
+    A file that several BSDFs name is in memory once. With ``differentiable`` a BSDF has its own copy, and
+    :func:`mitsuba.traverse` shows it as ``values``: a tensor with the file's axes, and the channels last. Directions
+    are then drawn as the file says, whatever the values become.
+
+    Sampling: from a table over the half vector for 27 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
+    ``MarginalContinuous2D``, and 2 % by the cosine (mi_brdfs.measured.proposal).
+
+    W. Matusik, H. Pfister, M. Brand and L. McMillan, A data-driven reflectance model, ACM Transactions on Graphics
+    22(3), 2003, doi:10.1145/882262.882343.
+
+    Example
+    -------
+    <bsdf type="tabulated">
+        <string name="filename" value="alum-bronze.binary"/>
+    </bsdf>
+
+    {"type": "tabulated", "filename": "alum-bronze.binary"}
+    """
+
+    plugins = "tabulated", "merl"
+
+    filename = File("the measured file")
+    scale = Colour(1, (0, np.inf), "factor on all values")
+    interpolation = Choice(("trilinear", "nearest"), "between the nodes of the file's grid")
+    extrapolate = Choice(("hold", "zero"), "beyond the measured range: the value at its border, or nothing")
+    differentiable = Flag(False, "give this BSDF a table of its own, with derivatives, as the parameter values")
+    rotation = Rotation()
+
+    def __init__(self, props: mi.Properties) -> None:
+        super().__init__(props)
+        chosen: dict[str, Any] = self.parameters.chosen
+        shared = not chosen["differentiable"]
+        self.tables = Tables.of(Path(chosen["filename"]), chosen["interpolation"], chosen["extrapolate"], shared)
+        if not shared:
+            self.arrays = {"values": self.tables.f.values}
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
+        p = super().evaluate(si, active)
+        p.wavelengths = si.wavelengths
+        return p
+
+    def lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
+        return (TabulatedLobe(self.tables, p.scale, getattr(p, "wavelengths", None)),)
+
+
+class TabulatedLobe(Lobe):
+    """A table times a colour."""
+
+    def __init__(self, tables: Tables, scale: Any, wavelengths: Any) -> None:
+        self.tables, self.colour, self.wavelengths = tables, scale, wavelengths
+        self.anisotropic, self.reciprocal = tables.anisotropic, tables.reciprocal
+
+    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+        return self.colour * self.tables.channels.colour(self.tables.albedo, wi, wi, self.wavelengths)
+
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+        f = self.tables.channels.colour(self.tables.f, wi, wo, self.wavelengths)
+        return self.colour * f * wo.z, self.tables.proposal.pdf(wi, wo)
+
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+        return self.tables.proposal.sample(wi, u, v)
+
+
+class Tables:
+    """What a file becomes in a variant: f, the albedo over θi, and the density that directions are drawn from."""
+
+    _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
+
+    @classmethod
+    def of(cls, path: Path, interpolation: Interpolation, extrapolate: Extrapolation, shared: bool) -> Tables:
+        """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
+        if not shared:
+            return cls(read(path), interpolation, extrapolate)
+        state = path.stat()
+        key = mi.variant(), path.resolve(), state.st_mtime_ns, state.st_size, interpolation, extrapolate
+        found = cls._shared.get(key)
+        if found is None:
+            found = cls._shared[key] = cls(read(path), interpolation, extrapolate)
+        return found
+
+    def __init__(self, measurement: Measurement, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
+        grid = measurement.data
+        if not isinstance(grid, Grid):
+            raise FileError(f"{measurement.path}: scattered samples.")
+        if not np.any(usable(grid.values)):
+            raise FileError(f"{measurement.path}: no value is positive; there is nothing to render.")
+        self.channels = Channels(measurement.wavelengths)
+        self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal
+        converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)
+        self.f = Table(converted, self.channels.spectrum, interpolation == "nearest", extrapolate == "hold")
+        self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
+        albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos(converted, NODES_I, interpolation, extrapolate))
+        self.albedo = Table(albedo, self.channels.spectrum, nearest=False, hold=True)
