@@ -44,6 +44,10 @@ class Coordinates:
         which is 1 unless a table is adaptive."""
         return self.locate(wi, wo, xp), 1
 
+    def prepared(self) -> Coordinates:
+        """Return these coordinates for Dr.Jit in the active variant, with what they look up, if anything, loaded."""
+        return self
+
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         """Return ``(wi, wo)``, by component, for values on the axes: one of the pairs that lie there."""
         raise NotImplementedError
