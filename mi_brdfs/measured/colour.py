@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from .basis import BASIS, WAVELENGTHS
-from .measurement import Axis, Grid, usable
+from .measurement import Axis, Grid
 from .observer import to_srgb
 from .table import Table, TableAxis, array, fetch
 
@@ -32,19 +33,21 @@ class Channels:
 
     def converted(self, grid: Grid) -> Grid:
         """Return a grid with the channels that the variant's table has: rgb variants show spectra under D65,
-        monochromatic ones the luminance."""
-        values = usable(grid.values)
+        monochromatic ones the luminance. Spectra are not negative, as colours outside sRGB are."""
+        values, signed = grid.usable, grid.signed and mi.is_rgb
         if self.weights is not None:
-            values = np.maximum(values @ self.weights, 0)
+            values = values @ self.weights
+            signed = mi.is_rgb
         if mi.is_monochromatic and values.shape[-1] == 3:
             values = values @ LUMINANCE[:, None]
-        return Grid(grid.coordinates, grid.axes, values)
+        return replace(grid, values=values, signed=signed)
 
     def brightness(self, grid: Grid) -> Grid:
         """Return a converted grid with one channel: the luminance of rgb, and else the mean."""
-        values = grid.values
+        values = grid.usable
         rgb = self.spectrum is None and values.shape[-1] == 3
-        return Grid(grid.coordinates, grid.axes, values @ LUMINANCE[:, None] if rgb else values.mean(-1, keepdims=True))
+        weighed = values @ LUMINANCE[:, None] if rgb else values.mean(-1, keepdims=True)
+        return replace(grid, values=weighed, signed=False)
 
     def colour(self, table: Table, wi: mi.Vector3f, wo: mi.Vector3f, wavelengths: Any) -> mi.UnpolarizedSpectrum:
         """Return a table's values as a colour, at ``wavelengths`` in spectral variants."""

@@ -77,6 +77,8 @@ class Grid:
     coordinates: Coordinates
     axes: tuple[Axis, ...]
     values: np.ndarray
+    signed: bool = False
+    """Whether negative channels are colours outside sRGB, and not errors."""
 
     def __post_init__(self) -> None:
         shape = tuple(len(axis.nodes) for axis in self.axes)
@@ -94,6 +96,11 @@ class Grid:
         wi, wo = self.coordinates.directions(*(place.ravel() for place in places))
         _, scale = self.coordinates.locate_scaled(wi, wo, NUMPY)
         return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * self.values.reshape(-1, self.values.shape[-1])
+
+    @property
+    def usable(self) -> np.ndarray:
+        """The values with 0 in place of those that mean nothing."""
+        return np.where(np.isfinite(self.values), self.values, 0) if self.signed else usable(self.values)
 
     @cached_property
     def closed(self) -> Grid:
@@ -119,10 +126,10 @@ class Grid:
         interpolation: Interpolation = "trilinear",
         extrapolate: Extrapolation = "hold",
     ) -> np.ndarray:
-        """Return f, with negative and missing values as 0, for directions of shape (…, 3): shape (…, channels)."""
+        """Return f, with values that mean nothing as 0, for directions of shape (…, 3): shape (…, channels)."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
         grid = self if interpolation == "nearest" else self.closed
-        values = usable(grid.values).reshape(-1, self.values.shape[-1])
+        values = grid.usable.reshape(-1, self.values.shape[-1])
         inside = np.ones((), dtype=bool)
         corners: list[tuple[Any, Any]] = [(0, 1.0)]
         for axis, place in zip(grid.axes, places, strict=True):

@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import choose, select
+from ..math import choose, normalize_or, select
 from .arrays import DRJIT, stacked, vector
 from .coordinates import TWO_PI, polar_angle, spherical, wrapped
 from .measurement import Extrapolation, Grid, Interpolation
@@ -47,7 +47,8 @@ class Proposal:
         x, y, z = wi.x + wo.x, wi.y + wo.y, wi.z + wo.z
         across = DRJIT.sqrt(x * x + y * y)
         u = DRJIT.sqrt(DRJIT.atan2(across, z) * (2 / dr.pi))
-        turn = DRJIT.atan2(y * wi.x - x * wi.y, x * wi.x + y * wi.y) * dr.inv_two_pi
+        cos_phi, sin_phi = normalize_or(wi.x, wi.y, (1, 0))
+        turn = DRJIT.atan2(y * cos_phi - x * sin_phi, x * cos_phi + y * sin_phi) * dr.inv_two_pi
         v = turn - dr.floor(turn)
         # As in half_vectors, where 4 (wi·h) sinθh = 2 |(x, y)|.
         solid_angle = 4 * dr.square(dr.pi) * u * across
@@ -59,9 +60,9 @@ class Proposal:
         cosine, _ = choose(u, COSINE_SHARE)
         disk = mi.warp.square_to_cosine_hemisphere(v)
         place, _ = self.warp.sample(v, self._given(wi))
-        theta, phi = dr.square(place.y) * (dr.pi / 2), place.x * dr.two_pi + dr.atan2(wi.y, wi.x)
-        (sin, cos), (sin_phi, cos_phi) = dr.sincos(theta), dr.sincos(phi)
-        h = mi.Vector3f(sin * cos_phi, sin * sin_phi, cos)
+        (sin, cos), (y, x) = dr.sincos(dr.square(place.y) * (dr.pi / 2)), dr.sincos(place.x * dr.two_pi)
+        cos_phi, sin_phi = normalize_or(wi.x, wi.y, (1, 0))
+        h = mi.Vector3f(sin * (x * cos_phi - y * sin_phi), sin * (y * cos_phi + x * sin_phi), cos)
         return select(cosine, disk, 2 * dr.dot(wi, h) * h - wi)
 
     def _given(self, wi: mi.Vector3f) -> list[mi.Float]:

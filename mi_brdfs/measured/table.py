@@ -12,7 +12,7 @@ import numpy as np
 from ..math import clamp
 from ..variants import is_scalar
 from .arrays import DRJIT
-from .measurement import MARGIN, Axis, Grid, usable
+from .measurement import MARGIN, Axis, Grid
 
 
 class Table:
@@ -27,7 +27,7 @@ class Table:
         self.coordinates, self.nearest, self.hold = grid.coordinates.prepared(), nearest, hold
         self.axes = [TableAxis(axis) for axis in grid.axes]
         self.spectrum = None if wavelengths is None else TableAxis(Axis(wavelengths))
-        self.values = mi.TensorXf(np.ascontiguousarray(usable(grid.values), dtype=np.float32))
+        self.values = mi.TensorXf(np.ascontiguousarray(grid.usable, dtype=np.float32))
         self.channels = grid.values.shape[-1]
 
     @property

@@ -16,7 +16,7 @@ from ..parameters import Choice, Colour, File, Flag, Rotation
 from .colour import Channels
 from .coordinates import PolarAngle
 from .formats import read
-from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement, usable
+from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
 from .proposal import NODES_I, Proposal, albedos
 from .table import Table
 
@@ -32,12 +32,13 @@ class Tabulated(Model):
     ``trilinear`` interpolates linearly between the neighbouring nodes of the file's own grid: half and difference
     angles for MERL, angles about the mirror direction for goniometers, adaptive coordinates for RGL; four-dimensional
     where the file is anisotropic. ``nearest`` takes the nearest node's value: MERL's own look-up. Negative values and
-    missing ones count as 0. What lies outside the measured range has the value at its border with ``hold``, and is 0
-    with ``zero``. What a file calls the incident direction is wi, as in Mitsuba's ``measured``.
+    missing ones count as 0, except for the channels of RGL's colours outside sRGB. What lies outside the measured range
+    has the value at its border with ``hold``, and is 0 with ``zero``. What a file calls the incident direction is wi,
+    as in Mitsuba's ``measured``.
 
     Linear sRGB values are rgb. In spectral variants they weigh three spectra that sum to 1, so that white stays white.
     Values at several wavelengths are interpolated between them in spectral variants; rgb variants show them under
-    daylight (D65). A single wavelength is grey.
+    daylight (D65), where saturated colours may have negative channels. A single wavelength is grey.
 
     The energy is the file's: nothing keeps a measurement from reflecting more than it receives. Reciprocal where the
     format is (MERL with half a turn of φd), else as good as the measurement. One-sided.
@@ -126,7 +127,7 @@ class Tables:
         grid = measurement.data
         if not isinstance(grid, Grid):
             raise FileError(f"{measurement.path}: scattered samples.")
-        if not np.any(usable(grid.values)):
+        if not np.any(grid.usable > 0):
             raise FileError(f"{measurement.path}: no value is positive; there is nothing to render.")
         self.channels = Channels(measurement.wavelengths)
         self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal

@@ -1,0 +1,113 @@
+"""The adaptive coordinates of Dupuy and Jakob, in which a table's nodes gather where normals are seen."""
+
+from __future__ import annotations
+
+import copy
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..math import EPSILON
+from .coordinates import TWO_PI, Coordinates, polar_angle, spherical
+from .warp import Map, MitsubaMap, MitsubaWarp, Warp
+
+FLOOR = 1e-9
+"""The least density of a normal, of the mean one: a row in which no normal is seen would be divided by 0."""
+
+
+class Adaptive(Coordinates):
+    """``(θi, u1, u2)``, and φi before them if there is more than one of it: (u1, u2) are the uniform numbers from which
+    the half vector is drawn as a visible normal.
+
+    J. Dupuy, W. Jakob, An adaptive parameterization for efficient material acquisition and rendering, ACM TOG 37(6),
+    2018, doi:10.1145/3272127.3275059. A direction is at (√(2θ/π), (φ + π)/2π) on the maps ``ndf``, the distribution of
+    normals D, ``sigma``, the projected area σ of the normals seen from it, and ``vndf``, the density of the visible
+    normals on these two coordinates. Tables hold f cosθo times 4 σ(wi)/D(h), or f cosθo if not ``jacobian``.
+
+    With one or two φi the material is isotropic, and azimuths of normals are relative to that of wi. With more, they
+    are absolute; if the φi span half of a turn, [-π, 0], both directions are turned by π where wi lies in the other
+    half, and if a quarter, [-π, -π/2], they are mirrored at the x and y axes.
+
+    Args:
+        phi_i: nodes in radians, shape (P,).
+        theta_i: nodes in radians, shape (T,).
+        ndf: shape (rows, columns) of φ and θ.
+        sigma: shape (rows, columns) of φ and θ.
+        vndf: shape (P, T, rows, columns).
+        jacobian: whether the table is of f cosθo 4 σ/D.
+    """
+
+    def __init__(
+        self,
+        phi_i: np.ndarray,
+        theta_i: np.ndarray,
+        ndf: np.ndarray,
+        sigma: np.ndarray,
+        vndf: np.ndarray,
+        jacobian: bool = True,
+    ) -> None:
+        self._relative, self._jacobian = len(phi_i) <= 2, jacobian
+        self._symmetry = 1 if self._relative else round(TWO_PI / float(phi_i[-1] - phi_i[0]))
+        self._nodes = (phi_i, theta_i) if len(phi_i) > 1 else (theta_i,)
+        vndf = np.maximum(vndf, FLOOR * vndf.mean(axis=(2, 3), keepdims=True))
+        self._tables = ndf, sigma, vndf if len(phi_i) > 1 else vndf[0]
+        self._warp, self._ndf, self._sigma = Warp(self._tables[2], self._nodes), Map(ndf), Map(sigma)
+        self.names = ("phi_i", "theta_i", "u1", "u2")[2 - len(self._nodes) :]
+
+    @property
+    def anisotropic(self) -> bool:
+        return len(self._nodes) > 1
+
+    def prepared(self) -> Adaptive:
+        ndf, sigma, vndf = self._tables
+        result = copy.copy(self)
+        result._warp, result._ndf, result._sigma = MitsubaWarp(vndf, self._nodes), MitsubaMap(ndf), MitsubaMap(sigma)
+        return result
+
+    def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
+        return self.locate_scaled(wi, wo, xp)[0]
+
+    def locate_scaled(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[tuple[Any, ...], Any]:
+        x, y = wi.x + wo.x, wi.y + wo.y
+        normal = SimpleNamespace(x=x, y=y, z=wi.z + wo.z)
+        theta_i, phi_i, theta_m = polar_angle(wi, xp), xp.atan2(wi.y, wi.x), polar_angle(normal, xp)
+        if self._symmetry >= 2:
+            flip_y = xp.select(wi.y < 0, 1.0, -1.0)
+            flip_x = xp.select(wi.x < 0, 1.0, -1.0) if self._symmetry == 4 else flip_y
+            x, y = x * flip_x, y * flip_y
+            phi_i = -abs(xp.atan2(wi.y * flip_y, wi.x * flip_x))
+        if self._relative:
+            sin = xp.sqrt(wi.x * wi.x + wi.y * wi.y)
+            upright = sin > 1e-7
+            sin = xp.select(upright, sin, 1)
+            cos_phi, sin_phi = xp.select(upright, wi.x / sin, 1), xp.select(upright, wi.y / sin, 0)
+            x, y = x * cos_phi + y * sin_phi, y * cos_phi - x * sin_phi
+        on_map = on_theta(theta_m, xp), on_phi(xp.atan2(y, x), xp)
+        parameters = (phi_i, theta_i)[2 - len(self._nodes) :]
+        places = (*parameters, *self._warp.invert(*on_map, parameters))
+        scale = 1 / xp.maximum(wo.z, EPSILON)
+        if self._jacobian:
+            area = self._sigma.eval(on_theta(theta_i, xp), on_phi(phi_i, xp))
+            scale = scale * self._ndf.eval(*on_map) / (4 * xp.maximum(area, EPSILON))
+        return places, xp.select(wo.z > 0, scale, 0)
+
+    def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
+        *parameters, u1, u2 = places
+        x, y = self._warp.sample(u1, u2, parameters)
+        phi_i = parameters[0] if len(parameters) > 1 else np.zeros(())
+        wi = spherical(parameters[-1], phi_i)
+        m = spherical(np.square(x) * (np.pi / 2), (2 * y - 1) * np.pi + (phi_i if self._relative else 0))
+        twice = 2 * (wi.x * m.x + wi.y * m.y + wi.z * m.z)
+        return wi, SimpleNamespace(x=twice * m.x - wi.x, y=twice * m.y - wi.y, z=twice * m.z - wi.z)
+
+
+def on_theta(theta: Any, xp: SimpleNamespace) -> Any:
+    """Return where a polar angle is on the maps."""
+    return xp.sqrt(theta * (2 / np.pi))
+
+
+def on_phi(phi: Any, xp: SimpleNamespace) -> Any:
+    """Return where an azimuth is on the maps: π is at 0, as -π."""
+    turned = phi * (1 / TWO_PI) + 0.5
+    return xp.select(turned < 1, turned, 0)

@@ -1,0 +1,118 @@
+"""RGL .bsdf, the tensor files of Dupuy and Jakob 2018, which Mitsuba's ``measured`` renders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..adaptive import Adaptive
+from ..files import BinaryFile
+from ..measurement import Axis, FileError, Grid, Measurement
+from ..tensors import MAGIC, Tensor, array, contents
+
+NAME = "RGL"
+DESCRIPTION = "the words 'tensor_file', then named arrays"
+
+
+def recognizes(path: Path, head: bytes) -> bool:
+    return head.startswith(MAGIC)
+
+
+def read(path: Path) -> Measurement:
+    return _File(path).measurement()
+
+
+class _File:
+    """A tensor file whose fields are those of a material."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.file = BinaryFile(path)
+        self.tensors = contents(self.file)
+
+    def measurement(self) -> Measurement:
+        spectral = "wavelengths" in self.tensors
+        name = "spectra" if spectral else "rgb"
+        phi_i, theta_i = self.nodes("phi_i"), self.nodes("theta_i", 0, np.pi / 2)
+        wavelengths = self.nodes("wavelengths", 0, np.inf) if spectral else None
+        channels = 3 if wavelengths is None else len(wavelengths)
+        given = self.fitting(name, {0: len(phi_i), 1: len(theta_i), 2: channels}, 5)
+        jacobian = self.field("jacobian", "u1", 1)
+        if jacobian.count != 1:
+            raise self.problem("jacobian", f"has {jacobian.count} values; it is one")
+        ndf, sigma = self.density("ndf", {}, 2), self.density("sigma", {}, 2)
+        vndf = self.density("vndf", {0: len(phi_i), 1: len(theta_i)}, 4)
+        values = array(self.file, given, name).transpose(0, 1, 4, 3, 2)
+        if len(phi_i) == 2 and all(np.array_equal(a[0], a[1], equal_nan=True) for a in (vndf, values)):
+            phi_i, vndf, values = phi_i[:1], vndf[:1], values[:1]
+        coordinates = Adaptive(phi_i, theta_i, ndf, sigma, vndf, bool(array(self.file, jacobian, "jacobian")[0]))
+        axes = [Axis(phi_i), Axis(theta_i), *(Axis(np.linspace(0, 1, n)) for n in values.shape[2:4])]
+        if not coordinates.anisotropic:
+            axes, values = axes[1:], values[0]
+        return Measurement(
+            self.path,
+            NAME,
+            Grid(coordinates, tuple(axes), values, signed=not spectral),
+            wavelengths=wavelengths,
+            material=self.description() or self.path.stem,
+            quantity="f cos",
+        )
+
+    def problem(self, name: str, problem: str, index: int = 0) -> FileError:
+        """Return an error at a value of a field."""
+        tensor = self.tensors[name]
+        return self.file.error(f"{name!r} {problem}", tensor.offset + index * np.dtype(tensor.dtype).itemsize)
+
+    def field(self, name: str, dtype: str, dimensions: int) -> Tensor:
+        """Return a field that must be there, with so many dimensions."""
+        if name not in self.tensors:
+            raise self.file.error(f"the table of contents ends without {name!r}; it has {', '.join(self.tensors)}")
+        tensor = self.tensors[name]
+        if tensor.dtype != dtype:
+            raise self.problem(name, f"is of type {np.dtype(tensor.dtype)}; it must be {np.dtype(dtype)}")
+        if len(tensor.shape) != dimensions or not tensor.count:
+            raise self.problem(
+                name, f"is of shape {tensor.shape}; it must have {dimensions} dimensions, none of them 0"
+            )
+        return tensor
+
+    def fitting(self, name: str, sizes: dict[int, int], dimensions: int) -> Tensor:
+        """Return a field whose last two axes are those of the unit square, and whose others have these sizes."""
+        tensor = self.field(name, "f4", dimensions)
+        if any(tensor.shape[axis] != size for axis, size in sizes.items()):
+            raise self.problem(
+                name, f"is of shape {tensor.shape}; by the other fields it must start with {tuple(sizes.values())}"
+            )
+        if min(tensor.shape[-2:]) < 2:
+            raise self.problem(name, f"is of shape {tensor.shape}; its last two dimensions must be at least 2")
+        return tensor
+
+    def nodes(self, name: str, low: float = -np.inf, high: float = np.inf) -> np.ndarray:
+        """Return increasing numbers."""
+        nodes = array(self.file, self.field(name, "f4", 1), name).astype(np.float64)
+        for k, wrong in enumerate(~((nodes >= low - 1e-4) & (nodes <= high + 1e-4) & np.isfinite(nodes))):
+            if wrong:
+                raise self.problem(name, f"has the value {nodes[k]:g}", k)
+        for k in np.flatnonzero(np.diff(nodes) <= 0):
+            raise self.problem(name, f"must increase, but {nodes[k + 1]:g} follows {nodes[k]:g}", int(k) + 1)
+        return nodes
+
+    def density(self, name: str, sizes: dict[int, int], dimensions: int) -> np.ndarray:
+        """Return maps on the unit square that are nowhere negative, and not 0 everywhere."""
+        values = array(self.file, self.fitting(name, sizes, dimensions), name)
+        wrong = np.flatnonzero(~((values >= 0) & (values < np.inf)))
+        if len(wrong):
+            raise self.problem(name, f"has the value {values.flat[wrong[0]]:g}", int(wrong[0]))
+        empty = np.flatnonzero(~np.any(values, axis=(-2, -1)))
+        if len(empty):
+            raise self.problem(name, "is 0 everywhere", int(empty[0]) * values.shape[-2] * values.shape[-1])
+        return values
+
+    def description(self) -> str:
+        """Return what the file says it is, if anything."""
+        tensor = self.tensors.get("description")
+        if tensor is None or tensor.dtype != "u1":
+            return ""
+        text = array(self.file, tensor, "description").tobytes().decode("utf-8", errors="replace")
+        return " ".join(text.replace("\0", " ").split())

@@ -1,0 +1,84 @@
+"""Mitsuba's tensor files: named arrays behind a table of contents."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .files import BinaryFile
+
+MAGIC = b"tensor_file\0"
+VERSION = 1, 0
+TYPES = dict(enumerate(("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8"), start=1))
+MOST_DIMENSIONS = 16
+LEAST_HEADER = 2 + 2 + 1 + 8
+"""Bytes of the contents' line of a field with no name and no dimensions."""
+
+
+@dataclass(frozen=True)
+class Tensor:
+    """An array of a file: numpy's name of the type, the first byte, and the shape."""
+
+    dtype: str
+    offset: int
+    shape: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        return math.prod(self.shape)
+
+    @property
+    def end(self) -> int:
+        return self.offset + self.count * np.dtype(self.dtype).itemsize
+
+
+def contents(file: BinaryFile) -> dict[str, Tensor]:
+    """Return which arrays a file has, by name.
+
+    Raises:
+        FileError: if it is none, or an array is not in it as a whole, or shares bytes with another.
+    """
+    if file.take("u1", len(MAGIC), "the words 'tensor_file'").tobytes() != MAGIC:
+        raise file.error("the words 'tensor_file' should stand", 0)
+    version = tuple(int(n) for n in file.take("u1", 2, "version numbers"))
+    if version != VERSION:
+        raise file.error(f"the version is {version[0]}.{version[1]}; only 1.0 is known", file.offset - 2)
+    count = int(file.take("u4", 1, "the number of fields")[0])
+    if count * LEAST_HEADER > file.left:
+        raise file.error(f"{count:,} fields are announced, for which the file is too small", file.offset - 4)
+    tensors: dict[str, Tensor] = {}
+    for _ in range(count):
+        start = file.offset
+        length = int(file.take("u2", 1, "the length of a field's name")[0])
+        name = file.take("u1", length, "a field's name").tobytes().decode("latin-1")
+        dimensions = int(file.take("u2", 1, f"the number of dimensions of {name!r}")[0])
+        type = int(file.take("u1", 1, f"the type of {name!r}")[0])
+        offset = int(file.take("u8", 1, f"the offset of {name!r}")[0])
+        if name in tensors:
+            raise file.error(f"a second field {name!r} follows", start)
+        if type not in TYPES:
+            raise file.error(f"field {name!r} is of the unknown type {type}", start)
+        if dimensions > MOST_DIMENSIONS:
+            raise file.error(f"field {name!r} has {dimensions:,} dimensions", start)
+        shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {name!r}"))
+        tensor = tensors[name] = Tensor(TYPES[type], offset, shape)
+        if tensor.end > file.size:
+            raise file.error(
+                f"field {name!r} should lie from byte {offset:,} to {tensor.end:,}, but the file ends at {file.size:,}",
+                start,
+            )
+    by_place = sorted((tensor.offset, tensor.end, name) for name, tensor in tensors.items() if tensor.count)
+    end, before = file.offset, "the table of contents"
+    for start, stop, name in by_place:
+        if start < end:
+            raise file.error(f"field {name!r} starts, but {before} reaches to byte {end:,}", start)
+        end, before = stop, f"field {name!r}"
+    return tensors
+
+
+def array(file: BinaryFile, tensor: Tensor, name: str) -> np.ndarray:
+    """Return an array of a file."""
+    file.offset = tensor.offset
+    return file.take(tensor.dtype, tensor.count, f"{name!r}").reshape(tensor.shape)
