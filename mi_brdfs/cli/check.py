@@ -47,8 +47,8 @@ def check(
     targets: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="TYPE|FILE.xml|FILE.xml:ID|XML…",
-            help="Plugins of the pack or others; files with a scene or BSDF, or one BSDF of a scene.",
+            metavar="TYPE|FILE|FILE.xml:ID|XML…",
+            help="Plugins of the pack or others; files with a scene, a BSDF or measured values; one BSDF of a scene.",
         ),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,

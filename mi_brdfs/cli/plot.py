@@ -19,7 +19,10 @@ from .variants import TracingVariant, set_tracing_variant
 def plot(
     targets: Annotated[
         list[str],
-        typer.Argument(metavar="TYPE|FILE.xml|XML…", help="Plugins of the pack or others; files with a scene or BSDF."),
+        typer.Argument(
+            metavar="TYPE|FILE|XML…",
+            help="Plugins of the pack or others; files with a scene, a BSDF or measured values.",
+        ),
     ],
     parameters: Annotated[
         list[str] | None,

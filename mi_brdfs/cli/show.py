@@ -23,8 +23,8 @@ def show(
     material: Annotated[
         str,
         typer.Argument(
-            metavar="TYPE|FILE.xml|FILE.xml:ID|XML",
-            help="A plugin of the pack or another; a file with a BSDF, or one BSDF of a scene.",
+            metavar="TYPE|FILE|FILE.xml:ID|XML",
+            help="A plugin of the pack or another; a file with a BSDF or measured values; one BSDF of a scene.",
         ),
     ],
     parameters: Parameters = None,

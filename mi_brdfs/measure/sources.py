@@ -42,9 +42,10 @@ class BSDFSource(NamedTuple):
 
 
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
-    """Yield the BSDFs that a word stands for: the type of a plugin, a ``<bsdf …>`` as text, the path of a scene, whose
-    materials count once each and those of lamps only if they reflect, or one of them as ``scene.xml:id``. Parameters
-    are those of the plugin, or the values of the ``<default>`` elements of XML.
+    """Yield the BSDFs that a word stands for: the type of a plugin, a ``<bsdf …>`` as text, the path of a measured
+    file, which ``tabulated`` renders, the path of a scene, whose materials count once each and those of lamps only if
+    they reflect, or one of them as ``scene.xml:id``. Parameters are those of the plugin, or the values of the
+    ``<default>`` elements of XML.
 
     Raises:
         ValueError: if it stands for none.
@@ -55,11 +56,15 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     file, _, wanted = ("", "", "") if is_text else word.partition(".xml:")
     path = Path(f"{file}.xml" if wanted else word)
     is_file = path.suffix == ".xml" and not is_text
-    if is_file and not path.is_file():
+    is_data = not is_text and not is_file and (bool(path.suffix) or path.name != word)
+    if (is_file or is_data) and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
         raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
-    source = BSDFSource(path.name if is_file else word, word, str(path) if is_file else word, None, parameters)
+    if is_data:
+        source = BSDFSource(path.name, word, "tabulated", None, {"filename": str(path.resolve()), **parameters})
+    else:
+        source = BSDFSource(path.name if is_file else word, word, str(path) if is_file else word, None, parameters)
     suffix = "".join(f" {name}={value}" for name, value in parameters.items())
     loaded = source.load()
     loaded = mi.load_dict(loaded) if isinstance(loaded, dict) else loaded

@@ -47,14 +47,14 @@ class Axis:
         """The nodes, and behind them the first one, a period later, if the axis goes round."""
         return self.nodes if self.period is None else np.append(self.nodes, self.nodes[0] + self.period)
 
-    def steps(self, x: np.ndarray, interpolation: Interpolation) -> list[tuple[np.ndarray, np.ndarray | float]]:
+    def steps(self, x: np.ndarray, interpolation: Interpolation) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return ``(index, share)`` of the two nodes that places are interpolated between, or of the nearest one."""
         nodes = self.looped
         if self.period is not None:
             x = nodes[0] + np.mod(x - nodes[0], self.period)
         position = np.interp(x, nodes, np.arange(len(nodes)))
         if interpolation == "nearest" or len(nodes) == 1:
-            return [((position + 0.5).astype(np.int64) % len(self.nodes), 1.0)]
+            return [((position + 0.5).astype(np.int64) % len(self.nodes), np.ones(np.shape(position)))]
         k = np.minimum(position.astype(np.int64), len(nodes) - 2)
         return [(k, k + 1 - position), ((k + 1) % len(self.nodes), position - k)]
 

@@ -15,6 +15,7 @@ from ..model import Model
 from ..parameters import Choice, Colour, File, Flag, Rotation
 from .colour import Channels
 from .coordinates import PolarAngle
+from .files import checked
 from .formats import read
 from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
 from .proposal import NODES_I, Proposal, albedos
@@ -79,6 +80,10 @@ class Tabulated(Model):
         if not shared:
             self.arrays = {"values": self.tables.f.values}
 
+    @classmethod
+    def manual(cls) -> str:
+        return super(Model, cls).manual()  # a file has no largest albedo but its own
+
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
         p = super().evaluate(si, active)
         p.wavelengths = si.wavelengths
@@ -116,7 +121,7 @@ class Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
         if not shared:
             return cls(read(path), interpolation, extrapolate)
-        state = path.stat()
+        state = checked(path).stat()
         key = mi.variant(), path.resolve(), state.st_mtime_ns, state.st_size, interpolation, extrapolate
         found = cls._shared.get(key)
         if found is None:

@@ -1,0 +1,258 @@
+"""The plugin of measured files: what it evaluates, how it is drawn from, what it shares, what it refuses."""
+
+from __future__ import annotations
+
+import gc
+import os
+import re
+import weakref
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+from support import call, context, efficiencies, hemisphere, interaction
+
+import mi_brdfs
+from mi_brdfs.measure.sources import find_sources
+from mi_brdfs.validation import check
+
+SCALE = np.array([1, 1.15, 1.66]) / 1500
+JUDGED = ("finite", "horizon", "support", "eval_pdf", "weight", "pdf", "chi2", "albedo", "components", "recompiles")
+
+
+def ggx(theta_h, theta_d, alpha, f0=(0.9, 0.6, 0.3), diffuse=0.02):
+    """A rough conductor without shadowing over a diffuse ground, from its half and difference angles."""
+    cos2 = np.cos(theta_h) ** 2
+    d = alpha**2 / (np.pi * (cos2 * (alpha**2 - 1) + 1) ** 2)
+    f0 = np.array(f0)
+    fresnel = f0 + (1 - f0) * (1 - np.cos(theta_d))[..., None] ** 5
+    return diffuse + d[..., None] * fresnel / 4
+
+
+def cell_centres(shape):
+    h, d, p = ((np.arange(n) + 0.5) / n for n in shape)
+    return np.meshgrid(h**2 * np.pi / 2, d * np.pi / 2, p * np.pi, indexing="ij")
+
+
+def write_merl(path, f, shape=(90, 30, 36)):
+    """Write a table of f(θh, θd, φd), shape (…, 3), where both directions are above the horizon, and -1 elsewhere."""
+    h, d, p = cell_centres(shape)
+    values = np.broadcast_to(f(h, d, p), (*shape, 3)) / SCALE
+    above = np.cos(h) * np.cos(d) > np.abs(np.sin(h) * np.sin(d) * np.cos(p))
+    values = np.where(above[..., None], values, -1)
+    path.write_bytes(np.array(shape, "<i4").tobytes() + np.moveaxis(values, -1, 0).astype("<f8").tobytes())
+    return path
+
+
+def angles(wi, wo):
+    """Half and difference angles from their definitions: turn h to the pole, and look where wi is."""
+    h = wi + wo
+    h /= np.linalg.norm(h, axis=1, keepdims=True)
+    theta, phi = np.arccos(h[:, 2]), np.arctan2(h[:, 1], h[:, 0])
+    x = wi[:, 0] * np.cos(phi) + wi[:, 1] * np.sin(phi)
+    y = wi[:, 1] * np.cos(phi) - wi[:, 0] * np.sin(phi)
+    dx, dz = x * np.cos(theta) - wi[:, 2] * np.sin(theta), x * np.sin(theta) + wi[:, 2] * np.cos(theta)
+    return theta, np.arccos(np.clip(dz, -1, 1)), np.mod(np.arctan2(y, dx), np.pi)
+
+
+@pytest.fixture
+def glossy(tmp_path):
+    return str(write_merl(tmp_path / "glossy.binary", lambda h, d, p: ggx(h, d, 0.2)))
+
+
+def pairs(count=4000):
+    return hemisphere(count, 1, 0.1).astype(np.float64), hemisphere(count, 2, 0.1).astype(np.float64)
+
+
+# --- Values ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
+def test_values_are_those_of_an_independent_trilinear_interpolation(variant, tmp_path):
+    shape = 20, 18, 24
+    table = np.random.default_rng(3).uniform(0.1, 1, (*shape, 3))
+    file = write_merl(tmp_path / "noise.binary", lambda h, d, p: table, shape)
+    h, d, p = cell_centres(shape)
+    above = np.cos(h) * np.cos(d) > np.abs(np.sin(h) * np.sin(d) * np.cos(p))
+    usable = np.where(above[..., None], table, 0)
+    nodes = [(np.arange(n) + 0.5) / n for n in shape]
+    nodes[2] = np.concatenate([nodes[2][-1:] - 1, nodes[2], nodes[2][:1] + 1])  # φd goes round after half a turn
+    round_trip = np.concatenate([usable[:, :, -1:], usable, usable[:, :, :1]], axis=2)
+    wi, wo = pairs(4000 if variant.startswith("llvm") else 200)
+    h, d, p = angles(wi, wo)
+    interpolator = RegularGridInterpolator(nodes, round_trip, bounds_error=False)
+    expected = interpolator(np.stack([np.sqrt(2 * h / np.pi), 2 * d / np.pi, p / np.pi], -1)) * wo[:, 2:]
+    inside = np.isfinite(expected[:, 0])  # without the half cells at the ends of the axes
+    assert inside.mean() > 0.9
+    with mi.variant_context(variant):
+        bsdf = mi.load_dict({"type": "merl", "filename": str(file)})
+        (value,) = call(bsdf.eval, context(), wi.astype(np.float32), wo.astype(np.float32))
+    # An angle's float32, 1e-6 where two directions almost cancel, over the width of a cell, 0.04.
+    np.testing.assert_allclose(value[inside], expected[inside], atol=1e-4)
+
+
+def test_nearest_is_the_floor_of_merls_indices(llvm_rgb, tmp_path):
+    shape = 20, 18, 24
+    table = np.random.default_rng(3).uniform(0.1, 1, (*shape, 3))
+    file = write_merl(tmp_path / "noise.binary", lambda h, d, p: table, shape)
+    wi, wo = pairs()
+    h, d, p = angles(wi, wo)
+    places = np.stack([np.sqrt(h / (np.pi / 2)) * shape[0], d / (np.pi / 2) * shape[1], p / np.pi * shape[2]])
+    index = places.astype(int)
+    expected = table[tuple(index)] * wo[:, 2:]
+    clear = np.all(np.abs(places - np.round(places)) > 1e-3, axis=0)  # of the borders of cells
+    h, d, p = (centre[tuple(index)] for centre in cell_centres(shape))
+    clear &= np.cos(h) * np.cos(d) > np.abs(np.sin(h) * np.sin(d) * np.cos(p))
+    bsdf = mi.load_dict({"type": "merl", "filename": str(file), "interpolation": "nearest"})
+    (value,) = call(bsdf.eval, context(), wi.astype(np.float32), wo.astype(np.float32))
+    np.testing.assert_allclose(value[clear], expected[clear], rtol=1e-5)
+    assert clear.mean() > 0.7
+
+
+def test_a_lambertian_table_is_lambertian_in_every_variant(variant, tmp_path):
+    file = write_merl(tmp_path / "matte.binary", lambda h, d, p: np.array([0.5, 0.5, 0.5]) / np.pi, (90, 90, 36))
+    bsdf = mi.load_dict({"type": "tabulated", "filename": str(file)})
+    wi, wo = (hemisphere(50, seed, 0.3) for seed in (1, 2))  # away from cells below the horizon
+    (value,) = call(bsdf.eval, context(), wi, wo)
+    # White is white in spectral variants, too.
+    np.testing.assert_allclose(value, 0.5 / np.pi * np.broadcast_to(wo[:, 2:], value.shape), rtol=1e-4)
+
+
+def test_rgb_keeps_its_colour_in_spectral_variants(tmp_path):
+    colour = np.array([0.7, 0.3, 0.1])
+    file = write_merl(tmp_path / "rust.binary", lambda h, d, p: colour / np.pi, (60, 60, 12))
+    scene = {
+        "type": "scene",
+        "sensor": {
+            "type": "radiancemeter",
+            "origin": [0, 0, 1],
+            "direction": [0, 0, -1],
+            "film": {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}, "pixel_format": "rgb"},
+        },
+        "integrator": {"type": "path", "max_depth": 2},
+        "shape": {"type": "rectangle", "bsdf": {"type": "tabulated", "filename": str(file)}},
+        "light": {"type": "constant"},
+    }
+    with mi.variant_context("llvm_ad_spectral"):
+        pixel = np.array(mi.render(mi.load_dict(scene), spp=1 << 16)).ravel()
+    np.testing.assert_allclose(pixel, colour, rtol=0.02)  # the noise of 65,536 times four wavelengths
+
+
+def test_scale_is_a_colour_and_has_a_derivative(llvm_rgb, glossy):
+    plain = mi.load_dict({"type": "tabulated", "filename": glossy})
+    tinted = mi.load_dict({"type": "tabulated", "filename": glossy, "scale": {"type": "rgb", "value": [2, 1, 0.5]}})
+    wi, wo = (w.astype(np.float32) for w in pairs(100))
+    (value,), (scaled,) = (call(bsdf.eval, context(), wi, wo) for bsdf in (plain, tinted))
+    np.testing.assert_allclose(scaled, value * [2, 1, 0.5], rtol=1e-5)
+    params = mi.traverse(tinted)
+    assert list(params.keys()) == ["scale.value"]
+    dr.enable_grad(params["scale.value"])
+    dr.backward(dr.sum(tinted.eval(context(), interaction(wi), mi.Vector3f(wo.T))))
+    np.testing.assert_allclose(np.array(dr.grad(params["scale.value"])).ravel(), value.sum(axis=0), rtol=1e-4)
+
+
+def test_values_have_derivatives_on_request(llvm_rgb, glossy):
+    bsdf = mi.load_dict({"type": "tabulated", "filename": glossy, "differentiable": True})
+    params = mi.traverse(bsdf)
+    wi, wo = (w.astype(np.float32) for w in pairs(64))
+    (value,) = call(bsdf.eval, context(), wi, wo)
+    table = params["values"]
+    dr.enable_grad(table)
+    params.update()
+    dr.backward(dr.sum(bsdf.eval(context(), interaction(wi), mi.Vector3f(wo.T))))
+    # f is linear in the table: the derivatives weigh its values to f.
+    gradient = np.array(dr.grad(params["values"]), np.float64)
+    assert np.sum(gradient * np.array(params["values"])) == pytest.approx(value.sum(), rel=1e-4)
+    params["values"] = mi.TensorXf(2 * np.array(params["values"]))
+    params.update()
+    (doubled,) = call(bsdf.eval, context(), wi, wo)
+    np.testing.assert_allclose(doubled, 2 * value, rtol=1e-5)
+
+
+# --- Sampling -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("alpha", [0.03, 0.3])
+def test_sampling_and_density_pass_the_checks(llvm_rgb, tmp_path, alpha):
+    file = write_merl(tmp_path / "metal.binary", lambda h, d, p: ggx(h, d, alpha), (90, 90, 36))
+    report = check({"type": "tabulated", "filename": str(file)}, only=JUDGED)
+    assert not report.failures, report
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.1, 0.5])
+def test_noise_is_next_to_none(llvm_rgb, tmp_path, alpha):
+    file = write_merl(tmp_path / "metal.binary", lambda h, d, p: ggx(h, d, alpha), (90, 90, 36))
+    assert (efficiencies({"type": "tabulated", "filename": str(file)}, (5, 30, 60, 80)) > 0.96).all()
+
+
+# --- Files ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_file_is_in_memory_once(llvm_rgb, glossy):
+    several = [mi.load_dict({"type": kind, "filename": glossy}) for kind in ("merl", "tabulated") * 5]
+    tables = {id(bsdf.model.tables) for bsdf in several}
+    assert len(tables) == 1
+    other = mi.load_dict({"type": "merl", "filename": glossy, "differentiable": True})
+    assert id(other.model.tables) not in tables
+    dead = weakref.ref(several[0].model.tables)
+    del several
+    gc.collect()
+    assert dead() is None
+
+
+def test_a_file_that_changes_is_read_again(llvm_rgb, tmp_path):
+    path = tmp_path / "matte.binary"
+    values = []
+    for albedo in (0.2, 0.6):
+        write_merl(path, lambda h, d, p, albedo=albedo: np.full(3, albedo / np.pi), (9, 9, 18))
+        os.utime(path, ns=(0, int(1e9 * albedo)))
+        bsdf = mi.load_dict({"type": "merl", "filename": str(path)})
+        (value,) = call(bsdf.eval, context(), *np.array([[[0, 0, 1]], [[0.6, 0, 0.8]]], np.float32))
+        values.append(value[0, 0])
+    assert values[1] == pytest.approx(3 * values[0], rel=1e-5)
+
+
+def test_a_relative_name_is_beside_the_scene(llvm_rgb, glossy, tmp_path):
+    scene = tmp_path / "scene.xml"
+    scene.write_text(
+        '<scene version="3.0.0"><bsdf type="twosided" id="b"><bsdf type="merl">'
+        '<string name="filename" value="glossy.binary"/></bsdf></bsdf></scene>'
+    )
+    assert mi.load_file(str(scene)) is not None
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({}, "tabulated: filename is missing; give the path of the measured file."),
+        ({"filename": ""}, "filename is empty"),
+        ({"filename": "nowhere.binary"}, "nowhere.binary: No such file or directory."),
+        ({"filename": "."}, "is a directory; give a file in it."),
+        ({"file": "x"}, "unknown parameter file; did you mean filename?"),
+        ({"interpolation": "cubic"}, 'interpolation = "cubic" is unknown'),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(llvm_rgb, glossy, given, sentence):
+    whole = {"type": "tabulated", "filename": glossy, **given} if "filename" not in given and given else given
+    with pytest.raises(RuntimeError, match=re.escape(sentence)):
+        mi.load_dict({"type": "tabulated", **whole})
+
+
+def test_a_table_without_light_is_refused(llvm_rgb, tmp_path):
+    file = write_merl(tmp_path / "black.binary", lambda h, d, p: np.full(3, -0.5), (9, 9, 18))
+    with pytest.raises(RuntimeError, match="no value is positive; there is nothing to render"):
+        mi.load_dict({"type": "merl", "filename": str(file)})
+
+
+def test_commands_take_the_file_itself(llvm_rgb, glossy):
+    (source,) = find_sources(glossy, {"extrapolate": "zero"})
+    assert source.load() == {"type": "tabulated", "filename": glossy, "extrapolate": "zero"}
+    with pytest.raises(ValueError, match=r"nowhere\.binary: no such file"):
+        list(find_sources("nowhere.binary"))
+
+
+def test_the_plugin_has_a_page_and_is_no_model():
+    assert "tabulated" in mi_brdfs.info("merl")
+    assert "tabulated" not in mi_brdfs.list_models()
