@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import pytest
 
 from mi_brdfs.measure import directions
 from mi_brdfs.measure.arrays import context as context
@@ -16,6 +20,16 @@ from mi_brdfs.measure.directions import direction as direction
 from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measure.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
+
+
+def shared(*parts: str) -> Path:
+    """The path of a measured file that the repository may not contain, in the folder ``MI_BRDFS_DATA``, by default
+    ``../shared/data``; without it the test is skipped."""
+    root = Path(__file__).parents[1]
+    path = (root / os.environ.get("MI_BRDFS_DATA", "../shared/data")).joinpath(*parts)
+    if not path.exists():
+        pytest.skip(f"There is no {path}; MI_BRDFS_DATA says where measured files are.")
+    return path
 
 
 def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:

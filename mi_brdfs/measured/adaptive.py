@@ -52,7 +52,9 @@ class Adaptive(Coordinates):
         self._nodes = (phi_i, theta_i) if len(phi_i) > 1 else (theta_i,)
         vndf = np.maximum(vndf, FLOOR * vndf.mean(axis=(2, 3), keepdims=True))
         self._tables = ndf, sigma, vndf if len(phi_i) > 1 else vndf[0]
-        self._warp, self._ndf, self._sigma = Warp(self._tables[2], self._nodes), Map(ndf), Map(sigma)
+        self._warp: Any = Warp(self._tables[2], self._nodes)
+        self._ndf: Map | MitsubaMap = Map(ndf)
+        self._sigma: Map | MitsubaMap = Map(sigma)
         self.names = ("phi_i", "theta_i", "u1", "u2")[2 - len(self._nodes) :]
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import getitem
 from typing import Any
 
 import mitsuba as mi
@@ -67,7 +68,7 @@ class Warp:
                 for index, weight in corners
                 for k, part in ((below, 1 - share), (above, share))
             ]
-        return lambda table, *index: sum(weight * table[(slice, *index)] for slice, weight in corners)
+        return lambda table, *index: sum(weight * getitem(table, (slice, *index)) for slice, weight in corners)
 
     @staticmethod
     def _across(look: Callable[..., Any], table: np.ndarray, row: Any, y: Any) -> Callable[[Any], Any]:

@@ -94,8 +94,10 @@ class _File:
         for k, wrong in enumerate(~((nodes >= low - 1e-4) & (nodes <= high + 1e-4) & np.isfinite(nodes))):
             if wrong:
                 raise self.problem(name, f"has the value {nodes[k]:g}", k)
-        for k in np.flatnonzero(np.diff(nodes) <= 0):
-            raise self.problem(name, f"must increase, but {nodes[k + 1]:g} follows {nodes[k]:g}", int(k) + 1)
+        for index in np.flatnonzero(np.diff(nodes) <= 0):
+            raise self.problem(
+                name, f"must increase, but {nodes[index + 1]:g} follows {nodes[index]:g}", int(index) + 1
+            )
         return nodes
 
     def density(self, name: str, sizes: dict[int, int], dimensions: int) -> np.ndarray:
