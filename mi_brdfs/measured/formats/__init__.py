@@ -7,9 +7,9 @@ from types import ModuleType
 
 from ..files import checked
 from ..measurement import FileError, Measurement
-from . import merl
+from . import mbsdf, merl, utia
 
-FORMATS: list[ModuleType] = [merl]
+FORMATS: list[ModuleType] = [mbsdf, merl, utia]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it."""
 
