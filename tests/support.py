@@ -21,6 +21,16 @@ from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measure.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
 
+ROOT = Path(__file__).parent.parent
+
+
+def shared(*parts: str) -> Path:
+    """A file with measured data that may not be shipped, in ``MI_BRDFS_DATA`` or ``../shared/data``."""
+    path = (ROOT / os.environ.get("MI_BRDFS_DATA", "../shared/data")).joinpath(*parts)
+    if not path.exists():
+        pytest.skip(f"there is no {path}; set MI_BRDFS_DATA to a folder with {'/'.join(parts)}")
+    return path
+
 
 def shared(*parts: str) -> Path:
     """The path of a measured file that the repository may not contain, in the folder ``MI_BRDFS_DATA``, by default

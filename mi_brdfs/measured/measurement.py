@@ -104,20 +104,43 @@ class Grid:
 
     @cached_property
     def closed(self) -> Grid:
-        """The grid with values at its poles that do not depend on the azimuth: the mean over it of the nodes at the
-        pole, or of the innermost ones if cells begin there."""
-        axes, values = list(self.axes), self.values
+        """The grid to interpolate in. A missing value next to measured ones is their mean, or f would sink towards it.
+        Values at poles do not depend on the azimuth: they are the mean over it of the nodes at the pole, or of the
+        innermost ones if cells begin there."""
+        axes, values = list(self.axes), self._filled()
         for polar, azimuth in self.coordinates.poles:
             axis = axes[polar]
             if axis.low > 0:
                 continue
             innermost = np.take(values, [0], axis=polar)
-            mean = np.broadcast_to(np.nanmean(innermost, axis=azimuth, keepdims=True), innermost.shape)
+            count = np.isfinite(innermost).sum(axis=azimuth, keepdims=True)
+            mean = np.nansum(innermost, axis=azimuth, keepdims=True, dtype=np.float64) / np.maximum(count, 1)
+            mean = np.broadcast_to(mean, innermost.shape)
             at_pole = axis.nodes[0] == 0
             rest = np.delete(values, 0, axis=polar) if at_pole else values
             values = np.concatenate([mean.astype(values.dtype), rest], axis=polar)
             axes[polar] = axis if at_pole else replace(axis, nodes=np.append(0, axis.nodes))
         return replace(self, axes=tuple(axes), values=values)
+
+    def _filled(self) -> np.ndarray:
+        """Return the values, with the mean of the measured neighbours along an axis in place of missing ones: one axis
+        after the other, which also reaches the corners of cells."""
+        missing = np.flatnonzero(np.isnan(self.values))
+        if not len(missing):
+            return self.values
+        values, stride = self.values.flatten(), self.values.size
+        for axis in self.axes:
+            count = len(axis.nodes)
+            stride //= count
+            k = missing // stride % count
+            near = []
+            for step in (-1, 1):
+                other = (k + step) % count
+                value = values[missing + (other - k) * stride]
+                near.append(np.where((axis.period is not None) | (other == k + step), value, np.nan))
+            lower, upper = near
+            values[missing] = np.where(np.isnan(lower), upper, np.where(np.isnan(upper), lower, lower / 2 + upper / 2))
+        return values.reshape(self.values.shape)
 
     def evaluate(
         self,
@@ -139,7 +162,7 @@ class Grid:
                 for index, weight in corners
                 for k, share in axis.steps(place, interpolation)
             ]
-        result = sum(weight[..., None] * values.take(index, axis=0) for index, weight in corners)
+        result = sum(np.asarray(weight)[..., None] * values.take(index, axis=0) for index, weight in corners)
         if extrapolate == "zero":
             result = np.where(inside[..., None], result, 0)
         return result * np.asarray(scale)[..., None]

@@ -1,0 +1,312 @@
+"""MERL, UTIA and MBSDF files: their values in the right places, and what is wrong with damaged ones."""
+
+import struct
+
+import numpy as np
+import pytest
+from support import hemisphere, shared
+
+from mi_brdfs.measured import FileError, read
+from mi_brdfs.measured.formats import merl
+from mi_brdfs.measured.source import Source
+
+SCALE = 1 / 1500, 1.15 / 1500, 1.66 / 1500
+RNG = np.random.default_rng(1)
+
+
+def merl_bytes(dimensions=(6, 5, 10), planes=None):
+    planes = np.random.default_rng(2).uniform(0, 100, (3, *dimensions)) if planes is None else planes
+    return struct.pack("<3i", *dimensions) + planes.astype("<f8").tobytes()
+
+
+def utia_bytes(theta=3, phi=24, dtype="<f8"):
+    return np.random.default_rng(3).uniform(0, 1, (3, theta, phi, theta, phi)).astype(dtype).tobytes()
+
+
+def mbsdf_bytes(theta=4, phi=6, kind=1, header=b'name="a \\"red\\" paint"\n', block=b"MBSDF_DATA_REFLECTION="):
+    values = np.random.default_rng(4).uniform(-0.1, 1, theta * theta * phi * (1, 3)[kind]).astype("<f4")
+    return b"NVIDIA ARC MBSDF V1\n" + header + block + b"\n" + struct.pack("<3I", kind, theta, phi) + values.tobytes()
+
+
+def written(folder, data, name):
+    path = folder / name
+    path.write_bytes(data)
+    return path
+
+
+def pairs(count, seed):
+    return hemisphere(count, seed).astype(np.float64), hemisphere(count, seed + 1).astype(np.float64)
+
+
+def turned(w, phi):
+    x, y, z = w.T
+    return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
+
+
+# --- MERL -----------------------------------------------------------------------------------------------------------
+
+
+def place_in_merl(wi, wo):
+    """θh, θd and φd after Rusinkiewicz, by the two turns that take the half vector to the normal."""
+    half = wi + wo
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    theta_h, phi_h = np.arccos(half[:, 2]), np.arctan2(half[:, 1], half[:, 0])
+    w = turned(wi, -phi_h)
+    x = w[:, 0] * np.cos(theta_h) - w[:, 2] * np.sin(theta_h)
+    z = w[:, 0] * np.sin(theta_h) + w[:, 2] * np.cos(theta_h)
+    return theta_h, np.arccos(z), np.arctan2(w[:, 1], x)
+
+
+def looked_up(planes, wi, wo):
+    """f by MERL's own rule: the cell that an index rounds down to, and whether it is safely inside that cell."""
+    n_h, n_d, n_phi = planes.shape[1:]
+    turn = np.pi if n_phi == 2 * n_d else 2 * np.pi
+    theta_h, theta_d, phi_d = place_in_merl(wi, wo)
+    degrees = np.degrees(theta_h)
+    places = (
+        np.sqrt(degrees / 90 * n_h * n_h),
+        theta_d / (np.pi / 2) * n_d,
+        np.where(phi_d < 0, phi_d + turn, phi_d) / turn * n_phi,
+    )
+    index = tuple(np.clip(np.floor(p).astype(int), 0, n - 1) for p, n in zip(places, (n_h, n_d, n_phi), strict=True))
+    safe = np.all([abs(p - np.round(p)) > 1e-6 for p in places], axis=0)
+    return np.stack([planes[c][index] * SCALE[c] for c in range(3)], axis=-1), safe
+
+
+@pytest.mark.parametrize("dimensions", [(90, 90, 180), (90, 90, 360), (30, 20, 40), (7, 9, 36)])
+def test_nearest_is_merls_own_look_up(tmp_path, dimensions):
+    planes = np.random.default_rng(5).uniform(0, 100, (3, *dimensions))
+    grid = read(written(tmp_path, merl_bytes(dimensions, planes), "x.binary")).data
+    assert grid.coordinates.reciprocal == (dimensions[2] == 2 * dimensions[1])
+    wi, wo = pairs(20000, 6)
+    expected, safe = looked_up(planes, wi, wo)
+    assert safe.mean() > 0.99
+    np.testing.assert_allclose(grid.evaluate(wi, wo, "nearest")[safe], expected[safe], rtol=1e-6)
+
+
+def test_merl_nodes_lie_at_centres(tmp_path):
+    grid = read(written(tmp_path, merl_bytes(), "x.binary")).data
+    wi, wo, f = grid.pairs()
+    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    np.testing.assert_allclose(grid.evaluate(wi, wo)[above], f[above], rtol=1e-6)
+    theta_h, theta_d, phi_d = place_in_merl(wi, wo)
+    i, j, k = np.unravel_index(np.arange(len(wi)), (6, 5, 10))
+    np.testing.assert_allclose(theta_h, ((i + 0.5) / 6) ** 2 * np.pi / 2, atol=1e-9)
+    np.testing.assert_allclose(theta_d, (j + 0.5) / 5 * np.pi / 2, atol=1e-7)
+    np.testing.assert_allclose(phi_d, (k + 0.5) / 10 * np.pi, atol=1e-7)
+
+
+def test_merl_is_reciprocal_and_isotropic(tmp_path):
+    grid = read(written(tmp_path, merl_bytes(), "x.binary")).data
+    wi, wo = pairs(1000, 8)
+    f = grid.evaluate(wi, wo)
+    np.testing.assert_allclose(grid.evaluate(wo, wi), f, rtol=1e-9)
+    np.testing.assert_allclose(grid.evaluate(turned(wi, 1.0), turned(wo, 1.0)), f, rtol=1e-6)
+
+
+def test_minus_one_is_missing_and_other_negatives_stay(tmp_path):
+    planes = np.full((3, 6, 5, 10), 30.0)
+    planes[:, 0, 0, 0] = -1
+    planes[:, 0, 0, 1] = -1 / np.array(SCALE)
+    planes[:, 0, 0, 2] = -0.5
+    values = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data.values
+    assert np.isnan(values[0, 0, :2]).all() and np.isnan(values).sum() == 6
+    np.testing.assert_allclose(values[0, 0, 2], -0.5 * np.array(SCALE), rtol=1e-6)
+
+
+def test_what_was_measured_holds_next_to_what_was_not(tmp_path):
+    planes = np.full((3, 6, 5, 10), 30.0)
+    planes[:, ::2, ::2] = planes[:, :, 3:, 5] = -1
+    grid = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data
+    np.testing.assert_allclose(grid.evaluate(*pairs(5000, 9)) / SCALE, 30, rtol=1e-5)
+    planes[:, :, 1:] = -1
+    f = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data.evaluate(*pairs(5000, 9))
+    assert 0.1 < (f == 0).mean() < 0.9 and f.max() < 30 * SCALE[2] * 1.001
+
+
+@pytest.mark.parametrize("dimensions", [(90, 90, 180), (20, 15, 60)])
+def test_merl_is_written_as_it_is_read(tmp_path, dimensions):
+    def f(wi, wo):
+        return (0.2 + wi[:, 2:] * wo[:, 2:]) * [1, 2, 3]
+
+    path = tmp_path / "x.binary"
+    merl.write(path, Source(f), dimensions)
+    assert path.stat().st_size == 12 + 24 * np.prod(dimensions)
+    wi, wo, values = read(path).data.pairs()
+    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    assert 0.3 < above.mean() < 0.9 and np.isnan(values[~above]).all()
+    np.testing.assert_allclose(values[above], f(wi[above], wo[above]), rtol=1e-6)
+
+
+def test_merl_refuses_what_it_cannot_hold(tmp_path):
+    for source, word in (
+        (Source(lambda wi, wo: wi, anisotropic=True), "isotropic"),
+        (Source(lambda wi, wo: wi, np.array([450.0, 550, 650])), "rgb"),
+    ):
+        with pytest.raises(ValueError, match=word):
+            merl.write(tmp_path / "x.binary", source)
+    assert not (tmp_path / "x.binary").exists()
+
+
+# --- UTIA -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theta, phi, dtype", [(6, 48, "<f8"), (6, 48, "<f4"), (3, 24, "<f8"), (4, 32, "<f4")])
+def test_utia_values_lie_where_the_index_says(tmp_path, theta, phi, dtype):
+    data = utia_bytes(theta, phi, dtype)
+    grid = read(written(tmp_path, data, "m001.bin")).data
+    plane = np.frombuffer(data, dtype).reshape(3, -1)
+    i, v = RNG.integers(theta, size=(2, 500))
+    p, q = RNG.integers(phi, size=(2, 500))
+    index = ((i * phi + p) * theta + v) * phi + q
+
+    def direction(polar, azimuth):
+        t, a = np.radians(polar * 90 / theta), np.radians(azimuth * 360 / phi)
+        return np.stack([np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), np.cos(t)], axis=-1)
+
+    at_pole = (i == 0) | (v == 0)  # there the azimuths are of no direction
+    assert grid.anisotropic and (~at_pole).sum() > 100
+    f = grid.evaluate(direction(i, p), direction(v, q))
+    np.testing.assert_allclose(f[~at_pole], plane[:, index[~at_pole]].T, rtol=1e-5)
+    # All of its values are there, once each.
+    np.testing.assert_allclose(np.sort(grid.values, axis=None), np.sort(np.float32(plane), axis=None))
+    # Beyond the last angle it holds.
+    low = direction(np.full(500, theta - 0.5), p)
+    np.testing.assert_allclose(
+        grid.evaluate(low, direction(v, q))[v > 0],
+        plane[:, index + (theta - 1 - i) * theta * phi**2].T[v > 0],
+        rtol=1e-5,
+    )
+
+
+# --- MBSDF ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+@pytest.mark.parametrize("block", [b"MBSDF_DATA=", b"MBSDF_DATA_REFLECTION="])
+def test_mbsdf_values_lie_where_the_index_says(tmp_path, kind, block):
+    data = mbsdf_bytes(4, 6, kind, block=block)
+    measurement = read(written(tmp_path, data, "x.mbsdf"))
+    assert measurement.material == 'a "red" paint'
+    channels = (1, 3)[kind]
+    values = np.frombuffer(data[-4 * 4 * 4 * 6 * channels :], "<f4").reshape(-1, channels)
+    i, o = RNG.integers(4, size=(2, 200))
+    k = RNG.integers(6, size=200)
+    ti, to, phi = np.radians((i + 0.5) * 22.5), np.radians((o + 0.5) * 22.5), np.radians((k + 0.5) * 30)
+    start = RNG.uniform(0, 6, 200)
+    wi = np.stack([np.sin(ti) * np.cos(start), np.sin(ti) * np.sin(start), np.cos(ti)], axis=-1)
+    for side in (1, -1):
+        azimuth = start + side * phi
+        wo = np.stack([np.sin(to) * np.cos(azimuth), np.sin(to) * np.sin(azimuth), np.cos(to)], axis=-1)
+        expected = np.maximum(values[(i * 4 + o) * 6 + k], 0) * np.ones(3)
+        np.testing.assert_allclose(measurement.data.evaluate(wi, wo), expected, atol=1e-5)
+    assert (measurement.data.values < 0).any()
+
+
+def test_mbsdf_with_transmission_is_read_for_its_reflection(tmp_path):
+    first = mbsdf_bytes()
+    data = first + mbsdf_bytes(2, 3, 0, b"", b"MBSDF_DATA_TRANSMISSION=")[len(b"NVIDIA ARC MBSDF V1\n") :]
+    measurement = read(written(tmp_path, data, "x.mbsdf"))
+    np.testing.assert_array_equal(measurement.data.values, read(written(tmp_path, first, "y.mbsdf")).data.values)
+    assert "transmission" in measurement.notes
+
+
+def test_the_car_paint_reflects_in_the_mirror_direction():
+    grid = read(shared("mbsdf", "carpaint_red.mbsdf")).data
+    assert grid.values.shape == (45, 45, 90, 3) and 0.1 < (grid.values < 0).mean() < 0.15
+    theta = np.radians([15, 30, 45, 60])
+    wi = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
+    mirrored, back = grid.evaluate(wi, wi * [-1, 1, 1]), grid.evaluate(wi, wi)
+    assert (mirrored > 3).all() and (back < 0.5).all()
+
+
+# --- Damaged files --------------------------------------------------------------------------------------------------
+
+
+def replaced(data, offset, part):
+    return data[:offset] + part + data[offset + len(part) :]
+
+
+M, U, B = merl_bytes(), utia_bytes(), mbsdf_bytes()
+HEAD = len(B) - 4 * 4 * 4 * 6 * 3 - 12
+NOISE = np.random.default_rng(7).bytes(5000)
+NUMBER = {"x.binary": ("<f8", 12), "x.bin": ("<f8", 0), "x.mbsdf": ("<f4", HEAD + 12)}
+"""The type of the values, and where they begin."""
+
+
+def filled(data, name, value):
+    dtype, start = NUMBER[name]
+    return data[:start] + np.full((len(data) - start) // np.dtype(dtype).itemsize, value, dtype).tobytes()
+
+
+def damaged(data, name):
+    """What any format must refuse, or read as it is."""
+    return {
+        **{f"the first {n} bytes": data[:n] for n in (1, 7, 11, 12, 13, 40)},
+        **{f"{share:.0%} of it": data[: int(len(data) * share)] for share in (0.25, 0.5, 0.9)},
+        "without its last byte": data[:-1],
+        "twice": data + data,
+        "a byte too much": data + b"\1",
+        "noise": NOISE,
+        "zeros": bytes(len(data) - 8),
+        "text": b"theta,phi,f\n" * 300,
+        "the end first": data[::-1],
+        "a byte missing inside": data[:100] + data[101:],
+    }
+
+
+REFUSED = {
+    **{("x.binary", k): v for k, v in damaged(M, "x.binary").items()},
+    ("x.binary", "0 cells"): replaced(M, 0, struct.pack("<i", 0)),
+    ("x.binary", "-6 cells"): replaced(M, 0, struct.pack("<i", -6)),
+    ("x.binary", "10 GB"): replaced(M, 0, struct.pack("<3i", 1000, 1000, 417)),
+    ("x.binary", "2³¹ - 1 cells"): replaced(M, 0, struct.pack("<3i", *[2**31 - 1] * 3)),
+    ("x.binary", "big-endian"): replaced(M, 0, struct.pack(">3i", 6, 5, 10)),
+    ("x.binary", "float32"): M[:12] + np.frombuffer(M[12:], "<f8").astype("<f4").tobytes(),
+    **{("x.bin", k): v for k, v in damaged(U, "x.bin").items()},
+    ("x.bin", "two planes"): U[: len(U) * 2 // 3],
+    ("x.bin", "four planes"): U + U[: len(U) // 3],
+    ("x.bin", "a header"): b"UTIA" + U,
+    ("x.bin", "7 × 48"): bytes(3 * 8 * (7 * 48) ** 2),
+    ("x.bin", "6 × 47"): bytes(3 * 8 * (6 * 47) ** 2),
+    **{("x.mbsdf", k): v for k, v in damaged(B, "x.mbsdf").items()},
+    ("x.mbsdf", "version 2"): B.replace(b"V1", b"V2"),
+    ("x.mbsdf", "type 2"): replaced(B, HEAD, struct.pack("<I", 2)),
+    ("x.mbsdf", "no θ"): replaced(B, HEAD + 4, struct.pack("<I", 0)),
+    ("x.mbsdf", "no φ"): replaced(B, HEAD + 8, struct.pack("<I", 0)),
+    ("x.mbsdf", "10 GB"): replaced(B, HEAD + 4, struct.pack("<2I", 2000, 200)),
+    ("x.mbsdf", "2³² - 1 steps"): replaced(B, HEAD + 4, struct.pack("<2I", *[2**32 - 1] * 2)),
+    ("x.mbsdf", "no data"): B[:HEAD].replace(b"MBSDF_DATA_REFLECTION=", b'other="1"'),
+    ("x.mbsdf", "transmission only"): mbsdf_bytes(block=b"MBSDF_DATA_TRANSMISSION="),
+    ("x.mbsdf", "two reflections"): B + B[HEAD - 23 :],
+    ("x.mbsdf", "an endless line"): B[:20] + b"k" * 200000,
+}
+READ = {
+    (name, word): filled(data, name, value)
+    for name, data in (("x.binary", M), ("x.bin", U), ("x.mbsdf", B))
+    for word, value in (("NaN", np.nan), ("infinite", np.inf), ("all negative", -2))
+} | {("x.binary", "1e300"): filled(M, "x.binary", 1e300), ("x.mbsdf", "3e38"): filled(B, "x.mbsdf", 3e38)}
+
+
+def test_there_are_twenty_of_each():
+    for name in NUMBER:
+        assert sum(file == name for file, _ in [*REFUSED, *READ]) >= 20
+
+
+@pytest.mark.parametrize("case", REFUSED, ids=" ".join)
+def test_a_damaged_file_is_refused_in_a_sentence(tmp_path, case):
+    path = written(tmp_path, REFUSED[case], case[0])
+    with pytest.raises(FileError) as caught:
+        read(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: at byte ") and text.endswith(".") and "\n" not in text
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("case", READ, ids=" ".join)
+def test_odd_values_are_read_and_count_as_none(tmp_path, case):
+    grid = read(written(tmp_path, READ[case], case[0])).data
+    f = grid.evaluate(*pairs(100, 10))
+    assert np.isfinite(f).all() and (f >= 0).all()
+    if case[1] in ("NaN", "infinite", "all negative"):
+        assert not f.any()
