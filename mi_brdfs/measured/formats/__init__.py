@@ -7,9 +7,9 @@ from types import ModuleType
 
 from ..files import checked
 from ..measurement import FileError, Measurement
-from . import merl, rgl
+from . import lighttools, merl, rgl, zemax
 
-FORMATS: list[ModuleType] = [merl, rgl]
+FORMATS: list[ModuleType] = [merl, rgl, zemax, lighttools]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it."""
 
