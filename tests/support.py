@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import pytest
 
 from mi_brdfs.measure import directions
 from mi_brdfs.measure.arrays import context as context
@@ -16,6 +20,16 @@ from mi_brdfs.measure.directions import direction as direction
 from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measure.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
+
+ROOT = Path(__file__).parent.parent
+
+
+def shared(*parts: str) -> Path:
+    """A file with measured data that may not be shipped, in ``MI_BRDFS_DATA`` or ``../shared/data``."""
+    path = (ROOT / os.environ.get("MI_BRDFS_DATA", "../shared/data")).joinpath(*parts)
+    if not path.exists():
+        pytest.skip(f"there is no {path}; set MI_BRDFS_DATA to a folder with {'/'.join(parts)}")
+    return path
 
 
 def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:

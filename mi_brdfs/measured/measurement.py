@@ -139,7 +139,7 @@ class Grid:
                 for index, weight in corners
                 for k, share in axis.steps(place, interpolation)
             ]
-        result = sum(weight[..., None] * values.take(index, axis=0) for index, weight in corners)
+        result = sum(np.asarray(weight)[..., None] * values.take(index, axis=0) for index, weight in corners)
         if extrapolate == "zero":
             result = np.where(inside[..., None], result, 0)
         return result * np.asarray(scale)[..., None]
