@@ -88,7 +88,11 @@ def test_stated_tis_is_lofts_sum_over_what_was_read(name):
     factor = 1 if measurement.data.anisotropic else 2  # both halves of a mirrored measurement, times 1/2
     beam = np.arcsin(3.5 / 2 / 82)
     for k, rotation in enumerate(table.rotations[:-1] if factor == 1 else table.rotations):
-        node = np.searchsorted(np.degrees(measurement.data.axes[3].nodes), (90 - rotation) % 360 - 1e-6) if factor == 1 else 0
+        node = (
+            np.searchsorted(np.degrees(measurement.data.axes[3].nodes), (90 - rotation) % 360 - 1e-6)
+            if factor == 1
+            else 0
+        )
         for i, theta in enumerate(table.incidences):
             f = looked_up(measurement, table, k, i)
             total = np.sum(f * solid_angles(table)) - f[0, 0] * (1 - np.cos(beam)) * beam * np.pi

@@ -13,7 +13,7 @@ from .measurement import FileError
 LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""
 OPENING = 1 << 16
-"""The bytes in which the first line that is no comment is looked for."""
+"""The bytes in which the first line that is no comment is looked for, and the words that tell formats apart."""
 
 
 class TextFile:
@@ -78,10 +78,7 @@ def shortened(word: str) -> str:
 
 
 def opening(path: Path, head: bytes) -> list[str]:
-    """Return the first lines of a text file, in small letters: comments, up to the first lines that are none and what
-    follows them. Of a binary file, none."""
-    if b"\0" in head and encoding(head) != "utf-16":
-        return []
+    """Return the first lines of a text file, in small letters, as many as a long comment may take."""
     with path.open("rb") as file:
         text = file.read(OPENING).decode(encoding(head), errors="replace")
     return [line.strip().lower() for line in text.splitlines()]

@@ -11,7 +11,7 @@ import numpy as np
 from ..coordinates import Spherical
 from ..measurement import FileError, Grid, Measurement
 from ..text import TextFile, is_number, opening, shortened
-from .zemax import CHANNELS, XYZ_TO_SRGB, Header, Ordered, Round, has_incidence_lines, is_table, words_of
+from .zemax import XYZ_TO_SRGB, Header, Ordered, Round, has_incidence_lines, is_table, words_of
 
 NAME = "LightTools"
 DESCRIPTION = "as Zemax, with the lines AOI, POI, Side above each block of data"
@@ -37,8 +37,8 @@ def read(path: Path) -> Measurement:
     lines = file.lines()
     header = Header.read(file, lines)
     content = header.content()
-    symmetry = header.symmetry(("planesymmetrical", "asymmetric", "asymmetrical"))
-    radials, azimuths = (header.require(file, name) for name in ("scatterradial", "scatterazimuth"))
+    symmetry = header.symmetry(("PlaneSymmetrical", "Asymmetric", "Asymmetrical"))
+    radials, azimuths = (header.require(file, name) for name in ("ScatterRadial", "ScatterAzimuth"))
     found = list(blocks(file, lines, len(radials) * len(azimuths)))
     front = [block for block in found if block.side == "front" and block.scatter == "brdf"]
     if not front:
@@ -46,33 +46,33 @@ def read(path: Path) -> Measurement:
     if len({block.plane for block in front}) > 1:
         raise FileError(f"{path} has several planes of incidence (POI); only tables of one can be read.")
     channels = sorted({block.channel for block in front})
-    if content != "monochrome" and [tristimulus for tristimulus, _ in channels] != [0, 1, 2]:
+    if content != "Monochrome" and [tristimulus for tristimulus, _ in channels] != [0, 1, 2]:
         raise FileError(f"{path}: its SpectralContent needs the blocks TrisX, TrisY and TrisZ.")
-    header.angles["incidence"] = np.unique([block.incidence for block in front])
+    header.angles["AOI"] = np.unique([block.incidence for block in front])
     table = {(block.incidence, block.channel): block for block in front}
-    if len(table) < len(front) or len(table) < len(header.angles["incidence"]) * len(channels):
+    if len(table) < len(front) or len(table) < len(header.angles["AOI"]) * len(channels):
         raise FileError(f"{path}: not every AOI has just one block for each wavelength or tristimulus value.")
-    theta_i, theta_o = Ordered(header, "incidence", most=90), Ordered(header, "scatterradial", most=90)
+    theta_i, theta_o = Ordered(header, "AOI", most=90), Ordered(header, "ScatterRadial", most=90)
 
     turned = (azimuths + 90) % 360 - 180  # Δφ in [-180°, 180°)
     one_side = np.all(turned <= 0) or np.all((turned >= 0) | (turned == -180))
-    mirrored = bool(one_side) and symmetry == "planesymmetrical"
-    header.angles["scatterazimuth"] = abs(turned) if mirrored else turned
-    delta = Ordered(header, "scatterazimuth", most=180) if mirrored else Round(header, "scatterazimuth")
+    mirrored = bool(one_side) and symmetry == "PlaneSymmetrical"
+    header.angles["ScatterAzimuth"] = abs(turned) if mirrored else turned
+    delta = Ordered(header, "ScatterAzimuth", most=180) if mirrored else Round(header, "ScatterAzimuth")
 
-    rows = [[table[incidence, channel].values for channel in channels] for incidence in header.angles["incidence"]]
+    rows = [[table[incidence, channel].values for channel in channels] for incidence in header.angles["AOI"]]
     values = np.array(rows).reshape(len(rows), len(channels), len(azimuths), len(radials)).transpose(0, 3, 2, 1)
     values = values[np.ix_(theta_i.order, theta_o.order, delta.order)]
-    luminance = channels[1 if content == "xyz" else 0]
-    stated = [table[incidence, luminance].tis for incidence in header.angles["incidence"]]
+    luminance = channels[1 if content == "XYZ" else 0]
+    stated = [table[incidence, luminance].tis for incidence in header.angles["AOI"]]
     wavelengths = np.array([wavelength or np.nan for _, wavelength in channels])
-    if content == "xyz":
+    if content == "XYZ":
         values = values @ XYZ_TO_SRGB.T
     return Measurement(
         path,
         NAME,
         Grid(Spherical(mirrored), (theta_i.axis, theta_o.axis, delta.axis), values),
-        None if content == "xyz" else np.where(np.isnan(wavelengths), header.wavelength, wavelengths),
+        None if content == "XYZ" else np.where(np.isnan(wavelengths), header.wavelength, wavelengths),
         material=header.comment("sample", "model.*", "material"),
         stated_albedos={
             float(theta): [tis] for theta, tis in zip(theta_i.axis.nodes, stated, strict=True) if np.isfinite(tis)
@@ -106,7 +106,7 @@ def blocks(file: TextFile, lines: Iterator[str], size: int) -> Iterator[Block]:
     for text in lines:
         words = words_of(text)
         word = words[0].lower() if words else ""
-        if not words or word in ("databegin", "dataend", *CHANNELS["monochrome"]):
+        if not words or word in ("databegin", "dataend", "monochrome"):
             continue
         if word[0].isalpha() and not is_number(word):
             if filled:
@@ -141,4 +141,4 @@ def blocks(file: TextFile, lines: Iterator[str], size: int) -> Iterator[Block]:
 
 
 def number(file: TextFile, head: dict[str, str], name: str, default: str) -> float:
-    return float(file.numbers([head.get(name, default)], f"the number of {name}")[0])
+    return float(file.numbers([head.get(name, default)], f"the number of {name.upper()}")[0])

@@ -15,12 +15,12 @@ from ..text import TextFile, is_number, opening, shortened
 
 NAME = "Zemax"
 DESCRIPTION = "text with the lines Symmetry, AngleOfIncidence, ScatterAzimuth, ScatterRadial, DataBegin"
-WORDS = ("source", "symmetry", "spectralcontent", "scattertype")
-ANGLES = ("samplerotation", "angleofincidence", "scatterazimuth", "scatterradial")
+WORDS = ("Source", "Symmetry", "SpectralContent", "ScatterType")
+ANGLES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
 CHANNELS = {
-    "monochrome": ["monochrome"],
-    "xyz": ["tristimulusx", "tristimulusy", "tristimulusz"],
-    "rgb": ["red", "green", "blue"],
+    "Monochrome": ["Monochrome"],
+    "XYZ": ["TristimulusX", "TristimulusY", "TristimulusZ"],
+    "RGB": ["Red", "Green", "Blue"],
 }
 """The blocks of data that each SpectralContent has."""
 XYZ_TO_SRGB = np.array(
@@ -39,12 +39,12 @@ def recognizes(path: Path, head: bytes) -> bool:
 def is_table(lines: list[str]) -> bool:
     """Return whether the first lines of a file are those of Zemax's or LightTools' tables."""
     first = next((line for line in lines if line and not line.startswith("#")), "")
-    return first.split()[:1] in [[word] for word in (*WORDS, *ANGLES)]
+    return words_of(first)[:1] in [[word.lower()] for word in (*WORDS, *ANGLES)]
 
 
 def has_incidence_lines(lines: list[str]) -> bool:
     """Return whether the angle of incidence stands above each block of data, as in LightTools' tables."""
-    return any(line.split()[:1] == ["aoi"] for line in lines)
+    return any(words_of(line)[:1] == ["aoi"] for line in lines)
 
 
 def read(path: Path) -> Measurement:
@@ -69,33 +69,33 @@ def read(path: Path) -> Measurement:
     lines = file.lines()
     header = Header.read(file, lines)
     angles = header.angles
-    angles.setdefault("samplerotation", np.zeros(1))
-    content, symmetry = header.content(), header.symmetry(("planesymmetrical", "asymmetrical", "asymmetrical4d"))
+    angles.setdefault("SampleRotation", np.zeros(1))
+    content, symmetry = header.content(), header.symmetry(("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"))
     values, stated = blocks(file, lines, CHANNELS[content], tuple(len(header.require(file, name)) for name in ANGLES))
 
-    theta_i = Ordered(header, "angleofincidence", most=90)
-    radial = Ordered(header, "scatterradial", most=180)
-    half = np.all((angles["scatterazimuth"] >= 0) & (angles["scatterazimuth"] <= 180))
-    mirrored = bool(half) and not symmetry.startswith("asymmetrical")
-    azimuth = Ordered(header, "scatterazimuth", most=180) if mirrored else Round(header, "scatterazimuth")
-    phi_i = Round(header, "samplerotation", start=90, sense=-1)
+    theta_i = Ordered(header, "AngleOfIncidence", most=90)
+    radial = Ordered(header, "ScatterRadial", most=180)
+    half = np.all((angles["ScatterAzimuth"] >= 0) & (angles["ScatterAzimuth"] <= 180))
+    mirrored = bool(half) and not symmetry.startswith("ASym")
+    azimuth = Ordered(header, "ScatterAzimuth", most=180) if mirrored else Round(header, "ScatterAzimuth")
+    phi_i = Round(header, "SampleRotation", start=90, sense=-1)
     places = (theta_i, azimuth, radial, phi_i)
     values = np.moveaxis(values, (1, 2, 3, 0), (0, 1, 2, 3))[np.ix_(*(place.order for place in places))]
-    stated = stated[np.ix_(phi_i.order, theta_i.order)][..., {"monochrome": 0, "xyz": 1, "rgb": 0}[content]]
+    stated = stated[np.ix_(phi_i.order, theta_i.order)][..., {"Monochrome": 0, "XYZ": 1, "RGB": 0}[content]]
     axes = tuple(place.axis for place in places)
     anisotropic = len(phi_i.order) > 1
     if not anisotropic:
         axes, values = axes[:3], values[..., 0, :]
     coordinates = SpecularPolar(mirrored, anisotropic)
     values[unseen(coordinates, axes) & np.all(values == 0, axis=-1)] = np.nan
-    if content == "xyz":
+    if content == "XYZ":
         values = values @ XYZ_TO_SRGB.T
-    states = np.all(np.isfinite(stated)) and content != "rgb"
+    states = np.all(np.isfinite(stated)) and content != "RGB"
     return Measurement(
         path,
         NAME,
         Grid(coordinates, axes, values),
-        np.array([header.wavelength]) if content == "monochrome" else None,
+        np.array([header.wavelength]) if content == "Monochrome" else None,
         material=header.comment("sample", "model.*", "material"),
         stated_albedos=dict(zip(theta_i.axis.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
         notes=header.notes,
@@ -128,12 +128,12 @@ class Header:
             words = words_of(text)
             if not words:
                 continue
-            word = words[0].lower()
-            if word == "databegin":
+            word = next((name for name in (*WORDS, *ANGLES) if name.lower() == words[0].lower()), words[0])
+            if word.lower() == "databegin":
                 return header
             if word in ANGLES:
                 header.angles[word] = announced(file, lines, words)
-            elif words[0].isalpha():
+            elif word.isalpha():
                 header.settings[word] = " ".join(words[1:])
             else:
                 raise file.error(f"{shortened(words[0])} is no keyword of the header")
@@ -145,18 +145,19 @@ class Header:
         return self.angles[name]
 
     def symmetry(self, known: tuple[str, ...]) -> str:
-        return self._setting("symmetry", known)
+        return self._setting("Symmetry", known)
 
     def content(self) -> str:
         """Return the SpectralContent, having refused what is no BRDF."""
-        self._setting("scattertype", ("brdf",))
-        return self._setting("spectralcontent", tuple(CHANNELS))
+        self._setting("ScatterType", ("BRDF",))
+        return self._setting("SpectralContent", tuple(CHANNELS))
 
     def _setting(self, name: str, known: tuple[str, ...]) -> str:
-        word = self.settings.get(name, known[0]).lower()
-        if word not in known:
-            raise FileError(f"{self.path}: its {name} is {shortened(word)}; only {', '.join(known)} can be read.")
-        return word
+        given = self.settings.get(name, known[0])
+        for word in known:
+            if word.lower() == given.lower():
+                return word
+        raise FileError(f"{self.path}: its {name} is {shortened(given)}; only {', '.join(known)} can be read.")
 
     @property
     def wavelength(self) -> float:
@@ -239,12 +240,12 @@ def blocks(
     size, block = int(np.prod(shape)), int(np.prod(shape[2:]))
     file.expect(size * len(channels), "values")
     values, stated = np.empty((len(channels), size)), np.full((len(channels), size // block), np.nan)
-    filled, channel = [0] * len(channels), 0
+    filled, channel, names = [0] * len(channels), 0, [name.lower() for name in channels]
     for text in lines:
         words = words_of(text)
         word = words[0].lower() if words else ""
-        if word in channels:
-            channel = channels.index(word)
+        if word in names:
+            channel = names.index(word)
         elif word == "tis":
             index, rest = divmod(filled[channel], block)
             if rest or index == stated.shape[1]:
