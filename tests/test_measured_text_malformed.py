@@ -6,8 +6,7 @@ import pytest
 
 from mi_brdfs.measured import FileError, read
 
-NUMBERS = " ".join(str(k / 100) for k in range(6))
-ZEMAX = f"""# Made for a test
+ZEMAX = """# Made for a test
 Source  Measured
 Symmetry  PlaneSymmetrical
 SpectralContent  Monochrome
@@ -125,7 +124,7 @@ def damage():
             yield pytest.param(text, at_a_line, id=f"{format}: {name}")
 
 
-@pytest.mark.parametrize("text, at_a_line", damage())
+@pytest.mark.parametrize("text, at_a_line", list(damage()))
 def test_damage_is_one_sentence(tmp_path, text, at_a_line):
     path = tmp_path / "x.bsdf"
     path.write_bytes(text.encode("latin-1"))
