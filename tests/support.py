@@ -32,16 +32,6 @@ def shared(*parts: str) -> Path:
     return path
 
 
-def shared(*parts: str) -> Path:
-    """The path of a measured file that the repository may not contain, in the folder ``MI_BRDFS_DATA``, by default
-    ``../shared/data``; without it the test is skipped."""
-    root = Path(__file__).parents[1]
-    path = (root / os.environ.get("MI_BRDFS_DATA", "../shared/data")).joinpath(*parts)
-    if not path.exists():
-        pytest.skip(f"There is no {path}; MI_BRDFS_DATA says where measured files are.")
-    return path
-
-
 def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     """Uniform directions with cosines of at least ``lowest``, shape (count, 3), float32."""
     return directions.hemisphere(count, seed, lowest)

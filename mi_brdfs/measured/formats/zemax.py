@@ -1,0 +1,264 @@
+"""Zemax .bsdf, the text tables of OpticStudio that goniometers and imaging spheres write."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..coordinates import Coordinates, SpecularPolar, wrapped
+from ..measurement import Axis, FileError, Grid, Measurement
+from ..text import TextFile, is_number, opening, shortened
+
+NAME = "Zemax"
+DESCRIPTION = "text with the lines Symmetry, AngleOfIncidence, ScatterAzimuth, ScatterRadial, DataBegin"
+WORDS = ("Source", "Symmetry", "SpectralContent", "ScatterType")
+ANGLES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+CHANNELS = {
+    "Monochrome": ["Monochrome"],
+    "XYZ": ["TristimulusX", "TristimulusY", "TristimulusZ"],
+    "RGB": ["Red", "Green", "Blue"],
+}
+"""The blocks of data that each SpectralContent has."""
+XYZ_TO_SRGB = np.array(
+    [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+)
+"""Linear sRGB of CIE XYZ (IEC 61966-2-1)."""
+MOST_ANGLES = 4096
+"""The most angles of a kind that a header is believed to mean."""
+
+
+def recognizes(path: Path, head: bytes) -> bool:
+    lines = opening(path, head)
+    return is_table(lines) and not has_incidence_lines(lines)
+
+
+def is_table(lines: list[str]) -> bool:
+    """Return whether the first lines of a file are those of Zemax's or LightTools' tables."""
+    first = next((line for line in lines if line and not line.startswith("#")), "")
+    return words_of(first)[:1] in [[word.lower()] for word in (*WORDS, *ANGLES)]
+
+
+def has_incidence_lines(lines: list[str]) -> bool:
+    """Return whether the angle of incidence stands above each block of data, as in LightTools' tables."""
+    return any(words_of(line)[:1] == ["aoi"] for line in lines)
+
+
+def read(path: Path) -> Measurement:
+    """Read a table in OpticStudio's tabular BSDF format (R. Rykowski, BSDF data interchange file format specification,
+    Radiant Imaging and Zemax 2008).
+
+    ScatterRadial is the angle from the mirror direction of the light, and ScatterAzimuth the angle about it,
+    counter-clockwise from the side of the normal: just :class:`~mi_brdfs.measured.coordinates.SpecularPolar`.
+    SampleRotation ψ is the angle from the normal of the plane of incidence to the sample's x axis, counter-clockwise
+    seen from above. So the light turns clockwise over the sample, and comes from the azimuth φi = 90° - ψ.
+
+    The grid reaches below the horizon, where files have 0: these count as missing. The TIS lines are kept as they are.
+    They mean ∫ f cosθo dωo, but not every program that writes such files computes that.
+
+    XYZ are taken as colours under D65, and become linear sRGB. A single channel has the wavelength that a comment on
+    the light states, and an unknown one (NaN) if none does or several do.
+
+    Raises:
+        FileError: if the file holds no BRDF, or is not complete.
+    """
+    file = TextFile(path)
+    lines = file.lines()
+    header = Header.read(file, lines)
+    angles = header.angles
+    angles.setdefault("SampleRotation", np.zeros(1))
+    content, symmetry = header.content(), header.symmetry(("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"))
+    values, stated = blocks(file, lines, CHANNELS[content], tuple(len(header.require(file, name)) for name in ANGLES))
+
+    theta_i = Ordered(header, "AngleOfIncidence", most=90)
+    radial = Ordered(header, "ScatterRadial", most=180)
+    half = np.all((angles["ScatterAzimuth"] >= 0) & (angles["ScatterAzimuth"] <= 180))
+    mirrored = bool(half) and not symmetry.startswith("ASym")
+    azimuth = Ordered(header, "ScatterAzimuth", most=180) if mirrored else Round(header, "ScatterAzimuth")
+    phi_i = Round(header, "SampleRotation", start=90, sense=-1)
+    places = (theta_i, azimuth, radial, phi_i)
+    values = np.moveaxis(values, (1, 2, 3, 0), (0, 1, 2, 3))[np.ix_(*(place.order for place in places))]
+    stated = stated[np.ix_(phi_i.order, theta_i.order)][..., {"Monochrome": 0, "XYZ": 1, "RGB": 0}[content]]
+    axes = tuple(place.axis for place in places)
+    anisotropic = len(phi_i.order) > 1
+    if not anisotropic:
+        axes, values = axes[:3], values[..., 0, :]
+    coordinates = SpecularPolar(mirrored, anisotropic)
+    values[unseen(coordinates, axes) & np.all(values == 0, axis=-1)] = np.nan
+    if content == "XYZ":
+        values = values @ XYZ_TO_SRGB.T
+    states = np.all(np.isfinite(stated)) and content != "RGB"
+    return Measurement(
+        path,
+        NAME,
+        Grid(coordinates, axes, values),
+        np.array([header.wavelength]) if content == "Monochrome" else None,
+        material=header.comment("sample", "model.*", "material"),
+        stated_albedos=dict(zip(theta_i.axis.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
+        notes=header.notes,
+    )
+
+
+def unseen(coordinates: Coordinates, axes: tuple[Axis, ...]) -> np.ndarray:
+    """Return which nodes of a grid lie below the horizon, or on it."""
+    _, wo = coordinates.directions(*np.meshgrid(*(axis.nodes for axis in axes), indexing="ij"))
+    return np.asarray(wo.z < 1e-9)
+
+
+@dataclass
+class Header:
+    """What stands above the data."""
+
+    path: Path
+    settings: dict[str, str] = field(default_factory=dict)
+    angles: dict[str, np.ndarray] = field(default_factory=dict)
+    """In degrees, as in the file."""
+    comments: list[str] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, file: TextFile, lines: Iterator[str]) -> Header:
+        """Read up to the line DataBegin."""
+        header = cls(file.path)
+        for text in lines:
+            if text.startswith("#"):
+                header.comments.append(text.strip("# \t"))
+            words = words_of(text)
+            if not words:
+                continue
+            word = next((name for name in (*WORDS, *ANGLES) if name.lower() == words[0].lower()), words[0])
+            if word.lower() == "databegin":
+                return header
+            if word in ANGLES:
+                header.angles[word] = announced(file, lines, words)
+            elif word.isalpha():
+                header.settings[word] = " ".join(words[1:])
+            else:
+                raise file.error(f"{shortened(words[0])} is no keyword of the header")
+        raise file.error("the file ends before the line DataBegin")
+
+    def require(self, file: TextFile, name: str) -> np.ndarray:
+        if name not in self.angles:
+            raise file.error(f"the data begin, but no {name} was given")
+        return self.angles[name]
+
+    def symmetry(self, known: tuple[str, ...]) -> str:
+        return self._setting("Symmetry", known)
+
+    def content(self) -> str:
+        """Return the SpectralContent, having refused what is no BRDF."""
+        self._setting("ScatterType", ("BRDF",))
+        return self._setting("SpectralContent", tuple(CHANNELS))
+
+    def _setting(self, name: str, known: tuple[str, ...]) -> str:
+        given = self.settings.get(name, known[0])
+        for word in known:
+            if word.lower() == given.lower():
+                return word
+        raise FileError(f"{self.path}: its {name} is {shortened(given)}; only {', '.join(known)} can be read.")
+
+    @property
+    def wavelength(self) -> float:
+        """The wavelength in nm that the comments on the light state, NaN if there is not just one."""
+        lights = [text for text in self.comments if re.search(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ", text)]
+        found = set()
+        for number, unit in re.findall(r"(\d+(?:\.\d+)?)\s*(nm|µm|μm|um)\b", "\n".join(lights)):
+            found.add(round(float(number) * (1 if unit == "nm" else 1000), 6))
+        return found.pop() if len(found) == 1 else np.nan
+
+    def comment(self, *names: str) -> str:
+        """Return what a comment ``name: …`` says, of the first of the names that has one."""
+        for name in names:
+            for text in self.comments:
+                if match := re.match(rf"(?i){name}\s*:\s*(\S.*)", text):
+                    return match.group(1)
+        return ""
+
+    @property
+    def notes(self) -> dict[str, str]:
+        pairs = (re.match(r"([A-Z][\w ()#']*?)\s*:\s*(\S.*)", text) for text in self.comments)
+        return {match.group(1): match.group(2) for match in pairs if match}
+
+
+class Ordered:
+    """Angles of a header, in degrees, as an increasing axis: ``order`` lists where its nodes are in the file."""
+
+    def __init__(self, header: Header, name: str, most: float) -> None:
+        angles = header.angles[name]
+        if not np.all((angles >= 0) & (angles <= most)):
+            raise FileError(f"{header.path}: {name} must lie between 0 and {most} degrees.")
+        self.order = np.argsort(angles, kind="stable")
+        if len(np.unique(angles)) < len(angles):
+            raise FileError(f"{header.path}: {name} lists an angle twice.")
+        self.axis = Axis(np.radians(angles[self.order]))
+
+
+class Round:
+    """Angles of a header, in degrees, as an axis that goes round, if they do. Of angles that a turn makes equal, as 0
+    and 360, the first counts."""
+
+    def __init__(self, header: Header, name: str, start: float = 0, sense: int = 1) -> None:
+        angles = header.angles[name]
+        if not np.all(np.isfinite(angles)):
+            raise FileError(f"{header.path}: {name} must be numbers.")
+        nodes, self.order = np.unique(np.round(wrapped(start + sense * angles, 360.0), 6), return_index=True)
+        gaps = np.diff(np.append(nodes, nodes[0] + 360))
+        closed = len(nodes) > 1 and gaps[-1] <= 1.5 * max(gaps[:-1])
+        self.axis = Axis(np.radians(nodes), period=2 * np.pi if closed else None)
+
+
+def words_of(text: str) -> list[str]:
+    """Return the words of a line, without its comment."""
+    return text.partition("#")[0].replace(",", " ").split()
+
+
+def announced(file: TextFile, lines: Iterator[str], words: list[str]) -> np.ndarray:
+    """Read ``name count`` and as many angles, from this line and those that follow."""
+    name, line = words[0], file.line
+    if len(words) < 2 or not words[1].isdecimal() or not 0 < int(words[1]) <= MOST_ANGLES:
+        raise file.error(f"{name} must be followed by the number of its angles, from 1 to {MOST_ANGLES}")
+    count = int(words[1])
+    file.expect(count, "angles")
+    found = list(file.numbers(words[2:], "an angle"))
+    while len(found) < count:
+        text = next(lines, None)
+        if text is None:
+            raise file.error(f"the file ends after {len(found)} of {count} angles of {name}")
+        found += list(file.numbers(words_of(text), f"an angle: {count} of {name} were announced in line {line}"))
+    if len(found) > count:
+        raise file.error(f"there are {len(found)} angles of {name}, but {count} were announced")
+    return np.array(found)
+
+
+def blocks(
+    file: TextFile, lines: Iterator[str], channels: list[str], shape: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read the data: for each channel, rotation and incidence a line ``TIS number``, which may be missing, and values.
+    Return these, shape (\\*shape, channels), and the stated TIS, shape (rotations, incidences, channels)."""
+    size, block = int(np.prod(shape)), int(np.prod(shape[2:]))
+    file.expect(size * len(channels), "values")
+    values, stated = np.empty((len(channels), size)), np.full((len(channels), size // block), np.nan)
+    filled, channel, names = [0] * len(channels), 0, [name.lower() for name in channels]
+    for text in lines:
+        words = words_of(text)
+        word = words[0].lower() if words else ""
+        if word in names:
+            channel = names.index(word)
+        elif word == "tis":
+            index, rest = divmod(filled[channel], block)
+            if rest or index == stated.shape[1]:
+                raise file.error(f"TIS stands after {rest} values of a block, which has {block}")
+            stated[channel, index] = float(words[1]) if len(words) > 1 and is_number(words[1]) else np.nan
+        elif words and word not in ("databegin", "dataend"):
+            row = file.numbers(words, "a value")
+            end = filled[channel] + len(row)
+            if end > size:
+                raise file.error(f"there are more than the {size} values that the header announces")
+            values[channel, filled[channel] : end] = row
+            filled[channel] = end
+    for name, count in zip(channels, filled, strict=True):
+        if count < size:
+            raise file.error(f"the file ends after {count} of {size} values of {name}")
+    return np.moveaxis(values.reshape(-1, *shape), 0, -1), np.moveaxis(stated.reshape(-1, *shape[:2]), 0, -1)

@@ -1,0 +1,84 @@
+"""Files as lines of text: every complaint names the file and the line, and no line is held that no table would have."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .measurement import FileError
+
+LONGEST = 1 << 20
+"""The characters of a line beyond which a file is no table."""
+OPENING = 1 << 16
+"""The bytes in which the first line that is no comment is looked for, and the words that tell formats apart."""
+
+
+class TextFile:
+    """Reads a text file line by line, in UTF-8, UTF-16 with its mark, or ASCII with a few foreign letters, with any
+    line ends."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.size, self.line = path, path.stat().st_size, 0
+        with path.open("rb") as file:
+            self._encoding = encoding(file.read(4))
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines, without the white space around them; ``line`` is the number of the last one, from 1."""
+        with self.path.open(encoding=self._encoding, errors="replace") as file:
+            while text := file.readline(LONGEST):
+                self.line += 1
+                if len(text) == LONGEST:
+                    raise self.error(f"there are more than {LONGEST:,} characters: this is no table")
+                yield text.strip()
+
+    def error(self, problem: str, line: int | None = None) -> FileError:
+        return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")
+
+    def numbers(self, words: Sequence[str], what: str = "a number") -> np.ndarray:
+        """Return words as numbers, also ``nan`` and ``inf``.
+
+        Raises:
+            FileError: if one is none.
+        """
+        try:
+            return np.array(words, dtype=np.float64)
+        except ValueError:
+            bad = next(word for word in words if not is_number(word))
+            raise self.error(f"{shortened(bad)} should be {what}") from None
+
+    def expect(self, count: int, what: str) -> None:
+        """Refuse a count of numbers for which the file is too small: a digit and a separator each.
+
+        Raises:
+            FileError: if it is.
+        """
+        if 2 * count > self.size + 1:
+            raise self.error(f"{count:,} {what} are announced, but the file has {self.size:,} bytes")
+
+
+def encoding(head: bytes) -> str:
+    """Return the encoding that the first bytes of a text file show."""
+    return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
+
+
+def is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def shortened(word: str) -> str:
+    """Return a word as it can be quoted in a sentence."""
+    return repr(word if len(word) <= 24 else word[:20] + "…")
+
+
+def opening(path: Path, head: bytes) -> list[str]:
+    """Return the first lines of a text file, in small letters, as many as a long comment may take."""
+    with path.open("rb") as file:
+        text = file.read(OPENING).decode(encoding(head), errors="replace")
+    return [line.strip().lower() for line in text.splitlines()]
