@@ -89,13 +89,27 @@ class Grid:
     def anisotropic(self) -> bool:
         return self.coordinates.anisotropic
 
-    def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return ``(wi, wo, f)`` of all nodes, also of those below the horizon: shapes (N, 3), (N, 3) and
-        (N, channels)."""
-        places = np.meshgrid(*(axis.nodes for axis in self.axes), indexing="ij")
-        wi, wo = self.coordinates.directions(*(place.ravel() for place in places))
+    def pairs(self, chosen: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return ``(wi, wo, f)`` of all nodes, also of those below the horizon, or of some by their indices into the
+        flat array: shapes (N, 3), (N, 3) and (N, channels)."""
+        shape = self.values.shape[:-1]
+        indices = np.unravel_index(np.arange(math.prod(shape))[chosen], shape)
+        places = (axis.nodes[index] for axis, index in zip(self.axes, indices, strict=True))
+        wi, wo = self.coordinates.directions(*places)
         _, scale = self.coordinates.locate_scaled(wi, wo, NUMPY)
-        return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * self.values.reshape(-1, self.values.shape[-1])
+        values = self.values.reshape(-1, self.values.shape[-1])[chosen]
+        return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * values
+
+    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        """Return whether directions of shape (N, 3) are above the horizon, on all axes in the range that was measured,
+        and nearest to a node with values in all channels: shape (N,)."""
+        places, _ = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
+        nearest = tuple(
+            np.floor(axis.position(place) + 0.5).astype(np.int64) % len(axis.nodes)
+            for axis, place in zip(self.axes, places, strict=True)
+        )
+        inside = np.all([axis.measured(place) for axis, place in zip(self.axes, places, strict=True)], axis=0)
+        return inside & (wi[:, 2] > 0) & (wo[:, 2] > 0) & np.isfinite(self.values[nearest]).all(axis=-1)
 
     @property
     def usable(self) -> np.ndarray:
@@ -128,6 +142,7 @@ class Grid:
     ) -> np.ndarray:
         """Return f, with values that mean nothing as 0, for directions of shape (…, 3): shape (…, channels)."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
+<<<<<<< HEAD
         grid = self if interpolation == "nearest" else self.closed
         values = grid.usable.reshape(-1, self.values.shape[-1])
         inside = np.ones((), dtype=bool)
@@ -140,6 +155,26 @@ class Grid:
                 for k, share in axis.steps(place, interpolation)
             ]
         result = sum(weight[..., None] * values.take(index, axis=0) for index, weight in corners)
+=======
+        inside = np.ones(len(wi), dtype=bool)
+        below, shares = [], []
+        for axis, place in zip(self.axes, places, strict=True):
+            inside &= axis.measured(place)
+            position = axis.position(place)
+            if interpolation == "nearest":
+                position = np.floor(position + 0.5)
+            k = np.minimum(position.astype(np.int64), max(len(axis.looped) - 2, 0))
+            below.append(k)
+            shares.append(position - k)
+        result = np.zeros((len(wi), self.values.shape[-1]))
+        for corner in itertools.product((0, 1), repeat=len(self.axes)):
+            index, weight = [], np.ones(len(wi))
+            for axis, k, share, step in zip(self.axes, below, shares, corner, strict=True):
+                index.append((k + step) % len(axis.nodes))
+                weight = weight * (share if step else 1 - share)
+            used = weight > 0
+            result[used] += weight[used, None] * usable(self.values[tuple(k[used] for k in index)])
+>>>>>>> f9c3919 (wip)
         if extrapolate == "zero":
             result = np.where(inside[..., None], result, 0)
         return result * np.asarray(scale)[..., None]
