@@ -13,13 +13,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from .arrays import stacked
-from .coordinates import spherical
+from .coordinates import TWO_PI, spherical
 from .measurement import Extrapolation, Grid
 
 RADII, TURNS = np.polynomial.legendre.leggauss(80), np.polynomial.legendre.leggauss(40)
 """Gauss's nodes and weights along the radius, and within each of the four ranges of azimuths of a part."""
-AT_ONCE = 1 << 18
-"""The most pairs of directions that are evaluated together, times channels."""
+AT_ONCE = 24
+"""The most angles of incidence, times channels, that are evaluated together."""
 
 
 def albedos(
@@ -30,19 +30,16 @@ def albedos(
 
     A lobe of GGX facets of α = .01 is integrated to 0.1 % up to 60°, and to 1 % up to 85°.
     """
-    found, shares = [], []
-    for theta in theta_i:
-        wo, weight = hemisphere(theta, phi_i)
-        wi = np.broadcast_to(stacked(spherical(np.array(theta), np.array(phi_i))), wo.shape)
-        parts = range(0, len(wo), max(AT_ONCE // grid.values.shape[-1], 1))
-        total = sum(
-            (weight * wo[:, 2])[k : k + parts.step] @ grid.evaluate(wi[k : k + parts.step], wo[k : k + parts.step],
-                                                                    extrapolate=extrapolate)
-            for k in parts
-        )  # fmt: skip
-        found.append(total)
-        shares.append(weight @ grid.measured(wi, wo) / (2 * np.pi))
-    return np.array(found), np.array(shares)
+    values, shares = [], []
+    for some in np.array_split(theta_i, -(-len(theta_i) * grid.values.shape[-1] // AT_ONCE)):
+        nodes = [hemisphere(theta, phi_i) for theta in some]
+        wo, solid_angle = (np.stack(column) for column in zip(*nodes, strict=True))
+        wi = np.broadcast_to(stacked(spherical(some, phi_i))[:, None], wo.shape)
+        f = grid.evaluate(wi, wo, extrapolate=extrapolate)
+        values.append(np.einsum("ij,ijk->ik", solid_angle * wo[..., 2], f))
+        inside = grid.measured(wi.reshape(-1, 3), wo.reshape(-1, 3)).reshape(solid_angle.shape)
+        shares.append((solid_angle * inside).sum(axis=1) / TWO_PI)
+    return np.concatenate(values), np.concatenate(shares)
 
 
 def hemisphere(theta_i: float, phi_i: float = 0) -> tuple[np.ndarray, np.ndarray]:

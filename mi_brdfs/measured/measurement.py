@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -104,10 +105,7 @@ class Grid:
         """Return whether directions of shape (N, 3) are above the horizon, on all axes in the range that was measured,
         and nearest to a node with values in all channels: shape (N,)."""
         places, _ = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
-        nearest = tuple(
-            np.floor(axis.position(place) + 0.5).astype(np.int64) % len(axis.nodes)
-            for axis, place in zip(self.axes, places, strict=True)
-        )
+        nearest = tuple(axis.steps(place, "nearest")[0][0] for axis, place in zip(self.axes, places, strict=True))
         inside = np.all([axis.measured(place) for axis, place in zip(self.axes, places, strict=True)], axis=0)
         return inside & (wi[:, 2] > 0) & (wo[:, 2] > 0) & np.isfinite(self.values[nearest]).all(axis=-1)
 
@@ -142,7 +140,6 @@ class Grid:
     ) -> np.ndarray:
         """Return f, with values that mean nothing as 0, for directions of shape (…, 3): shape (…, channels)."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
-<<<<<<< HEAD
         grid = self if interpolation == "nearest" else self.closed
         values = grid.usable.reshape(-1, self.values.shape[-1])
         inside = np.ones((), dtype=bool)
@@ -155,26 +152,6 @@ class Grid:
                 for k, share in axis.steps(place, interpolation)
             ]
         result = sum(weight[..., None] * values.take(index, axis=0) for index, weight in corners)
-=======
-        inside = np.ones(len(wi), dtype=bool)
-        below, shares = [], []
-        for axis, place in zip(self.axes, places, strict=True):
-            inside &= axis.measured(place)
-            position = axis.position(place)
-            if interpolation == "nearest":
-                position = np.floor(position + 0.5)
-            k = np.minimum(position.astype(np.int64), max(len(axis.looped) - 2, 0))
-            below.append(k)
-            shares.append(position - k)
-        result = np.zeros((len(wi), self.values.shape[-1]))
-        for corner in itertools.product((0, 1), repeat=len(self.axes)):
-            index, weight = [], np.ones(len(wi))
-            for axis, k, share, step in zip(self.axes, below, shares, corner, strict=True):
-                index.append((k + step) % len(axis.nodes))
-                weight = weight * (share if step else 1 - share)
-            used = weight > 0
-            result[used] += weight[used, None] * usable(self.values[tuple(k[used] for k in index)])
->>>>>>> f9c3919 (wip)
         if extrapolate == "zero":
             result = np.where(inside[..., None], result, 0)
         return result * np.asarray(scale)[..., None]
