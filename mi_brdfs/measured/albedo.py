@@ -1,9 +1,9 @@
 """The directional albedo of a table, ∫ f cosθo dωo, by a fixed quadrature.
 
-The hemisphere is cut in two by the plane that is perpendicular to the plane of incidence: what lies nearer to the mirror
-direction than to wi, and the other way round. Each part has polar coordinates about its centre, the mirror direction or
-wi, with nodes that grow dense towards it, where highlights and retro-reflection are; great circles bound it, so that no
-node is wasted and none crosses an edge.
+The plane through the normal that is perpendicular to the plane of incidence cuts the hemisphere in two. Each part has
+polar coordinates about its centre, the mirror direction of the one and wi of the other, with nodes that grow dense
+towards it, where highlights and retro-reflection are; great circles bound it, so that none is
+wasted and no edge lies between them.
 """
 
 from __future__ import annotations

@@ -65,7 +65,7 @@ class Census:
 def census(data: Grid | Samples) -> Census:
     """Count the values of a measurement."""
     total = Census()
-    for wi, wo, values in _batches(data):
+    for wi, wo, values in batches(data):
         # A direction in the horizon, where files may have a node, is a rounding error above or below it.
         above = (wi[:, 2] > -1e-9) & (wo[:, 2] > -1e-9)
         finite = above & np.isfinite(values).any(axis=1)
@@ -79,7 +79,7 @@ def census(data: Grid | Samples) -> Census:
     return total
 
 
-def _batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     if isinstance(data, Samples):
         yield data.pairs()
         return

@@ -153,11 +153,12 @@ def summarize(measurement: Measurement) -> Summary:
     if found.least > found.most:
         raise FileError(f"{measurement.path}: no value above the horizon is a number.")
     grid = gridded(data)
-    theta_i, theta_o = (_ends(grid, name, seen) for name, seen in
+    theta_i, theta_o = (ends(grid, name, seen) for name, seen in
                         (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
     angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
-    azimuths = _azimuths(grid)
-    by_azimuth = {phi: albedos(grid, np.radians(angles), phi, extrapolate="zero") for phi in azimuths[:: -(-len(azimuths) // AZIMUTHS)]}
+    turns = azimuths(grid)
+    turns = turns[:: -(-len(turns) // AZIMUTHS)]
+    by_azimuth = {phi: albedos(grid, np.radians(angles), phi, extrapolate="zero") for phi in turns}
     covered = np.concatenate([shares for _, shares in by_azimuth.values()])
     return Summary(
         file=str(measurement.path),
@@ -212,16 +213,16 @@ def _wavelengths(measurement: Measurement) -> str:
     return f"{nm[0]:g} nm" if len(nm) == 1 else f"{len(nm)} from {min(nm):g} to {max(nm):g} nm"
 
 
-def _ends(grid: Grid, name: str, seen: Range) -> Range:
-    """Return the measured range of an angle: the ends of its axis if it has one, all of it in half and difference
-    angles, which no direction escapes, and else what values were seen at."""
+def ends(grid: Grid, name: str, seen: Range = (0, 90)) -> Range:
+    """Return the measured range of an angle, in degrees: the ends of its axis if it has one, all of it in half and
+    difference angles, which no direction escapes, and else what values were seen at."""
     if name in grid.coordinates.names:
         axis = grid.axes[grid.coordinates.names.index(name)]
         return float(np.degrees(axis.low)), float(np.degrees(axis.high))
-    return (0.0, 90.0) if "theta_d" in grid.coordinates.names else seen
+    return (0, 90) if "theta_d" in grid.coordinates.names else seen
 
 
-def _azimuths(grid: Grid) -> np.ndarray:
+def azimuths(grid: Grid) -> np.ndarray:
     """Return the azimuths of incidence at which an anisotropic material was measured, in radians; 0 for an isotropic
     one."""
     if not grid.anisotropic:
@@ -241,10 +242,9 @@ def _largest(
 
 
 def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
-    azimuths = _azimuths(grid)
-    found = []
+    turns, found = azimuths(grid), []
     for theta, stated in measurement.stated_albedos.items():
-        for phi, one in zip(azimuths, stated, strict=False):
+        for phi, one in zip(turns, stated, strict=False):
             (integrated,), _ = albedos(grid, np.array([theta]), phi, extrapolate="zero")
             found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
     return found
