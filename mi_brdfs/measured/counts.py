@@ -14,6 +14,8 @@ from .measurement import Grid, Samples
 
 AT_ONCE = 1 << 18
 """The most pairs of directions in memory together."""
+HORIZON = 1e-6
+"""The cosine up to which a direction is in the horizon."""
 Range = tuple[float, float]
 
 
@@ -43,7 +45,7 @@ class Census:
     above: Counts = Counts()
     """Pairs of directions that are both above the horizon."""
     below: Counts = Counts()
-    """The others: grids have nodes there, where files hold anything."""
+    """The others, also those in the horizon: grids have nodes there, where files hold anything."""
     least: float = math.inf
     most: float = -math.inf
     """The least and the largest finite value above the horizon."""
@@ -66,8 +68,8 @@ def census(data: Grid | Samples) -> Census:
     """Count the values of a measurement."""
     total = Census()
     for wi, wo, values in batches(data):
-        # A direction in the horizon, where files may have a node, is a rounding error above or below it.
-        above = (wi[:, 2] > -1e-9) & (wo[:, 2] > -1e-9)
+        # A node in the horizon is a rounding error above or below it.
+        above = (wi[:, 2] > HORIZON) & (wo[:, 2] > HORIZON)
         finite = above & np.isfinite(values).any(axis=1)
         part = Census(Counts.of(values[above]), Counts.of(values[~above]))
         if finite.any():

@@ -89,7 +89,7 @@ class Summary:
     def rows(self) -> list[tuple[str, str]]:
         """Return what each finding is called, and what it is, in words."""
         above = self.above
-        lowest = f", down to {100 * self.most_negative:.2g} % of the largest" if above.negative else ""
+        lowest = f", down to {_percent(self.most_negative)} of the largest" if above.negative else ""
         rows = [
             ("format", self.format),
             ("material", self.material or "not named"),
@@ -105,7 +105,7 @@ class Summary:
         if self.below.values:
             kinds = {"negative": self.below.negative, "missing": self.below.missing, "zero": self.below.zero}
             told = ", ".join(f"{count:,} {kind}" for kind, count in kinds.items() if count)
-            rows.append(("below the horizon", f"{self.below.values:,}" + (f", of which {told}" if told else "")))
+            rows.append(("below horizon", f"{self.below.values:,}" + (f", of which {told}" if told else "")))
         rows.append(("reciprocity", self._reciprocity()))
         if self.largest_albedo is not None:
             it = self.largest_albedo
@@ -126,7 +126,7 @@ class Summary:
         if self.reciprocity is None:
             return "unknown: no pair of directions was measured both ways"
         it = self.reciprocity
-        return f"off by {100 * it.median:.2g} % in the median, {100 * it.percentile95:.2g} % at the 95th percentile"
+        return f"off by {_percent(it.median)} in the median, {_percent(it.percentile95)} at the 95th percentile"
 
     def _place(self, it: Albedo | Scatter) -> str:
         return f"θi = {it.theta_i:g}°" + (f", φi = {it.phi_i:g}°" if self.symmetry == "anisotropic" else "")
@@ -137,7 +137,7 @@ class Summary:
         off = np.array([abs(it.integrated - it.stated) / max(it.stated, 1e-6) for it in self.scatter])
         worst = self.scatter[int(off.argmax())]
         return [
-            f"{len(off)} figures; the values differ by {100 * np.median(off):.2g} % in the median, most at "
+            f"{len(off)} figures; the values differ by {_percent(np.median(off))} in the median, most at "
             f"{self._place(worst)}: {worst.stated:.4g} is stated, the values give {worst.integrated:.4g}"
         ]
 
@@ -184,7 +184,7 @@ def summarize(measurement: Measurement) -> Summary:
 
 def channel_names(measurement: Measurement) -> list[str]:
     """Return what each channel is."""
-    if measurement.wavelengths is not None:
+    if measurement.wavelengths is not None and np.isfinite(measurement.wavelengths).all():
         return [f"{wavelength:g} nm" for wavelength in measurement.wavelengths]
     count = measurement.data.values.shape[-1]
     return ["red", "green", "blue"] if count == 3 else [""] if count == 1 else [f"channel {k}" for k in range(count)]
@@ -209,7 +209,9 @@ def _grid(data: Grid | Samples) -> str:
 def _wavelengths(measurement: Measurement) -> str:
     nm = measurement.wavelengths
     if nm is None:
-        return "linear sRGB" if measurement.data.values.shape[-1] == 3 else "one, not stated"
+        return "linear sRGB"
+    if np.isnan(nm).any():
+        return f"{len(nm)}, not stated"
     return f"{nm[0]:g} nm" if len(nm) == 1 else f"{len(nm)} from {min(nm):g} to {max(nm):g} nm"
 
 
@@ -218,7 +220,7 @@ def ends(grid: Grid, name: str, seen: Range = (0, 90)) -> Range:
     difference angles, which no direction escapes, and else what values were seen at."""
     if name in grid.coordinates.names:
         axis = grid.axes[grid.coordinates.names.index(name)]
-        return float(np.degrees(axis.low)), float(np.degrees(axis.high))
+        return round(float(np.degrees(axis.low)), 4), round(float(np.degrees(axis.high)), 4)
     return (0, 90) if "theta_d" in grid.coordinates.names else seen
 
 
@@ -253,4 +255,8 @@ def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
 def _share(count: int, of: int) -> str:
     if not count:
         return "none"
-    return f"{count:,} ({100 * count / of:.2g} %)"
+    return f"{count:,} ({_percent(count / of)})"
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.0f} %" if abs(part) >= 0.1 else f"{100 * part:.2g} %"
