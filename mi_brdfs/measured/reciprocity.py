@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .measurement import Grid, usable
+from .measurement import Grid
 
 PAIRS = 1 << 17
 """The most nodes that are compared."""
@@ -34,11 +34,11 @@ def reciprocity_error(grid: Grid) -> ReciprocityError | None:
         return None
     count = math.prod(grid.values.shape[:-1])
     chosen = np.sort(np.random.default_rng(1).permutation(count)[:PAIRS]) if count > PAIRS else np.arange(count)
-    wi, wo, f = grid.pairs(chosen)
+    wi, wo, _ = grid.pairs(chosen)
     both = grid.measured(wi, wo) & grid.measured(wo, wi)
-    wi, wo, f = wi[both], wo[both], usable(f[both])
-    reverse = grid.evaluate(wo, wi)
-    larger = np.maximum(f, reverse)
+    wi, wo = wi[both], wo[both]
+    f, reverse = grid.evaluate(wi, wo), grid.evaluate(wo, wi)
+    larger = np.maximum(abs(f), abs(reverse))
     lit = larger > 0
     if not lit.any():
         return None

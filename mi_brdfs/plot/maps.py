@@ -40,6 +40,8 @@ DOTTED = 0, (1, 2)
 WI = {"marker": "v", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
 MIRROR = {"marker": "v", "markersize": 6}
 ABOVE = 0.11
+DARK = 0.2
+"""The albedo from which on the scale of albedos reaches 1."""
 
 
 def hemisphere(
@@ -111,13 +113,13 @@ def albedo(
 
 
 def frame_albedo(ax: Axes, text: str) -> None:
-    """Set the axes of albedo curves that are drawn, with a line at 1."""
-    curves = ax.get_lines()
+    """Set the axes of albedo curves that are drawn, with a line at 1 unless they are far below."""
+    top = largest(curve.get_ydata() for curve in ax.get_lines())
     ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
     calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])
-    ax.set_ylim(0, 1.05 * max(1, largest(curve.get_ydata() for curve in curves)))
+    ax.set_ylim(0, 1.05 * (top if top < DARK else max(1, top)))
     ax.set_xlabel(r"$\theta_i$", fontsize=TEXT)
     ax.set_ylabel(text, fontsize=TEXT)
 

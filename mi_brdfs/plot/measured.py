@@ -23,13 +23,13 @@ from ..measured.measurement import usable
 from ..measured.observer import to_srgb
 from ..measured.scattered import gridded
 from ..measured.summary import azimuths, ends
-from .lobes import Curve, dim, largest, refined
+from .lobes import Curve, refined
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
 from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title
 
 PIXELS = 256
-DECADES = 5
+DECADES = 4
 """The most decades of brightness that a slice shows."""
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -87,9 +87,10 @@ class _Table:
         self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")
 
     def colour(self, f: np.ndarray) -> np.ndarray:
-        """Return values as linear sRGB, or as they are if they have one channel."""
+        """Return values as linear sRGB, limited to its gamut, or as they are if they have one channel."""
         wavelengths = self.measurement.wavelengths
-        return f if wavelengths is None or len(wavelengths) == 1 else np.maximum(f @ to_srgb(wavelengths), 0)
+        spectral = wavelengths is not None and len(wavelengths) > 1
+        return np.maximum(f @ to_srgb(wavelengths) if spectral else f, 0)
 
     def luminance(self, f: np.ndarray) -> np.ndarray:
         colour = self.colour(f)
@@ -116,8 +117,7 @@ def _draw_slice(ax: Axes, it: _Table) -> None:
     wi, wo = map(stacked, pair)
     f, seen = it.grid.evaluate(wi, wo), it.measured(wi, wo)
     luminance, colour = it.luminance(f), it.colour(f)
-    top = largest([luminance[seen]])
-    norm = LogNorm(float(np.clip(dim([luminance[seen]]), 10.0**-DECADES * top, 0.1 * top)), top, clip=True)
+    norm = _norm(luminance[seen])
     brightness = norm(np.maximum(luminance, norm.vmin)).filled(0)
     if colour.shape[-1] == 3:
         # Of a grey, the display's value is the brightness, as in the bar.
@@ -125,9 +125,10 @@ def _draw_slice(ax: Axes, it: _Table) -> None:
         shown, palette = brightness[..., None] * hue ** (1 / 2.2), "gray"
     else:
         shown, palette = colormaps["viridis"](brightness)[..., :3], "viridis"
-    ax.add_patch(Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1))
+    patch = Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1)
+    ax.add_patch(patch)
     ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
-    bar = ax.figure.colorbar(ScalarMappable(norm, palette), ax=ax, shrink=0.75, aspect=25, pad=0.02)
+    bar = ax.figure.colorbar(ScalarMappable(norm, palette), ax=ax, shrink=0.75, aspect=25, pad=0.02, extend="both")
     bar.set_label(it.quantity, fontsize=TEXT, color=INK)
     bar.ax.tick_params(labelsize=SMALL, labelcolor=INK)
     bar.outline.set_visible(False)
@@ -138,10 +139,21 @@ def _draw_slice(ax: Axes, it: _Table) -> None:
     ax.set_yticks(turns, [f"{turn}°" for turn in turns])
     ax.set_xlabel(r"$\theta_h$", fontsize=TEXT, color=INK)
     ax.set_ylabel(r"$\theta_d$", fontsize=TEXT, color=INK)
+    if not seen.all():
+        _legend(ax, [patch], ["not measured"])
+
+
+def _norm(luminance: np.ndarray) -> LogNorm:
+    """Return the scale of a slice: up to its peak, or as many decades as can be told apart above what is dim."""
+    lit = luminance[luminance > 0]
+    if not len(lit):
+        return LogNorm(0.1, 1, clip=True)
+    low = max(np.quantile(lit, 0.1), np.median(lit) / 30)
+    return LogNorm(low, np.clip(lit.max(), 10 * low, 10**DECADES * low), clip=True)
 
 
 def _draw_lobes(ax: Axes, it: _Table) -> None:
-    curves = [LabelledCurve(incidence(round(t, 2)), t, _curve(it, t), look(k)) for k, t in enumerate(it.angles)]
+    curves = [LabelledCurve(incidence(float(f"{t:.3g}")), t, _curve(it, t), look(k)) for k, t in enumerate(it.angles)]
     calm(ax)
     draw_cartesian(ax, curves, True, False, it.quantity)
     for line, nodes in zip(curves, _nodes(it), strict=True):
@@ -204,7 +216,7 @@ def _draw_albedo(ax: Axes, it: _Table) -> None:
     _legend(ax, handles, [handle.get_label() for handle in handles])
 
 
-def _legend(ax: Axes, handles: list[Line2D], labels: list[str]) -> None:
+def _legend(ax: Axes, handles: list, labels: list[str]) -> None:
     """Add a legend below a panel."""
     columns = 2 if len(labels) in (2, 4) else 3
     ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, frameon=False,
