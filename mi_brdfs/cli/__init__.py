@@ -1,10 +1,10 @@
-"""The command line ``mi-brdfs``: list, info, presets, doctor, show, render, gallery, plot, check, energy, bench.
+"""The command line ``mi-brdfs``.
 
-One file each. Results go to stdout, errors and progress to stderr. Exit status: 0 success, 1 error, 2 wrong usage, 3 if
-``check`` could judge nothing, 130 after Ctrl-C.
+A file for each command. Results go to stdout, errors and progress to stderr. Exit status: 0 success, 1 error, 2 wrong
+usage, 3 if ``check`` could judge nothing, 130 after Ctrl-C.
 """
 
-from . import list, info, presets, doctor, show, render, gallery, plot, check, energy, bench  # noqa: F401, I001 -- in the order of --help
+from . import list, info, presets, measured, doctor, show, render, gallery, plot, check, energy, bench  # noqa: F401, I001 -- in the order of --help
 from .app import app, main
 
 __all__ = ["app", "main"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -89,13 +90,24 @@ class Grid:
     def anisotropic(self) -> bool:
         return self.coordinates.anisotropic
 
-    def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return ``(wi, wo, f)`` of all nodes, also of those below the horizon: shapes (N, 3), (N, 3) and
-        (N, channels)."""
-        places = np.meshgrid(*(axis.nodes for axis in self.axes), indexing="ij")
-        wi, wo = self.coordinates.directions(*(place.ravel() for place in places))
+    def pairs(self, chosen: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return ``(wi, wo, f)`` of all nodes, also of those below the horizon, or of some by their indices into the
+        flat array: shapes (N, 3), (N, 3) and (N, channels)."""
+        shape = self.values.shape[:-1]
+        indices = np.unravel_index(np.arange(math.prod(shape))[chosen], shape)
+        places = (axis.nodes[index] for axis, index in zip(self.axes, indices, strict=True))
+        wi, wo = self.coordinates.directions(*places)
         _, scale = self.coordinates.locate_scaled(wi, wo, NUMPY)
-        return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * self.values.reshape(-1, self.values.shape[-1])
+        values = self.values.reshape(-1, self.values.shape[-1])[chosen]
+        return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * values
+
+    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        """Return whether directions of shape (N, 3) are above the horizon, on all axes in the range that was measured,
+        and nearest to a node with values in all channels: shape (N,)."""
+        places, _ = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
+        nearest = tuple(axis.steps(place, "nearest")[0][0] for axis, place in zip(self.axes, places, strict=True))
+        inside = np.all([axis.measured(place) for axis, place in zip(self.axes, places, strict=True)], axis=0)
+        return inside & (wi[:, 2] > 0) & (wo[:, 2] > 0) & np.isfinite(self.values[nearest]).all(axis=-1)
 
     @property
     def usable(self) -> np.ndarray:

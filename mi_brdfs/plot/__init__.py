@@ -12,7 +12,8 @@ except ImportError:
     raise ImportError("plots need Matplotlib: pip install 'mi_brdfs[plot]'") from None
 
 from .maps import albedo, hemisphere
+from .measured import measured
 from .planar import cartesian, polar
 from .sphere import sphere
 
-__all__ = ["albedo", "cartesian", "hemisphere", "polar", "sphere"]
+__all__ = ["albedo", "cartesian", "hemisphere", "measured", "polar", "sphere"]

@@ -100,11 +100,11 @@ def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float, chan
     for start, end in pieces:
         inside = seeds[(seeds > start) & (seeds < end)]
         theta = np.unique(np.concatenate([np.linspace(start, end, 2 * round(end - start) + 1), inside]))
-        curves.append(_refined(lambda angles: value(probe, wi, in_plane(angles, azimuth), channel), theta))
+        curves.append(refined(lambda angles: value(probe, wi, in_plane(angles, azimuth), channel), theta))
     return Curve(*(np.concatenate(column) for column in zip(*curves, strict=True)))
 
 
-def _refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
+def refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
     """Return a curve through points at these angles, and between them wherever it departs from the chord."""
     points, values = [theta], [evaluate(theta)]
     left, right = (theta[:-1], values[0][:-1]), (theta[1:], values[0][1:])

@@ -40,6 +40,8 @@ DOTTED = 0, (1, 2)
 WI = {"marker": "v", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
 MIRROR = {"marker": "v", "markersize": 6}
 ABOVE = 0.11
+DARK = 0.2
+"""The albedo from which on the scale of albedos reaches 1."""
 
 
 def hemisphere(
@@ -99,21 +101,27 @@ def albedo(
     found = named(bsdfs, labels)
     figure = new_figure(6, 3.8)
     ax = figure.subplots()
-    ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
     handles = []
     for k, it in enumerate(found):
         for channel, name in channels_of(rgb):
             label = f"{it.label}, {name}" if name else it.label
             curve = lobes.albedo(it.probe, azimuth, channel)
             handles += ax.plot(*curve, label=label, **look(k, CHANNELS.get(name)))
+    frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
+    add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
+    return figure
+
+
+def frame_albedo(ax: Axes, text: str) -> None:
+    """Set the axes of albedo curves that are drawn, with a line at 1 unless they are far below."""
+    top = largest(curve.get_ydata() for curve in ax.get_lines())
+    ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
     calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])
-    ax.set_ylim(0, 1.05 * max(1, largest(handle.get_ydata() for handle in handles)))
+    ax.set_ylim(0, 1.05 * (top if top < DARK else max(1, top)))
     ax.set_xlabel(r"$\theta_i$", fontsize=TEXT)
-    ax.set_ylabel(quantity("directional albedo", unit="", rgb=rgb), fontsize=TEXT)
-    add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
-    return figure
+    ax.set_ylabel(text, fontsize=TEXT)
 
 
 def _draw_disc(ax: Axes, picture: np.ndarray, norm: LogNorm, theta_i: float, above: bool) -> None:

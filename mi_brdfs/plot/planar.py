@@ -85,7 +85,7 @@ def cartesian(
     """Draw the luminance of f cosθ_o in the plane of incidence over the signed angle θ_o, negative on the side of wi;
     transmission lies beyond ±90°. Triangles at the top are the mirror directions. Everything else is as in
     :func:`polar`."""
-    return _planar(_draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels, normalize, rgb)
+    return _planar(draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels, normalize, rgb)
 
 
 class LabelledCurve(NamedTuple):
@@ -199,7 +199,8 @@ def _at(theta: Any, radius: Any) -> tuple[np.ndarray, np.ndarray]:
     return radius * np.sin(np.radians(theta)), radius * np.cos(np.radians(theta))
 
 
-def _draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str) -> None:
+def draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str) -> None:
+    """Draw curves over the signed angle, with ``text`` for what they show."""
     end = 180 if whole else 90
     if log:
         low, high = _range(lines)

@@ -1,0 +1,86 @@
+"""``mi-brdfs measured``"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from .app import command
+from .errors import one_line
+from .interrupts import interruptible
+from .options import check_output, write_json
+from .terminal import Exit, err, fail, out, print_table
+
+if TYPE_CHECKING:
+    from ..measured import Measurement
+
+
+@command()
+def measured(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
+    plot_file: Annotated[
+        Path | None,
+        typer.Option("--plot", metavar="FILE", help="Also draw slices, lobes and albedos: .png, .svg, .pdf or .jpg."),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
+    ] = None,
+) -> None:
+    """Tell what files with measured BRDFs hold: grid, range and symmetry, how much is negative or missing, errors of
+    reciprocity, albedos."""
+    from ..measured import read  # imports numpy
+    from ..measured.summary import summarize
+
+    if plot_file is not None:
+        _check_picture(plot_file)
+    check_output("--json", json_file)
+    drawn, findings, failed = [], [], 0
+    with interruptible():
+        for file in files:
+            try:
+                measurement = read(file)
+                summary = summarize(measurement)
+            except ValueError as error:
+                err.print(f"mi-brdfs: {one_line(error)}")
+                failed += 1
+                continue
+            if len(files) > 1:
+                out.print(summary.file, style="bold")
+            table = Table(box=None, pad_edge=False, show_header=False)
+            for row in summary.rows():
+                table.add_row(*row)
+            print_table(table)
+            if len(files) > 1:
+                out.print()
+            findings.append(summary.to_dict())
+            drawn += [measurement] if plot_file is not None else []
+        write_json(json_file, findings)
+        if plot_file is not None and drawn:
+            _draw(drawn, plot_file)
+    if failed:
+        raise typer.Exit(Exit.ERROR)
+
+
+def _check_picture(file: Path) -> None:
+    """Fail if no picture can be drawn, or not into this file: before the work."""
+    try:
+        from ..plot.command import PICTURES
+    except ImportError as error:
+        fail(str(error))
+    if file.suffix.lower() not in PICTURES:
+        fail(f"--plot {file}: write a {', '.join(PICTURES[:-1])} or {PICTURES[-1]}", Exit.USAGE)
+    check_output("--plot", file)
+
+
+def _draw(measurements: list[Measurement], file: Path) -> None:
+    from .. import plot
+    from ..plot.command import write
+
+    try:
+        write(plot.measured(*measurements), file)
+    except OSError as error:
+        fail(f"cannot write {file}: {error.strerror}")
+    out.print(str(file))

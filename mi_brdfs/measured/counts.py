@@ -1,0 +1,94 @@
+"""How many values a measurement has, of what kind, and at which angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass
+
+import numpy as np
+
+from .arrays import components
+from .coordinates import polar_angle
+from .measurement import Grid, Samples
+
+AT_ONCE = 1 << 18
+"""The most pairs of directions in memory together."""
+HORIZON = 1e-6
+"""The cosine up to which a direction is in the horizon."""
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many values there are, one for each pair of directions and channel, and how many of a kind."""
+
+    values: int = 0
+    negative: int = 0
+    missing: int = 0
+    """Not a number, or infinite."""
+    zero: int = 0
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> Counts:
+        finite = np.isfinite(values)
+        return cls(values.size, int((finite & (values < 0)).sum()), int((~finite).sum()), int((values == 0).sum()))
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+
+@dataclass(frozen=True)
+class Census:
+    """What :func:`census` counts."""
+
+    above: Counts = Counts()
+    """Pairs of directions that are both above the horizon."""
+    below: Counts = Counts()
+    """The others, also those in the horizon: grids have nodes there, where files hold anything."""
+    least: float = math.inf
+    most: float = -math.inf
+    """The least and the largest finite value above the horizon."""
+    theta_i: Range = (math.inf, -math.inf)
+    theta_o: Range = (math.inf, -math.inf)
+    """The least and the largest angle to the normal, in degrees, of finite values above the horizon."""
+
+    def __add__(self, other: Census) -> Census:
+        return Census(
+            self.above + other.above,
+            self.below + other.below,
+            min(self.least, other.least),
+            max(self.most, other.most),
+            _joined(self.theta_i, other.theta_i),
+            _joined(self.theta_o, other.theta_o),
+        )
+
+
+def census(data: Grid | Samples) -> Census:
+    """Count the values of a measurement."""
+    total = Census()
+    for wi, wo, values in batches(data):
+        # A node in the horizon is a rounding error above or below it.
+        above = (wi[:, 2] > HORIZON) & (wo[:, 2] > HORIZON)
+        finite = above & np.isfinite(values).any(axis=1)
+        part = Census(Counts.of(values[above]), Counts.of(values[~above]))
+        if finite.any():
+            numbers = values[above][np.isfinite(values[above])]
+            angles = [np.degrees(polar_angle(components(w[finite]))) for w in (wi, wo)]
+            (i, o) = ((float(angle.min()), float(angle.max())) for angle in angles)
+            part = Census(part.above, part.below, float(numbers.min()), float(numbers.max()), i, o)
+        total += part
+    return total
+
+
+def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    if isinstance(data, Samples):
+        yield data.pairs()
+        return
+    count = math.prod(data.values.shape[:-1])
+    for start in range(0, count, AT_ONCE):
+        yield data.pairs(slice(start, start + AT_ONCE))
+
+
+def _joined(one: Range, other: Range) -> Range:
+    return min(one[0], other[0]), max(one[1], other[1])

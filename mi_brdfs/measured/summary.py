@@ -1,0 +1,262 @@
+"""What a measured file is, and what its values say of themselves: ``mi-brdfs measured FILE``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .albedo import albedos
+from .counts import Counts, Range, census
+from .measurement import FileError, Grid, Measurement, Samples
+from .reciprocity import ReciprocityError, reciprocity_error
+from .scattered import gridded
+
+ANGLES = np.arange(0, 86, 5)
+"""The angles of incidence at which albedos are integrated, in degrees, where they were measured."""
+AZIMUTHS = 8
+"""The most azimuths of incidence at which those of anisotropic materials are."""
+AXES = {
+    "sqrt_theta_h": "θh", "theta_d": "θd", "phi_d": "φd", "phi_h": "φh",
+    "theta_i": "θi", "theta_o": "θo", "delta_phi": "Δφ", "phi_i": "φi",
+    "azimuth": "azimuths", "radial": "radial angles",
+}  # fmt: skip
+"""The axes of tables in words."""
+FEW = 6
+"""The most stated albedos that are told one by one."""
+
+
+@dataclass(frozen=True)
+class Albedo:
+    """A directional albedo, the angles of incidence in degrees, and the channel in words."""
+
+    value: float
+    theta_i: float
+    phi_i: float
+    channel: str
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """A directional albedo that the file states as total integrated scatter, the angles of incidence in degrees, and
+    the mean over the channels of the integral over its values, with nothing beyond them."""
+
+    stated: float
+    integrated: float
+    theta_i: float
+    phi_i: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What :func:`summarize` finds; angles are in degrees."""
+
+    file: str
+    format: str
+    material: str
+    symmetry: str
+    """"isotropic", "isotropic and symmetric to the plane of incidence" or "anisotropic"."""
+    quantity: str
+    """"f" or "f cos": what the file holds."""
+    grid: str
+    """The nodes of each axis, in words."""
+    wavelengths: str
+    theta_i: Range
+    theta_o: Range
+    """From the least to the largest angle at which anything was measured."""
+    coverage: Range
+    """The least and the largest share of the hemisphere of wo, by solid angle, that was measured at one wi."""
+    above: Counts
+    """Of pairs of directions above the horizon."""
+    below: Counts
+    """Of the others: grids have nodes there, where files hold anything."""
+    most_negative: float
+    """Above the horizon, as a part of the largest value."""
+    reciprocal: bool
+    """Whether the coordinates of the table are the same for (wi, wo) and (wo, wi)."""
+    reciprocity: ReciprocityError | None
+    """None if reciprocal, or if no pair was measured both ways."""
+    largest_albedo: Albedo | None
+    """None if no angle of incidence up to 85° was measured."""
+    scatter: list[Scatter]
+    notes: dict[str, str] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as what JSON can hold."""
+        return asdict(self)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return what each finding is called, and what it is, in words."""
+        above = self.above
+        lowest = f", down to {_percent(self.most_negative)} of the largest" if above.negative else ""
+        rows = [
+            ("format", self.format),
+            ("material", self.material or "not named"),
+            ("symmetry", self.symmetry),
+            ("quantity", {"f": "f", "f cos": "f cosθo, here divided by the cosine"}[self.quantity]),
+            ("wavelengths", self.wavelengths),
+            ("values", f"{above.values + self.below.values:,}, of {self.grid}"),
+            ("measured", self._range()),
+            ("negative", _share(above.negative, above.values) + lowest),
+            ("missing", _share(above.missing, above.values)),
+            ("zero", _share(above.zero, above.values)),
+        ]
+        if self.below.values:
+            kinds = {"negative": self.below.negative, "missing": self.below.missing, "zero": self.below.zero}
+            told = ", ".join(f"{count:,} {kind}" for kind, count in kinds.items() if count)
+            rows.append(("below horizon", f"{self.below.values:,}" + (f", of which {told}" if told else "")))
+        rows.append(("reciprocity", self._reciprocity()))
+        if self.largest_albedo is not None:
+            it = self.largest_albedo
+            rows.append(("largest albedo", f"{it.value:.3g} at {self._place(it)}" + (it.channel and f", {it.channel}")))
+        return rows + [("stated albedo", line) for line in self._scatter()]
+
+    def _range(self) -> str:
+        low, high = (f"{100 * share:.0f}" for share in self.coverage)
+        ends = [f"{name} {start:.4g} to {end:.4g}°" for name, (start, end) in
+                (("θi", self.theta_i), ("θo", self.theta_o))]  # fmt: skip
+        if low == high == "100":
+            return f"all directions, {ends[0]}" if self.theta_i != (0, 90) else "all directions"
+        return f"{', '.join(ends)}; {low if low == high else f'{low} to {high}'} % of the hemisphere at each θi"
+
+    def _reciprocity(self) -> str:
+        if self.reciprocal:
+            return "exact, by the coordinates of the table"
+        if self.reciprocity is None:
+            return "unknown: no pair of directions was measured both ways"
+        it = self.reciprocity
+        return f"off by {_percent(it.median)} in the median, {_percent(it.percentile95)} at the 95th percentile"
+
+    def _place(self, it: Albedo | Scatter) -> str:
+        return f"θi = {it.theta_i:g}°" + (f", φi = {it.phi_i:g}°" if self.symmetry == "anisotropic" else "")
+
+    def _scatter(self) -> list[str]:
+        if len(self.scatter) <= FEW:
+            return [f"{it.stated:.4g} at {self._place(it)}; the values give {it.integrated:.4g}" for it in self.scatter]
+        off = np.array([abs(it.integrated - it.stated) / max(it.stated, 1e-6) for it in self.scatter])
+        worst = self.scatter[int(off.argmax())]
+        return [
+            f"{len(off)} figures; the values differ by {_percent(np.median(off))} in the median, most at "
+            f"{self._place(worst)}: {worst.stated:.4g} is stated, the values give {worst.integrated:.4g}"
+        ]
+
+
+def summarize(measurement: Measurement) -> Summary:
+    """Return what a measurement is and holds: its grid, its symmetry, what of it is negative or missing, how far it is
+    from reciprocal, and how much light it reflects.
+
+    Raises:
+        FileError: if no value is a number.
+    """
+    data, found = measurement.data, census(measurement.data)
+    if found.least > found.most:
+        raise FileError(f"{measurement.path}: no value above the horizon is a number.")
+    grid = gridded(data)
+    theta_i, theta_o = (ends(grid, name, seen) for name, seen in
+                        (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
+    angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
+    turns = azimuths(grid)
+    turns = turns[:: -(-len(turns) // AZIMUTHS)]
+    by_azimuth = {phi: albedos(grid, np.radians(angles), phi, extrapolate="zero") for phi in turns}
+    covered = np.concatenate([shares for _, shares in by_azimuth.values()])
+    return Summary(
+        file=str(measurement.path),
+        format=measurement.format,
+        material=measurement.material,
+        symmetry=_symmetry(data),
+        quantity=measurement.quantity,
+        grid=_grid(data),
+        wavelengths=_wavelengths(measurement),
+        theta_i=theta_i,
+        theta_o=theta_o,
+        coverage=(float(covered.min()), float(covered.max())),
+        above=found.above,
+        below=found.below,
+        most_negative=min(found.least, 0) / found.most if found.most > 0 else 0,
+        reciprocal=grid.coordinates.reciprocal,
+        reciprocity=reciprocity_error(grid),
+        largest_albedo=_largest(angles, by_azimuth, measurement),
+        scatter=_stated(measurement, grid),
+        notes=dict(measurement.notes),
+    )
+
+
+def channel_names(measurement: Measurement) -> list[str]:
+    """Return what each channel is."""
+    if measurement.wavelengths is not None and np.isfinite(measurement.wavelengths).all():
+        return [f"{wavelength:g} nm" for wavelength in measurement.wavelengths]
+    count = measurement.data.values.shape[-1]
+    return ["red", "green", "blue"] if count == 3 else [""] if count == 1 else [f"channel {k}" for k in range(count)]
+
+
+def _symmetry(data: Grid | Samples) -> str:
+    if data.anisotropic:
+        return "anisotropic"
+    mirrored = isinstance(data, Grid) and data.coordinates.mirrored
+    return "isotropic and symmetric to the plane of incidence" if mirrored else "isotropic"
+
+
+def _grid(data: Grid | Samples) -> str:
+    channels = data.values.shape[-1]
+    of = f" × {channels} channels" if channels > 1 else ""
+    if isinstance(data, Samples):
+        return f"{len(data.values):,} pairs of directions{of}"
+    named = zip(data.axes, data.coordinates.names, strict=True)
+    return " × ".join(f"{len(axis.nodes)} {AXES.get(name, name.replace('_', ' '))}" for axis, name in named) + of
+
+
+def _wavelengths(measurement: Measurement) -> str:
+    nm = measurement.wavelengths
+    if nm is None:
+        return "linear sRGB"
+    if np.isnan(nm).any():
+        return f"{len(nm)}, not stated"
+    return f"{nm[0]:g} nm" if len(nm) == 1 else f"{len(nm)} from {min(nm):g} to {max(nm):g} nm"
+
+
+def ends(grid: Grid, name: str, seen: Range = (0, 90)) -> Range:
+    """Return the measured range of an angle, in degrees: the ends of its axis if it has one, all of it in half and
+    difference angles, which no direction escapes, and else what values were seen at."""
+    if name in grid.coordinates.names:
+        axis = grid.axes[grid.coordinates.names.index(name)]
+        return round(float(np.degrees(axis.low)), 4), round(float(np.degrees(axis.high)), 4)
+    return (0, 90) if "theta_d" in grid.coordinates.names else seen
+
+
+def azimuths(grid: Grid) -> np.ndarray:
+    """Return the azimuths of incidence at which an anisotropic material was measured, in radians; 0 for an isotropic
+    one."""
+    if not grid.anisotropic:
+        return np.zeros(1)
+    if "phi_i" in grid.coordinates.names:
+        return grid.axes[grid.coordinates.names.index("phi_i")].nodes
+    return np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS)
+
+
+def _largest(
+    angles: np.ndarray, by_azimuth: dict[float, tuple[np.ndarray, np.ndarray]], measurement: Measurement
+) -> Albedo | None:
+    values = np.stack([found for found, _ in by_azimuth.values()])  # azimuth, angle, channel
+    azimuth, angle, channel = np.unravel_index(values.argmax(), values.shape)
+    phi = float(np.degrees(list(by_azimuth)[azimuth]))
+    return Albedo(float(values.max()), float(angles[angle]), phi, channel_names(measurement)[channel])
+
+
+def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
+    turns, found = azimuths(grid), []
+    for theta, stated in measurement.stated_albedos.items():
+        for phi, one in zip(turns, stated, strict=False):
+            (integrated,), _ = albedos(grid, np.array([theta]), phi, extrapolate="zero")
+            found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
+    return found
+
+
+def _share(count: int, of: int) -> str:
+    if not count:
+        return "none"
+    return f"{count:,} ({_percent(count / of)})"
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.0f} %" if abs(part) >= 0.1 else f"{100 * part:.2g} %"

@@ -1,0 +1,223 @@
+"""Figures of measured files: Matplotlib."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+
+from ..measured import Measurement, read
+from ..measured.albedo import albedos
+from ..measured.arrays import stacked
+from ..measured.colour import LUMINANCE
+from ..measured.coordinates import HalfDifference, spherical
+from ..measured.counts import batches
+from ..measured.measurement import usable
+from ..measured.observer import to_srgb
+from ..measured.scattered import gridded
+from ..measured.summary import azimuths, ends
+from .lobes import Curve, refined
+from .maps import frame_albedo
+from .planar import MIRROR, LabelledCurve, draw_cartesian
+from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title
+
+PIXELS = 256
+DECADES = 4
+"""The most decades of brightness that a slice shows."""
+ANGLES = 10, 40, 70
+"""The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
+LOBES = 4
+NEAR = 0.5
+"""How far from the plane of incidence, and in θi from the curve, nodes are drawn, in degrees."""
+NODE = {"linestyle": "", "marker": "o", "markersize": 3, "fillstyle": "none", "markeredgewidth": 0.8}
+STATED = {"linestyle": "", "marker": "o", "markersize": 4, "color": INK}
+
+
+def measured(*files: str | os.PathLike | Measurement) -> Figure:
+    """Draw what measured files hold, a row of three panels for each.
+
+    * The slice φd = 90° of half and difference angles: highlights are on the left, grazing incidence at the top, and
+      retro-reflection at the bottom. Hues are those of the material, brightness is the logarithm of the luminance.
+      Nothing was measured where the ground is hatched.
+    * f in the plane of incidence, over the signed angle θo, negative on the side of wi: curves as the table
+      interpolates, and points where it has nodes.
+    * The directional albedo over θi, of what was measured, and points where the file states it.
+
+    Anisotropic materials are lit from the first azimuth of their table.
+
+    Args:
+        files: paths, or what :func:`mi_brdfs.measured.read` returned.
+
+    Raises:
+        FileError: if one cannot be read.
+        ValueError: if there are none.
+    """
+    if not files:
+        raise ValueError("there is no measured file to draw")
+    found = [file if isinstance(file, Measurement) else read(file) for file in files]
+    figure = new_figure(11, 3.9 * len(found) + 0.2)
+    for measurement, row in zip(found, figure.subplots(len(found), 3, squeeze=False), strict=True):
+        it = _Table(measurement)
+        _draw_slice(row[0], it)
+        _draw_lobes(row[1], it)
+        _draw_albedo(row[2], it)
+        if len(found) > 1:
+            row[0].set_title(it.name, loc="left", fontsize=TEXT + 1, color=INK)
+    if len(found) == 1:
+        set_title(figure, it.name)
+    return figure
+
+
+class _Table:
+    """A measurement as a table with a luminance."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        self.measurement, self.grid = measurement, gridded(measurement.data)
+        path, material = measurement.path, measurement.material
+        self.name = path.name if material in ("", path.stem) else f"{material} ({path.name})"
+        self.phi = float(azimuths(self.grid)[0])
+        self.coloured = self.grid.values.shape[-1] > 1
+        self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")
+
+    def colour(self, f: np.ndarray) -> np.ndarray:
+        """Return values as linear sRGB, limited to its gamut, or as they are if they have one channel."""
+        wavelengths = self.measurement.wavelengths
+        spectral = wavelengths is not None and len(wavelengths) > 1
+        return np.maximum(f @ to_srgb(wavelengths) if spectral else f, 0)
+
+    def luminance(self, f: np.ndarray) -> np.ndarray:
+        colour = self.colour(f)
+        return colour @ LUMINANCE if colour.shape[-1] == 3 else colour.mean(axis=-1)
+
+    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        return self.grid.measured(wi.reshape(-1, 3), wo.reshape(-1, 3)).reshape(wo.shape[:-1])
+
+    @property
+    def angles(self) -> np.ndarray:
+        """The angles of incidence of lobes, in degrees."""
+        names = self.grid.coordinates.names
+        if "theta_i" not in names:
+            return np.array(ANGLES)
+        nodes = np.degrees(self.grid.axes[names.index("theta_i")].nodes)
+        nodes = nodes[nodes < 85]
+        return nodes[np.unique(np.linspace(0, len(nodes) - 1, LOBES).round().astype(int))]
+
+
+def _draw_slice(ax: Axes, it: _Table) -> None:
+    middles = (np.arange(PIXELS) + 0.5) / PIXELS
+    theta_h, theta_d = np.meshgrid(middles, middles)
+    pair = HalfDifference().directions(np.sqrt(theta_h), theta_d * np.pi / 2, np.full_like(theta_h, np.pi / 2))
+    wi, wo = map(stacked, pair)
+    f, seen = it.grid.evaluate(wi, wo), it.measured(wi, wo)
+    luminance, colour = it.luminance(f), it.colour(f)
+    norm = _norm(luminance[seen])
+    brightness = norm(np.maximum(luminance, norm.vmin)).filled(0)
+    if colour.shape[-1] == 3:
+        # Of a grey, the display's value is the brightness, as in the bar.
+        hue = colour / np.maximum(colour.max(axis=-1, keepdims=True), 1e-30)
+        shown, palette = brightness[..., None] * hue ** (1 / 2.2), "gray"
+    else:
+        shown, palette = colormaps["viridis"](brightness)[..., :3], "viridis"
+    patch = Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1)
+    ax.add_patch(patch)
+    ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
+    bar = ax.figure.colorbar(ScalarMappable(norm, palette), ax=ax, shrink=0.75, aspect=25, pad=0.02, extend="both")
+    bar.set_label(it.quantity, fontsize=TEXT, color=INK)
+    bar.ax.tick_params(labelsize=SMALL, labelcolor=INK)
+    bar.outline.set_visible(False)
+    calm(ax)
+    ax.grid(False)
+    turns = range(0, 91, 30)
+    ax.set_xticks(turns, [f"{turn}°" for turn in turns])
+    ax.set_yticks(turns, [f"{turn}°" for turn in turns])
+    ax.set_xlabel(r"$\theta_h$", fontsize=TEXT, color=INK)
+    ax.set_ylabel(r"$\theta_d$", fontsize=TEXT, color=INK)
+    if not seen.all():
+        _legend(ax, [patch], ["not measured"])
+
+
+def _norm(luminance: np.ndarray) -> LogNorm:
+    """Return the scale of a slice: up to its peak, or as many decades as can be told apart above what is dim."""
+    lit = luminance[luminance > 0]
+    if not len(lit):
+        return LogNorm(0.1, 1, clip=True)
+    low = max(np.quantile(lit, 0.1), np.median(lit) / 30)
+    return LogNorm(low, np.clip(lit.max(), 10 * low, 10**DECADES * low), clip=True)
+
+
+def _draw_lobes(ax: Axes, it: _Table) -> None:
+    curves = [LabelledCurve(incidence(float(f"{t:.3g}")), t, _curve(it, t), look(k)) for k, t in enumerate(it.angles)]
+    calm(ax)
+    draw_cartesian(ax, curves, True, False, it.quantity)
+    for line, nodes in zip(curves, _nodes(it), strict=True):
+        ax.plot(*nodes, color=line.look["color"], **NODE)
+    marks = [Line2D([], [], linestyle="", color=FAINT, **MIRROR), Line2D([], [], color=FAINT, **NODE)]
+    _legend(ax, [*ax.get_lines()[1 : 2 * len(curves) : 2], *marks], [*(c.label for c in curves), "mirror", "nodes"])
+
+
+def _curve(it: _Table, theta_i: float) -> Curve:
+    """Return the luminance of f in the plane of incidence, and NaN where nothing was measured."""
+    wi = stacked(spherical(np.radians(theta_i), it.phi))
+
+    def pairs(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        wo = stacked(spherical(np.radians(-theta), it.phi))
+        return np.broadcast_to(wi, wo.shape), wo
+
+    near = np.geomspace(0.01, 20, 40)
+    theta = np.concatenate(
+        [np.linspace(-90, 90, 361), *(end + near * side for end in (-theta_i, theta_i) for side in (-1, 1))]
+    )
+    curve = refined(lambda t: it.luminance(it.grid.evaluate(*pairs(t))), np.unique(theta[abs(theta) < 90]))
+    return curve._replace(value=np.where(it.measured(*pairs(curve.theta)), curve.value, np.nan))
+
+
+def _nodes(it: _Table) -> list[Curve]:
+    """Return what the table has near the plane of incidence, for each angle of incidence."""
+    found: list[list[np.ndarray]] = [[] for _ in it.angles]
+    for wi, wo, f in batches(it.measurement.data):
+        sin = np.hypot(wi[:, 0], wi[:, 1])
+        x, y = np.where(sin > 1e-6, wi[:, :2].T / np.maximum(sin, 1e-6), [[np.cos(it.phi)], [np.sin(it.phi)]])
+        along, across = wo[:, 0] * x + wo[:, 1] * y, wo[:, 1] * x - wo[:, 0] * y
+        theta_i, theta_o = np.degrees(np.arctan2(sin, wi[:, 2])), np.degrees(np.arctan2(-along, wo[:, 2]))
+        # Far from the mirror direction, values change more slowly.
+        near = abs(across) < np.radians(NEAR + 0.05 * abs(theta_o - theta_i))
+        near &= (wi[:, 2] > 0) & (wo[:, 2] > 0)
+        if it.grid.anisotropic:
+            near &= x * np.cos(it.phi) + y * np.sin(it.phi) > np.cos(np.radians(NEAR))
+        for k, wanted in enumerate(it.angles):
+            mine = near & (abs(theta_i - wanted) < NEAR)
+            # By as much as the mirror direction: a highlight stays in place.
+            shifted = theta_o[mine] + wanted - theta_i[mine]
+            found[k].append(np.stack([shifted, it.luminance(usable(f[mine]))]))
+    return [Curve(*np.concatenate(parts, axis=1)) for parts in found]
+
+
+def _draw_albedo(ax: Axes, it: _Table) -> None:
+    low, high = ends(it.grid, "theta_i")
+    angles = np.unique(np.append(np.arange(0, 90), [low, min(high, 89)]))
+    angles = angles[(angles >= low) & (angles <= high)]
+    values, _ = albedos(it.grid, np.radians(angles), it.phi, extrapolate="zero")
+    colour = it.colour(values)
+    names = list(CHANNELS) if colour.shape[-1] == 3 else [""]
+    handles = []
+    for channel, name in enumerate(names):
+        handles += ax.plot(angles, colour[:, channel], label=name or "integrated", **look(channel, CHANNELS.get(name)))
+    stated = {theta: albedo[0] for theta, albedo in it.measurement.stated_albedos.items()}
+    if stated:
+        handles += ax.plot(np.degrees(list(stated)), list(stated.values()), label="stated", **STATED)
+    frame_albedo(ax, "directional albedo")
+    _legend(ax, handles, [handle.get_label() for handle in handles])
+
+
+def _legend(ax: Axes, handles: list, labels: list[str]) -> None:
+    """Add a legend below a panel."""
+    columns = 2 if len(labels) in (2, 4) else 3
+    ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, frameon=False,
+              fontsize=SMALL, labelcolor=INK)  # fmt: skip
