@@ -7,15 +7,9 @@ from types import ModuleType
 
 from ..files import checked
 from ..measurement import FileError, Measurement
-<<<<<<< HEAD
-from . import mbsdf, merl, rgl, utia
+from . import lighttools, mbsdf, merl, rgl, utia, zemax
 
-FORMATS: list[ModuleType] = [mbsdf, merl, rgl, utia]
-=======
-from . import lighttools, merl, rgl, zemax
-
-FORMATS: list[ModuleType] = [merl, rgl, zemax, lighttools]
->>>>>>> text
+FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, utia]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it."""
 
