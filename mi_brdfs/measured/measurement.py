@@ -80,6 +80,8 @@ class Grid:
     values: np.ndarray
     signed: bool = False
     """Whether negative channels are colours outside sRGB, and not errors."""
+    is_closed: bool = False
+    """Whether this is the ``closed`` one."""
 
     def __post_init__(self) -> None:
         shape = tuple(len(axis.nodes) for axis in self.axes)
@@ -109,7 +111,7 @@ class Grid:
         inside = np.all([axis.measured(place) for axis, place in zip(self.axes, places, strict=True)], axis=0)
         return inside & (wi[:, 2] > 0) & (wo[:, 2] > 0) & np.isfinite(self.values[nearest]).all(axis=-1)
 
-    @property
+    @cached_property
     def usable(self) -> np.ndarray:
         """The values with 0 in place of those that mean nothing."""
         return np.where(np.isfinite(self.values), self.values, 0) if self.signed else usable(self.values)
@@ -117,13 +119,12 @@ class Grid:
     @cached_property
     def closed(self) -> Grid:
         """The grid to interpolate in. A missing value next to measured ones is their mean, or f would sink towards it.
-        Values at poles do not depend on the azimuth: they are the mean over it of the nodes at the pole, or of the
-        innermost ones if cells begin there."""
+        Values at poles do not depend on the azimuth: they are the mean over it of the innermost nodes."""
+        if self.is_closed:
+            return self
         axes, values = list(self.axes), self._filled()
         for polar, azimuth in self.coordinates.poles:
             axis = axes[polar]
-            if axis.low > 0:
-                continue
             innermost = np.take(values, [0], axis=polar)
             count = np.isfinite(innermost).sum(axis=azimuth, keepdims=True)
             mean = np.nansum(innermost, axis=azimuth, keepdims=True, dtype=np.float64) / np.maximum(count, 1)
@@ -132,7 +133,7 @@ class Grid:
             rest = np.delete(values, 0, axis=polar) if at_pole else values
             values = np.concatenate([mean.astype(values.dtype), rest], axis=polar)
             axes[polar] = axis if at_pole else replace(axis, nodes=np.append(0, axis.nodes))
-        return replace(self, axes=tuple(axes), values=values)
+        return replace(self, axes=tuple(axes), values=values, is_closed=True)
 
     def _filled(self) -> np.ndarray:
         """Return the values, with the mean of the measured neighbours along an axis in place of missing ones: one axis
@@ -161,19 +162,22 @@ class Grid:
         interpolation: Interpolation = "trilinear",
         extrapolate: Extrapolation = "hold",
     ) -> np.ndarray:
-        """Return f, with values that mean nothing as 0, for directions of shape (…, 3): shape (…, channels)."""
+        """Return f, with values that mean nothing as 0, for directions of shape (…, 3), or (3,) for one wi and many wo:
+        shape (…, channels)."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
         grid = self if interpolation == "nearest" else self.closed
-        values = grid.usable.reshape(-1, self.values.shape[-1])
-        inside = np.ones((), dtype=bool)
+        values, inside = grid.usable, np.ones((), dtype=bool)
         corners: list[tuple[Any, Any]] = [(0, 1.0)]
+        kept = 0
         for axis, place in zip(grid.axes, places, strict=True):
             inside = inside & axis.measured(place)
-            corners = [
-                (index * len(axis.nodes) + k, weight * share)
-                for index, weight in corners
-                for k, share in axis.steps(place, interpolation)
-            ]
+            steps = axis.steps(place, interpolation)
+            if np.ndim(place) == 0:  # the same for all: one interpolation of the whole grid
+                values = sum(share * values.take(k, axis=kept) for k, share in steps)
+                continue
+            kept += 1
+            corners = [(index * len(axis.nodes) + k, weight * share) for index, weight in corners for k, share in steps]
+        values = values.reshape(-1, values.shape[-1])
         result = sum(np.asarray(weight)[..., None] * values.take(index, axis=0) for index, weight in corners)
         if extrapolate == "zero":
             result = np.where(inside[..., None], result, 0)

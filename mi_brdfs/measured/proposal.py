@@ -16,7 +16,8 @@ COSINE_SHARE = 0.02
 NODES_I = np.radians([*np.linspace(0, 80, 21), 82, 84, 86, 87, 88, 89])
 """The angles θi at which the density is tabulated, and between which it is interpolated."""
 AZIMUTHS_I = np.linspace(0, TWO_PI, 37)
-"""The azimuths φi at which that of an anisotropic table is."""
+NODES_I_ANISOTROPIC = NODES_I[::2]
+"""The azimuths φi and the angles θi at which that of an anisotropic table is."""
 NODES_U, NODES_V = 129, 65
 
 
@@ -33,14 +34,16 @@ class Proposal:
 
     def __init__(self, brightness: Grid, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
         self.anisotropic = brightness.anisotropic
-        density = _tabulated(brightness, interpolation, extrapolate)
+        thetas = NODES_I_ANISOTROPIC if self.anisotropic else NODES_I
+        phis = AZIMUTHS_I[:-1] if self.anisotropic else np.zeros(1)
+        density = _tabulated(brightness, phis, thetas, interpolation, extrapolate)
         # A slice without light cannot be normalized: make it even.
         dark = density.sum(axis=(-1, -2), keepdims=True) <= 0
-        density = np.where(dark, 1, density).astype(np.float32)
+        density = np.where(dark, np.float32(1), density)
         if self.anisotropic:
-            self.warp = mi.MarginalContinuous2D2(density, [AZIMUTHS_I, NODES_I])
+            self.warp = mi.MarginalContinuous2D2(np.concatenate([density, density[:1]]), [AZIMUTHS_I, thetas])
         else:
-            self.warp = mi.MarginalContinuous2D1(density, [NODES_I])
+            self.warp = mi.MarginalContinuous2D1(density[0], [thetas])
 
     def pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
         """Return the density of :meth:`sample` per solid angle of wo."""
@@ -71,30 +74,29 @@ class Proposal:
         return [wrapped(DRJIT.atan2(wi.y, wi.x), TWO_PI, DRJIT), theta] if self.anisotropic else [theta]
 
 
-def _tabulated(brightness: Grid, interpolation: Interpolation, extrapolate: Extrapolation) -> np.ndarray:
-    """Return the density at the nodes, not normalized: shape ([azimuths,] angles θi, u, v)."""
+def _tabulated(
+    brightness: Grid, phis: np.ndarray, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation
+) -> np.ndarray:
+    """Return the density at the nodes, not normalized: shape (azimuths, angles θi, u, v)."""
     u, v = np.meshgrid(np.linspace(0, 1, NODES_U), np.linspace(0, 1, NODES_V), indexing="ij")
-    slices = []
-    for phi in AZIMUTHS_I[:-1] if brightness.anisotropic else [0.0]:
-        for theta in NODES_I:
+    density = np.empty((len(phis), len(thetas), *u.shape), np.float32)
+    for j, phi in enumerate(phis):
+        for k, theta in enumerate(thetas):
             wi, wo, solid_angle = half_vectors(theta, phi, u, v)
             f = brightness.evaluate(wi, wo, interpolation, extrapolate)[..., 0]
-            slices.append(f * np.maximum(wo[..., 2], 0) * solid_angle)
-    if not brightness.anisotropic:
-        return np.stack(slices)
-    turned = np.stack(slices).reshape(len(AZIMUTHS_I) - 1, len(NODES_I), *u.shape)
-    return np.concatenate([turned, turned[:1]])
+            density[j, k] = f * np.maximum(wo[..., 2], 0) * solid_angle
+    return density
 
 
 def half_vectors(theta: float, phi: float, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return ``(wi, wo, |∂ωo/∂(u, v)|)`` for θi, φi, and places in the unit square with θh = π/2 u² and
-    φh - φi = 2π v. wo may lie below the horizon."""
+    φh - φi = 2π v. The one wi has the shape (3,); wo may lie below the horizon."""
     wi, h = spherical(theta, phi), spherical(np.square(u) * (np.pi / 2), phi + TWO_PI * v)
     cos = wi.x * h.x + wi.y * h.y + wi.z * h.z
     wo = stacked(vector(2 * cos * h.x - wi.x, 2 * cos * h.y - wi.y, 2 * cos * h.z - wi.z))
     # dωo = 4 (wi·h) sinθh dθh dφh, with dθh = π u du and dφh = 2π dv.
     solid_angle = 4 * np.maximum(cos, 0) * np.hypot(h.x, h.y) * 2 * np.pi**2 * u
-    return np.broadcast_to(stacked(wi), wo.shape), wo, solid_angle
+    return stacked(wi), wo, solid_angle
 
 
 def albedos(grid: Grid, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation) -> np.ndarray:
