@@ -77,7 +77,7 @@ class Plugin:
     An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, and all their
     ``textures`` and ``ranges`` by property name, with the channels of the colours that it was given or has by default
     as ``constants``; choices are attributes under their declared names. ``arrays`` are what else ``mitsuba.traverse``
-    shows, with derivatives.
+    shows, with derivatives, and ``captured`` what else kernels read.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -90,7 +90,14 @@ class Plugin:
             raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
         for parameter in cls.declared():
             for name in {parameter.name, *parameter.names}:
-                if hasattr(Model, name) or name in ("parameters", "textures", "ranges", "constants", "arrays"):
+                if hasattr(Model, name) or name in (
+                    "parameters",
+                    "textures",
+                    "ranges",
+                    "constants",
+                    "arrays",
+                    "captured",
+                ):
                     raise TypeError(
                         f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model."
                     )
@@ -105,6 +112,7 @@ class Plugin:
         self.textures, self.ranges = self.parameters.textures, self.parameters.ranges
         self.constants = reader.constants
         self.arrays: dict[str, Any] = {}
+        self.captured: list[Any] = []
         vars(self).update(self.parameters.chosen)
 
     @classmethod

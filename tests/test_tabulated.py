@@ -6,16 +6,18 @@ import gc
 import os
 import re
 import weakref
+from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
-from support import call, context, efficiencies, hemisphere, interaction
+from support import call, context, efficiencies, hemisphere, interaction, shared
 
 import mi_brdfs
 from mi_brdfs.measure.sources import find_sources
+from mi_brdfs.measured import read
 from mi_brdfs.validation import check
 
 SCALE = np.array([1, 1.15, 1.66]) / 1500
@@ -171,7 +173,106 @@ def test_values_have_derivatives_on_request(llvm_rgb, glossy):
     np.testing.assert_allclose(doubled, 2 * value, rtol=1e-5)
 
 
+LOFT = Path(__file__).parent / "data" / "loft"
+
+
+def real_files():
+    """Files of each kind of table; those that the repository may not contain are skipped where they are not."""
+    return [LOFT / "AnoBlackEC1onAlum.bsdf", shared("mbsdf", "carpaint_red.mbsdf"), shared("loft", "IMX455.bsdf")]
+
+
+def test_every_kind_of_table_is_looked_up_as_in_numpy(llvm_rgb):
+    for path in [*real_files(), shared("rgl", "chm_mint_rgb.bsdf")]:
+        wi, wo = pairs(20000)
+        wo[:8000] = wi[:8000] * [-1, -1, 1] + np.random.default_rng(3).normal(0, 0.05, (8000, 3))
+        wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+        bsdf = mi.load_dict({"type": "tabulated", "filename": str(path)})
+        (value,) = call(bsdf.eval, context(), wi.astype(np.float32), wo.astype(np.float32))
+        above = wo[:, 2] > 0.01
+        expected = read(path).data.evaluate(wi, wo)[above] * wo[above, 2:]
+        # Between nodes that differ by a factor, the float32 of an angle is 1e-5 of f.
+        np.testing.assert_allclose(value[above] - expected, 0, atol=2e-4 * expected.max())
+
+
+def test_rotation_turns_an_anisotropic_table(llvm_rgb):
+    path, wi, wo = shared("loft", "IMX455.bsdf"), *pairs(1000)
+    plain = mi.load_dict({"type": "tabulated", "filename": str(path)})
+    assert mi.has_flag(plain.flags(), mi.BSDFFlags.Anisotropic)
+    turned = mi.load_dict({"type": "tabulated", "filename": str(path), "rotation": 0.1})
+    cos, sin = np.cos(0.2 * np.pi), np.sin(0.2 * np.pi)
+    turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+    (value,) = call(plain.eval, context(), wi.astype(np.float32), wo.astype(np.float32))
+    (same,) = call(turned.eval, context(), (wi @ turn).astype(np.float32), (wo @ turn).astype(np.float32))
+    np.testing.assert_allclose(same, value, atol=1e-3 * value.max())
+
+
+def lit(bsdf, integrator="path"):
+    """A sphere below a lamp and a sky."""
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": integrator, "max_depth": 2},
+            "sensor": {
+                "type": "perspective",
+                "fov": 30,
+                "to_world": mi.ScalarTransform4f().look_at([0, -4, 0], [0, 0, 0], [0, 0, 1]),
+                "film": {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}},
+            },
+            "sphere": {"type": "sphere", "bsdf": bsdf},
+            "lamp": {"type": "point", "position": [2, -3, 2], "intensity": {"type": "rgb", "value": 20.0}},
+            "sky": {"type": "constant"},
+        }
+    )
+
+
+def picture(scene, seed=0, spp=64):
+    return np.array(mi.render(scene, spp=spp, seed=seed), np.float64)
+
+
+def test_pictures_of_rgl_files_are_those_of_measured(llvm_rgb):
+    for path in sorted(shared("rgl").glob("*.bsdf"))[::3]:
+        ours, theirs = (lit({"type": kind, "filename": str(path)}) for kind in ("tabulated", "measured"))
+        ours = np.array([picture(ours, seed) for seed in range(16)])
+        theirs = np.array([picture(theirs, seed) for seed in range(16, 32)])
+        noise = np.sqrt((ours.var(axis=0, ddof=1) + theirs.var(axis=0, ddof=1)) / 16)
+        z = (ours.mean(axis=0) - theirs.mean(axis=0)) / np.maximum(noise, 1e-6)
+        # Student's t of 30 degrees of freedom, 1,728 values: beyond 5.5 with probability 0.01.
+        assert abs(z).max() < 5.5, path.name
+        assert abs(np.mean(z)) < 0.5 and np.std(z) < 1.2, path.name
+
+
+def test_values_have_derivatives_through_prb(llvm_rgb, glossy):
+    scene = lit({"type": "merl", "filename": glossy, "differentiable": True}, "prb")
+    params, key = mi.traverse(scene), "sphere.bsdf.values"
+    table, image = np.array(params[key]), picture(scene, spp=1024)
+    dr.enable_grad(params[key])
+    dr.backward(dr.sum(mi.render(scene, params, spp=1024, seed=1, seed_grad=2), axis=None))
+    gradient = np.array(dr.grad(params[key]), np.float64)
+    params[key] = mi.TensorXf(0 * table)
+    params.update()
+    # The light is linear in the table. The noise of either sum is 0.3 %.
+    assert np.sum(gradient * table) == pytest.approx(np.sum(image - picture(scene, spp=1024)), rel=0.015)
+
+
+def test_pictures_can_be_frozen(llvm_rgb, glossy):
+    def render(scene, seed):
+        return mi.render(scene, spp=4, seed=seed)
+
+    scene = lit({"type": "merl", "filename": glossy})
+    frozen = dr.freeze(render, auto_opaque=False)
+    for seed in range(4):
+        seed = dr.opaque(mi.UInt32, seed)
+        np.testing.assert_allclose(np.array(frozen(scene, seed)), np.array(render(scene, seed)), rtol=1e-4)
+    assert frozen.n_recordings < 4
+
+
 # --- Sampling -------------------------------------------------------------------------------------------------------
+
+
+def test_sampling_real_files_passes_the_checks(llvm_rgb):
+    for path in [*real_files(), shared("rgl", "cc_ibiza_sunset_rgb.bsdf")]:
+        report = check({"type": "tabulated", "filename": str(path)}, only=[c for c in JUDGED if c != "finite"])
+        assert not report.failures, report
 
 
 @pytest.mark.parametrize("alpha", [0.03, 0.3])

@@ -67,6 +67,11 @@ class Adaptive(Coordinates):
         result._warp, result._ndf, result._sigma = MitsubaWarp(vndf, self._nodes), MitsubaMap(ndf), MitsubaMap(sigma)
         return result
 
+    @property
+    def captured(self) -> list[Any]:
+        looked_up = self._warp, self._ndf, self._sigma
+        return [it.table for it in looked_up if isinstance(it, (MitsubaWarp, MitsubaMap))]
+
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         return self.locate_scaled(wi, wo, xp)[0]
 

@@ -47,8 +47,12 @@ class Coordinates:
         return self.locate(wi, wo, xp), 1
 
     def prepared(self) -> Coordinates:
-        """Return these coordinates with what kernels of the active variant read."""
+        """Return these coordinates with what kernels of the active variant read, which is then ``captured``."""
         return self
+
+    @property
+    def captured(self) -> list[Any]:
+        return []
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         """Return ``(wi, wo)``, by component, for values on the axes: one of the pairs that lie there."""

@@ -18,9 +18,8 @@ from .measurement import MARGIN, Axis, Grid
 class Table:
     """A grid whose values and nodes are arrays of the active variant.
 
-    ``values``, a tensor of the grid's shape, and ``nodes``, of the axes whose nodes are not evenly spaced, are all that
-    a kernel reads. The channels are what they are in the grid; with ``wavelengths`` in nm, which :meth:`evaluate` then
-    interpolates between, they are a further axis.
+    ``values`` is a tensor of the grid's shape. The channels are what they are in the grid; with ``wavelengths`` in nm,
+    which :meth:`evaluate` then interpolates between, they are a further axis.
     """
 
     def __init__(self, grid: Grid, wavelengths: np.ndarray | None, nearest: bool, hold: bool) -> None:
@@ -31,11 +30,11 @@ class Table:
         self.channels = grid.values.shape[-1]
 
     @property
-    def arrays(self) -> dict[str, Any]:
+    def captured(self) -> list[Any]:
         """Everything that a kernel reads."""
         axes = [*self.axes, *([self.spectrum] if self.spectrum else [])]
-        nodes = {f"nodes_{k}": axis.nodes for k, axis in enumerate(axes) if axis.nodes is not None}
-        return {"values": self.values, **nodes}
+        nodes = [axis.nodes for axis in axes if axis.nodes is not None]
+        return [self.values, *nodes, *self.coordinates.captured]
 
     def evaluate(self, wi: mi.Vector3f, wo: mi.Vector3f, wavelengths: Any = None) -> list[Any]:
         """Return f for each channel or, where channels are a spectrum, for each of the ``wavelengths``."""

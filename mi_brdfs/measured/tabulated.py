@@ -77,6 +77,7 @@ class Tabulated(Model):
         chosen: dict[str, Any] = self.parameters.chosen
         shared = not chosen["differentiable"]
         self.tables = Tables.of(Path(chosen["filename"]), chosen["interpolation"], chosen["extrapolate"], shared)
+        self.captured = self.tables.captured
         if not shared:
             self.arrays = {"values": self.tables.f.values}
 
@@ -141,3 +142,4 @@ class Tables:
         self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
         albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos(converted, NODES_I, interpolation, extrapolate))
         self.albedo = Table(albedo, self.channels.spectrum, nearest=False, hold=True)
+        self.captured = [*self.f.captured, *self.albedo.captured, *self.channels.basis, self.proposal.warp]

@@ -81,11 +81,11 @@ class MitsubaWarp:
 
     def __init__(self, density: np.ndarray, nodes: Sequence[np.ndarray]) -> None:
         kind = {1: mi.MarginalContinuous2D1, 2: mi.MarginalContinuous2D2}[len(nodes)]
-        self._warp = kind(density, [axis.tolist() for axis in nodes])
+        self.table = kind(density, [axis.tolist() for axis in nodes])
         self._parameters = {1: mi.Vector1f, 2: mi.Vector2f}[len(nodes)]
 
     def invert(self, x: Any, y: Any, parameters: Sequence[Any]) -> tuple[Any, Any]:
-        uniform, _ = self._warp.invert(mi.Point2f(x, y), self._parameters(*parameters))
+        uniform, _ = self.table.invert(mi.Point2f(x, y), self._parameters(*parameters))
         return uniform.x, uniform.y
 
 
@@ -107,10 +107,10 @@ class MitsubaMap:
     """The same for Dr.Jit, in the active variant."""
 
     def __init__(self, values: np.ndarray) -> None:
-        self._values = mi.MarginalContinuous2D0(values, normalize=False, enable_sampling=False)
+        self.table = mi.MarginalContinuous2D0(values, normalize=False, enable_sampling=False)
 
     def eval(self, x: Any, y: Any) -> Any:
-        return self._values.eval(mi.Point2f(x, y))
+        return self.table.eval(mi.Point2f(x, y))
 
 
 def cumulated(values: np.ndarray) -> np.ndarray:

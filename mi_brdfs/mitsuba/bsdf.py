@@ -37,7 +37,7 @@ class ModelBSDF:
             warn_once(f"{self.model.plugins[0]}: {excess}.")
         # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,
         # but not in other Python objects.
-        self.textures = self.model.textures
+        self.textures, self.captured = self.model.textures, self.model.captured
 
         flags = mi.BSDFFlags
         common = flags.FrontSide
