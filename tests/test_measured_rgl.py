@@ -126,11 +126,10 @@ def test_reads_as_mitsuba_does(tmp_path, kind):
         agrees(path)
 
 
-def test_reads_real_files_as_mitsuba_does():
+def test_reads_real_files_as_mitsuba_does(llvm_rgb):
     """Negative channels, of colours outside sRGB, included."""
     for path in sorted(shared("rgl").glob("*.bsdf")):
-        with mi.variant_context("llvm_ad_rgb"):
-            agrees(path)
+        agrees(path)
 
 
 @pytest.mark.parametrize("kind", KINDS)
