@@ -18,6 +18,7 @@ from ..tensors import write as write_tensors
 NAME = "RGL"
 DESCRIPTION = "the words 'tensor_file', then named arrays"
 
+SUFFIX = ".bsdf"
 THETA_I = np.radians([*np.linspace(0, 80, 25), 82, 84, 86, 87, 88, 89, 90])
 """The angles that are written. RGL's own files have 8, and 32 x 32 values at each."""
 STEP_PHI_I = np.radians(10)
@@ -60,7 +61,7 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
         channels = {"wavelengths": source.wavelengths.astype(np.float32), "spectra": values}
     fields: dict[str, np.ndarray] = {
         "version": np.array([1, 0], dtype=np.uint32),
-        "description": np.frombuffer((source.material or path.stem).encode(), dtype=np.uint8),
+        "description": np.frombuffer(source.material.encode(), dtype=np.uint8),
         "phi_i": phi_i.astype(np.float32),
         "theta_i": THETA_I.astype(np.float32),
         "sigma": maps.sigma,
