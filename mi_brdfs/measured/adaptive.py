@@ -50,7 +50,8 @@ class Adaptive(Coordinates):
         self._relative, self._jacobian = len(phi_i) <= 2, jacobian
         self._symmetry = 1 if self._relative else round(TWO_PI / float(phi_i[-1] - phi_i[0]))
         self._nodes = (phi_i, theta_i) if len(phi_i) > 1 else (theta_i,)
-        vndf = np.maximum(vndf, FLOOR * vndf.mean(axis=(2, 3), keepdims=True))
+        mean = vndf.mean(axis=(2, 3), dtype=np.float64, keepdims=True)
+        vndf = np.maximum(vndf, (FLOOR * mean).astype(np.float32))
         self._tables = ndf, sigma, vndf if len(phi_i) > 1 else vndf[0]
         self._warp: Any = Warp(self._tables[2], self._nodes)
         self._ndf: Map | MitsubaMap = Map(ndf)

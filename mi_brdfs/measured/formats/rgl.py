@@ -158,7 +158,8 @@ class _File:
 
     def nodes(self, name: str, low: float = -np.inf, high: float = np.inf) -> np.ndarray:
         """Return increasing numbers."""
-        nodes = array(self.file, self.field(name, "f4", 1), name).astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            nodes = array(self.file, self.field(name, "f4", 1), name).astype(np.float64)
         for k, wrong in enumerate(~((nodes >= low - 1e-4) & (nodes <= high + 1e-4) & np.isfinite(nodes))):
             if wrong:
                 raise self.problem(name, f"has the value {nodes[k]:g}", k)
