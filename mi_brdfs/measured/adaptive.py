@@ -50,7 +50,8 @@ class Adaptive(Coordinates):
         self._relative, self._jacobian = len(phi_i) <= 2, jacobian
         self._symmetry = 1 if self._relative else round(TWO_PI / float(phi_i[-1] - phi_i[0]))
         self._nodes = (phi_i, theta_i) if len(phi_i) > 1 else (theta_i,)
-        vndf = np.maximum(vndf, FLOOR * vndf.mean(axis=(2, 3), keepdims=True))
+        mean = vndf.mean(axis=(2, 3), dtype=np.float64, keepdims=True)
+        vndf = np.maximum(vndf, (FLOOR * mean).astype(np.float32))
         self._tables = ndf, sigma, vndf if len(phi_i) > 1 else vndf[0]
         self._warp: Any = Warp(self._tables[2], self._nodes)
         self._ndf: Map | MitsubaMap = Map(ndf)
@@ -100,13 +101,24 @@ class Adaptive(Coordinates):
         return places, xp.select(wo.z > 0, scale, 0)
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
+        wi, m, cosine, _ = self._normals(*places)
+        return wi, SimpleNamespace(x=2 * cosine * m.x - wi.x, y=2 * cosine * m.y - wi.y, z=2 * cosine * m.z - wi.z)
+
+    def solid_angle(self, *places: np.ndarray) -> np.ndarray:
+        """Return |∂ωo/∂(u1, u2)|."""
+        _, _, cosine, around = self._normals(*places)
+        return 4 * np.maximum(cosine, 0) * around
+
+    def _normals(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace, np.ndarray, np.ndarray]:
+        """Return ``(wi, h, wi·h, |∂ωh/∂(u1, u2)|)``."""
         *parameters, u1, u2 = places
-        x, y = self._warp.sample(u1, u2, parameters)
+        x, y, density = self._warp.sample(u1, u2, parameters)
         phi_i = parameters[0] if len(parameters) > 1 else np.zeros(())
+        theta_m = np.square(x) * (np.pi / 2)
         wi = spherical(parameters[-1], phi_i)
-        m = spherical(np.square(x) * (np.pi / 2), (2 * y - 1) * np.pi + (phi_i if self._relative else 0))
-        twice = 2 * (wi.x * m.x + wi.y * m.y + wi.z * m.z)
-        return wi, SimpleNamespace(x=twice * m.x - wi.x, y=twice * m.y - wi.y, z=twice * m.z - wi.z)
+        m = spherical(theta_m, (2 * y - 1) * np.pi + (phi_i if self._relative else 0))
+        around = 2 * np.pi**2 * x * np.sin(theta_m) / np.maximum(density, FLOOR)
+        return wi, m, wi.x * m.x + wi.y * m.y + wi.z * m.z, around
 
 
 def on_theta(theta: Any, xp: SimpleNamespace) -> Any:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -51,7 +53,7 @@ def contents(file: BinaryFile) -> dict[str, Tensor]:
     for _ in range(count):
         start = file.offset
         length = int(file.take("u2", 1, "the length of a field's name")[0])
-        name = file.take("u1", length, "a field's name").tobytes().decode("latin-1")
+        name = file.take("u1", length, "a field's name").tobytes().decode(errors="replace")
         dimensions = int(file.take("u2", 1, f"the number of dimensions of {name!r}")[0])
         type = int(file.take("u1", 1, f"the type of {name!r}")[0])
         offset = int(file.take("u8", 1, f"the offset of {name!r}")[0])
@@ -81,3 +83,25 @@ def array(file: BinaryFile, tensor: Tensor, name: str) -> np.ndarray:
     """Return an array of a file."""
     file.offset = tensor.offset
     return file.take(tensor.dtype, tensor.count, f"{name!r}").reshape(tensor.shape)
+
+
+def write(path: Path, fields: dict[str, np.ndarray]) -> None:
+    """Write arrays, each from a multiple of 8 bytes on.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    arrays = {name: np.ascontiguousarray(field, field.dtype.newbyteorder("<")) for name, field in fields.items()}
+    head = struct.pack("<12sBBI", MAGIC, *VERSION, len(fields))
+    offset = len(head) + sum(13 + len(name.encode()) + 8 * field.ndim for name, field in arrays.items())
+    types = {dtype: number for number, dtype in TYPES.items()}
+    for name, field in arrays.items():
+        offset += -offset % 8
+        head += struct.pack("<H", len(name.encode())) + name.encode()
+        head += struct.pack(f"<HBQ{field.ndim}Q", field.ndim, types[field.dtype.str[1:]], offset, *field.shape)
+        offset += field.nbytes
+    with path.open("wb") as file:
+        file.write(head)
+        for field in arrays.values():
+            file.write(bytes(-file.tell() % 8))
+            file.write(field.tobytes())

@@ -41,8 +41,8 @@ class Warp:
         low, high = (look(self._rows, row + step, width - 1) for step in (0, 1))
         return u, look(self._columns, row) + integral(y, low, high) / (height - 1)
 
-    def sample(self, u: np.ndarray, v: np.ndarray, parameters: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the point (x, y) to which the uniform point (u, v) is mapped."""
+    def sample(self, u: np.ndarray, v: np.ndarray, parameters: Sequence[Any]) -> tuple[np.ndarray, ...]:
+        """Return the point (x, y) to which the uniform point (u, v) is mapped, and the density there."""
         look = self._interpolated(parameters)
         height, width = self._density.shape[1:]
         row = last_below(lambda k: look(self._columns, k), v, height)
@@ -53,7 +53,7 @@ class Warp:
         column = last_below(along, u, width)
         low, high = (self._across(look, self._density, row, y)(column + step) for step in (0, 1))
         x = end_of(low, high, (u - along(column)) * (width - 1))
-        return (column + x) / (width - 1), (row + y) / (height - 1)
+        return (column + x) / (width - 1), (row + y) / (height - 1), (1 - x) * low + x * high
 
     def _interpolated(self, parameters: Sequence[Any]) -> Callable[..., Any]:
         """Return a look-up in tables of all slices at an index, interpolated between the slices."""

@@ -6,13 +6,23 @@ from pathlib import Path
 
 import numpy as np
 
+from ..adaptation import LAST, adapted, brightness, turned
 from ..adaptive import Adaptive
+from ..arrays import NUMPY, components, stacked
 from ..files import BinaryFile
 from ..measurement import Axis, FileError, Grid, Measurement
+from ..source import Source
 from ..tensors import MAGIC, Tensor, array, contents
+from ..tensors import write as write_tensors
 
 NAME = "RGL"
 DESCRIPTION = "the words 'tensor_file', then named arrays"
+
+SUFFIX = ".bsdf"
+THETA_I = np.radians([*np.linspace(0, 80, 25), 82, 84, 86, 87, 88, 89, 90])
+"""The angles that are written. RGL's own files have 8, and 32 x 32 values at each."""
+STEP_PHI_I = np.radians(10)
+RESOLUTION, RESOLUTION_ANISOTROPIC = 64, 32
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -21,6 +31,64 @@ def recognizes(path: Path, head: bytes) -> bool:
 
 def read(path: Path) -> Measurement:
     return _File(path).measurement()
+
+
+def write(path: Path, source: Source, resolution: int | None = None) -> None:
+    """Write ``resolution`` x ``resolution`` values for each of 32 angles θi, by default 64, and 32 for each of the φi
+    too if the source is anisotropic: 3 MB and more in rgb.
+
+    Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    span = turned(source)
+    resolution = resolution or (RESOLUTION_ANISOTROPIC if span else RESOLUTION)
+    # As Mitsuba has it, the whole turn, the lower half and the third quadrant.
+    phi_i = np.linspace(-np.pi, span - np.pi, round(span / STEP_PHI_I) + 1) if span else np.zeros(1)
+    maps = adapted(source, phi_i, THETA_I, resolution)
+    coordinates = maps.coordinates
+    u = np.linspace(0, 1, resolution)
+    slices: list[tuple[np.ndarray, ...]] = []
+    for azimuth in phi_i:
+        axes = [np.minimum(THETA_I, LAST), u, u]
+        places = np.meshgrid(*([azimuth, *axes] if span else axes), indexing="ij")
+        slices.append(_slices(source, coordinates, [place.reshape(place.shape[-3:]) for place in places]))
+    values, luminance, valid = (np.stack(fields) for fields in zip(*slices, strict=True))
+    dark = ~luminance.any(axis=(-2, -1), keepdims=True)
+    channels = {"rgb": values}
+    if source.wavelengths is not None:
+        channels = {"wavelengths": source.wavelengths.astype(np.float32), "spectra": values}
+    fields: dict[str, np.ndarray] = {
+        "version": np.array([1, 0], dtype=np.uint32),
+        "description": np.frombuffer(source.material.encode(), dtype=np.uint8),
+        "phi_i": phi_i.astype(np.float32),
+        "theta_i": THETA_I.astype(np.float32),
+        "sigma": maps.sigma,
+        "ndf": maps.ndf,
+        "vndf": maps.vndf,
+        "luminance": np.where(dark, 1, luminance).astype(np.float32),
+        **channels,
+        "jacobian": np.ones(1, dtype=np.uint8),
+        "valid": np.packbits(valid),
+    }
+    write_tensors(path, fields)
+
+
+def _slices(source: Source, coordinates: Adaptive, places: list[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Return ``(values, density, valid)`` at places, shapes (θi, channels, u2, u1), and (θi, u2, u1) twice: the table's
+    values, what directions are to be drawn in proportion to, and which of them are above the horizon."""
+    wi, wo = coordinates.directions(*places)
+    above = wo.z > 1e-6
+    given, taken = stacked(wi)[above], stacked(wo)[above]
+    f = source.evaluate(given, taken)
+    f = np.where(np.isfinite(f), f, 0)
+    _, scale = coordinates.locate_scaled(components(given), components(taken), NUMPY)
+    values = np.zeros((*above.shape, f.shape[-1]), dtype=np.float32)
+    values[above] = f / scale[:, None]
+    density = np.zeros(above.shape)
+    density[above] = brightness(f) * wo.z[above] * coordinates.solid_angle(*places)[above]
+    return values.transpose(0, 3, 2, 1), density.transpose(0, 2, 1), above.transpose(0, 2, 1)
 
 
 class _File:
@@ -90,7 +158,8 @@ class _File:
 
     def nodes(self, name: str, low: float = -np.inf, high: float = np.inf) -> np.ndarray:
         """Return increasing numbers."""
-        nodes = array(self.file, self.field(name, "f4", 1), name).astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            nodes = array(self.file, self.field(name, "f4", 1), name).astype(np.float64)
         for k, wrong in enumerate(~((nodes >= low - 1e-4) & (nodes <= high + 1e-4) & np.isfinite(nodes))):
             if wrong:
                 raise self.problem(name, f"has the value {nodes[k]:g}", k)

@@ -1,0 +1,139 @@
+"""Adaptive coordinates for a BRDF that is given as a function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .adaptive import Adaptive
+from .arrays import stacked
+from .colour import LUMINANCE
+from .coordinates import TWO_PI, spherical
+from .source import Source
+from .warp import Map
+
+COLUMNS, ROWS = 128, 64
+"""The nodes over θ and over φ of the distribution of normals."""
+LAST = np.radians(89.5)
+"""The angle at which the value at the horizon is taken."""
+NORMALS_SHARE = 0.2
+"""The share of u1 that follows the visible normals; the rest is even in √θ. Narrow lobes get enough nodes by it, and
+wide ones do not lose theirs; between 0.1 and 0.3 errors are the same."""
+COSINE_SHARE = 0.05
+"""The share of the cosine in the distribution of normals, wherever nothing is scattered back."""
+ITERATIONS = 50
+
+
+@dataclass(frozen=True)
+class Maps:
+    """What :class:`Adaptive` is made of."""
+
+    phi_i: np.ndarray
+    theta_i: np.ndarray
+    ndf: np.ndarray
+    sigma: np.ndarray
+    vndf: np.ndarray
+
+    @property
+    def coordinates(self) -> Adaptive:
+        return Adaptive(self.phi_i, self.theta_i, self.ndf, self.sigma, self.vndf)
+
+
+def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -> Maps:
+    """Return maps whose ``ndf`` and ``sigma`` take the highlights out of f, so that a table of f cosθo 4 σ/D is smooth,
+    and whose ``vndf`` spends its nodes on directions above the horizon alone.
+
+    Only on ``ndf`` the table's values depend; ``vndf`` may be any density that is sampled and inverted. Here u2 is the
+    azimuth of the half vector, and the end of u1 is the horizon, where 2 (wi·h) h - wi has no height:
+    θh = atan2(cosθi, -sinθi cos(φh - φi))/2. A density of the visible normals alone would spend half of the nodes below
+    the horizon, and so few about the normal that a cosine has errors of 10 %.
+    """
+    ndf, sigma = normals(source)
+    x, y = np.meshgrid(np.linspace(0, 1, COLUMNS), np.linspace(0, 1, rows))
+    theta, phi = np.square(x) * (np.pi / 2), (2 * y - 1) * np.pi
+    density = Map(ndf).eval(x, y) * x * np.sin(theta)
+    vndf = np.empty((len(phi_i), len(theta_i), rows, COLUMNS), dtype=np.float32)
+    for p, azimuth in enumerate(phi_i):
+        cos_phi = np.cos(phi - azimuth if len(phi_i) > 2 else phi)
+        for t, polar in enumerate(theta_i):
+            cos, sin = np.cos(polar), np.sin(polar)
+            horizon = np.sqrt(np.arctan2(cos, -sin * cos_phi) / np.pi)
+            above = (x < horizon + 1 / (COLUMNS - 1)).astype(np.float64)
+            seen = above * density * np.maximum(cos * np.cos(theta) + sin * np.sin(theta) * cos_phi, 0)
+            even, total = above / area(above), area(seen)
+            followed = np.divide(seen, total, out=even.copy(), where=total > 0)
+            vndf[p, t] = NORMALS_SHARE * followed + (1 - NORMALS_SHARE) * even
+    return Maps(phi_i, theta_i, ndf, sigma, vndf)
+
+
+def normals(source: Source) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``(ndf, sigma)``, a distribution of normals D and the projected areas of those seen from a direction, from
+    what is scattered straight back.
+
+    For microfacets without shadowing f(w, w) cosθ = D(w) F(0)/(4 σ(w)) with σ(w) = ∫ D(h) max(w·h, 0) dh, so that D is
+    the eigenvector of 4 f(w, w) cosθ max(w·h, 0): power iteration finds it (J. Dupuy et al., Extracting
+    microfacet-based BRDF parameters from arbitrary materials with power iterations, CGF 34(4), 2015,
+    doi:10.1111/cgf.12675). σ is a convolution over φ.
+    """
+    u = np.linspace(0, 1, COLUMNS)
+    theta = np.square(u) * (np.pi / 2)
+    phi = (np.arange(ROWS) * (2 / ROWS) - 1) * np.pi if source.anisotropic else np.zeros(1)
+    w = stacked(spherical(*np.meshgrid(np.minimum(theta, LAST), phi)))
+    back = 4 * brightness(source.evaluate(w.reshape(-1, 3), w.reshape(-1, 3))).reshape(w.shape[:-1]) * np.cos(theta)
+
+    turn = np.arange(ROWS) * (TWO_PI / ROWS)
+    cos, sin = np.cos(theta)[:, None, None], np.sin(theta)[:, None, None]
+    seen = np.maximum(cos * cos[:, 0] + sin * sin[:, 0] * np.cos(turn), 0)
+    solid_angle = np.sin(theta) * np.pi * u * (TWO_PI / ROWS / (COLUMNS - 1))
+    kernel = np.fft.rfft(seen * solid_angle[:, None])
+
+    def projected(density: np.ndarray) -> np.ndarray:
+        waves = np.fft.rfft(np.broadcast_to(density, (ROWS, COLUMNS)), axis=0)
+        return np.fft.irfft(np.einsum("thf,fh->ft", kernel, waves), ROWS, axis=0)[: len(phi)]
+
+    cosine = np.broadcast_to(np.cos(theta) / np.pi, back.shape)
+    ndf = cosine
+    for _ in range(ITERATIONS):
+        found = back * projected(ndf)
+        if not np.any(found > 0):
+            break
+        ndf = found / projected(found)[:, 0].mean()
+    ndf = (1 - COSINE_SHARE) * ndf + COSINE_SHARE * cosine
+    return closed(ndf), closed(projected(ndf))
+
+
+def closed(rows: np.ndarray) -> np.ndarray:
+    """Return a map with its first row once more at the end, and nowhere 0: it is divided by."""
+    return np.maximum(np.concatenate([rows, rows[:1]]), 1e-6).astype(np.float32)
+
+
+def turned(source: Source) -> float:
+    """Return over which angle φi is to be tabulated: 2π, or π or π/2 where turning or mirroring both directions changes
+    nothing, or 0 if isotropic."""
+    if not source.anisotropic:
+        return 0.0
+    random = np.random.default_rng(0).random((4, 1024))
+    wi = stacked(spherical(np.arccos(random[0]), TWO_PI * random[1]))
+    h = stacked(spherical(random[2] ** 2, TWO_PI * random[3]))
+    wo = 2 * np.sum(wi * h, axis=1, keepdims=True) * h - wi
+    above = (wo[:, 2] > 0.01) & (wi[:, 2] > 0.01)
+    f = source.evaluate(wi[above], wo[above])
+    unchanged = [
+        np.allclose(source.evaluate(wi[above] * signs, wo[above] * signs), f, rtol=2e-3, atol=1e-3 * f.mean())
+        for signs in ([-1, -1, 1], [-1, 1, 1])
+    ]
+    if not unchanged[0]:
+        return TWO_PI
+    return np.pi / 2 if unchanged[1] else np.pi
+
+
+def brightness(values: np.ndarray) -> np.ndarray:
+    """Return the luminance of linear sRGB, the mean of other channels, and 0 where that is negative or missing."""
+    weighed = values @ LUMINANCE if values.shape[-1] == 3 else values.mean(axis=-1)
+    return np.where(weighed > 0, weighed, 0)
+
+
+def area(values: np.ndarray) -> np.ndarray:
+    """Return the integrals over [0, 1] of the rows."""
+    return (values.sum(axis=-1, keepdims=True) - (values[:, :1] + values[:, -1:]) / 2) / (values.shape[-1] - 1)
