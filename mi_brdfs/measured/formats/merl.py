@@ -66,16 +66,16 @@ def read(path: Path) -> Measurement:
 
 
 def write(path: Path, source: Source, dimensions: tuple[int, int, int] = (90, 90, 180)) -> None:
-    """Write the values at the centres of the cells, and -1 where one of the directions is below the horizon.
+    """Write the values at the centres of the cells, in linear sRGB, and -1 where one of the directions is below the
+    horizon. Where φd of [0, 180°) stands for all of the turn, values are the means over both orders of the directions.
 
     Raises:
-        ValueError: if the source is anisotropic, or its channels are wavelengths.
+        ValueError: if the source is anisotropic.
         OSError: if the file cannot be written.
     """
     if source.anisotropic:
-        raise ValueError("MERL's tables hold isotropic BRDFs only")
-    if source.wavelengths is not None:
-        raise ValueError("MERL's tables hold rgb only, not wavelengths")
+        raise ValueError("the BRDF is anisotropic, which MERL's tables cannot hold; .bsdf and .csv files can")
+    evaluate = source.rgb().evaluate
     coordinates, axes = cells(dimensions)
     planes = np.full((3, *dimensions), float(MISSING))
     for k, root in enumerate(axes[0].nodes):
@@ -83,7 +83,9 @@ def write(path: Path, source: Source, dimensions: tuple[int, int, int] = (90, 90
         wi, wo = (stacked(w).reshape(-1, 3) for w in coordinates.directions(root, theta_d, phi_d))
         above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
         if above.any():
-            planes[:, k].reshape(3, -1)[:, above] = (source.evaluate(wi[above], wo[above]) / SCALE).T
+            wi, wo = wi[above], wo[above]
+            f = (evaluate(wi, wo) + evaluate(wo, wi)) / 2 if coordinates.reciprocal else evaluate(wi, wo)
+            planes[:, k].reshape(3, -1)[:, above] = (f / SCALE).T
     with path.open("wb") as file:
         file.write(np.array(dimensions, dtype="<i4").tobytes())
         file.write(planes.astype("<f8", copy=False).data)
