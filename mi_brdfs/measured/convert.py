@@ -26,6 +26,7 @@ LANES = 1 << 20
 PAIRS = 1 << 15
 STEEPEST = 80
 """The angle, in degrees, up to which a conversion is judged."""
+GREY = "What was measured at one wavelength became grey."
 ALIKE = 1e-3
 """By what part of its peak f may change where it counts as the same."""
 
@@ -143,7 +144,7 @@ def _of_measurement(measurement: Measurement) -> Source:
     grid = measurement.data
     if isinstance(grid, Samples):
         raise ValueError(f"{measurement.path} has values at single pairs of directions, which are on no grid")
-    if not usable(grid.values).any():
+    if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
     return Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
 
@@ -186,12 +187,8 @@ def _compared(source: Source, written: Measurement) -> tuple[float, float, list[
     assert isinstance(grid, Grid)
     losses = []
     if source.wavelengths is not None and written.wavelengths is None:
-        several = len(source.wavelengths) > 1
-        losses.append(
-            f"Its {len(source.wavelengths)} wavelengths became linear sRGB, as seen under D65."
-            if several
-            else f"Its only wavelength, {source.wavelengths[0]:g} nm, became grey."
-        )
+        count = len(source.wavelengths)
+        losses.append(f"Its {count} wavelengths became linear sRGB, as seen under D65." if count > 1 else GREY)
     if source.wavelengths is None or written.wavelengths is None:
         source, written_as = source.rgb(), Source(grid.evaluate, written.wavelengths).rgb()
     else:
@@ -213,7 +210,8 @@ def _compared(source: Source, written: Measurement) -> tuple[float, float, list[
 
 
 def _percent(part: float) -> str:
-    return f"{100 * part:.2g} %" if part >= 1e-6 else "less than 0.0001 %"
+    percent = 100 * part
+    return "less than 0.001 %" if percent < 0.001 else f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
 def _cells(grid: Grid, wi: Array, wo: Array) -> Array:
