@@ -1,5 +1,7 @@
 """BSDFs and measured files in another format: as exact as the format allows, or refused in a sentence."""
 
+import re
+
 import numpy as np
 import pytest
 from support import hemisphere
@@ -8,6 +10,7 @@ from typer.testing import CliRunner
 from mi_brdfs.cli import app
 from mi_brdfs.measured import FileError, Grid, Measurement, bake, convert, read
 from mi_brdfs.measured.coordinates import Spherical
+from mi_brdfs.measured.formats import ENDINGS
 from mi_brdfs.measured.measurement import Axis
 
 import mitsuba as mi  # isort: skip
@@ -121,6 +124,11 @@ def test_baking_needs_rgb():
 def run(*words):
     result = CliRunner().invoke(app, ["convert", *map(str, words)])
     return result.exit_code, " ".join(result.output.split())
+
+
+def test_the_help_names_all_endings():
+    _, text = run("-h")
+    assert all(re.search(rf"\{ending}\b", text) for ending in ENDINGS)
 
 
 def test_the_command(tmp_path):

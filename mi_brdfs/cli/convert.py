@@ -25,11 +25,12 @@ def convert(
         ),
     ],
     output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The file to write; its ending says the format: .binary is MERL.")
+        Path, typer.Argument(metavar="OUT", help="The file to write: .binary (MERL), .bsdf (RGL or Zemax), .csv.")
     ],
     parameters: Parameters = None,
     format: Annotated[
-        str | None, typer.Option(metavar="NAME", help="The format, where several have this ending.")
+        str | None,
+        typer.Option(metavar="NAME", help="The format, where several have that ending; by default the first."),
     ] = None,
     variant: TracingVariant = None,
 ) -> None:

@@ -17,7 +17,7 @@ from ..measure.probe import BSDFProbe
 from ..measure.sources import name_of
 from ..variants import is_measurable
 from .arrays import NUMPY, components
-from .formats import FORMATS, read
+from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, Samples, usable
 from .source import Source
 
@@ -146,7 +146,9 @@ def _of_measurement(measurement: Measurement) -> Source:
         raise ValueError(f"{measurement.path} has values at single pairs of directions, which are on no grid")
     if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
-    return Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
+    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
+    stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
+    return source if stated else source.rgb()
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
@@ -171,14 +173,14 @@ def _writer(path: Path, format: str | None) -> ModuleType:
     Raises:
         ValueError: if there is none.
     """
-    writable = [it for it in FORMATS if hasattr(it, "write")]
-    fitting = [it for it in writable if path.suffix.lower() == it.SUFFIX]
-    chosen = [it for it in fitting if format is None or it.NAME.lower() == format.lower()]
+    writable = {it.NAME: it for it in FORMATS if hasattr(it, "write")}
+    fitting = [name for name in ENDINGS.get(path.suffix.lower(), []) if name in writable]
+    chosen = [name for name in fitting if format is None or name.lower() == format.lower()]
     if not chosen:
-        wanted = f"{path} as {format}" if format and fitting else str(path)
-        known = ", ".join(f"{it.SUFFIX} ({it.NAME})" for it in writable)
-        raise ValueError(f"there is no way to write {wanted}; files that can be written are {known}")
-    return chosen[0]
+        wanted = f"{path} as {format}" if fitting else str(path)
+        known = [f"{ending} ({name})" for ending, names in ENDINGS.items() for name in names if name in writable]
+        raise ValueError(f"there is no way to write {wanted}; files that can be written are {', '.join(known)}")
+    return writable[chosen[0]]
 
 
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:

@@ -26,5 +26,5 @@ class Source:
         """Return the same in linear sRGB: spectra under D65, a single wavelength as grey."""
         if self.wavelengths is None:
             return self
-        weights = to_srgb(self.wavelengths)
+        weights = to_srgb(self.wavelengths) if len(self.wavelengths) > 1 else np.ones((1, 3))
         return replace(self, evaluate=lambda wi, wo: np.maximum(self.evaluate(wi, wo) @ weights, 0), wavelengths=None)

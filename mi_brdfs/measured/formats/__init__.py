@@ -12,8 +12,9 @@ from . import lighttools, mbsdf, merl, rgl, utia, zemax
 FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, utia]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it. Those that can be written
-have ``SUFFIX``, what the names of their files end in, and ``write(path, source)``; of several with the same ending the
-first is written by default."""
+have ``write(path, source)``."""
+ENDINGS = {".binary": ["MERL"], ".bsdf": ["RGL", "Zemax"], ".csv": ["CSV"]}
+"""Of files that are written, with the names of the formats: the first one by default."""
 
 HEAD = 1024
 

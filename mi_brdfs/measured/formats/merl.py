@@ -34,7 +34,6 @@ from ..source import Source
 
 NAME = "MERL"
 DESCRIPTION = "three int32, such as 90, 90, 180, then float64"
-SUFFIX = ".binary"
 SCALE = np.array([1, 1.15, 1.66]) / 1500
 """What the channels are multiplied by, as MERL's own reader does."""
 MISSING = -1
@@ -43,8 +42,8 @@ MOST = 4096
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    if path.suffix == SUFFIX or len(head) < 12:
-        return path.suffix == SUFFIX
+    if path.suffix == ".binary" or len(head) < 12:
+        return path.suffix == ".binary"
     dimensions = [int(n) for n in np.frombuffer(head, dtype="<i4", count=3)]
     return all(0 < n <= MOST for n in dimensions) and path.stat().st_size == 12 + 24 * prod(dimensions)
 
