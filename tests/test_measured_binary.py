@@ -1,6 +1,8 @@
 """MERL, UTIA and MBSDF files: their values in the right places, and what is wrong with damaged ones."""
 
 import struct
+import timeit
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -122,6 +124,17 @@ def test_what_was_measured_holds_next_to_what_was_not(tmp_path):
     planes[:, :, 1:] = -1
     f = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data.evaluate(*pairs(5000, 9))
     assert 0.1 < (f == 0).mean() < 0.9 and f.max() < 30 * SCALE[2] * 1.001
+
+
+def test_merl_is_read_at_once_and_in_little_memory(tmp_path):
+    path = written(tmp_path, merl_bytes((90, 90, 180)), "x.binary")
+    times = [timeit.timeit(lambda: read(path), number=1) for _ in range(3)]
+    assert min(times) < 0.25
+    tracemalloc.start()
+    read(path)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2 * path.stat().st_size
 
 
 @pytest.mark.parametrize("dimensions", [(90, 90, 180), (20, 15, 60)])

@@ -19,6 +19,7 @@ from ..variants import is_measurable
 from .arrays import NUMPY, components
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, Samples, usable
+from .scattered import gridded
 from .source import Source
 
 LANES = 1 << 20
@@ -141,14 +142,16 @@ def _source(given: Any) -> tuple[Source, list[str]]:
 
 
 def _of_measurement(measurement: Measurement) -> Source:
-    grid = measurement.data
-    if isinstance(grid, Samples):
-        raise ValueError(f"{measurement.path} has values at single pairs of directions, which are on no grid")
+    grid = _grid(measurement)
     if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
     source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
     stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
     return source if stated else source.rgb()
+
+
+def _grid(measurement: Measurement) -> Grid:
+    return gridded(measurement.data) if isinstance(measurement.data, Samples) else measurement.data
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
@@ -185,8 +188,7 @@ def _writer(path: Path, format: str | None) -> ModuleType:
 
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:
     """Return the root mean square error, the largest, and what was lost on the way."""
-    grid = written.data
-    assert isinstance(grid, Grid)
+    grid = _grid(written)
     losses = []
     if source.wavelengths is not None and written.wavelengths is None:
         count = len(source.wavelengths)
@@ -198,7 +200,7 @@ def _compared(source: Source, written: Measurement) -> tuple[float, float, list[
     wi, wo = _pairs(PAIRS)
     cosine = wo[:, 2:]
     f, found = source.evaluate(wi, wo) * cosine, written_as.evaluate(wi, wo) * cosine
-    error, peak = abs(found - f).max(axis=-1), f.max()
+    error, peak = abs(found - f).max(axis=-1), f.max() or 1.0
     if grid.coordinates.reciprocal:
         change = abs(source.evaluate(wo, wi) * cosine - f).max() / peak
         if change > ALIKE:
