@@ -1,6 +1,8 @@
 """MERL, UTIA and MBSDF files: their values in the right places, and what is wrong with damaged ones."""
 
 import struct
+import timeit
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -124,6 +126,17 @@ def test_what_was_measured_holds_next_to_what_was_not(tmp_path):
     assert 0.1 < (f == 0).mean() < 0.9 and f.max() < 30 * SCALE[2] * 1.001
 
 
+def test_merl_is_read_at_once_and_in_little_memory(tmp_path):
+    path = written(tmp_path, merl_bytes((90, 90, 180)), "x.binary")
+    times = [timeit.timeit(lambda: read(path), number=1) for _ in range(3)]
+    assert min(times) < 0.25
+    tracemalloc.start()
+    read(path)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2 * path.stat().st_size
+
+
 @pytest.mark.parametrize("dimensions", [(90, 90, 180), (20, 15, 60)])
 def test_merl_is_written_as_it_is_read(tmp_path, dimensions):
     def f(wi, wo):
@@ -138,14 +151,16 @@ def test_merl_is_written_as_it_is_read(tmp_path, dimensions):
     np.testing.assert_allclose(values[above], f(wi[above], wo[above]), rtol=1e-6)
 
 
-def test_merl_refuses_what_it_cannot_hold(tmp_path):
-    for source, word in (
-        (Source(lambda wi, wo: wi, anisotropic=True), "isotropic"),
-        (Source(lambda wi, wo: wi, np.array([450.0, 550, 650])), "rgb"),
-    ):
-        with pytest.raises(ValueError, match=word):
-            merl.write(tmp_path / "x.binary", source)
-    assert not (tmp_path / "x.binary").exists()
+def test_merl_refuses_anisotropy_and_shows_spectra_in_rgb(tmp_path):
+    path = tmp_path / "x.binary"
+    with pytest.raises(ValueError, match="anisotropic"):
+        merl.write(path, Source(lambda wi, wo: wi, anisotropic=True))
+    assert not path.exists()
+    merl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), 0.5), np.array([450.0, 550, 650])), (6, 5, 10))
+    np.testing.assert_allclose(read(path).data.evaluate(*pairs(9, 1)), 0.5, rtol=1e-5)
+    merl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), [0, 0, 0.5]), np.array([450.0, 550, 650])), (6, 5, 10))
+    red = read(path).data.evaluate(*pairs(9, 1))
+    assert (red[:, 0] > 5 * red[:, 1]).all() and (red[:, 2] == 0).all()
 
 
 # --- UTIA -----------------------------------------------------------------------------------------------------------

@@ -13,7 +13,10 @@ fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "t
 COLUMNS = 80
 COMMANDS = {
     "help": ["-h"],
-    **{f"help of {name}": [name, "-h"] for name in ("show", "render", "gallery", "plot", "check", "energy", "bench")},
+    **{
+        f"help of {name}": [name, "-h"]
+        for name in ("show", "render", "gallery", "plot", "convert", "check", "energy", "bench")
+    },
     "list": ["list"],
     "info": ["info", "ward"],
     "info of the kit": ["info", "microfacet"],
@@ -24,6 +27,7 @@ COMMANDS = {
     "render": ["render", "scene.xml"],
     "gallery": ["gallery", "lambert", "--size", "16", "--spp", "4"],
     "plot": ["plot", "lambert", "--kind", "albedo"],
+    "convert": ["convert", "phong", "phong.binary"],
     "check": ["check", "lambert", "phong", "scene.xml", "--only", "finite", "--only", "albedo"],
     "energy": ["energy", "lambert"],
     "bench": ["bench", "--only", "recompiles"],

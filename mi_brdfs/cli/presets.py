@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import Annotated, Any
 
 import typer
@@ -12,7 +11,7 @@ from rich.text import Text
 from ..published import preset, presets, provenance
 from .app import command
 from .errors import one_line
-from .terminal import Exit, err, fail, out, print_table
+from .terminal import Exit, err, fail, out, print_paragraph, print_table
 
 LETTERS = {"alpha": "α", "exponent": "n", "b": "B"}
 """The parameters that are shown in the table, the width of the lobe."""
@@ -62,9 +61,7 @@ def _show(name: str) -> None:
     items = [f"    {key!r}: {value!r}," for key, value in values.items()]
     facts = [f"Source: {origin.source}, doi:{origin.doi}.", f"Formula: {origin.convention}."]
     facts += [f"Note: {defect}" for defect in origin.defects]
-    width = min(out.width, 100) if out.is_terminal else 100
     out.print("\n".join(["{", *items, "}"]))
     out.print(f'\n<bsdf type="{values["type"]}">\n    <string name="preset" value="{name}"/>\n</bsdf>\n')
     for fact in facts:
-        lines = textwrap.wrap(fact, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-        out.print("\n".join(lines))
+        print_paragraph(fact)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
@@ -30,6 +31,13 @@ def print_table(table: Table) -> None:
     """Print a table, with each row on one line where another program reads it."""
     console = Console(markup=False, highlight=False, width=None if out.is_terminal else 400)
     console.print(table)
+
+
+def print_paragraph(text: str) -> None:
+    """Print a text with its lines no longer than the terminal's, nor than 100 characters."""
+    width = min(out.width, 100) if out.is_terminal else 100
+    lines = textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    out.print("\n".join(lines))
 
 
 def fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:

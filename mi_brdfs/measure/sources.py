@@ -56,7 +56,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     file, _, wanted = ("", "", "") if is_text else word.partition(".xml:")
     path = Path(f"{file}.xml" if wanted else word)
     is_file = path.suffix == ".xml" and not is_text
-    is_data = not is_text and not is_file and (bool(path.suffix) or path.name != word)
+    is_data = is_measured(word)
     if (is_file or is_data) and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
@@ -81,6 +81,12 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
         yield source._replace(name=(name_of(loaded) if is_text else source.name) + suffix)
     else:
         raise ValueError(f"{word if wanted else source.name} is not a {'scene' if wanted else 'BSDF'}")
+
+
+def is_measured(word: str) -> bool:
+    """Return whether a word is the path of a measured file: no XML, and not the type of a plugin."""
+    path = Path(word)
+    return not word.startswith("<") and ".xml" not in word and (bool(path.suffix) or path.name != word)
 
 
 def name_of(bsdf: mi.BSDF) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from .observer import to_srgb
 
 
 @dataclass(frozen=True)
@@ -19,3 +21,10 @@ class Source:
     """In nm, one a channel; None where the channels are linear sRGB."""
     anisotropic: bool = False
     material: str = ""
+
+    def rgb(self) -> Source:
+        """Return the same in linear sRGB: spectra under D65, a single wavelength as grey."""
+        if self.wavelengths is None:
+            return self
+        weights = to_srgb(self.wavelengths) if len(self.wavelengths) > 1 else np.ones((1, 3))
+        return replace(self, evaluate=lambda wi, wo: np.maximum(self.evaluate(wi, wo) @ weights, 0), wavelengths=None)

@@ -11,7 +11,10 @@ from . import lighttools, mbsdf, merl, rgl, utia, zemax
 
 FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, utia]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
-``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it."""
+``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it. Those that can be written
+have ``write(path, source)``."""
+ENDINGS = {".binary": ["MERL"], ".bsdf": ["RGL", "Zemax"], ".csv": ["CSV"]}
+"""Of files that are written, with the names of the formats: the first one by default."""
 
 HEAD = 1024
 

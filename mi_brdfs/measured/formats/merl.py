@@ -34,7 +34,6 @@ from ..source import Source
 
 NAME = "MERL"
 DESCRIPTION = "three int32, such as 90, 90, 180, then float64"
-SUFFIX = ".binary"
 SCALE = np.array([1, 1.15, 1.66]) / 1500
 """What the channels are multiplied by, as MERL's own reader does."""
 MISSING = -1
@@ -43,8 +42,8 @@ MOST = 4096
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    if path.suffix == SUFFIX or len(head) < 12:
-        return path.suffix == SUFFIX
+    if path.suffix == ".binary" or len(head) < 12:
+        return path.suffix == ".binary"
     dimensions = [int(n) for n in np.frombuffer(head, dtype="<i4", count=3)]
     return all(0 < n <= MOST for n in dimensions) and path.stat().st_size == 12 + 24 * prod(dimensions)
 
@@ -66,16 +65,16 @@ def read(path: Path) -> Measurement:
 
 
 def write(path: Path, source: Source, dimensions: tuple[int, int, int] = (90, 90, 180)) -> None:
-    """Write the values at the centres of the cells, and -1 where one of the directions is below the horizon.
+    """Write the values at the centres of the cells, in linear sRGB, and -1 where one of the directions is below the
+    horizon. Where φd of [0, 180°) stands for all of the turn, values are the means over both orders of the directions.
 
     Raises:
-        ValueError: if the source is anisotropic, or its channels are wavelengths.
+        ValueError: if the source is anisotropic.
         OSError: if the file cannot be written.
     """
     if source.anisotropic:
-        raise ValueError("MERL's tables hold isotropic BRDFs only")
-    if source.wavelengths is not None:
-        raise ValueError("MERL's tables hold rgb only, not wavelengths")
+        raise ValueError("the BRDF is anisotropic, which MERL's tables cannot hold; .bsdf and .csv files can")
+    evaluate = source.rgb().evaluate
     coordinates, axes = cells(dimensions)
     planes = np.full((3, *dimensions), float(MISSING))
     for k, root in enumerate(axes[0].nodes):
@@ -83,7 +82,9 @@ def write(path: Path, source: Source, dimensions: tuple[int, int, int] = (90, 90
         wi, wo = (stacked(w).reshape(-1, 3) for w in coordinates.directions(root, theta_d, phi_d))
         above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
         if above.any():
-            planes[:, k].reshape(3, -1)[:, above] = (source.evaluate(wi[above], wo[above]) / SCALE).T
+            wi, wo = wi[above], wo[above]
+            f = (evaluate(wi, wo) + evaluate(wo, wi)) / 2 if coordinates.reciprocal else evaluate(wi, wo)
+            planes[:, k].reshape(3, -1)[:, above] = (f / SCALE).T
     with path.open("wb") as file:
         file.write(np.array(dimensions, dtype="<i4").tobytes())
         file.write(planes.astype("<f8", copy=False).data)

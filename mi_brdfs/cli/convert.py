@@ -1,0 +1,67 @@
+"""``mi-brdfs convert``"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import mitsuba as mi
+import typer
+
+from .app import command
+from .errors import one_line
+from .interrupts import interruptible
+from .options import Parameters, check_output, parameters_of
+from .terminal import Exit, err, fail, print_paragraph, stdout_to_stderr
+from .variants import TracingVariant, set_tracing_variant
+
+
+@command()
+def convert(
+    given: Annotated[
+        str,
+        typer.Argument(
+            metavar="IN", help="A measured file; or a BSDF: the type of a plugin, FILE.xml, FILE.xml:ID, or XML."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The file to write: .binary (MERL), .bsdf (RGL or Zemax), .csv.")
+    ],
+    parameters: Parameters = None,
+    format: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="The format, where several have that ending; by default the first."),
+    ] = None,
+    variant: TracingVariant = None,
+) -> None:
+    """Write a measured file in another format, or any BSDF as a table, and say how far the two differ."""
+    parts = parameters_of(parameters)
+    check_output("OUT", output)
+    from ..measure.sources import is_measured  # imports numpy
+    from ..measured import convert as converted
+
+    is_bsdf = not is_measured(given)
+    if is_bsdf:
+        set_tracing_variant(variant)
+    elif parts:
+        fail(f"-D {next(iter(parts))}: {given} is a measured file, and has no parameters", Exit.USAGE)
+    with stdout_to_stderr(), interruptible(), err.status(f"Writing {output.name}"):
+        try:
+            result = converted(_bsdf(given, parts) if is_bsdf else given, output, format)
+        except OSError as error:
+            fail(f"cannot write {output}: {error.strerror or error}")
+        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
+            fail(one_line(error), Exit.USAGE)
+    for line in str(result).splitlines():
+        print_paragraph(line)
+
+
+def _bsdf(word: str, parameters: dict[str, str]) -> dict[str, Any] | mi.BSDF:
+    """Return the only BSDF that a word stands for."""
+    from ..measure.sources import find_sources
+
+    found = list(find_sources(word, parameters))
+    if len(found) > 1:
+        words = ", ".join(it.word for it in found)
+        raise ValueError(f"{word} has several materials; convert one of {words}")
+    return found[0].load()

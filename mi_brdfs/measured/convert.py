@@ -1,0 +1,252 @@
+"""Measured files, and any BSDF, written in another format."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from ..measure.arrays import CENTRE, Array
+from ..measure.probe import BSDFProbe
+from ..measure.sources import name_of
+from ..variants import is_measurable
+from .arrays import NUMPY, components
+from .formats import ENDINGS, FORMATS, read
+from .measurement import Grid, Measurement, Samples, usable
+from .scattered import gridded
+from .source import Source
+
+LANES = 1 << 20
+"""Pairs of directions that a BSDF is evaluated for at once."""
+PAIRS = 1 << 15
+STEEPEST = 80
+"""The angle, in degrees, up to which a conversion is judged."""
+GREY = "What was measured at one wavelength became grey."
+ALIKE = 1e-3
+"""By what part of its peak f may change where it counts as the same."""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """What was written, and how it differs from what was given."""
+
+    path: Path
+    format: str
+    rms: float
+    """The root mean square error of f cosθo, in parts of its peak, at random pairs of directions up to 80° from the
+    normal: half of the ``wo`` are cosine-weighted, half of them around the mirror direction."""
+    largest: float
+    """The largest error, outside one cell of the peak."""
+    losses: tuple[str, ...]
+    """What the file does not hold, a sentence each."""
+
+    def __str__(self) -> str:
+        error = (
+            f"Read back at {PAIRS:,} random pairs of directions up to {STEEPEST}° from the normal, f cosθ is off by "
+            f"{_percent(self.rms)} of its peak (root mean square), and by at most {_percent(self.largest)} farther "
+            "than a cell from the peak."
+        )
+        return "\n".join([f"{self.path}: {self.format}.", error, *self.losses])
+
+
+def convert(
+    given: str | Path | Measurement | mi.BSDF | dict | Source, path: str | Path, format: str | None = None
+) -> Conversion:
+    """Write a measured file, or a BSDF, in another format.
+
+    ``given`` is the path of a measured file or what :func:`read` returned of it; or a BSDF or its dict, which is
+    evaluated in the active variant (:func:`bake`). ``path`` ends in what the format's files end in: ``.binary`` for
+    MERL, ``.bsdf`` for RGL, ``.csv``; ``format`` chooses among formats with the same ending.
+
+    A file that exists is replaced, once the new one is complete.
+
+    Raises:
+        FileError: if the given file cannot be read.
+        ValueError: if the format cannot hold what is given, none has this ending, or there is nothing to write.
+        OSError: if the file cannot be written.
+    """
+    path = Path(path)
+    if isinstance(given, (str, Path)) and Path(given).exists() and path.exists() and os.path.samefile(given, path):
+        raise ValueError(f"{path} cannot be converted onto itself; give another name")
+    if path.exists() and not path.is_file():
+        raise ValueError(f"{path} is not a regular file; give the name of one")
+    writer = _writer(path, format)
+    source, losses = _source(given)
+    target = path.resolve()
+    # Under another name until it is complete, but with the same ending.
+    part = target.with_name(f".{os.getpid()}-{target.name}")
+    try:
+        writer.write(part, source)
+        rms, largest, more = _compared(source, read(part))
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+    return Conversion(path, writer.NAME, rms, largest, (*losses, *more))
+
+
+def bake(bsdf: mi.BSDF | dict[str, Any]) -> Source:
+    """Return the reflection of a BSDF on its front side, without delta functions, as what files are written from.
+
+    It is evaluated in the active variant, at texture coordinates (0.4, 0.3). It counts as anisotropic if turning both
+    directions about the normal changes f by more than 0.1 % of its peak.
+
+    Raises:
+        ValueError: if the variant is not a vectorized one with rgb, or the BSDF has no such reflection.
+    """
+    return _baked(_probe(bsdf))
+
+
+def _probe(bsdf: mi.BSDF | dict[str, Any]) -> BSDFProbe:
+    variant = mi.variant()
+    if not is_measurable(variant) or not mi.is_rgb:
+        raise ValueError(f"a BSDF is written in a vectorized rgb variant such as llvm_ad_rgb, not {variant or 'none'}")
+    loaded = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    if not isinstance(loaded, mi.BSDF):
+        raise ValueError(f"{type(loaded).__name__} is not a BSDF of {variant}")
+    return BSDFProbe(loaded)
+
+
+def _baked(probe: BSDFProbe) -> Source:
+    if not probe.components:
+        raise ValueError("the BSDF reflects and transmits in single directions only: there is no value to write")
+
+    def evaluate(wi: Array, wo: Array) -> Array:
+        wi, wo = np.asarray(wi, np.float32), np.asarray(wo, np.float32)
+        batches = [slice(k, k + LANES) for k in range(0, len(wi), LANES)]
+        f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in batches]
+        return usable(np.concatenate(f))
+
+    wi, wo = _pairs(PAIRS)
+    f, turned = evaluate(wi, wo), evaluate(_turned(wi), _turned(wo))
+    if not f.any():
+        raise ValueError("the BSDF reflects nothing on its front side: there is no value to write")
+    return Source(evaluate, anisotropic=not _alike(f, turned), material=name_of(probe.bsdf))
+
+
+def _source(given: Any) -> tuple[Source, list[str]]:
+    """Return what to write, and what is known to be lost."""
+    if isinstance(given, Source):
+        return given, []
+    if isinstance(given, (str, Path)):
+        given = read(given)
+    if isinstance(given, Measurement):
+        return _of_measurement(given), []
+    probe = _probe(given)
+    return _baked(probe), list(_left_out(probe))
+
+
+def _of_measurement(measurement: Measurement) -> Source:
+    grid = _grid(measurement)
+    if not grid.usable.any():
+        raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
+    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
+    stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
+    return source if stated else source.rgb()
+
+
+def _grid(measurement: Measurement) -> Grid:
+    return gridded(measurement.data) if isinstance(measurement.data, Samples) else measurement.data
+
+
+def _left_out(probe: BSDFProbe) -> Iterator[str]:
+    """Yield what of a BSDF is not written."""
+    if probe.deltas:
+        yield "Its reflection or transmission in single directions (delta functions) is left out."
+    if any(part.has(mi.BSDFFlags.Transmission) for part in probe.components):
+        yield "The light that it transmits is left out."
+    wi, wo = (np.float32(w) for w in _pairs(PAIRS))
+    elsewhere = np.random.default_rng(2).random((PAIRS, 2), np.float32)
+    if not _alike(probe.eval(probe.whole, wi, wo), probe.eval(probe.whole, wi, wo, elsewhere)):
+        yield f"It varies over the surface; this is how it is at texture coordinates {CENTRE}."
+
+
+def _alike(f: Array, other: Array) -> bool:
+    return bool(abs(f - other).max() <= ALIKE * f.max())
+
+
+def _writer(path: Path, format: str | None) -> ModuleType:
+    """Return the module of the format to write.
+
+    Raises:
+        ValueError: if there is none.
+    """
+    writable = {it.NAME: it for it in FORMATS if hasattr(it, "write")}
+    fitting = [name for name in ENDINGS.get(path.suffix.lower(), []) if name in writable]
+    chosen = [name for name in fitting if format is None or name.lower() == format.lower()]
+    if not chosen:
+        wanted = f"{path} as {format}" if fitting else str(path)
+        known = [f"{ending} ({name})" for ending, names in ENDINGS.items() for name in names if name in writable]
+        raise ValueError(f"there is no way to write {wanted}; files that can be written are {', '.join(known)}")
+    return writable[chosen[0]]
+
+
+def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:
+    """Return the root mean square error, the largest, and what was lost on the way."""
+    grid = _grid(written)
+    losses = []
+    if source.wavelengths is not None and written.wavelengths is None:
+        count = len(source.wavelengths)
+        losses.append(f"Its {count} wavelengths became linear sRGB, as seen under D65." if count > 1 else GREY)
+    if source.wavelengths is None or written.wavelengths is None:
+        source, written_as = source.rgb(), Source(grid.evaluate, written.wavelengths).rgb()
+    else:
+        written_as = Source(grid.evaluate)
+    wi, wo = _pairs(PAIRS)
+    cosine = wo[:, 2:]
+    f, found = source.evaluate(wi, wo) * cosine, written_as.evaluate(wi, wo) * cosine
+    error, peak = abs(found - f).max(axis=-1), f.max() or 1.0
+    if grid.coordinates.reciprocal:
+        change = abs(source.evaluate(wo, wi) * cosine - f).max() / peak
+        if change > ALIKE:
+            losses.append(
+                f"{written.format} is reciprocal: f is the mean over both orders of the directions, between which f "
+                f"cosθ differs by up to {_percent(change)} of its peak."
+            )
+    cells = _cells(grid, wi, wo)
+    far = (abs(cells - cells[:, [f.max(axis=-1).argmax()]]) > 1).any(axis=0)
+    return float(np.sqrt(np.mean(error**2)) / peak), float(error[far].max(initial=0) / peak), losses
+
+
+def _percent(part: float) -> str:
+    percent = 100 * part
+    return "less than 0.001 %" if percent < 0.001 else f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
+
+
+def _cells(grid: Grid, wi: Array, wo: Array) -> Array:
+    """Return where directions lie on the axes of a grid, counted in cells, shape (axes, N)."""
+    places, _ = grid.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
+    return np.stack([np.interp(x, a.nodes, np.arange(len(a.nodes))) for a, x in zip(grid.axes, places, strict=True)])
+
+
+def _pairs(count: int) -> tuple[Array, Array]:
+    """Draw pairs of directions up to 80° from the normal, always the same: ``wi`` cosine-weighted, ``wo`` cosine-
+    weighted or around the mirror direction, by half vectors whose angles are log-uniform from 0.05° to 30°."""
+    rng = np.random.default_rng(1)
+    wi = _lambertian(rng, count)
+    tilt, azimuth = np.radians(np.exp(rng.uniform(np.log(0.05), np.log(30), count))), rng.uniform(0, 2 * np.pi, count)
+    h = np.stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)], axis=-1)
+    mirrored = 2 * np.sum(wi * h, axis=-1, keepdims=True) * h - wi
+    wo = np.where((np.arange(count) % 2 == 0) & (mirrored[:, 2] > LOWEST), mirrored.T, _lambertian(rng, count).T).T
+    return wi, wo
+
+
+LOWEST = np.cos(np.radians(STEEPEST))
+
+
+def _lambertian(rng: np.random.Generator, count: int) -> Array:
+    cosine, phi = np.sqrt(rng.uniform(LOWEST**2, 1, count)), rng.uniform(0, 2 * np.pi, count)
+    sine = np.sqrt(1 - cosine**2)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+
+
+def _turned(w: Array) -> Array:
+    """Return directions turned about the normal, each by another angle."""
+    angle = np.linspace(0, 2 * np.pi, len(w))
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([w[:, 0] * cos - w[:, 1] * sin, w[:, 0] * sin + w[:, 1] * cos, w[:, 2]], axis=-1)

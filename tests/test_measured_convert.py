@@ -1,0 +1,160 @@
+"""BSDFs and measured files in another format: as exact as the format allows, or refused in a sentence."""
+
+import re
+
+import numpy as np
+import pytest
+from support import hemisphere
+from typer.testing import CliRunner
+
+from mi_brdfs.cli import app
+from mi_brdfs.measured import FileError, Grid, Measurement, bake, convert, read
+from mi_brdfs.measured.coordinates import Spherical
+from mi_brdfs.measured.formats import ENDINGS
+from mi_brdfs.measured.measurement import Axis
+
+import mitsuba as mi  # isort: skip
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
+RED = {"type": "rgb", "value": [0.8, 0.2, 0.1]}
+
+
+@pytest.mark.parametrize(
+    "bsdf",
+    [
+        {"type": "walter"},
+        {"type": "ward"},
+        {"type": "burley", "base_color": RED},
+        {"type": "ward", "alpha": 0.05, "diffuse_reflectance": 0.05, "specular_reflectance": RED},
+    ],
+    ids=str,
+)
+def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path, bsdf):
+    result = convert(bsdf, tmp_path / "x.binary")
+    assert result.format == "MERL" and result.losses == ()
+    assert result.rms < 0.001 and result.largest < 0.01
+    # What the file holds, found without the code that judged it.
+    wi, wo = (w.astype(np.float64) for w in (hemisphere(4000, 1, 0.3), hemisphere(4000, 2, 0.3)))
+    found = read(tmp_path / "x.binary").data.evaluate(wi, wo)
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(np.float32(wi.T))
+    f = np.array(mi.load_dict(bsdf).eval(mi.BSDFContext(), si, mi.Vector3f(np.float32(wo.T)))).T / wo[:, 2:]
+    assert abs(found - f).max() < 0.01 * f.max() and np.median(abs(found / f - 1)) < 0.005
+
+
+def test_it_says_what_is_lost(tmp_path):
+    lacquer = {"type": "plastic", "diffuse_reflectance": {"type": "checkerboard"}}
+    bsdf = {"type": "blendbsdf", "weight": 0.5, "lacquer": lacquer, "glass": {"type": "roughdielectric"}}
+    losses = convert(bsdf, tmp_path / "x.binary").losses
+    for loss, word in zip(losses, ("delta functions", "transmits", "varies over the surface"), strict=True):
+        assert word in loss
+
+
+def measurement(f, channels, wavelengths=None):
+    """Values at the nodes of a coarse grid of polar angles."""
+    polar, azimuth = Axis(np.radians(np.arange(5, 90, 10))), Axis(np.radians(np.arange(0, 181, 20)))
+    places = np.meshgrid(polar.nodes, polar.nodes, azimuth.nodes, indexing="ij")
+    values = np.repeat(f(*places)[..., None], channels, axis=-1)
+    return Measurement("some file", "test", Grid(Spherical(True), (polar, polar, azimuth), values), wavelengths)
+
+
+def test_a_measurement_keeps_its_values(tmp_path):
+    result = convert(measurement(lambda i, o, d: 1 + np.cos(i) * np.cos(o), 3), tmp_path / "x.binary")
+    assert result.losses == () and result.rms < 0.002 and result.largest < 0.02
+
+
+def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
+    path = tmp_path / "x.binary"
+    (loss,) = convert(measurement(lambda i, o, d: 1 + 0 * i, 1, np.array([650.0])), path).losses
+    assert "grey" in loss
+    spectral = measurement(lambda i, o, d: 1 + np.cos(i), 4, np.array([450.0, 500, 550, 600]))
+    one, other = convert(spectral, path).losses
+    assert "4 wavelengths" in one and "reciprocal" in other
+    wi, wo = (w.astype(np.float64) for w in (hemisphere(100, 3, 0.5), hemisphere(100, 4, 0.5)))
+    mean = 1 + (wi[:, 2] + wo[:, 2]) / 2
+    np.testing.assert_allclose(read(path).data.evaluate(wi, wo)[:, 0], mean, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "given, name, words",
+    [
+        ({"type": "dielectric"}, "x.binary", "single directions only"),
+        ({"type": "diffuse", "reflectance": 0}, "x.binary", "reflects nothing"),
+        ({"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3}, "x.binary", "anisotropic"),
+        ({"type": "constant"}, "x.binary", "not a BSDF"),
+        ({"type": "ward"}, "x.exr", "no way to write .*x.exr; .* .binary"),
+        ({"type": "ward"}, "x", "no way to write"),
+        ({"type": "ward"}, "folder.binary", "not a regular file"),
+        (measurement(lambda i, o, d: -1 + 0 * i, 3), "x.binary", "no positive value"),
+        ("nowhere.binary", "x.binary", "No such file"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_is_refused(tmp_path, given, name, words):
+    (tmp_path / "folder.binary").mkdir()
+    with pytest.raises(ValueError, match=words):
+        convert(given, tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.binary"]
+
+
+def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(tmp_path, monkeypatch):
+    path = tmp_path / "x.binary"
+    convert({"type": "lambert"}, path)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="onto itself"):
+        convert(path, path)
+
+    def full(path, source):
+        path.write_bytes(b"half of it")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("mi_brdfs.measured.formats.merl.write", full)
+    with pytest.raises(OSError):
+        convert({"type": "ward"}, path)
+    assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+
+
+def test_baking_needs_rgb():
+    with mi.variant_context("llvm_ad_spectral"), pytest.raises(ValueError, match="vectorized rgb variant"):
+        bake({"type": "ward"})
+    assert bake({"type": "ward", "alpha_u": 0.1, "alpha_v": 0.2}).anisotropic
+
+
+def run(*words):
+    result = CliRunner().invoke(app, ["convert", *map(str, words)])
+    return result.exit_code, " ".join(result.output.split())
+
+
+def test_the_help_names_all_endings():
+    _, text = run("-h")
+    assert all(re.search(rf"\{ending}\b", text) for ending in ENDINGS)
+
+
+def test_the_command(tmp_path):
+    path = tmp_path / "x.binary"
+    status, text = run("phong", path, "-D", "exponent=20")
+    assert status == 0 and "MERL" in text and "% of its peak" in text
+    assert run('<bsdf type="lambert"/>', tmp_path / "y.binary")[0] == 0
+    assert run(path, tmp_path / "z.binary")[0] == 0
+    for words, answer in (
+        ((path, path), "onto itself"),
+        ((path, tmp_path / "y.binary", "-D", "alpha=1"), "no parameters"),
+        (("wardd", path), 'did you mean "ward"?'),
+        (("nowhere.bsdf", path), "No such file or directory"),
+        (("ward", tmp_path), "it is a folder"),
+        (("ward", tmp_path / "none" / "x.binary"), "there is no folder"),
+        (("ward", path, "--format", "zip"), "as zip"),
+        (("ward", path, "--variant", "llvm_ad_spectral"), "vectorized rgb variant"),
+    ):
+        status, text = run(*words)
+        assert status == 2 and answer in text, (words, text)
+    path.write_bytes(path.read_bytes()[:1000])
+    status, text = run(path, tmp_path / "y.binary")
+    assert status == 2 and "at byte 12" in text
+
+
+def test_a_file_that_ends_too_soon_is_named(tmp_path):
+    (tmp_path / "x.binary").write_bytes(b"\0" * 5)
+    with pytest.raises(FileError, match=r"x\.binary: at byte 0"):
+        convert(tmp_path / "x.binary", tmp_path / "y.binary")
