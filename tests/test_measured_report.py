@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from mi_brdfs import plot
-from mi_brdfs.measured import Axis, FileError, Grid, Measurement, read
+from mi_brdfs.measured import Axis, FileError, Grid, Measurement, read, summarize
 from mi_brdfs.measured.albedo import albedos
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
-from mi_brdfs.measured.summary import summarize
 
 SCALE = np.array([1, 1.15, 1.66]) / 1500
 DIMENSIONS = 30, 30, 60
@@ -196,7 +195,7 @@ def test_the_range_of_a_goniometer():
     assert (first.stated, first.theta_i, second.theta_i) == (0.75, 0, 30)
     assert first.integrated == pytest.approx(0.75, rel=0.01)
     assert second.integrated == pytest.approx(0.75 * np.cos(np.pi / 6), rel=0.01)  # the horizon cuts nothing off
-    assert dict(found.rows())["stated albedo"].startswith("0.5 at θi = 30°; the values give 0.6")
+    assert dict(found.rows())["stated TIS"].startswith("0.5 at θi = 30°; the values' albedo is 0.6")
 
 
 def test_each_rotation_has_its_stated_albedo():

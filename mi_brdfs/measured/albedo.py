@@ -8,6 +8,7 @@ between them.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,8 +19,9 @@ from .measurement import Extrapolation, Grid
 
 RADII = 96
 """The nodes along a radius."""
-TURNS, TURN_WEIGHTS = np.polynomial.legendre.leggauss(64)
-"""Those within a quarter of a turn about the centre of a part, and their weights, on [-1, 1]."""
+TURNS = 64
+"""Those within a quarter of a turn about the centre of a part."""
+_gauss = functools.cache(np.polynomial.legendre.leggauss)
 
 
 def albedos(grid: Grid, theta_i: np.ndarray, phi_i: float = 0, extrapolate: Extrapolation = "hold") -> np.ndarray:
@@ -61,10 +63,11 @@ def _part(theta: float, towards: int) -> Iterator[tuple[np.ndarray, np.ndarray]]
     """Yield the directions and solid angles of the part about the direction in the xz plane at an angle to the normal,
     on the side of positive or negative x."""
     cos, sin = np.cos(theta), np.sin(theta)
-    u, of_u = TURNS / 2 + 0.5, TURN_WEIGHTS[:, None] / 2
+    nodes, weights = _gauss(TURNS)
+    u, of_u = nodes / 2 + 0.5, weights[:, None] / 2
     # Shifted from one azimuth to the next, by the golden ratio: where f ends as at a wall, at the edge of what was
     # measured, the errors of the rows cancel.
-    t = (np.arange(RADII) + np.mod(np.arange(len(u))[:, None] * 0.6180339887498949, 1)) / RADII
+    t = (np.arange(RADII) + np.mod(np.arange(TURNS)[:, None] * 0.6180339887498949, 1)) / RADII
     # The azimuth about the centre is 0 towards the normal. Up to a quarter of a turn the plane x = 0 bounds the part,
     # and the horizon from there on.
     for start in (0, np.pi / 2):

@@ -38,8 +38,10 @@ class Albedo:
 
 @dataclass(frozen=True)
 class Scatter:
-    """A directional albedo that the file states as total integrated scatter, the angles of incidence in degrees, and
-    the mean over the channels of the integral over its values, with nothing beyond them."""
+    """A total integrated scatter (TIS) that the file states, the directional albedo by its values, with nothing beyond
+    them, as the mean over the channels, and the angles of incidence in degrees.
+
+    They should be the same; but not every program that writes such files takes the cosine, or the whole hemisphere."""
 
     stated: float
     integrated: float
@@ -109,7 +111,7 @@ class Summary:
         if self.largest_albedo is not None:
             it = self.largest_albedo
             rows.append(("largest albedo", f"{it.value:.3g} at {self._place(it)}" + (it.channel and f", {it.channel}")))
-        return rows + [("stated albedo", line) for line in self._scatter()]
+        return rows + [("stated TIS", line) for line in self._scatter()]
 
     def _range(self) -> str:
         low, high = (f"{100 * share:.0f}" for share in self.coverage)
@@ -132,12 +134,13 @@ class Summary:
 
     def _scatter(self) -> list[str]:
         if len(self.scatter) <= FEW:
-            return [f"{it.stated:.4g} at {self._place(it)}; the values give {it.integrated:.4g}" for it in self.scatter]
+            told = "{:.4g} at {}; the values' albedo is {:.4g}"
+            return [told.format(it.stated, self._place(it), it.integrated) for it in self.scatter]
         off = np.array([abs(it.integrated - it.stated) / max(it.stated, 1e-6) for it in self.scatter])
         worst = self.scatter[int(off.argmax())]
         return [
-            f"{len(off)} figures; the values differ by {_percent(np.median(off))} in the median, most at "
-            f"{self._place(worst)}: {worst.stated:.4g} is stated, the values give {worst.integrated:.4g}"
+            f"{len(off)} figures, which differ from the values' albedo by {_percent(np.median(off))} in the median, "
+            f"most at {self._place(worst)}: {worst.stated:.4g}, and the albedo is {worst.integrated:.4g}"
         ]
 
 
@@ -254,6 +257,8 @@ def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
     turns, found = azimuths(grid), []
     for theta, stated in measurement.stated_albedos.items():
         for phi, one in zip(turns, stated, strict=False):
+            if not np.isfinite(one):
+                continue
             (integrated,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
             found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
     return found

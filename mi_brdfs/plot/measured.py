@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -39,7 +39,7 @@ NODE = {"linestyle": "", "marker": "o", "markersize": 3, "fillstyle": "none", "m
 STATED = {"linestyle": "", "marker": "o", "markersize": 4, "color": INK}
 
 
-def measured(*files: str | os.PathLike | Measurement) -> Figure:
+def measured(*files: str | Path | Measurement) -> Figure:
     """Draw what measured files hold, a row of three panels for each.
 
     * The slice φd = 90° of half and difference angles: highlights are on the left, grazing incidence at the top, and
@@ -88,8 +88,9 @@ class _Table:
     def colour(self, f: np.ndarray) -> np.ndarray:
         """Return values as linear sRGB, limited to its gamut, or as they are if they have one channel."""
         wavelengths = self.measurement.wavelengths
-        spectral = wavelengths is not None and len(wavelengths) > 1
-        return np.maximum(f @ to_srgb(wavelengths) if spectral else f, 0)
+        if wavelengths is not None and len(wavelengths) > 1:
+            f = f @ to_srgb(wavelengths)
+        return np.maximum(f, 0)
 
     def luminance(self, f: np.ndarray) -> np.ndarray:
         colour = self.colour(f)
