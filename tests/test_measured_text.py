@@ -9,7 +9,7 @@ from support import shared
 
 from mi_brdfs.measured import read
 
-LOFT = Path(__file__).parent / "data" / "loft"
+LOFT = Path(__file__).parents[1] / "scenes" / "measured"
 SMALL = ["AnoBlackEC1onAlum", "AnoBlackEC2onAlum", "AnoBlackNiTEonINVAR", "aeroglaze_z307"]
 
 

@@ -31,8 +31,7 @@ def measured(
 ) -> None:
     """Tell what files with measured BRDFs hold: grid, range and symmetry, how much is negative or missing, errors of
     reciprocity, albedos."""
-    from ..measured import read  # imports numpy
-    from ..measured.summary import summarize
+    from ..measured import read, summarize  # imports numpy
 
     if plot_file is not None:
         _check_picture(plot_file)

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from .albedo import albedos
+from .albedo import albedos, coverage
 from .counts import Counts, Range, census
 from .measurement import FileError, Grid, Measurement, Samples
 from .reciprocity import ReciprocityError, reciprocity_error
-from .scattered import gridded
 
 ANGLES = np.arange(0, 86, 5)
 """The angles of incidence at which albedos are integrated, in degrees, where they were measured."""
@@ -39,8 +38,10 @@ class Albedo:
 
 @dataclass(frozen=True)
 class Scatter:
-    """A directional albedo that the file states as total integrated scatter, the angles of incidence in degrees, and
-    the mean over the channels of the integral over its values, with nothing beyond them."""
+    """A total integrated scatter (TIS) that the file states, the directional albedo by its values, with nothing beyond
+    them, as the mean over the channels, and the angles of incidence in degrees.
+
+    They should be the same; but not every program that writes such files takes the cosine, or the whole hemisphere."""
 
     stated: float
     integrated: float
@@ -110,7 +111,7 @@ class Summary:
         if self.largest_albedo is not None:
             it = self.largest_albedo
             rows.append(("largest albedo", f"{it.value:.3g} at {self._place(it)}" + (it.channel and f", {it.channel}")))
-        return rows + [("stated albedo", line) for line in self._scatter()]
+        return rows + [("stated TIS", line) for line in self._scatter()]
 
     def _range(self) -> str:
         low, high = (f"{100 * share:.0f}" for share in self.coverage)
@@ -133,12 +134,13 @@ class Summary:
 
     def _scatter(self) -> list[str]:
         if len(self.scatter) <= FEW:
-            return [f"{it.stated:.4g} at {self._place(it)}; the values give {it.integrated:.4g}" for it in self.scatter]
+            told = "{:.4g} at {}; the values' albedo is {:.4g}"
+            return [told.format(it.stated, self._place(it), it.integrated) for it in self.scatter]
         off = np.array([abs(it.integrated - it.stated) / max(it.stated, 1e-6) for it in self.scatter])
         worst = self.scatter[int(off.argmax())]
         return [
-            f"{len(off)} figures; the values differ by {_percent(np.median(off))} in the median, most at "
-            f"{self._place(worst)}: {worst.stated:.4g} is stated, the values give {worst.integrated:.4g}"
+            f"{len(off)} figures, which differ from the values' albedo by {_percent(np.median(off))} in the median, "
+            f"most at {self._place(worst)}: {worst.stated:.4g}, and the albedo is {worst.integrated:.4g}"
         ]
 
 
@@ -152,14 +154,13 @@ def summarize(measurement: Measurement) -> Summary:
     data, found = measurement.data, census(measurement.data)
     if found.least > found.most:
         raise FileError(f"{measurement.path}: no value above the horizon is a number.")
-    grid = gridded(data)
+    grid = table(data)
     theta_i, theta_o = (ends(grid, name, seen) for name, seen in
                         (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
     angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
     turns = azimuths(grid)
     turns = turns[:: -(-len(turns) // AZIMUTHS)]
-    by_azimuth = {phi: albedos(grid, np.radians(angles), phi, extrapolate="zero") for phi in turns}
-    covered = np.concatenate([shares for _, shares in by_azimuth.values()])
+    covered = np.array([coverage(grid, np.radians(angles), phi) for phi in turns])
     return Summary(
         file=str(measurement.path),
         format=measurement.format,
@@ -170,16 +171,25 @@ def summarize(measurement: Measurement) -> Summary:
         wavelengths=_wavelengths(measurement),
         theta_i=theta_i,
         theta_o=theta_o,
-        coverage=(float(covered.min()), float(covered.max())),
+        coverage=(float(covered.min(initial=1)), float(covered.max(initial=0))),
         above=found.above,
         below=found.below,
         most_negative=min(found.least, 0) / found.most if found.most > 0 else 0,
         reciprocal=grid.coordinates.reciprocal,
         reciprocity=reciprocity_error(grid),
-        largest_albedo=_largest(angles, by_azimuth, measurement),
+        largest_albedo=_largest(measurement, grid, angles, turns),
         scatter=_stated(measurement, grid),
         notes=dict(measurement.notes),
     )
+
+
+def table(data: Grid | Samples) -> Grid:
+    """Return a measurement's values on a grid."""
+    if isinstance(data, Grid):
+        return data
+    from .scattered import gridded
+
+    return gridded(data)
 
 
 def channel_names(measurement: Measurement) -> list[str]:
@@ -234,12 +244,12 @@ def azimuths(grid: Grid) -> np.ndarray:
     return np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS)
 
 
-def _largest(
-    angles: np.ndarray, by_azimuth: dict[float, tuple[np.ndarray, np.ndarray]], measurement: Measurement
-) -> Albedo | None:
-    values = np.stack([found for found, _ in by_azimuth.values()])  # azimuth, angle, channel
-    azimuth, angle, channel = np.unravel_index(values.argmax(), values.shape)
-    phi = float(np.degrees(list(by_azimuth)[azimuth]))
+def _largest(measurement: Measurement, grid: Grid, angles: np.ndarray, turns: np.ndarray) -> Albedo | None:
+    if not len(angles):
+        return None
+    values = np.array([albedos(grid, np.radians(angles), phi, extrapolate="zero") for phi in turns])
+    turn, angle, channel = np.unravel_index(values.argmax(), values.shape)
+    phi = round(float(np.degrees(turns[turn])), 4)
     return Albedo(float(values.max()), float(angles[angle]), phi, channel_names(measurement)[channel])
 
 
@@ -247,7 +257,9 @@ def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
     turns, found = azimuths(grid), []
     for theta, stated in measurement.stated_albedos.items():
         for phi, one in zip(turns, stated, strict=False):
-            (integrated,), _ = albedos(grid, np.array([theta]), phi, extrapolate="zero")
+            if not np.isfinite(one):
+                continue
+            (integrated,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
             found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
     return found
 

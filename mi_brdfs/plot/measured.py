@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -21,8 +21,7 @@ from ..measured.coordinates import HalfDifference, spherical
 from ..measured.counts import batches
 from ..measured.measurement import usable
 from ..measured.observer import to_srgb
-from ..measured.scattered import gridded
-from ..measured.summary import azimuths, ends
+from ..measured.summary import azimuths, ends, table
 from .lobes import Curve, refined
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
@@ -40,7 +39,7 @@ NODE = {"linestyle": "", "marker": "o", "markersize": 3, "fillstyle": "none", "m
 STATED = {"linestyle": "", "marker": "o", "markersize": 4, "color": INK}
 
 
-def measured(*files: str | os.PathLike | Measurement) -> Figure:
+def measured(*files: str | Path | Measurement) -> Figure:
     """Draw what measured files hold, a row of three panels for each.
 
     * The slice φd = 90° of half and difference angles: highlights are on the left, grazing incidence at the top, and
@@ -79,7 +78,7 @@ class _Table:
     """A measurement as a table with a luminance."""
 
     def __init__(self, measurement: Measurement) -> None:
-        self.measurement, self.grid = measurement, gridded(measurement.data)
+        self.measurement, self.grid = measurement, table(measurement.data)
         path, material = measurement.path, measurement.material
         self.name = path.name if material in ("", path.stem) else f"{material} ({path.name})"
         self.phi = float(azimuths(self.grid)[0])
@@ -89,8 +88,9 @@ class _Table:
     def colour(self, f: np.ndarray) -> np.ndarray:
         """Return values as linear sRGB, limited to its gamut, or as they are if they have one channel."""
         wavelengths = self.measurement.wavelengths
-        spectral = wavelengths is not None and len(wavelengths) > 1
-        return np.maximum(f @ to_srgb(wavelengths) if spectral else f, 0)
+        if wavelengths is not None and len(wavelengths) > 1:
+            f = f @ to_srgb(wavelengths)
+        return np.maximum(f, 0)
 
     def luminance(self, f: np.ndarray) -> np.ndarray:
         colour = self.colour(f)
@@ -106,7 +106,7 @@ class _Table:
         if "theta_i" not in names:
             return np.array(ANGLES)
         nodes = np.degrees(self.grid.axes[names.index("theta_i")].nodes)
-        nodes = nodes[nodes < 85]
+        nodes = nodes[nodes < max(85, nodes[0] + 1)]
         return nodes[np.unique(np.linspace(0, len(nodes) - 1, LOBES).round().astype(int))]
 
 
@@ -201,9 +201,9 @@ def _nodes(it: _Table) -> list[Curve]:
 
 def _draw_albedo(ax: Axes, it: _Table) -> None:
     low, high = ends(it.grid, "theta_i")
-    angles = np.unique(np.append(np.arange(0, 90), [low, min(high, 89)]))
+    angles = np.unique(np.append(np.arange(0, 90, 3), [low, min(high, 89)]))
     angles = angles[(angles >= low) & (angles <= high)]
-    values, _ = albedos(it.grid, np.radians(angles), it.phi, extrapolate="zero")
+    values = albedos(it.grid, np.radians(angles), it.phi, extrapolate="zero")
     colour = it.colour(values)
     names = list(CHANNELS) if colour.shape[-1] == 3 else [""]
     handles = []

@@ -1,6 +1,0 @@
-from .measurement import Grid
-
-
-def gridded(data):
-    assert isinstance(data, Grid)
-    return data

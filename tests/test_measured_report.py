@@ -1,0 +1,311 @@
+"""What `mi-brdfs measured` says of a file, against values known in advance; what it draws, and how it fails."""
+
+import dataclasses
+import json
+import os
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mi_brdfs import plot
+from mi_brdfs.measured import Axis, FileError, Grid, Measurement, read, summarize
+from mi_brdfs.measured.albedo import albedos
+from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
+
+SCALE = np.array([1, 1.15, 1.66]) / 1500
+DIMENSIONS = 30, 30, 60
+REFLECTANCE = np.array([0.2, 0.5, 0.8])
+
+
+def cell_centres(dimensions, reciprocal=True):
+    """θh, θd and φd in the middle of MERL's cells."""
+    unit = [(np.arange(n) + 0.5) / n for n in dimensions]
+    return np.meshgrid(unit[0] ** 2 * np.pi / 2, unit[1] * np.pi / 2, unit[2] * np.pi * (2 - reciprocal), indexing="ij")
+
+
+def heights(theta_h, theta_d, phi_d):
+    """The cosines of wi and wo: the half vector turned by θh has d at (θd, φd) and the other direction opposite."""
+    across = np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+    return np.cos(theta_h) * np.cos(theta_d) - across, np.cos(theta_h) * np.cos(theta_d) + across
+
+
+def merl(path, f, dimensions=DIMENSIONS):
+    """A MERL file with the values of f, shape (*dimensions, 3)."""
+    planes = np.moveaxis(np.broadcast_to(f, (*dimensions, 3)) / SCALE, -1, 0)
+    path.write_bytes(struct.pack("<3i", *dimensions) + planes.astype("<f8").tobytes())
+    return path
+
+
+@pytest.fixture
+def lambert(tmp_path):
+    return merl(tmp_path / "lambert.binary", REFLECTANCE / np.pi)
+
+
+def goniometer(values=1 / np.pi, radial=60.0, anisotropic=False, stated=None, channels=1):
+    """Values at θi = 0, 30 and 60° within a cone about the mirror direction."""
+    radii, azimuths = np.radians(np.linspace(0, radial, 13)), np.radians(np.arange(0, 181, 15))
+    axes = [Axis(np.radians([0, 30, 60])), Axis(azimuths), Axis(radii)]
+    if anisotropic:
+        axes = [axes[0], Axis(np.radians(np.arange(0, 360, 15)), period=2 * np.pi), axes[2],
+                Axis(np.radians([0, 90, 180, 270]), period=2 * np.pi)]  # fmt: skip
+    shape = *(len(axis.nodes) for axis in axes), channels
+    grid = Grid(SpecularPolar(not anisotropic, anisotropic), tuple(axes), np.broadcast_to(values, shape).copy())
+    return Measurement(Path("paint.bsdf"), "Zemax", grid, wavelengths=np.array([650.0]), stated_albedos=stated or {})
+
+
+def rows(measurement):
+    return dict(summarize(measurement).rows())
+
+
+# --- Albedos --------------------------------------------------------------------------------------------------------
+
+
+class Lobe(Grid):
+    """A Phong lobe about the mirror direction of wi, or about wi, without a table's interpolation."""
+
+    exponent, retro = 20_000, False
+
+    def evaluate(self, wi, wo, interpolation="trilinear", extrapolate="hold"):
+        centre = wi if self.retro else wi * [-1, -1, 1]
+        cos = np.maximum(np.sum(centre * wo, axis=-1), 0)
+        return ((self.exponent + 2) / (2 * np.pi) * cos**self.exponent)[..., None]
+
+
+@pytest.mark.parametrize("retro", [False, True])
+@pytest.mark.parametrize("exponent", [2, 200, 20_000, 2_000_000])
+def test_the_albedo_of_a_lobe_of_any_width(exponent, retro):
+    """It is cosθi where the horizon cuts nothing off: 20,000 is as narrow as facets of alpha = .005 make it."""
+    lobe = Lobe(HalfDifference(), (Axis(np.array([0.5])),) * 3, np.ones((1, 1, 1, 1)))
+    lobe.exponent, lobe.retro = exponent, retro
+    angles = np.radians({2: [0], 200: [0, 7, 30, 45]}.get(exponent, [0, 0.1, 3, 30, 60, 75, 80, 82]))
+    found = albedos(lobe, angles, phi_i=0.7)
+    np.testing.assert_allclose(found[:, 0], np.cos(angles), rtol=2e-3)
+
+
+def test_lamberts_albedo_is_its_reflectance(lambert):
+    angles = np.radians([0, 20, 50, 70, 85])
+    found = albedos(read(lambert).data, angles)
+    np.testing.assert_allclose(found, np.tile(REFLECTANCE, (5, 1)), rtol=5e-4)
+    largest = summarize(read(lambert)).largest_albedo
+    assert largest.value == pytest.approx(0.8, rel=5e-4) and largest.channel == "blue"
+
+
+def test_a_narrow_lobe_in_a_table(tmp_path):
+    """GGX facets of alpha .01 at normal incidence, where θh is θd, in MERL's own cells: the integral over the table
+    agrees with one over θo of what it interpolates."""
+    dimensions = 90, 4, 4
+    theta_h, _, _ = cell_centres(dimensions)
+    f = 1e-4 / (4 * np.pi * (np.cos(theta_h) ** 2 * (1e-4 - 1) + 1) ** 2)
+    grid = read(merl(tmp_path / "a.binary", f[..., None], dimensions)).data
+    (found,) = albedos(grid, np.zeros(1))
+    theta = np.pi / 2 * np.linspace(0, 1, 200_001) ** 4
+    nodes = np.append(0, np.sqrt(theta_h[:, 0, 0] * 2 / np.pi))
+    f = np.interp(np.sqrt(theta / np.pi), nodes, np.append(f[0, 0, 0], f[:, 0, 0]))
+    middle, step = (theta[1:] + theta[:-1]) / 2, np.diff(theta)
+    expected = 2 * np.pi * np.sum((f[1:] + f[:-1]) / 2 * np.cos(middle) * np.sin(middle) * step)
+    assert found[0] == pytest.approx(expected, rel=2e-3)
+
+
+# --- The summary ----------------------------------------------------------------------------------------------------
+
+
+def test_counts_are_exact(tmp_path):
+    """Negative, missing and zero values above the horizon, and those below it, are those that were planted."""
+    rng = np.random.default_rng(1)
+    cos_i, cos_o = heights(*cell_centres(DIMENSIONS))
+    above = np.broadcast_to(((cos_i > 0) & (cos_o > 0))[..., None], (*DIMENSIONS, 3))
+    f = rng.uniform(0.1, 1, above.shape)
+    f[0, 0, 0] = 4
+    kind = rng.choice(5, above.shape, p=[0.9, 0.04, 0.03, 0.02, 0.01])
+    kind[0, 0, 0] = 0
+    for k, value in enumerate((-0.2, np.nan, 0, np.inf), start=1):
+        f[kind == k] = value
+    f[1, 1, 1, 2], kind[1, 1, 1, 2] = -0.68, 1
+    found = summarize(read(merl(tmp_path / "dirty.binary", f)))
+    for counts, where in ((found.above, above), (found.below, ~above)):
+        expected = [(kind[where] == k).sum() for k in (1, 2, 3, 4)]
+        assert counts.values == where.sum()
+        assert [counts.negative, counts.missing, counts.zero] == [expected[0], expected[1] + expected[3], expected[2]]
+    assert found.most_negative == pytest.approx(-0.68 / 4, rel=1e-5)
+    assert found.above.negative > 100 and found.below.negative > 100
+    words = dict(found.rows())
+    assert f"{found.above.negative:,}" in words["negative"] and "-17 % of the largest" in words["negative"]
+
+
+def test_reciprocity_is_by_how_much_the_halves_differ(tmp_path):
+    """Exchanging the directions turns φd by half a turn: a whole turn of φd can say that they differ."""
+    f = np.where(np.arange(60)[:, None] < 30, 0.3, 0.4)
+    dimensions = 30, 20, 60
+    found = summarize(read(merl(tmp_path / "one-way.binary", f, dimensions)))
+    assert not found.reciprocal
+    assert found.reciprocity.median == pytest.approx(0.25, rel=1e-5)
+    assert found.reciprocity.percentile95 == pytest.approx(0.25, rel=1e-5)
+    f[:] = 0.3
+    f[[3, 33], 0] = 0.3, 0.6  # at one of 30 pairs of φd, too few for these percentiles
+    found = summarize(read(merl(tmp_path / "almost.binary", f, dimensions)))
+    assert found.reciprocity.median == pytest.approx(0, abs=1e-5)
+    assert found.reciprocity.percentile95 == pytest.approx(0, abs=1e-5)
+
+
+def test_half_a_turn_of_merls_is_reciprocal_by_construction(lambert):
+    found = summarize(read(lambert))
+    assert found.reciprocal and found.reciprocity is None
+    assert dict(found.rows())["reciprocity"] == "exact, by the coordinates of the table"
+
+
+def test_nothing_was_measured_both_ways():
+    """Where θi is 60° only and θo at most 30°."""
+    axes = Axis(np.radians([60.0])), Axis(np.radians([0, 30])), Axis(np.array([0, np.pi]))
+    grid = Grid(Spherical(True), axes, np.ones((1, 2, 2, 1)))
+    words = rows(Measurement(Path("a.csv"), "CSV", grid, wavelengths=np.array([np.nan])))
+    assert words["reciprocity"] == "unknown: no pair of directions was measured both ways"
+    assert words["wavelengths"] == "1, not stated" and words["largest albedo"].endswith("θi = 60°")
+    assert words["measured"].startswith("θi 60 to 60°, θo 0 to 30°; 13 % of the hemisphere")
+
+
+def test_what_a_table_is_in_words(lambert):
+    words = rows(read(lambert))
+    assert words["format"] == "MERL" and words["material"] == "lambert"
+    assert words["symmetry"] == "isotropic" and words["wavelengths"] == "linear sRGB"
+    assert words["values"] == "162,000, of 30 θh × 30 θd × 60 φd × 3 channels"
+    assert words["measured"] == "all directions"
+    assert words["negative"] == words["missing"] == words["zero"] == "none"
+    words = rows(goniometer())
+    assert words["symmetry"] == "isotropic and symmetric to the plane of incidence"
+    assert words["values"] == "507, of 3 θi × 13 azimuths × 13 radial angles" and words["wavelengths"] == "650 nm"
+    words = rows(goniometer(anisotropic=True))
+    assert words["symmetry"] == "anisotropic" and "φi = 0°" in words["largest albedo"]
+    spectral = goniometer(np.linspace(0.1, 0.2, 31), channels=31)
+    spectral = dataclasses.replace(spectral, wavelengths=np.arange(400.0, 701, 10))
+    words = rows(spectral)
+    assert words["wavelengths"] == "31 from 400 to 700 nm" and words["largest albedo"].endswith(", 700 nm")
+
+
+def test_the_range_of_a_goniometer():
+    """A cone of 60° about the normal is half of the hemisphere, and nothing beyond it counts in its scatter: the
+    integral of cosθ/π over it is sin²60°."""
+    found = summarize(goniometer(stated={0.0: [0.75], np.pi / 6: [0.5]}))
+    assert found.theta_i == (0, 60) and found.theta_o[0] == 0 and found.theta_o[1] == pytest.approx(85, abs=5)
+    assert found.coverage[1] == pytest.approx(0.5, abs=0.01)
+    first, second = found.scatter
+    assert (first.stated, first.theta_i, second.theta_i) == (0.75, 0, 30)
+    assert first.integrated == pytest.approx(0.75, rel=0.01)
+    assert second.integrated == pytest.approx(0.75 * np.cos(np.pi / 6), rel=0.01)  # the horizon cuts nothing off
+    assert dict(found.rows())["stated TIS"].startswith("0.5 at θi = 30°; the values' albedo is 0.6")
+
+
+def test_each_rotation_has_its_stated_albedo():
+    values = np.array([1, 2, 3, 4])[:, None] / (10 * np.pi)
+    measurement = goniometer(values, radial=150, anisotropic=True, stated={0.0: [0.1, 0.2, 0.3, 0.5]})
+    found = summarize(measurement)
+    assert [it.phi_i for it in found.scatter] == [0, 90, 180, 270]
+    np.testing.assert_allclose([it.integrated for it in found.scatter], [0.1, 0.2, 0.3, 0.4], rtol=1e-3)
+    assert (found.largest_albedo.value, found.largest_albedo.phi_i) == (pytest.approx(0.4, rel=1e-3), 270)
+
+
+def test_a_file_without_numbers(tmp_path):
+    path = merl(tmp_path / "empty.binary", np.nan)
+    with pytest.raises(FileError, match=r"empty\.binary: no value above the horizon is a number"):
+        summarize(read(path))
+
+
+# --- The command ----------------------------------------------------------------------------------------------------
+
+
+def run(*arguments, columns=80):
+    return subprocess.run(
+        [sys.executable, "-m", "mi_brdfs", "measured", *map(str, arguments)],
+        capture_output=True, text=True, timeout=120, env=os.environ | {"COLUMNS": str(columns)},
+    )  # fmt: skip
+
+
+def test_the_command_tells_of_each_file_and_goes_on_after_a_bad_one(lambert, tmp_path):
+    done = run(lambert, tmp_path, lambert, "--json", tmp_path / "a.json", "--plot", tmp_path / "a.png")
+    assert done.returncode == 1
+    assert done.stderr == f"mi-brdfs: {tmp_path} is a directory; give a file in it.\n"
+    assert done.stdout.count("162,000, of 30 θh × 30 θd × 60 φd × 3 channels") == 2
+    assert done.stdout.count(str(lambert)) == 2 and done.stdout.endswith("a.png\n")
+    one, other = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert one == other == json.loads(json.dumps(summarize(read(lambert)).to_dict()))
+    assert one["above"]["values"] + one["below"]["values"] == 162_000
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize("option, file, words", [
+    ("--plot", "a.html", "a.html: write a .png, .svg, .pdf or .jpg"),
+    ("--plot", "nowhere/a.png", "there is no folder"),
+    ("--json", "nowhere/a.json", "there is no folder"),
+])  # fmt: skip
+def test_a_wrong_option(lambert, tmp_path, option, file, words):
+    done = run(lambert, option, tmp_path / file)
+    assert done.returncode == 2 and done.stdout == ""
+    assert words in done.stderr and done.stderr.count("\n") == 1
+
+
+# --- The pictures ---------------------------------------------------------------------------------------------------
+
+
+def lines(ax):
+    """The curves and points of a panel that have data."""
+    return [np.array(line.get_data(), dtype=float) for line in ax.lines]
+
+
+def test_the_slice_has_the_colours_of_the_material(lambert):
+    """Lambert's is even: of the luminance at the end of the scale, with the display's values of the hue."""
+    (image,) = plot.measured(lambert).axes[0].images
+    shown = image.get_array()
+    assert shown.shape == (256, 256, 4) and (shown[..., 3] == 1).all()
+    expected = np.tile((REFLECTANCE / 0.8) ** (1 / 2.2), (256, 256, 1))
+    np.testing.assert_allclose(shown[..., :3] / shown[..., 2:3], expected, rtol=1e-4)
+
+
+def test_the_slice_shows_what_was_measured():
+    """Up to θi = 60°, and up to an angle of 60° between wo and the mirror direction."""
+    figure = plot.measured(goniometer())
+    seen = figure.axes[0].images[0].get_array()[..., 3]
+    middles = (np.arange(256) + 0.5) / 256 * np.pi / 2
+    theta_h, theta_d = np.meshgrid(middles, middles)
+    wi = np.stack([np.cos(theta_d) * np.sin(theta_h), np.sin(theta_d), np.cos(theta_d) * np.cos(theta_h)], axis=-1)
+    wo = wi * [1, -1, 1]
+    cone = np.sum(wi * [-1, -1, 1] * wo, axis=-1) >= 0.5
+    assert (seen != (cone & (wi[..., 2] >= 0.5))).mean() < 1e-4
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["not measured"]
+    assert 0.1 < seen.mean() < 0.9
+
+
+def test_lobes_pass_through_the_nodes():
+    """A lobe that falls off with the radial angle: each curve is it, each node lies on it, none beyond the cone."""
+    radial = np.linspace(0, 60, 13)
+    figure = plot.measured(goniometer(np.exp(-radial / 20)[:, None]))
+    panel = lines(figure.axes[1])
+    for theta_i, curve, nodes in zip((0, 30, 60), panel[1:6:2], panel[6:], strict=True):
+        for theta, value in (curve[:, np.isfinite(curve[1])], nodes):
+            expected = np.interp(abs(theta - theta_i), radial, np.exp(-radial / 20))
+            np.testing.assert_allclose(value, expected, rtol=0.01)
+            assert theta.min() == pytest.approx(theta_i - 60, abs=0.5)
+            assert theta.max() == pytest.approx(min(theta_i + 60, 90), abs=5.5)
+        assert len(nodes[0]) > 15
+
+
+def test_albedos_are_drawn_beside_those_that_are_stated(lambert):
+    red, green, blue, one = lines(plot.measured(lambert).axes[2])
+    for curve, albedo in zip((red, green, blue), REFLECTANCE, strict=True):
+        np.testing.assert_allclose(curve[1], albedo, rtol=1e-3)
+    assert list(one[1]) == [1, 1]
+    curve, stated, _ = lines(plot.measured(goniometer(stated={0.0: [0.7], np.pi / 3: [0.3]})).axes[2])
+    assert curve[1][0] == pytest.approx(0.75, rel=0.01) and curve[0][-1] == 60
+    np.testing.assert_allclose(stated, [[0, 60], [0.7, 0.3]])
+
+
+def test_several_files_have_a_row_each(lambert):
+    figure = plot.measured(lambert, goniometer())
+    assert [ax.get_title(loc="left") for ax in figure.axes if ax.get_title(loc="left")] == [
+        "lambert.binary",
+        "paint.bsdf",
+    ]
+    with pytest.raises(ValueError, match="no measured file"):
+        plot.measured()
