@@ -7,9 +7,9 @@ from types import ModuleType
 
 from ..files import checked
 from ..measurement import FileError, Measurement
-from . import lighttools, merl, rgl, zemax
+from . import alta, cornell, csv, lighttools, merl, rgl, zemax
 
-FORMATS: list[ModuleType] = [merl, rgl, zemax, lighttools]
+FORMATS: list[ModuleType] = [merl, rgl, zemax, lighttools, alta, cornell, csv]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it."""
 
