@@ -81,7 +81,7 @@ def test_zemax_values_are_at_their_directions(name):
 
 @pytest.mark.parametrize("name", [*SMALL[:3], "IMX455"])
 def test_stated_tis_is_lofts_sum_over_what_was_read(name):
-    """LOFT's scripts sum f over the azimuths that the file has, less a bit for the beam, without the cosine. Of
+    """LOFT's scripts sum f over the azimuths that the file has, without the cosine, less a bit for the beam. Of
     isotropic samples these are half of all: the sum is the albedo of a Lambertian surface, but of no other."""
     path = LOFT / f"{name}.bsdf" if name in SMALL else shared("loft", f"{name}.bsdf")
     measurement, table = read(path), Table(path)

@@ -173,7 +173,7 @@ def test_values_have_derivatives_on_request(llvm_rgb, glossy):
     np.testing.assert_allclose(doubled, 2 * value, rtol=1e-5)
 
 
-LOFT = Path(__file__).parent / "data" / "loft"
+LOFT = Path(__file__).parents[1] / "scenes" / "measured"
 
 
 def real_files():

@@ -1,10 +1,23 @@
 """Measured BRDFs: files, tables, and what they say."""
 
-from .convert import Conversion, bake, convert
-from .formats import read
-from .measurement import Axis, FileError, Grid, Measurement, Samples
-from .source import Source
-from .summary import Summary, summarize
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .conversion import Conversion, bake, convert
+    from .formats import read
+    from .measurement import Axis, FileError, Grid, Measurement, Samples
+    from .source import Source
+    from .summary import Summary, summarize
+
+_HOMES = {
+    "conversion": ("Conversion", "bake", "convert"),
+    "formats": ("read",),
+    "measurement": ("Axis", "FileError", "Grid", "Measurement", "Samples"),
+    "source": ("Source",),
+    "summary": ("Summary", "summarize"),
+}
+"""The modules of the public names, imported when they are used: the readers take time."""
 
 __all__ = [
     "Axis",
@@ -20,3 +33,14 @@ __all__ = [
     "read",
     "summarize",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f".{module}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
-from weakref import WeakValueDictionary
+from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
 import numpy as np
@@ -13,13 +11,9 @@ import numpy as np
 from ..lobes import Lobe
 from ..model import Model
 from ..parameters import Choice, Colour, File, Flag, Rotation
-from .colour import Channels
-from .coordinates import PolarAngle
-from .files import checked
-from .formats import read
-from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
-from .proposal import NODES_I, Proposal, albedos
-from .table import Table
+
+if TYPE_CHECKING:
+    from .tables import Tables
 
 
 class Tabulated(Model):
@@ -73,10 +67,12 @@ class Tabulated(Model):
     rotation = Rotation()
 
     def __init__(self, props: mi.Properties) -> None:
+        from .tables import Tables  # on first use: the readers take time
+
         super().__init__(props)
         chosen: dict[str, Any] = self.parameters.chosen
         shared = not chosen["differentiable"]
-        self.tables = Tables.of(Path(chosen["filename"]), chosen["interpolation"], chosen["extrapolate"], shared)
+        self.tables = Tables.of(chosen["filename"], chosen["interpolation"], chosen["extrapolate"], shared)
         self.captured = self.tables.captured
         if not shared:
             self.arrays = {"values": self.tables.f.values}
@@ -110,36 +106,3 @@ class TabulatedLobe(Lobe):
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.tables.proposal.sample(wi, u, v)
-
-
-class Tables:
-    """What a file becomes in a variant: f, the albedo over θi, and the density that directions are drawn from."""
-
-    _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
-
-    @classmethod
-    def of(cls, path: Path, interpolation: Interpolation, extrapolate: Extrapolation, shared: bool) -> Tables:
-        """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
-        if not shared:
-            return cls(read(path), interpolation, extrapolate)
-        state = checked(path).stat()
-        key = mi.variant(), path.resolve(), state.st_mtime_ns, state.st_size, interpolation, extrapolate
-        found = cls._shared.get(key)
-        if found is None:
-            found = cls._shared[key] = cls(read(path), interpolation, extrapolate)
-        return found
-
-    def __init__(self, measurement: Measurement, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
-        grid = measurement.data
-        if not isinstance(grid, Grid):
-            raise FileError(f"{measurement.path}: scattered samples.")
-        if not np.any(grid.usable > 0):
-            raise FileError(f"{measurement.path}: no value is positive; there is nothing to render.")
-        self.channels = Channels(measurement.wavelengths)
-        self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal
-        converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)
-        self.f = Table(converted, self.channels.spectrum, interpolation == "nearest", extrapolate == "hold")
-        self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
-        albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos(converted, NODES_I, interpolation, extrapolate))
-        self.albedo = Table(albedo, self.channels.spectrum, nearest=False, hold=True)
-        self.captured = [*self.f.captured, *self.albedo.captured, *self.channels.basis, self.proposal.warp]

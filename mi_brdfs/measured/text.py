@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterator, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ class TextFile:
 
     def __init__(self, path: Path) -> None:
         self.path, self.size, self.line = path, path.stat().st_size, 0
+        self.comments: list[str] = []
+        self.row_lines = array("q")
         with path.open("rb") as file:
             self._encoding = encoding(file.read(4))
 
@@ -33,6 +36,15 @@ class TextFile:
                 if len(text) == LONGEST:
                     raise self.error(f"there are more than {LONGEST:,} characters: this is no table")
                 yield text.strip()
+
+    def rows(self) -> Iterator[list[str]]:
+        """Yield the words of lines that have some, between white space and commas, and collect the comments."""
+        for text in self.lines():
+            text, _, comment = text.partition("#")
+            if comment := comment.strip("# \t"):
+                self.comments.append(comment)
+            if words := text.replace(",", " ").split():
+                yield words
 
     def error(self, problem: str, line: int | None = None) -> FileError:
         return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")
@@ -48,6 +60,30 @@ class TextFile:
         except ValueError:
             bad = next(word for word in words if not is_number(word))
             raise self.error(f"{shortened(bad)} should be {what}") from None
+
+    def table(self, rows: Iterable[Sequence[str]], columns: int, what: str, more: bool = False) -> np.ndarray:
+        """Return rows of words as numbers, shape (rows, columns); with ``more``, further columns are left out.
+
+        ``row_lines`` has the line of each.
+
+        Raises:
+            FileError: if a row has fewer numbers or more, or there is no row; ``what`` says what columns are.
+        """
+        numbers = array("d")
+        self.row_lines = array("q")
+        for words in rows:
+            if not words:
+                continue
+            if len(words) < columns or (len(words) > columns and not more):
+                raise self.error(f"there are {len(words)} numbers, but should be {columns}: {what}")
+            try:
+                numbers.extend(map(float, words[:columns]))
+            except ValueError:
+                self.numbers(words)
+            self.row_lines.append(self.line)
+        if not numbers:
+            raise self.error("the file ends without a row of numbers")
+        return np.frombuffer(numbers).reshape(-1, columns)
 
     def expect(self, count: int, what: str) -> None:
         """Refuse a count of numbers for which the file is too small: a digit and a separator each.
@@ -82,3 +118,9 @@ def opening(path: Path, head: bytes) -> list[str]:
     with path.open("rb") as file:
         text = file.read(OPENING).decode(encoding(head), errors="replace")
     return [line.strip().lower() for line in text.splitlines()]
+
+
+def first_words(lines: list[str]) -> list[str]:
+    """Return the words of the first line that is no comment."""
+    words = (line.partition("#")[0].replace(",", " ").split() for line in lines)
+    return next(filter(None, words), [])

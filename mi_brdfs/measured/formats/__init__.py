@@ -7,9 +7,9 @@ from types import ModuleType
 
 from ..files import checked
 from ..measurement import FileError, Measurement
-from . import lighttools, mbsdf, merl, rgl, utia, zemax
+from . import alta, cornell, csv, lighttools, mbsdf, merl, rgl, utia, zemax
 
-FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, utia]
+FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, alta, cornell, csv, utia]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` is the first kilobyte, and ``read(path)``; the first that recognizes a file reads it. Those that can be written
 have ``write(path, source)``."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..coordinates import Spherical
 from ..measurement import FileError, Grid, Measurement
 from ..text import TextFile, is_number, opening, shortened
-from .zemax import XYZ_TO_SRGB, Header, Ordered, Round, has_incidence_lines, is_table, words_of
+from .zemax import XYZ_TO_SRGB, Header, Ordered, Round, has_incidence_lines, is_table
 
 NAME = "LightTools"
 DESCRIPTION = "as Zemax, with the lines AOI, POI, Side above each block of data"
@@ -34,12 +34,12 @@ def read(path: Path) -> Measurement:
         FileError: if the file has no such BRDF, or not all of it.
     """
     file = TextFile(path)
-    lines = file.lines()
-    header = Header.read(file, lines)
+    rows = file.rows()
+    header = Header.read(file, rows)
     content = header.content()
     symmetry = header.symmetry(("PlaneSymmetrical", "Asymmetric", "Asymmetrical"))
     radials, azimuths = (header.require(file, name) for name in ("ScatterRadial", "ScatterAzimuth"))
-    found = list(blocks(file, lines, len(radials) * len(azimuths)))
+    found = list(blocks(file, rows, len(radials) * len(azimuths)))
     front = [block for block in found if block.side == "front" and block.scatter == "brdf"]
     if not front:
         raise FileError(f"{path} has no block with Side Front and ScatterType BRDF.")
@@ -60,8 +60,8 @@ def read(path: Path) -> Measurement:
     header.angles["ScatterAzimuth"] = abs(turned) if mirrored else turned
     delta = Ordered(header, "ScatterAzimuth", most=180) if mirrored else Round(header, "ScatterAzimuth")
 
-    rows = [[table[incidence, channel].values for channel in channels] for incidence in header.angles["AOI"]]
-    values = np.array(rows).reshape(len(rows), len(channels), len(azimuths), len(radials)).transpose(0, 3, 2, 1)
+    each = [[table[incidence, channel].values for channel in channels] for incidence in header.angles["AOI"]]
+    values = np.array(each).reshape(len(each), len(channels), len(azimuths), len(radials)).transpose(0, 3, 2, 1)
     values = values[np.ix_(theta_i.order, theta_o.order, delta.order)]
     luminance = channels[1 if content == "XYZ" else 0]
     stated = [table[incidence, luminance].tis for incidence in header.angles["AOI"]]
@@ -98,21 +98,20 @@ class Block:
 KEYWORDS = ("aoi", "poi", "side", "scattertype", "tristimulusvalue", "wavelength", "tis")
 
 
-def blocks(file: TextFile, lines: Iterator[str], size: int) -> Iterator[Block]:
+def blocks(file: TextFile, rows: Iterator[list[str]], size: int) -> Iterator[Block]:
     """Read the blocks: lines ``keyword value``, of which a block repeats what has changed, and ``size`` values."""
     file.expect(size, "values in a block")
     head: dict[str, str] = {}
     values, filled = np.empty(size), 0
-    for text in lines:
-        words = words_of(text)
-        word = words[0].lower() if words else ""
-        if not words or word in ("databegin", "dataend", "monochrome"):
+    for words in rows:
+        word = words[0].lower()
+        if word in ("databegin", "dataend", "monochrome"):
             continue
         if word[0].isalpha() and not is_number(word):
             if filled:
                 raise file.error(f"{words[0]} stands after {filled} values of a block, which has {size}")
             if word not in KEYWORDS or len(words) < 2:
-                raise file.error(f"{shortened(text)} is no keyword of a block with its value")
+                raise file.error(f"{shortened(' '.join(words))} is no keyword of a block with its value")
             head[word] = words[1].lower()
             continue
         row = file.numbers(words, "a value")

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..coordinates import Coordinates, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
-from ..text import TextFile, is_number, opening, shortened
+from ..text import TextFile, first_words, is_number, opening, shortened
 
 NAME = "Zemax"
 DESCRIPTION = "text with the lines Symmetry, AngleOfIncidence, ScatterAzimuth, ScatterRadial, DataBegin"
@@ -38,13 +38,12 @@ def recognizes(path: Path, head: bytes) -> bool:
 
 def is_table(lines: list[str]) -> bool:
     """Return whether the first lines of a file are those of Zemax's or LightTools' tables."""
-    first = next((line for line in lines if line and not line.startswith("#")), "")
-    return words_of(first)[:1] in [[word.lower()] for word in (*WORDS, *ANGLES)]
+    return first_words(lines)[:1] in [[word.lower()] for word in (*WORDS, *ANGLES)]
 
 
 def has_incidence_lines(lines: list[str]) -> bool:
     """Return whether the angle of incidence stands above each block of data, as in LightTools' tables."""
-    return any(words_of(line)[:1] == ["aoi"] for line in lines)
+    return any(first_words([line])[:1] == ["aoi"] for line in lines)
 
 
 def read(path: Path) -> Measurement:
@@ -66,12 +65,12 @@ def read(path: Path) -> Measurement:
         FileError: if the file holds no BRDF, or is not complete.
     """
     file = TextFile(path)
-    lines = file.lines()
-    header = Header.read(file, lines)
+    rows = file.rows()
+    header = Header.read(file, rows)
     angles = header.angles
     angles.setdefault("SampleRotation", np.zeros(1))
     content, symmetry = header.content(), header.symmetry(("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"))
-    values, stated = blocks(file, lines, CHANNELS[content], tuple(len(header.require(file, name)) for name in ANGLES))
+    values, stated = blocks(file, rows, CHANNELS[content], tuple(len(header.require(file, name)) for name in ANGLES))
 
     theta_i = Ordered(header, "AngleOfIncidence", most=90)
     radial = Ordered(header, "ScatterRadial", most=180)
@@ -119,20 +118,15 @@ class Header:
     comments: list[str] = field(default_factory=list)
 
     @classmethod
-    def read(cls, file: TextFile, lines: Iterator[str]) -> Header:
+    def read(cls, file: TextFile, rows: Iterator[list[str]]) -> Header:
         """Read up to the line DataBegin."""
-        header = cls(file.path)
-        for text in lines:
-            if text.startswith("#"):
-                header.comments.append(text.strip("# \t"))
-            words = words_of(text)
-            if not words:
-                continue
+        header = cls(file.path, comments=file.comments)
+        for words in rows:
             word = next((name for name in (*WORDS, *ANGLES) if name.lower() == words[0].lower()), words[0])
             if word.lower() == "databegin":
                 return header
             if word in ANGLES:
-                header.angles[word] = announced(file, lines, words)
+                header.angles[word] = announced(file, rows, words)
             elif word.isalpha():
                 header.settings[word] = " ".join(words[1:])
             else:
@@ -209,12 +203,7 @@ class Round:
         self.axis = Axis(np.radians(nodes), period=2 * np.pi if closed else None)
 
 
-def words_of(text: str) -> list[str]:
-    """Return the words of a line, without its comment."""
-    return text.partition("#")[0].replace(",", " ").split()
-
-
-def announced(file: TextFile, lines: Iterator[str], words: list[str]) -> np.ndarray:
+def announced(file: TextFile, rows: Iterator[list[str]], words: list[str]) -> np.ndarray:
     """Read ``name count`` and as many angles, from this line and those that follow."""
     name, line = words[0], file.line
     if len(words) < 2 or not words[1].isdecimal() or not 0 < int(words[1]) <= MOST_ANGLES:
@@ -223,17 +212,17 @@ def announced(file: TextFile, lines: Iterator[str], words: list[str]) -> np.ndar
     file.expect(count, "angles")
     found = list(file.numbers(words[2:], "an angle"))
     while len(found) < count:
-        text = next(lines, None)
-        if text is None:
+        row = next(rows, None)
+        if row is None:
             raise file.error(f"the file ends after {len(found)} of {count} angles of {name}")
-        found += list(file.numbers(words_of(text), f"an angle: {count} of {name} were announced in line {line}"))
+        found += list(file.numbers(row, f"an angle: {count} of {name} were announced in line {line}"))
     if len(found) > count:
         raise file.error(f"there are {len(found)} angles of {name}, but {count} were announced")
     return np.array(found)
 
 
 def blocks(
-    file: TextFile, lines: Iterator[str], channels: list[str], shape: tuple[int, ...]
+    file: TextFile, rows: Iterator[list[str]], channels: list[str], shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read the data: for each channel, rotation and incidence a line ``TIS number``, which may be missing, and values.
     Return these, shape (\\*shape, channels), and the stated TIS, shape (rotations, incidences, channels)."""
@@ -241,9 +230,8 @@ def blocks(
     file.expect(size * len(channels), "values")
     values, stated = np.empty((len(channels), size)), np.full((len(channels), size // block), np.nan)
     filled, channel, names = [0] * len(channels), 0, [name.lower() for name in channels]
-    for text in lines:
-        words = words_of(text)
-        word = words[0].lower() if words else ""
+    for words in rows:
+        word = words[0].lower()
         if word in names:
             channel = names.index(word)
         elif word == "tis":
@@ -251,7 +239,7 @@ def blocks(
             if rest or index == stated.shape[1]:
                 raise file.error(f"TIS stands after {rest} values of a block, which has {block}")
             stated[channel, index] = float(words[1]) if len(words) > 1 and is_number(words[1]) else np.nan
-        elif words and word not in ("databegin", "dataend"):
+        elif word not in ("databegin", "dataend"):
             row = file.numbers(words, "a value")
             end = filled[channel] + len(row)
             if end > size:

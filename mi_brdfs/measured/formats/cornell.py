@@ -1,0 +1,55 @@
+"""Cornell .brdf, the spectral goniometer measurements of the Program of Computer Graphics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..measurement import Measurement
+from ..rows import arranged, checked_angles
+from ..text import TextFile, first_words, opening
+
+NAME = "Cornell"
+DESCRIPTION = "text: the number of wavelengths, these in nm, then rows of θi, φi, θo, φo and a spectrum"
+MOST_WAVELENGTHS = 4096
+"""The most wavelengths that a file is believed to have."""
+
+
+def recognizes(path: Path, head: bytes) -> bool:
+    lines = opening(path, head)
+    words = first_words(lines)
+    named = path.suffix.lower() == ".brdf" or any("num wls" in line for line in lines)
+    return named and len(words) == 1 and words[0].isdecimal()
+
+
+def read(path: Path) -> Measurement:
+    """Read rows of angles in radians, the mirror direction being at φo = φi + π, and f in 1/sr at each wavelength
+    (S. C. Foo, A gonioreflectometer for measuring the bidirectional reflectance of material for use in illumination
+    computation, Cornell University 1997).
+
+    Raises:
+        FileError: if the file is not complete, or has other columns.
+    """
+    file = TextFile(path)
+    rows = file.rows()
+    first = next(rows, [""])
+    if len(first) != 1 or not first[0].isdecimal() or not 0 < int(first[0]) <= MOST_WAVELENGTHS:
+        raise file.error(f"the number of wavelengths should stand alone, from 1 to {MOST_WAVELENGTHS}")
+    count = int(first[0])
+    file.expect(count, "wavelengths")
+    wavelengths: list[float] = []
+    while len(wavelengths) < count:
+        row = next(rows, None)
+        if row is None:
+            raise file.error(f"the file ends after {len(wavelengths)} of {count} wavelengths")
+        wavelengths += list(file.numbers(row, "a wavelength"))
+    if len(wavelengths) > count or not np.all(np.diff(wavelengths) > 0) or not wavelengths[0] > 0:
+        raise file.error(f"there should be {count} growing wavelengths, but there are {len(wavelengths)}")
+    end = next((k for k, comment in enumerate(file.comments) if "wl" in comment.lower()), 0)
+    material = " ".join(comment for comment in file.comments[:end] if "university" not in comment.lower())
+    table = file.table(rows, 4 + count, f"four angles and {count} values")
+    checked_angles(file, table[:, [0, 2]], table[:, [1, 3]])
+    theta_i, phi_i, theta_o, phi_o = table[:, :4].T
+    data = arranged(theta_i, phi_i, theta_o, phi_o, table[:, 4:])
+    return Measurement(path, NAME, data, np.array(wavelengths), material=material or path.stem)

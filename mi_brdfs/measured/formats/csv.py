@@ -1,0 +1,161 @@
+"""CSV with a header that says what its columns are, and in which units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..measurement import Measurement
+from ..rows import arranged, checked_angles, without_cosine
+from ..text import TextFile, opening, shortened
+
+NAME = "CSV"
+DESCRIPTION = "a header with theta_i_deg, theta_o_deg, phi_o_deg (or _rad) and f, or r, g, b, or wavelengths in nm"
+ANGLE = re.compile(
+    r"(theta|phi|delta_?phi|dphi)(?:_?(incident|incoming|in|i|light|l|outgoing|out|o|reflected|r|scattered|s|view|v))?"
+    r"[\s_]*[(\[]?(degrees|deg|°|radians|rad)?[)\]]?"
+)
+INCIDENT = ("incident", "incoming", "in", "i", "light", "l")
+VALUE = re.compile(
+    r"(?:(red|green|blue|r|g|b)|(f|f_r|brdf)|(?:(?:f|brdf)[\s_]*)?(\d+(?:\.\d+)?)[\s_]*(?:nm)?)([\s_*·]*cos)?"
+    r"\s*(?:[(\[]1/sr[)\]])?"
+)
+UNITS = {"d": np.pi / 180, "°": np.pi / 180, "r": 1.0}
+"""Radians in a unit, by its first letter."""
+
+
+def recognizes(path: Path, head: bytes) -> bool:
+    first = next((line for line in opening(path, head) if line and not line.startswith("#")), "")
+    return path.suffix.lower() == ".csv" or any(ANGLE.fullmatch(name) for name in split(first, separator(first)))
+
+
+def read(path: Path) -> Measurement:
+    """Read rows of angles and values below a header line.
+
+    The columns are ``theta_i``, ``phi_i`` (0 if missing), ``theta_o`` and ``phi_o``, or ``delta_phi`` for φo - φi, in
+    any order, each with its unit: ``theta_i_deg``, ``theta_i_rad``, ``theta_i [deg]``; or a comment says it for all:
+    ``# angles: degrees``. ``in``, ``l`` and ``light`` mean ``i``, and ``out``, ``r``, ``s``, ``v`` and ``view`` ``o``.
+    The other columns are ``r``, ``g``, ``b`` in linear sRGB, wavelengths in nm (``450``, ``450nm``), or a single ``f``,
+    whose wavelength a comment can give: ``# wavelength: 650``. Names with ``_cos`` behind them, or a comment
+    ``# quantity: f cos``, mean f cosθo. An empty field is a missing value. Commas, semicolons (with decimal points or
+    commas), tabs or white space separate.
+
+    Rows that cross all angles become a grid, others samples: see :func:`mi_brdfs.measured.rows.arranged`.
+
+    Raises:
+        FileError: if a column or a unit is missing, ambiguous or unknown, or a row is not of such numbers.
+    """
+    file = TextFile(path)
+    rows = fields(file)
+    columns = Columns(file, next(rows, []))
+    table = file.table(rows, columns.count, "as many as the header has")
+    angles = {name: table[:, k] * unit for name, (k, unit) in columns.angles.items()}
+    phi_i = angles.get("phi_i", np.zeros(len(table)))
+    phi_o = angles["phi_o"] if "phi_o" in angles else phi_i + angles["delta_phi"]
+    theta_i, theta_o = angles["theta_i"], angles["theta_o"]
+    checked_angles(file, np.stack([theta_i, theta_o], axis=1), np.stack([phi_i, phi_o], axis=1))
+    values = table[:, columns.values]
+    if columns.quantity == "f cos":
+        values = without_cosine(values, np.cos(theta_o))
+    return Measurement(
+        path,
+        NAME,
+        arranged(theta_i, phi_i, theta_o, phi_o, values),
+        columns.wavelengths,
+        material=columns.stated("material") or path.stem,
+        quantity=columns.quantity,
+    )
+
+
+class Columns:
+    """What a header and the comments above it say of the columns."""
+
+    def __init__(self, file: TextFile, names: list[str]) -> None:
+        self.file, self.count = file, len(names)
+        self.angles: dict[str, tuple[int, float]] = {}
+        """The column of an angle, and its unit in radians, by ``theta_i``, ``phi_i``, ``theta_o``, ``phi_o`` or
+        ``delta_phi``."""
+        found: list[tuple[str, int, bool]] = []
+        for k, name in enumerate(names):
+            if match := ANGLE.fullmatch(name.strip().lower()):
+                self._add_angle(k, name, *match.groups())
+            elif match := VALUE.fullmatch(name.strip().lower()):
+                colour, grey, wavelength, cos = match.groups()
+                found.append(((colour or "")[:1] or (grey and "f") or wavelength, k, bool(cos)))
+            else:
+                raise file.error(f"the column {shortened(name)} is no angle, no wavelength, and none of f, r, g, b")
+        for name in ("theta_i", "theta_o"):
+            if name not in self.angles:
+                raise file.error(f"the header has no column {name}, as theta_i_deg, theta_o_deg, phi_o_deg, f")
+        if ("phi_o" in self.angles) == ("delta_phi" in self.angles):
+            raise file.error("the header should have just one of the columns phi_o and delta_phi")
+        kinds = [kind for kind, _, _ in found]
+        if len(set(kinds)) < len(kinds) or not kinds:
+            raise file.error(
+                f"the header has {'no column of values' if not kinds else 'two columns of the same values'}"
+            )
+        self.wavelengths: np.ndarray | None = None
+        if set(kinds) == set("rgb"):
+            found.sort(key=lambda each: "rgb".index(each[0]))
+        elif kinds == ["f"]:
+            self.wavelengths = np.array([self._number("wavelength")])
+        elif not set(kinds) & set("rgbf"):
+            found.sort(key=lambda each: float(each[0]))
+            self.wavelengths = np.array([float(kind) for kind, _, _ in found])
+        else:
+            raise file.error(f"the values {', '.join(kinds)} should be f, or r, g and b, or wavelengths in nm")
+        self.values = [k for _, k, _ in found]
+        self.quantity = self._quantity({cos for _, _, cos in found})
+
+    def _add_angle(self, k: int, name: str, kind: str, of: str | None, unit: str | None) -> None:
+        unit = unit or self.stated("angles") or self.stated("units")
+        if not unit or unit[0].lower() not in UNITS:
+            raise self.file.error(f"the column {shortened(name)} has no unit: call it {name.strip()}_deg or _rad")
+        key = f"{kind}_{'i' if of in INCIDENT else 'o'}" if kind in ("theta", "phi") else "delta_phi"
+        if (kind in ("theta", "phi")) == (of is None) or key in self.angles:
+            raise self.file.error(
+                f"the column {shortened(name)} is ambiguous: angles are theta_i, phi_i, theta_o, phi_o"
+            )
+        self.angles[key] = k, UNITS[unit[0].lower()]
+
+    def stated(self, name: str) -> str:
+        """Return what a comment ``# name: …`` says."""
+        matches = (re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment) for comment in self.file.comments)
+        return next((match.group(1) for match in matches if match), "")
+
+    def _number(self, name: str) -> float:
+        match = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", self.stated(name))
+        return float(match.group(1)) if match else np.nan
+
+    def _quantity(self, cosines: set[bool]) -> Literal["f", "f cos"]:
+        stated = re.sub(r"[\s_*·]+", " ", self.stated("quantity").lower())
+        if stated not in ("", "f", "brdf", "f cos", "brdf cos"):
+            raise self.file.error(f"the quantity {shortened(stated)} is neither f nor f cos")
+        if len(cosines) > 1 or (True in cosines and stated in ("f", "brdf")):
+            raise self.file.error("some values are f cos, and others are f")
+        return "f cos" if True in cosines or stated.endswith("cos") else "f"
+
+
+def fields(file: TextFile) -> Iterator[list[str]]:
+    """Yield the fields of rows, with ``nan`` for empty ones, and collect comments."""
+    mark: str | None = ""
+    for text in file.lines():
+        if text.startswith("#"):
+            file.comments.append(text.strip("# \t"))
+        elif text:
+            mark = separator(text) if mark == "" else mark
+            row = split(text, mark)
+            yield [field.replace(",", ".") for field in row] if mark == ";" else row
+
+
+def separator(text: str) -> str | None:
+    """Return what separates the fields of a line: semicolons, tabs, commas, or white space (None)."""
+    return next((mark for mark in ";\t," if mark in text), None)
+
+
+def split(text: str, mark: str | None) -> list[str]:
+    return [field.strip().strip('"') or "nan" for field in text.split(mark)]

@@ -1,0 +1,113 @@
+"""Rows of directions and values: a grid where they fill one, and single samples otherwise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import stacked
+from .coordinates import TWO_PI, Spherical, spherical, wrapped
+from .measurement import Axis, Grid, Samples
+from .text import TextFile
+
+SAME = 1e-6
+"""By how much, in radians, angles of one node may differ."""
+LEAST_COSINE = 1e-4
+"""Below it, f cosθ says nothing of f."""
+
+
+def checked_angles(file: TextFile, polar: np.ndarray, azimuths: np.ndarray) -> None:
+    """Refuse rows with angles, in radians and of shape (N, any), that no directions above the surface have.
+
+    Raises:
+        FileError: if there are some.
+    """
+    bad = ~np.all(abs(polar) <= np.pi / 2 + SAME, axis=1) | ~np.all(abs(azimuths) <= 4 * np.pi + SAME, axis=1)
+    if np.any(bad):
+        k = int(np.argmax(bad))
+        theta = " and ".join(f"{np.degrees(angle):.4g}°" for angle in polar[k])
+        phi = " and ".join(f"{np.degrees(angle):.4g}°" for angle in azimuths[k])
+        raise file.error(
+            f"θ is {theta}, and φ is {phi}: θ must be from -90° to 90°, φ from -720° to 720°", file.row_lines[k]
+        )
+
+
+def arranged(
+    theta_i: np.ndarray, phi_i: np.ndarray, theta_o: np.ndarray, phi_o: np.ndarray, values: np.ndarray
+) -> Grid | Samples:
+    """Return rows of angles in radians, shape (N,), and values, shape (N, channels), as a grid of
+    :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with each other, and as samples if
+    not. Rows of a single φi are of an isotropic material. A negative θ means the other side of the normal. Rows of the
+    same angles are averaged.
+    """
+    theta_i, phi_i = upright(theta_i, phi_i)
+    theta_o, phi_o = upright(theta_o, phi_o)
+    start = wrapped(phi_i - phi_i[0] + SAME / 2, TWO_PI)
+    anisotropic = bool(np.ptp(start) > SAME)
+    if not anisotropic:
+        phi_o, phi_i = phi_o - phi_i, np.zeros_like(phi_i)
+    return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
+        stacked(spherical(theta_i, phi_i)), stacked(spherical(theta_o, phi_o)), values, anisotropic
+    )
+
+
+def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return directions with a polar angle that is not negative."""
+    return abs(theta), np.where(theta < 0, phi + np.pi, phi)
+
+
+def gathered(
+    theta_i: np.ndarray,
+    phi_i: np.ndarray,
+    theta_o: np.ndarray,
+    phi_o: np.ndarray,
+    values: np.ndarray,
+    anisotropic: bool,
+) -> Grid | None:
+    """Return the grid that rows fill, None if they do not."""
+    delta = np.pi - (np.pi - phi_o + phi_i + SAME / 2) % TWO_PI
+    mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
+    delta = abs(delta) if mirrored else wrapped(delta, TWO_PI)
+    columns = [theta_i, theta_o, delta, *([wrapped(phi_i + SAME / 2, TWO_PI)] if anisotropic else [])]
+    nodes, places = zip(*(nodes_of(column) for column in columns), strict=True)
+    shape = tuple(len(each) for each in nodes)
+    size = np.prod(shape, dtype=np.float64)
+    if size > 2 * len(values) + sum(shape) * shape[2]:  # more than rows at poles could stand for
+        return None
+    place = np.ravel_multi_index(places, shape)
+    count = np.bincount(place, minlength=int(size))
+    table = np.zeros((int(size), values.shape[1]))
+    np.add.at(table, place, values)
+    table, count = table.reshape(*shape, -1), count.reshape(*shape, 1)
+    for polar in (0, 1):
+        if nodes[polar][0] < SAME and not anisotropic:
+            # A row at the pole stands for all azimuths.
+            pole = (slice(None),) * polar + (slice(0, 1),)
+            table[pole], count[pole] = (each[pole].sum(axis=2, keepdims=True) for each in (table, count))
+    if not np.all(count):
+        return None
+    axes = [Axis(each) for each in nodes]
+    for k in range(3 if mirrored else 2, len(axes)):
+        axes[k] = around(nodes[k])
+        if k == 2 and axes[k].period is None and shape[k] > 1:
+            return None
+    return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
+
+
+def nodes_of(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the different angles, and which of them each one is."""
+    order = np.argsort(angles, kind="stable")
+    rank = np.empty(len(angles), dtype=np.int64)
+    rank[order] = np.append(0, np.cumsum(np.diff(angles[order]) > SAME))
+    return np.bincount(rank, angles) / np.bincount(rank), rank
+
+
+def around(nodes: np.ndarray) -> Axis:
+    """Return azimuths in [0, 2π) as an axis that goes round, if no gap among them is much larger than the others."""
+    gaps = np.diff(np.append(nodes, nodes[0] + TWO_PI))
+    return Axis(nodes, period=TWO_PI if len(nodes) > 1 and gaps[-1] <= 1.5 * max(gaps[:-1]) else None)
+
+
+def without_cosine(values: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """Return f for f cosθo, and NaN where the cosine is next to 0."""
+    seen = cosine >= LEAST_COSINE
+    return np.where(seen[:, None], values / np.where(seen, cosine, 1)[:, None], np.nan)

@@ -1,0 +1,51 @@
+"""What a measured file becomes in a variant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from weakref import WeakValueDictionary
+
+import mitsuba as mi
+import numpy as np
+
+from .colour import Channels
+from .coordinates import PolarAngle
+from .files import checked
+from .formats import read
+from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
+from .proposal import NODES_I, Proposal, albedos
+from .scattered import gridded
+from .table import Table
+
+
+class Tables:
+    """f, the albedo over θi, and the density that directions are drawn from. ``captured`` is all that kernels read."""
+
+    _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
+
+    @classmethod
+    def of(cls, filename: str, interpolation: Interpolation, extrapolate: Extrapolation, shared: bool) -> Tables:
+        """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
+        path = Path(filename)
+        if not shared:
+            return cls(read(path), interpolation, extrapolate)
+        state = checked(path).stat()
+        key = mi.variant(), path.resolve(), state.st_mtime_ns, state.st_size, interpolation, extrapolate
+        found = cls._shared.get(key)
+        if found is None:
+            found = cls._shared[key] = cls(read(path), interpolation, extrapolate)
+        return found
+
+    def __init__(self, measurement: Measurement, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
+        data = measurement.data
+        if not np.any(data.values > 0):
+            raise FileError(f"{measurement.path}: no value is positive; there is nothing to render.")
+        grid = data if isinstance(data, Grid) else gridded(data, extrapolate)
+        self.channels = Channels(measurement.wavelengths)
+        self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal
+        converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)
+        self.f = Table(converted, self.channels.spectrum, interpolation == "nearest", extrapolate == "hold")
+        self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
+        albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos(converted, NODES_I, interpolation, extrapolate))
+        self.albedo = Table(albedo, self.channels.spectrum, nearest=False, hold=True)
+        self.captured = [*self.f.captured, *self.albedo.captured, *self.channels.basis, self.proposal.warp]
