@@ -33,11 +33,10 @@ class Channels:
 
     def converted(self, grid: Grid) -> Grid:
         """Return a grid with the channels that the variant's table has: rgb variants show spectra under D65,
-        monochromatic ones the luminance. Spectra are not negative, as colours outside sRGB are."""
+        monochromatic ones the luminance. Only files in rgb keep colours outside sRGB, and only as rgb."""
         values, signed = grid.usable, grid.signed and mi.is_rgb
         if self.weights is not None:
             values = values @ self.weights
-            signed = mi.is_rgb
         if mi.is_monochromatic and values.shape[-1] == 3:
             values = values @ LUMINANCE[:, None]
         return replace(grid, values=values, signed=signed)

@@ -33,7 +33,8 @@ class Tabulated(Model):
 
     Linear sRGB values are rgb. In spectral variants they weigh three spectra that sum to 1, so that white stays white.
     Values at several wavelengths are interpolated between them in spectral variants; rgb variants show them under
-    daylight (D65), where saturated colours may have negative channels. A single wavelength is grey.
+    daylight (D65), and clip colours outside sRGB. A single wavelength is grey. Scattered samples become a grid of half
+    and difference angles, of means of the nearest samples with positive weights.
 
     The energy is the file's: nothing keeps a measurement from reflecting more than it receives. Reciprocal where the
     format is (MERL with half a turn of φd), else as good as the measurement. One-sided.
