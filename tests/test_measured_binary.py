@@ -264,7 +264,7 @@ def damaged(data, name):
         "a byte too much": data + b"\1",
         "noise": NOISE,
         "zeros": bytes(len(data) - 8),
-        "text": b"theta,phi,f\n" * 300,
+        "text": b"Once upon a time\n" * 300,
         "the end first": data[::-1],
         "a byte missing inside": data[:100] + data[101:],
     }

@@ -89,7 +89,7 @@ def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
         (measurement(lambda i, o, d: -1 + 0 * i, 3), "x.binary", "no positive value"),
         ("nowhere.binary", "x.binary", "No such file"),
     ],
-    ids=str,
+    ids=lambda given: "negative" if isinstance(given, Measurement) else str(given),
 )
 def test_what_cannot_be_is_refused(tmp_path, given, name, words):
     (tmp_path / "folder.binary").mkdir()
