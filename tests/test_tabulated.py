@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
-from support import call, context, efficiencies, hemisphere, interaction, shared
+from support import call, context, direction, efficiencies, hemisphere, interaction, shared
 
 import mi_brdfs
 from mi_brdfs.measure.sources import find_sources
@@ -350,10 +350,60 @@ def test_a_table_without_light_is_refused(llvm_rgb, tmp_path):
 def test_commands_take_the_file_itself(llvm_rgb, glossy):
     (source,) = find_sources(glossy, {"extrapolate": "zero"})
     assert source.load() == {"type": "tabulated", "filename": glossy, "extrapolate": "zero"}
-    with pytest.raises(ValueError, match=r"nowhere\.binary: no such file"):
+    with pytest.raises(RuntimeError, match=r"nowhere\.binary: No such file"):
         list(find_sources("nowhere.binary"))
 
 
 def test_the_plugin_has_a_page_and_is_no_model():
     assert "tabulated" in mi_brdfs.info("merl")
     assert "tabulated" not in mi_brdfs.list_models()
+
+
+# --- MERL's own files, where there are some --------------------------------------------------------------------------
+
+MERL = sorted(Path(os.environ.get("MI_BRDFS_MERL_DIR", "nowhere")).glob("*.binary"))
+WITH_MERL = pytest.mark.skipif(not MERL, reason="MI_BRDFS_MERL_DIR names no folder with MERL's .binary files")
+
+
+def test_merls_folder_is_looked_in(llvm_rgb, tmp_path, monkeypatch):
+    write_merl(tmp_path / "made-up.binary", lambda h, d, p: ggx(h, d, 0.2), (9, 9, 18))
+    with pytest.raises(RuntimeError, match="No such file"):
+        mi.load_dict({"type": "merl", "filename": "made-up.binary"})
+    monkeypatch.setenv("MI_BRDFS_MERL_DIR", str(tmp_path))
+    assert mi.load_dict({"type": "merl", "filename": "made-up.binary"}) is not None
+
+
+@WITH_MERL
+@pytest.mark.slow
+def test_noise_of_merls_materials(llvm_rgb):
+    found = np.array([efficiencies({"type": "merl", "filename": str(path)}, (5, 30, 60, 80)) for path in MERL])
+    assert (np.median(found, axis=0) >= 0.99).all()
+    assert (found >= 0.96).all()
+
+
+@WITH_MERL
+@pytest.mark.slow
+@pytest.mark.parametrize("path", MERL, ids=lambda path: path.stem)
+def test_sampling_merls_materials(llvm_rgb, path):
+    angles = (5, 25, 45, 65, 85)
+    report = check({"type": "merl", "filename": str(path)}, only=JUDGED, angles=angles, significance=0.01 / len(MERL))
+    assert not report.failures, report
+
+
+@WITH_MERL
+@pytest.mark.slow
+@pytest.mark.parametrize("path", MERL, ids=lambda path: path.stem)
+def test_scalar_variants_draw_merls_materials_alike(path):
+    wi = np.array([direction(theta, 20) for theta in (5, 45, 85)], np.float32)
+    u, v = (np.random.default_rng(1).random((3, n)).astype(np.float32) for n in (1, 2))
+    drawn = []
+    for variant in ("scalar_rgb", "llvm_ad_rgb"):
+        with mi.variant_context(variant):
+            bsdf = mi.load_dict({"type": "merl", "filename": str(path)})
+            wo, _, weight = call(bsdf.sample, context(), wi, u, v)
+            value, density = call(bsdf.eval_pdf, context(), wi, wo.astype(np.float32))
+        np.testing.assert_allclose(weight * density, value, rtol=1e-3, atol=1e-6 * value.max())
+        drawn.append((wo, value, density))
+    for scalar, compiled in zip(*drawn, strict=True):
+        # Where a density rises steeply, the float32 of a direction is 1 % of it.
+        np.testing.assert_allclose(scalar, compiled, rtol=0.02, atol=1e-4)

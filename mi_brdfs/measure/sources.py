@@ -57,12 +57,13 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     path = Path(f"{file}.xml" if wanted else word)
     is_file = path.suffix == ".xml" and not is_text
     is_data = is_measured(word)
-    if (is_file or is_data) and not path.is_file():
+    if is_file and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
         raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
     if is_data:
-        source = BSDFSource(path.name, word, "tabulated", None, {"filename": str(path.resolve()), **parameters})
+        filename = str(path.resolve()) if path.exists() else word  # the plugin looks elsewhere, too
+        source = BSDFSource(path.name, word, "tabulated", None, {"filename": filename, **parameters})
     else:
         source = BSDFSource(path.name if is_file else word, word, str(path) if is_file else word, None, parameters)
     suffix = "".join(f" {name}={value}" for name, value in parameters.items())

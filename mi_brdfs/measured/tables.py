@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from weakref import WeakValueDictionary
 
 import mitsuba as mi
@@ -26,10 +25,10 @@ class Tables:
     @classmethod
     def of(cls, filename: str, interpolation: Interpolation, extrapolate: Extrapolation, shared: bool) -> Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
-        path = Path(filename)
+        path = checked(filename)
         if not shared:
             return cls(read(path), interpolation, extrapolate)
-        state = checked(path).stat()
+        state = path.stat()
         key = mi.variant(), path.resolve(), state.st_mtime_ns, state.st_size, interpolation, extrapolate
         found = cls._shared.get(key)
         if found is None:
