@@ -402,6 +402,14 @@ def test_what_scatters_nothing_back_is_written_too(tmp_path):
     assert error.max() < 0.012 * f.max() and error.mean() < 0.006 * f.mean()
 
 
+def test_an_unstated_wavelength_is_grey(tmp_path):
+    path = tmp_path / "written.bsdf"
+    rgl.write(path, Source(lambda wi, wo: np.full((len(wi), 1), 0.2), np.array([np.nan])))
+    wi, wo = (hemisphere(100, seed, 0.1) for seed in (1, 2))
+    assert read(path).wavelengths is None
+    np.testing.assert_allclose(read(path).data.evaluate(wi, wo), np.full((100, 3), 0.2), rtol=0.05)
+
+
 def test_a_black_file_is_black_in_mitsuba(tmp_path, llvm_rgb):
     rgl.write(tmp_path / "written.bsdf", Source(lambda wi, wo: np.zeros((len(wi), 3)), anisotropic=True))
     probe = BSDFProbe(mi.load_dict({"type": "measured", "filename": str(tmp_path / "written.bsdf")}))
