@@ -11,6 +11,7 @@ from .adaptive import Adaptive, on_phi, on_theta
 from .arrays import NUMPY, stacked
 from .colour import LUMINANCE
 from .coordinates import TWO_PI, HalfDifference, polar_angle, spherical
+from .measurement import usable
 from .source import Source
 from .warp import Map
 
@@ -22,7 +23,7 @@ NORMALS_SHARE = 0.2
 """The share of u1 that follows the visible normals; the rest is even in √θ. Narrow lobes get enough nodes by it, and
 wide ones do not lose theirs; between 0.1 and 0.3 errors are the same."""
 COSINE_SHARE = 0.05
-"""The share of the cosine in the distribution of normals, wherever nothing is scattered back."""
+"""The share of the cosine in the distribution of normals: it is divided by where nothing is scattered, too."""
 ITERATIONS = 10
 
 
@@ -45,10 +46,10 @@ def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -
     """Return maps whose ``ndf`` and ``sigma`` take the highlights out of f, so that a table of f cosθo 4 σ/D is smooth,
     and whose ``vndf`` spends its nodes on directions above the horizon alone.
 
-    Only on ``ndf`` the table's values depend; ``vndf`` may be any density that is sampled and inverted. Here u2 is the
-    azimuth of the half vector, and the end of u1 is the horizon, where 2 (wi·h) h - wi has no height:
-    θh = atan2(cosθi, -sinθi cos(φh - φi))/2. A density of the visible normals alone would spend half of the nodes below
-    the horizon, and so few about the normal that a cosine has errors of 10 %.
+    ``vndf`` need not be that of the visible normals: any density will do that is the same for sampling and inverting.
+    Here u2 is the azimuth of the half vector, and the end of u1 is the horizon, where 2 (wi·h) h - wi has no height:
+    θh = atan2(cosθi, -sinθi cos(φh - φi))/2. The visible normals alone would spend many nodes below the horizon, and so
+    few about the normal that a Lambertian table is off by 10 % of its peak.
     """
     ndf, sigma = normals(source)
     x, y = np.meshgrid(np.linspace(0, 1, COLUMNS), np.linspace(0, 1, rows))
@@ -145,7 +146,7 @@ def turned(source: Source) -> float:
 def brightness(values: np.ndarray) -> np.ndarray:
     """Return the luminance of linear sRGB, the mean of other channels, and 0 where that is negative or missing."""
     weighed = values @ LUMINANCE if values.shape[-1] == 3 else values.mean(axis=-1)
-    return np.where(weighed > 0, weighed, 0)
+    return usable(weighed)
 
 
 def area(values: np.ndarray) -> np.ndarray:

@@ -36,7 +36,8 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     too if the source is anisotropic: 3 MB and more in rgb.
 
     Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones. What is of one
-    wavelength that nobody stated is written as grey.
+    wavelength that nobody stated is written as grey. Where anisotropic files have a symmetry, ``measured`` looks the
+    wrong slice up for a wi with exactly y = 0; ``tabulated`` does not.
 
     Raises:
         OSError: if the file cannot be written.
