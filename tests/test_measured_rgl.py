@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import tracemalloc
 
 import drjit as dr
 import mitsuba as mi
@@ -400,6 +401,25 @@ def test_what_scatters_nothing_back_is_written_too(tmp_path):
     f = forward(wi, wo) * wo[:, 2:]
     error = abs(read(tmp_path / "written.bsdf").data.evaluate(wi, wo) * wo[:, 2:] - f)
     assert error.max() < 0.012 * f.max() and error.mean() < 0.006 * f.mean()
+
+
+def test_an_unstated_wavelength_is_grey(tmp_path):
+    path = tmp_path / "written.bsdf"
+    rgl.write(path, Source(lambda wi, wo: np.full((len(wi), 1), 0.2), np.array([np.nan])))
+    wi, wo = (hemisphere(100, seed, 0.1) for seed in (1, 2))
+    assert read(path).wavelengths is None
+    np.testing.assert_allclose(read(path).data.evaluate(wi, wo), np.full((100, 3), 0.2), rtol=0.05)
+
+
+def test_reading_takes_little_memory_beyond_the_result(tmp_path):
+    path = tmp_path / "written.bsdf"
+    rgl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), 0.2)))
+    tracemalloc.start()
+    measurement = read(path)
+    kept, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert measurement.data.values.nbytes < kept
+    assert peak - kept < 2 * path.stat().st_size
 
 
 def test_a_black_file_is_black_in_mitsuba(tmp_path, llvm_rgb):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
-from .adaptive import Adaptive
-from .arrays import stacked
+from .adaptive import Adaptive, on_phi, on_theta
+from .arrays import NUMPY, stacked
 from .colour import LUMINANCE
-from .coordinates import TWO_PI, spherical
+from .coordinates import TWO_PI, HalfDifference, polar_angle, spherical
+from .measurement import usable
 from .source import Source
 from .warp import Map
 
@@ -21,8 +23,8 @@ NORMALS_SHARE = 0.2
 """The share of u1 that follows the visible normals; the rest is even in √θ. Narrow lobes get enough nodes by it, and
 wide ones do not lose theirs; between 0.1 and 0.3 errors are the same."""
 COSINE_SHARE = 0.05
-"""The share of the cosine in the distribution of normals, wherever nothing is scattered back."""
-ITERATIONS = 50
+"""The share of the cosine in the distribution of normals: it is divided by where nothing is scattered, too."""
+ITERATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,10 @@ def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -
     """Return maps whose ``ndf`` and ``sigma`` take the highlights out of f, so that a table of f cosθo 4 σ/D is smooth,
     and whose ``vndf`` spends its nodes on directions above the horizon alone.
 
-    Only on ``ndf`` the table's values depend; ``vndf`` may be any density that is sampled and inverted. Here u2 is the
-    azimuth of the half vector, and the end of u1 is the horizon, where 2 (wi·h) h - wi has no height:
-    θh = atan2(cosθi, -sinθi cos(φh - φi))/2. A density of the visible normals alone would spend half of the nodes below
-    the horizon, and so few about the normal that a cosine has errors of 10 %.
+    ``vndf`` need not be that of the visible normals: any density will do that is the same for sampling and inverting.
+    Here u2 is the azimuth of the half vector, and the end of u1 is the horizon, where 2 (wi·h) h - wi has no height:
+    θh = atan2(cosθi, -sinθi cos(φh - φi))/2. The visible normals alone would spend many nodes below the horizon, and so
+    few about the normal that a Lambertian table is off by 10 % of its peak.
     """
     ndf, sigma = normals(source)
     x, y = np.meshgrid(np.linspace(0, 1, COLUMNS), np.linspace(0, 1, rows))
@@ -68,19 +70,25 @@ def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -
 
 
 def normals(source: Source) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``(ndf, sigma)``, a distribution of normals D and the projected areas of those seen from a direction, from
-    what is scattered straight back.
+    """Return ``(ndf, sigma)``, a distribution of normals D, and the projected areas of those seen from a direction,
+    σ(w) = ∫ D(h) max(w·h, 0) dh.
 
-    For microfacets without shadowing f(w, w) cosθ = D(w) F(0)/(4 σ(w)) with σ(w) = ∫ D(h) max(w·h, 0) dh, so that D is
-    the eigenvector of 4 f(w, w) cosθ max(w·h, 0): power iteration finds it (J. Dupuy et al., Extracting
-    microfacet-based BRDF parameters from arbitrary materials with power iterations, CGF 34(4), 2015,
-    doi:10.1111/cgf.12675). σ is a convolution over φ.
+    Without shadowing f cosθo = D(h) F/(4 σ(wi)). D is thus the mean of 4 f cosθo σ(wi) over pairs of directions with
+    the half vector h, in which σ comes from D by iteration. (From h itself alone, the eigenvector of J. Dupuy et al.,
+    Extracting microfacet-based BRDF parameters from arbitrary materials with power iterations, CGF 34(4), 2015,
+    doi:10.1111/cgf.12675, would follow; but few goniometers measure what is scattered straight back.)
     """
     u = np.linspace(0, 1, COLUMNS)
     theta = np.square(u) * (np.pi / 2)
     phi = (np.arange(ROWS) * (2 / ROWS) - 1) * np.pi if source.anisotropic else np.zeros(1)
-    w = stacked(spherical(*np.meshgrid(np.minimum(theta, LAST), phi)))
-    back = 4 * brightness(source.evaluate(w.reshape(-1, 3), w.reshape(-1, 3))).reshape(w.shape[:-1]) * np.cos(theta)
+    wi, wo = around(*np.meshgrid(np.minimum(theta, LAST), phi))
+    above = (wi.z > 0) & (wo.z > 0)
+    weight = np.where(above, wi.z * wo.z, 0)
+    weight /= weight.sum(axis=0)
+    back = np.zeros(above.shape)
+    back[above] = 4 * brightness(source.evaluate(stacked(wi)[above], stacked(wo)[above]))
+    back *= weight * wo.z
+    place = on_theta(polar_angle(wi), NUMPY), on_phi(np.arctan2(wi.y, wi.x), NUMPY)
 
     turn = np.arange(ROWS) * (TWO_PI / ROWS)
     cos, sin = np.cos(theta)[:, None, None], np.sin(theta)[:, None, None]
@@ -92,15 +100,22 @@ def normals(source: Source) -> tuple[np.ndarray, np.ndarray]:
         waves = np.fft.rfft(np.broadcast_to(density, (ROWS, COLUMNS)), axis=0)
         return np.fft.irfft(np.einsum("thf,fh->ft", kernel, waves), ROWS, axis=0)[: len(phi)]
 
-    cosine = np.broadcast_to(np.cos(theta) / np.pi, back.shape)
+    cosine = np.broadcast_to(np.cos(theta) / np.pi, (len(phi), COLUMNS))
     ndf = cosine
     for _ in range(ITERATIONS):
-        found = back * projected(ndf)
+        found = np.sum(back * Map(closed(projected(ndf))).eval(*place), axis=0)
         if not np.any(found > 0):
             break
         ndf = found / projected(found)[:, 0].mean()
     ndf = (1 - COSINE_SHARE) * ndf + COSINE_SHARE * cosine
     return closed(ndf), closed(projected(ndf))
+
+
+def around(theta_h: np.ndarray, phi_h: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
+    """Return pairs of directions with half vectors, along a new first axis."""
+    theta_d, phi_d = np.meshgrid(np.radians([20, 40, 60]), np.arange(8) * (TWO_PI / 8))
+    theta_d, phi_d = (np.append(0, d)[:, None, None] for d in (theta_d, phi_d))
+    return HalfDifference(anisotropic=True).directions(np.sqrt(theta_h * (2 / np.pi)), theta_d, phi_d, phi_h)
 
 
 def closed(rows: np.ndarray) -> np.ndarray:
@@ -131,7 +146,7 @@ def turned(source: Source) -> float:
 def brightness(values: np.ndarray) -> np.ndarray:
     """Return the luminance of linear sRGB, the mean of other channels, and 0 where that is negative or missing."""
     weighed = values @ LUMINANCE if values.shape[-1] == 3 else values.mean(axis=-1)
-    return np.where(weighed > 0, weighed, 0)
+    return usable(weighed)
 
 
 def area(values: np.ndarray) -> np.ndarray:

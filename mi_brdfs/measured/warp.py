@@ -24,9 +24,11 @@ class Warp:
         slices = density.reshape(-1, height, width).astype(np.float64)
         rows = cumulated(slices)
         columns = cumulated(rows[..., -1])
-        total = columns[:, -1]
-        self._density, self._rows = slices / total[:, None, None], rows / total[:, None, None]
-        self._columns = columns / total[:, None]
+        total = columns[:, -1:].copy()
+        for table in (slices, rows):
+            table /= total[..., None]
+        columns /= total
+        self._density, self._rows, self._columns = slices, rows, columns
         self._nodes = nodes
 
     def invert(self, x: np.ndarray, y: np.ndarray, parameters: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -115,8 +117,10 @@ class MitsubaMap:
 
 def cumulated(values: np.ndarray) -> np.ndarray:
     """Return the integrals over [0, 1] of piecewise linear functions up to each of their nodes, the last axis."""
-    sums = np.cumsum((values[..., 1:] + values[..., :-1]) / (2 * (values.shape[-1] - 1)), axis=-1)
-    return np.concatenate([np.zeros_like(values[..., :1]), sums], axis=-1)
+    result = np.zeros_like(values)
+    for slice, sums in zip(values, result, strict=True):  # for want of memory not all at once
+        np.cumsum((slice[..., 1:] + slice[..., :-1]) / (2 * (values.shape[-1] - 1)), axis=-1, out=sums[..., 1:])
+    return result
 
 
 def patch(x: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

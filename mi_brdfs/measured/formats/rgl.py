@@ -17,8 +17,6 @@ from ..tensors import write as write_tensors
 
 NAME = "RGL"
 DESCRIPTION = "the words 'tensor_file', then named arrays"
-
-SUFFIX = ".bsdf"
 THETA_I = np.radians([*np.linspace(0, 80, 25), 82, 84, 86, 87, 88, 89, 90])
 """The angles that are written. RGL's own files have 8, and 32 x 32 values at each."""
 STEP_PHI_I = np.radians(10)
@@ -37,11 +35,15 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     """Write ``resolution`` x ``resolution`` values for each of 32 angles θi, by default 64, and 32 for each of the φi
     too if the source is anisotropic: 3 MB and more in rgb.
 
-    Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones.
+    Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones. What is of one
+    wavelength that nobody stated is written as grey. Where anisotropic files have a symmetry, ``measured`` looks the
+    wrong slice up for a wi with exactly y = 0; ``tabulated`` does not.
 
     Raises:
         OSError: if the file cannot be written.
     """
+    if source.wavelengths is not None and np.isnan(source.wavelengths).any():
+        source = source.rgb()
     span = turned(source)
     resolution = resolution or (RESOLUTION_ANISOTROPIC if span else RESOLUTION)
     # As Mitsuba has it, the whole turn, the lower half and the third quadrant.
