@@ -8,6 +8,7 @@ from support import hemisphere
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
+from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measured import FileError, Grid, Measurement, bake, convert, read
 from mi_brdfs.measured.coordinates import Spherical
 from mi_brdfs.measured.formats import ENDINGS
@@ -37,10 +38,22 @@ def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path, bsdf):
     # What the file holds, found without the code that judged it.
     wi, wo = (w.astype(np.float64) for w in (hemisphere(4000, 1, 0.3), hemisphere(4000, 2, 0.3)))
     found = read(tmp_path / "x.binary").data.evaluate(wi, wo)
-    si = mi.SurfaceInteraction3f()
-    si.wi = mi.Vector3f(np.float32(wi.T))
-    f = np.array(mi.load_dict(bsdf).eval(mi.BSDFContext(), si, mi.Vector3f(np.float32(wo.T)))).T / wo[:, 2:]
+    probe = BSDFProbe(mi.load_dict(bsdf))
+    f = probe.eval(probe.whole, wi, wo) / wo[:, 2:]
     assert abs(found - f).max() < 0.01 * f.max() and np.median(abs(found / f - 1)) < 0.005
+
+
+@pytest.mark.parametrize("bsdf", [{"type": "walter"}, {"type": "ward", "alpha_u": 0.15, "alpha_v": 0.3}], ids=str)
+def test_mitsubas_measured_has_the_values_that_were_written(tmp_path, bsdf):
+    path = tmp_path / "x.bsdf"
+    assert convert(bsdf, path).largest < 0.03
+    if bsdf["type"] == "walter":  # on the way through another format
+        convert(bsdf, tmp_path / "x.binary")
+        assert convert(tmp_path / "x.binary", path).largest < 0.01
+    wi, wo = (hemisphere(4000, seed, 0.3) for seed in (1, 2))
+    probes = [BSDFProbe(mi.load_dict(it)) for it in (bsdf, {"type": "measured", "filename": str(path)})]
+    f, found = (probe.eval(probe.whole, wi, wo) for probe in probes)
+    assert abs(found - f).max() < 0.03 * f.max() and np.sqrt(np.mean((found - f) ** 2)) < 0.002 * f.max()
 
 
 def test_it_says_what_is_lost(tmp_path):

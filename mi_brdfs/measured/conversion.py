@@ -19,7 +19,6 @@ from ..variants import is_measurable
 from .arrays import NUMPY, components
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, Samples, usable
-from .scattered import gridded
 from .source import Source
 
 LANES = 1 << 20
@@ -151,7 +150,9 @@ def _of_measurement(measurement: Measurement) -> Source:
 
 
 def _grid(measurement: Measurement) -> Grid:
-    return gridded(measurement.data) if isinstance(measurement.data, Samples) else measurement.data
+    if isinstance(measurement.data, Samples):
+        raise ValueError(f"{measurement.path} has values at single pairs of directions, which are on no grid")
+    return measurement.data
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
