@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
 from mi_brdfs.measure.probe import BSDFProbe
-from mi_brdfs.measured import FileError, Grid, Measurement, bake, convert, read
+from mi_brdfs.measured import FileError, Grid, Measurement, Samples, bake, convert, read
 from mi_brdfs.measured.coordinates import Spherical
 from mi_brdfs.measured.formats import ENDINGS
 from mi_brdfs.measured.measurement import Axis
@@ -75,6 +75,13 @@ def measurement(f, channels, wavelengths=None):
 def test_a_measurement_keeps_its_values(tmp_path):
     result = convert(measurement(lambda i, o, d: 1 + np.cos(i) * np.cos(o), 3), tmp_path / "x.binary")
     assert result.losses == () and result.rms < 0.002 and result.largest < 0.02
+
+
+def test_scattered_samples_are_put_on_a_grid(tmp_path):
+    wi, wo = (hemisphere(400, seed, 0.2).astype(np.float64) for seed in (5, 6))
+    samples = Samples(wi, wo, np.full((400, 3), 0.25), anisotropic=False)
+    result = convert(Measurement("some file", "test", samples), tmp_path / "x.binary")
+    assert result.losses == () and result.largest < 1e-6
 
 
 def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
