@@ -8,7 +8,8 @@ from support import hemisphere
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
-from mi_brdfs.measured import FileError, Grid, Measurement, bake, convert, read
+from mi_brdfs.measure.probe import BSDFProbe
+from mi_brdfs.measured import FileError, Grid, Measurement, Samples, bake, convert, read
 from mi_brdfs.measured.coordinates import Spherical
 from mi_brdfs.measured.formats import ENDINGS
 from mi_brdfs.measured.measurement import Axis
@@ -37,10 +38,22 @@ def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path, bsdf):
     # What the file holds, found without the code that judged it.
     wi, wo = (w.astype(np.float64) for w in (hemisphere(4000, 1, 0.3), hemisphere(4000, 2, 0.3)))
     found = read(tmp_path / "x.binary").data.evaluate(wi, wo)
-    si = mi.SurfaceInteraction3f()
-    si.wi = mi.Vector3f(np.float32(wi.T))
-    f = np.array(mi.load_dict(bsdf).eval(mi.BSDFContext(), si, mi.Vector3f(np.float32(wo.T)))).T / wo[:, 2:]
+    probe = BSDFProbe(mi.load_dict(bsdf))
+    f = probe.eval(probe.whole, wi, wo) / wo[:, 2:]
     assert abs(found - f).max() < 0.01 * f.max() and np.median(abs(found / f - 1)) < 0.005
+
+
+@pytest.mark.parametrize("bsdf", [{"type": "walter"}, {"type": "ward", "alpha_u": 0.15, "alpha_v": 0.3}], ids=str)
+def test_mitsubas_measured_has_the_values_that_were_written(tmp_path, bsdf):
+    path = tmp_path / "x.bsdf"
+    assert convert(bsdf, path).largest < 0.03
+    if bsdf["type"] == "walter":  # on the way through another format
+        convert(bsdf, tmp_path / "x.binary")
+        assert convert(tmp_path / "x.binary", path).largest < 0.01
+    wi, wo = (hemisphere(4000, seed, 0.3) for seed in (1, 2))
+    probes = [BSDFProbe(mi.load_dict(it)) for it in (bsdf, {"type": "measured", "filename": str(path)})]
+    f, found = (probe.eval(probe.whole, wi, wo) for probe in probes)
+    assert abs(found - f).max() < 0.03 * f.max() and np.sqrt(np.mean((found - f) ** 2)) < 0.002 * f.max()
 
 
 def test_it_says_what_is_lost(tmp_path):
@@ -62,6 +75,13 @@ def measurement(f, channels, wavelengths=None):
 def test_a_measurement_keeps_its_values(tmp_path):
     result = convert(measurement(lambda i, o, d: 1 + np.cos(i) * np.cos(o), 3), tmp_path / "x.binary")
     assert result.losses == () and result.rms < 0.002 and result.largest < 0.02
+
+
+def test_scattered_samples_are_put_on_a_grid(tmp_path):
+    wi, wo = (hemisphere(400, seed, 0.2).astype(np.float64) for seed in (5, 6))
+    samples = Samples(wi, wo, np.full((400, 3), 0.25), anisotropic=False)
+    result = convert(Measurement("some file", "test", samples), tmp_path / "x.binary")
+    assert result.losses == () and result.largest < 1e-6
 
 
 def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):

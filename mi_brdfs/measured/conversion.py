@@ -18,9 +18,9 @@ from ..measure.sources import name_of
 from ..variants import is_measurable
 from .arrays import NUMPY, components
 from .formats import ENDINGS, FORMATS, read
-from .measurement import Grid, Measurement, Samples, usable
-from .scattered import gridded
+from .measurement import Grid, Measurement, usable
 from .source import Source
+from .summary import table
 
 LANES = 1 << 20
 """Pairs of directions that a BSDF is evaluated for at once."""
@@ -142,16 +142,12 @@ def _source(given: Any) -> tuple[Source, list[str]]:
 
 
 def _of_measurement(measurement: Measurement) -> Source:
-    grid = _grid(measurement)
+    grid = table(measurement.data)
     if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
     source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
     stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
     return source if stated else source.rgb()
-
-
-def _grid(measurement: Measurement) -> Grid:
-    return gridded(measurement.data) if isinstance(measurement.data, Samples) else measurement.data
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
@@ -188,7 +184,7 @@ def _writer(path: Path, format: str | None) -> ModuleType:
 
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:
     """Return the root mean square error, the largest, and what was lost on the way."""
-    grid = _grid(written)
+    grid = table(written.data)
     losses = []
     if source.wavelengths is not None and written.wavelengths is None:
         count = len(source.wavelengths)
