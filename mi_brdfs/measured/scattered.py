@@ -10,7 +10,7 @@ from .measurement import Axis, Extrapolation, Grid, Samples
 
 NEIGHBOURS = 10
 """How many samples a value is interpolated between."""
-NODES_PER_SAMPLE, LEAST_NODES, MOST_NODES = 40, 20_000, 100_000
+NODES_PER_SAMPLE, LEAST_NODES, MOST_NODES = 100, 20_000, 120_000
 SHARES = {False: np.array([4.0, 4.0, 1.0]), True: np.array([2.0, 1.5, 1.5, 2.0])}
 """How finely √θh, θd, φd (of isotropic materials, only up to π/2) and φh are divided, compared with each other."""
 PAIRS, CHUNK = 4096, 8192
