@@ -10,11 +10,11 @@ from .measurement import Axis, Extrapolation, Grid, Samples
 
 NEIGHBOURS = 10
 """How many samples a value is interpolated between."""
-NODES_PER_SAMPLE, LEAST_NODES, MOST_NODES = 12, 8_000, 200_000
-SHARES = np.array([2.0, 1.5, 1.0, 1.5])
-"""How finely √θh, θd, φd in [0, π/2] and φh are divided, compared with each other."""
-BLOCK = 128
-"""How many nodes next to each other are interpolated at once."""
+NODES_PER_SAMPLE, LEAST_NODES, MOST_NODES = 100, 20_000, 120_000
+SHARES = {False: np.array([4.0, 4.0, 1.0]), True: np.array([2.0, 1.5, 1.5, 2.0])}
+"""How finely √θh, θd, φd (of isotropic materials, only up to π/2) and φh are divided, compared with each other."""
+PAIRS, CHUNK = 4096, 8192
+"""How many distances are computed at once, and how many nodes are interpolated at once."""
 RIDGE = 1e-2
 """How much the weights prefer their start to balancing, in units of the neighbourhood: the samples around a node at the
 rim of what was measured cannot balance."""
@@ -29,7 +29,7 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     that the samples balance about the node (M. Arroyo and M. Ortiz, Local maximum-entropy approximation schemes,
     IJNME 65, 2006, doi:10.1002/nme.1534), which reproduces straight lines. Distances are those of :func:`embedded`:
     exchanging the directions, and mirroring both if the material is isotropic, change nothing. Samples that coincide
-    are averaged. The axes are as fine as the samples are dense.
+    are averaged. The axes are finer where samples are dense or bright.
 
     What was measured are pairs of polar angles within the ranges of the samples'. Beyond them, nodes have the mean of
     the nearest samples (``hold``), or no value (NaN, ``zero``).
@@ -43,14 +43,15 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     wi, wo, anisotropic = samples.wi[known], samples.wo[known], samples.anisotropic
     points, values = merged(embedded(wi, wo, anisotropic), samples.values[known])
     coordinates = HalfDifference(reciprocal=True, anisotropic=anisotropic)
-    axes = spaced(coordinates.locate(components(wi), components(wo), NUMPY), len(points))
+    places = coordinates.locate(components(wi), components(wo), NUMPY)
+    axes = spaced(places, np.maximum(samples.values[known], 0).sum(axis=1), len(points))
     half = len(axes[2].nodes) // 2 + 1
     # Isotropic tables are symmetric about φd = π/2.
     counted = [axis.nodes if k != 2 or anisotropic else axis.nodes[:half] for k, axis in enumerate(axes)]
     directions = coordinates.directions(*np.meshgrid(*counted, indexing="ij"))
     shape = tuple(len(nodes) for nodes in counted)
     nodes = embedded(stacked(directions[0]), stacked(directions[1]), anisotropic).reshape(-1, points.shape[1])
-    table = interpolated(points, values, nodes, shape).reshape(*shape, -1)
+    table = interpolated(points, values, nodes).reshape(*shape, -1)
     if extrapolate == "zero":
         table[~measured(wi, wo, *(polar_angle(w) for w in directions))] = np.nan
     if not anisotropic:
@@ -83,27 +84,30 @@ def merged(points: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return points[first], total / np.bincount(group)[:, None]
 
 
-def spaced(places: tuple[np.ndarray, ...], count: int) -> tuple[Axis, ...]:
-    """Return axes for ``count`` samples, half of whose nodes are spread evenly, and half as the samples' places are."""
-    shares = SHARES[: len(places)]
+def spaced(places: tuple[np.ndarray, ...], brightness: np.ndarray, count: int) -> tuple[Axis, ...]:
+    """Return axes for samples at some places of some brightness, ``count`` of which differ."""
+    shares = SHARES[len(places) > 3]
     size = np.clip(NODES_PER_SAMPLE * count, LEAST_NODES, MOST_NODES)
-    numbers = np.maximum(np.round(shares * (size / np.prod(shares)) ** (1 / len(shares))), 4).astype(int)
-    root, theta_d = (
-        Axis(spread(place, end, number), low=0, high=end)
-        for place, end, number in zip(places, (1.0, np.pi / 2), numbers, strict=False)
+    root, theta_d, *azimuths = np.maximum(shares * (size / np.prod(shares)) ** (1 / len(shares)), 4).astype(int)
+    halves = [(azimuths[0], np.pi), (azimuths[1], 2 * np.pi)] if len(azimuths) > 1 else [(2 * azimuths[0], np.pi)]
+    return (
+        Axis(spread(places[0], brightness, 1, root), low=0, high=1),
+        Axis(spread(places[1], brightness, np.pi / 2, theta_d), low=0, high=np.pi / 2),
+        *(Axis(np.arange(n) * (period / n), period=period) for n, period in halves),
     )
-    azimuths = [Axis(np.arange(n) * (period / n), period=period) for n, period in ((2 * numbers[2], np.pi),)]
-    if len(places) > 3:
-        azimuths.append(Axis(np.arange(2 * numbers[3]) * (np.pi / numbers[3]), period=2 * np.pi))
-    return (root, theta_d, *azimuths)
 
 
-def spread(places: np.ndarray, end: float, count: int) -> np.ndarray:
-    """Return nodes from 0 to ``end``, whose density is the mean of a constant one and of that of some places."""
+def spread(places: np.ndarray, brightness: np.ndarray, end: float, count: int) -> np.ndarray:
+    """Return nodes from 0 to ``end``, a third of which are spread evenly, a third as samples are, and a third as their
+    brightness is."""
     x = np.linspace(0, end, 8 * count + 1)
-    share = (x / end + np.searchsorted(np.sort(places), x, side="right") / len(places)) / 2
-    share[0], share[-1] = 0, 1
-    return np.interp(np.linspace(0, 1, count), share, x)
+    order = np.argsort(places)
+    share = x / end
+    for weight in (np.ones(len(places)), brightness + 1e-9):
+        below = np.append(0, np.cumsum(weight[order]))
+        share = share + below[np.searchsorted(places[order], x, side="right")] / below[-1]
+    share[0], share[-1] = 0, 3
+    return np.interp(np.linspace(0, 3, count), share, x)
 
 
 def measured(
@@ -118,56 +122,58 @@ def measured(
     return within(theta_i, theta_o) | within(theta_o, theta_i)
 
 
-def interpolated(points: np.ndarray, values: np.ndarray, nodes: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return values at nodes, shape (nodes, channels), which are those of a grid of some shape: blocks of it are near
-    each other."""
-    count = min(NEIGHBOURS, len(points) - 1)
-    if count < 1:
+def interpolated(points: np.ndarray, values: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return values at nodes, shape (nodes, channels)."""
+    if len(points) == 1:
         return np.repeat(values, len(nodes), axis=0)
+    index = nearest(points, nodes, min(NEIGHBOURS + 1, len(points)))
     result = np.empty((len(nodes), values.shape[1]))
-    for block in blocks(shape):
-        near = candidates(points, nodes[block], count + 1)
-        squared = np.sum((nodes[block][:, None] - points[near]) ** 2, axis=-1)
-        nearest = np.argpartition(squared, count, axis=1)[:, : count + 1]
-        index = near[nearest]
-        weight = weights(points[index] - nodes[block][:, None], np.take_along_axis(squared, nearest, axis=1))
-        result[block] = np.einsum("nk,nkc->nc", weight, values[index])
+    for start in range(0, len(nodes), CHUNK):
+        chunk = slice(start, start + CHUNK)
+        weight = weights(points[index[chunk]] - nodes[chunk, None])
+        result[chunk] = np.einsum("nk,nkc->nc", weight, values[index[chunk]])
     return result
 
 
-def blocks(shape: tuple[int, ...]) -> list[np.ndarray]:
-    """Return the flat indices of the nodes of a grid, in cubes of about ``BLOCK``."""
-    side = max(round(BLOCK ** (1 / len(shape))), 1)
-    cells = np.meshgrid(*(np.arange(n) // side for n in shape), indexing="ij")
-    cell = np.ravel_multi_index(tuple(cells), tuple(-(-n // side) for n in shape)).ravel()
-    order = np.argsort(cell, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(cell[order])) + 1)
+def nearest(points: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
+    """Return the indices of the nearest points of each node, shape (nodes, count).
+
+    Nodes are halved until few are left, and with them the points in question: those of a group are no further from its
+    middle than the middle's own are, and twice the reach of the group."""
+    index = np.empty((len(nodes), count), dtype=np.int64)
+    groups = [(np.arange(len(nodes)), np.arange(len(points)))]
+    while groups:
+        group, near = groups.pop()
+        low, high = nodes[group].min(axis=0), nodes[group].max(axis=0)
+        middle = (low + high) / 2
+        reach = np.sqrt(np.max(np.sum((nodes[group] - middle) ** 2, axis=1)))
+        distance = np.sqrt(np.sum((points[near] - middle) ** 2, axis=1))
+        near = near[distance <= np.partition(distance, count - 1)[count - 1] + 2 * reach + 1e-12]
+        if len(group) * len(near) > PAIRS and len(group) > 1:
+            order = np.argsort(nodes[group, np.argmax(high - low)])
+            groups += [(group[half], near) for half in np.array_split(order, 2)]
+        else:
+            squared = np.sum((nodes[group][:, None] - points[near]) ** 2, axis=-1)
+            index[group] = near[np.argpartition(squared, count - 1, axis=1)[:, :count]]
+    return index
 
 
-def candidates(points: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of points among which are the nearest of each node: no further from the middle of the nodes
-    than its own nearest and twice the nodes' reach."""
-    middle = (nodes.min(axis=0) + nodes.max(axis=0)) / 2
-    reach = np.sqrt(np.max(np.sum((nodes - middle) ** 2, axis=1)))
-    distance = np.sqrt(np.sum((points - middle) ** 2, axis=1))
-    return np.flatnonzero(distance <= np.partition(distance, count - 1)[count - 1] + 2 * reach + 1e-12)
-
-
-def weights(offsets: np.ndarray, squared: np.ndarray) -> np.ndarray:
+def weights(offsets: np.ndarray) -> np.ndarray:
     """Return weights for points at offsets from a node, shape (nodes, points, dimensions): see :func:`gridded`."""
-    distance = np.sqrt(np.maximum(squared, 1e-18))
+    distance = np.maximum(np.sqrt(np.sum(offsets**2, axis=-1)), 1e-9)
     radius = np.max(distance, axis=1, keepdims=True) * 1.0001
     start = 2 * np.log((radius - distance) / (radius * distance))
     offsets = offsets / radius[..., None]
-    tilt = np.zeros((len(offsets), offsets.shape[-1]))
+    transposed = np.swapaxes(offsets, 1, 2)
+    tilt = np.zeros((len(offsets), offsets.shape[-1], 1))
     ridge = RIDGE * np.eye(offsets.shape[-1])
-    for _ in range(10):  # Newton's method, for the root of the tilted mean
-        weight = softmax(start + np.einsum("nkd,nd->nk", offsets, tilt))
-        mean = np.einsum("nk,nkd->nd", weight, offsets)
-        spread = np.einsum("nk,nkd,nke->nde", weight, offsets, offsets) - mean[:, :, None] * mean[:, None, :] + ridge
-        step = np.linalg.solve(spread, (mean + RIDGE * tilt)[..., None])[..., 0]
+    for _ in range(8):  # Newton's method, for the root of the tilted mean
+        weight = softmax(start + (offsets @ tilt)[..., 0])[..., None]
+        mean = transposed @ weight
+        spread = transposed @ (offsets * weight) - mean @ np.swapaxes(mean, 1, 2) + ridge
+        step = np.linalg.solve(spread, mean + RIDGE * tilt)
         tilt -= step * np.minimum(1, 2 / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9))
-    return softmax(start + np.einsum("nkd,nd->nk", offsets, tilt))
+    return softmax(start + (offsets @ tilt)[..., 0])
 
 
 def softmax(x: np.ndarray) -> np.ndarray:

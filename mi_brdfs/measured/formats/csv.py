@@ -9,8 +9,11 @@ from typing import Literal
 
 import numpy as np
 
+from ..arrays import stacked
+from ..coordinates import spherical
 from ..measurement import Measurement
 from ..rows import arranged, checked_angles, without_cosine
+from ..source import Source
 from ..text import TextFile, opening, shortened
 
 NAME = "CSV"
@@ -69,6 +72,34 @@ def read(path: Path) -> Measurement:
         material=columns.stated("material") or path.stem,
         quantity=columns.quantity,
     )
+
+
+def write(path: Path, source: Source) -> None:
+    """Write a row for each θi of 0 to 85° and 89°, θo every 2.5°, and Δφ every 10°, every 2.5° about the mirror
+    direction; for anisotropic sources, with θ every 5°, Δφ every 10° and φi every 15°. The columns are r, g, b, or
+    wavelengths in nm.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    theta = np.append(np.arange(0, 90, 5.0), 89)
+    if source.anisotropic:
+        angles = theta, theta, np.arange(0, 360, 10.0), np.arange(0, 360, 15.0)
+    else:
+        fine = np.append(np.arange(0, 90, 2.5), 89)
+        angles = theta, fine, np.append(np.arange(0, 140, 10.0), np.arange(140, 181, 2.5)), np.zeros(1)
+    known = source.wavelengths is None or np.all(np.isfinite(source.wavelengths))
+    names = ["f"] if not known else "rgb" if source.wavelengths is None else [f"{w:.10g}nm" for w in source.wavelengths]
+    with path.open("w", encoding="utf-8") as file:
+        if source.material:
+            file.write(f"# material: {' '.join(source.material.split())}\n")
+        file.write(",".join(["theta_i_deg", "theta_o_deg", "delta_phi_deg", "phi_i_deg", *names]) + "\n")
+        for theta_i in angles[0]:
+            rows = np.stack(np.meshgrid([theta_i], *angles[1:], indexing="ij"), axis=-1).reshape(-1, 4)
+            i, o, delta, phi_i = np.radians(rows).T
+            f = source.evaluate(stacked(spherical(i, phi_i)), stacked(spherical(o, phi_i + delta)))
+            for row, values in zip(rows, f, strict=True):
+                file.write(",".join([*(f"{angle:g}" for angle in row), *(f"{value:.7g}" for value in values)]) + "\n")
 
 
 class Columns:

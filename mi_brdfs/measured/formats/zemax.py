@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..albedo import hemisphere
+from ..arrays import stacked
 from ..coordinates import Coordinates, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
+from ..source import Source
 from ..text import TextFile, first_words, is_number, opening, shortened
 
 NAME = "Zemax"
@@ -27,6 +30,7 @@ XYZ_TO_SRGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
 """Linear sRGB of CIE XYZ (IEC 61966-2-1)."""
+QUARTER = np.pi / 2
 MOST_ANGLES = 4096
 """The most angles of a kind that a header is believed to mean."""
 
@@ -105,6 +109,60 @@ def unseen(coordinates: Coordinates, axes: tuple[Axis, ...]) -> np.ndarray:
     """Return which nodes of a grid lie below the horizon, or on it."""
     _, wo = coordinates.directions(*np.meshgrid(*(axis.nodes for axis in axes), indexing="ij"))
     return np.asarray(wo.z < 1e-9)
+
+
+def write(path: Path, source: Source) -> None:
+    """Write values for AngleOfIncidence 0 to 85°, ScatterAzimuth every 5° up to 180° and 54 ScatterRadial, which are
+    dense about the mirror direction, with the TIS of each; for anisotropic sources, SampleRotation and ScatterAzimuth
+    every 15° up to 360°. Directions below the horizon have 0. Colours are written as XYZ under D65, and greys and
+    single wavelengths as Monochrome.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    if source.wavelengths is not None and len(source.wavelengths) > 1:
+        source = source.rgb()
+    turn = np.arange(0, 361, 15.0)
+    angles = (
+        turn if source.anisotropic else np.zeros(1),
+        np.arange(0, 86, 5.0),
+        turn if source.anisotropic else np.arange(0, 181, 5.0),
+        np.concatenate([np.arange(0, 5, 0.5), np.arange(5, 10, 1.0), np.arange(10, 30, 2.5), np.arange(30, 181, 5.0)]),
+    )
+    rotations, theta_i, azimuths, radials = (np.radians(each) for each in angles)
+    coordinates = SpecularPolar(mirrored=False, anisotropic=True)
+    tables, stated = [], []
+    for rotation in rotations:
+        for theta in theta_i:
+            phi_i = QUARTER - rotation
+            wi, wo = map(stacked, coordinates.directions(theta, *np.meshgrid(azimuths, radials, indexing="ij"), phi_i))
+            seen = wo[..., 2] > 1e-9
+            around, solid_angle = hemisphere(theta, phi_i)
+            each = np.concatenate([wo[seen], around])
+            f = source.evaluate(np.broadcast_to(wi, each.shape), each)
+            table = np.zeros((*seen.shape, f.shape[-1]))
+            table[seen] = f[: -len(around)]
+            tables.append(table)
+            stated.append((solid_angle * around[:, 2]) @ f[-len(around) :])
+    values, albedos = np.array(tables), np.array(stated)
+    content = "XYZ" if np.any(np.ptp(values, axis=-1)) else "Monochrome"
+    if content == "XYZ":
+        values, albedos = (each @ np.linalg.inv(XYZ_TO_SRGB).T for each in (values, albedos))
+    with path.open("w", encoding="utf-8") as file:
+        if source.material:
+            file.write(f"# Material: {' '.join(source.material.split())}\n")
+        if source.wavelengths is not None and np.isfinite(source.wavelengths[0]):
+            file.write(f"# Wavelength: {source.wavelengths[0]:g} nm\n")
+        file.write(f"Source\tMeasured\nSymmetry\t{'ASymmetrical4D' if source.anisotropic else 'PlaneSymmetrical'}\n")
+        file.write(f"SpectralContent\t{content}\nScatterType\tBRDF\n")
+        for name, each in zip(ANGLES, angles, strict=True):
+            file.write(f"{name}\t{len(each)}\n" + "\t".join(f"{angle:g}" for angle in each) + "\n")
+        for k, channel in enumerate(CHANNELS[content]):
+            file.write(f"\n{channel}\nDataBegin\n")
+            for table, albedo in zip(values[..., k], albedos[:, k], strict=True):
+                file.write(f"TIS\t{albedo:.6e}\n")
+                file.writelines("\t".join(f"{value:.6e}" for value in row) + "\n" for row in table)
+            file.write("DataEnd\n")
 
 
 @dataclass

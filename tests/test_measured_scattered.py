@@ -1,0 +1,116 @@
+"""Scattered samples as a grid: weights, symmetries, what lies beyond, and how well samples that were left out come
+back."""
+
+import numpy as np
+import pytest
+from support import direction, hemisphere, shared
+
+from mi_brdfs.measured import Samples, read
+from mi_brdfs.measured.scattered import embedded, gridded, nearest, weights
+
+
+def pairs(count, seed, lowest=0.05):
+    return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
+
+
+def glossy(wi, wo):
+    """A reciprocal and isotropic BRDF with a highlight and two colours."""
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
+    lobe = np.exp(-8 * (1 - half[..., 2:] ** 2))
+    return np.concatenate([0.1 + lobe, 0.3 - 0.1 * lobe], axis=-1)
+
+
+def streaked(wi, wo):
+    """The same, narrow in x and wide in y."""
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
+    return 0.1 + np.exp(-8 * half[..., :1] ** 2 - half[..., 1:2] ** 2)
+
+
+def test_weights_are_positive_and_balance():
+    rng = np.random.default_rng(1)
+    points, node = rng.uniform(-1, 1, (500, 3)), rng.uniform(-0.5, 0.5, (50, 3))
+    index = nearest(points, node, 11)
+    offsets = points[index] - node[:, None]
+    weight = weights(offsets)
+    assert np.all(weight >= 0)
+    np.testing.assert_allclose(weight.sum(axis=1), 1, rtol=1e-12)
+    balance = np.linalg.norm(np.einsum("nk,nkd->nd", weight, offsets), axis=1)
+    assert np.median(balance / np.linalg.norm(offsets, axis=-1).min(axis=1)) < 0.15
+    at_sample = weights(points[nearest(points, points[:1], 11)] - points[0])
+    assert at_sample.max() > 1 - 1e-6
+
+
+def test_nearest_points_are_the_nearest():
+    rng = np.random.default_rng(2)
+    points, nodes = rng.normal(size=(3000, 3)), rng.normal(size=(700, 3))
+    squared = np.sum((nodes[:, None] - points) ** 2, axis=-1)
+    expected = np.sort(np.argsort(squared, axis=1)[:, :7], axis=1)
+    np.testing.assert_array_equal(np.sort(nearest(points, nodes, 7), axis=1), expected)
+
+
+def test_distance_knows_the_symmetries():
+    (wi, wo), mirror, phi = pairs(100, 3), np.array([1, -1, 1]), 0.7
+    turn = np.array([[np.cos(phi), -np.sin(phi), 0], [np.sin(phi), np.cos(phi), 0], [0, 0, 1]])
+    for anisotropic in (False, True):
+        np.testing.assert_allclose(embedded(wo, wi, anisotropic), embedded(wi, wo, anisotropic), atol=1e-9)
+    np.testing.assert_allclose(embedded(wi * mirror, wo * mirror, False), embedded(wi, wo, False), atol=1e-9)
+    np.testing.assert_allclose(embedded(wi @ turn, wo @ turn, False), embedded(wi, wo, False), atol=1e-9)
+    assert np.all(np.linalg.norm(embedded(wi @ turn, wo @ turn, True) - embedded(wi, wo, True), axis=1) > 0.02)
+
+
+@pytest.mark.parametrize("f, anisotropic, gain", [(glossy, False, 0.5), (streaked, True, 0.75)])
+def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
+    """Better than from the nearest neighbour; in four dimensions, 2000 samples are few."""
+    wi, wo = pairs(2000, 5)
+    values = f(wi, wo)
+    grid = gridded(Samples(wi, wo, values, anisotropic))
+    assert grid.values.min() >= values.min()
+    assert grid.values.max() <= values.max()
+    wi_2, wo_2 = pairs(1000, 9, lowest=0.2)
+    found, expected = grid.evaluate(wi_2, wo_2), f(wi_2, wo_2)
+    points, others = embedded(wi, wo, anisotropic), embedded(wi_2, wo_2, anisotropic)
+    neighbour = values[nearest(points, others, 1)[:, 0]]
+    assert np.median(abs(found / expected - 1)) < gain * np.median(abs(neighbour / expected - 1))
+    np.testing.assert_allclose(grid.evaluate(wo_2, wi_2), found, rtol=1e-6)
+
+
+def test_beyond_the_measured_range():
+    wi, wo = pairs(2000, 13, lowest=0.5)
+    samples = Samples(wi, wo, glossy(wi, wo), False)
+    inside, outside = direction(30)[None], direction(80, 60)[None]
+    held, zero = gridded(samples), gridded(samples, "zero")
+    assert np.all(held.evaluate(inside, outside) > 0.05)
+    assert np.all(zero.evaluate(inside, outside) == 0)
+    assert np.all(zero.evaluate(outside, inside) == 0)
+    assert np.all(zero.evaluate(inside, inside) == held.evaluate(inside, inside))
+
+
+def test_missing_values_and_few_samples():
+    wi, wo = pairs(30, 15)
+    values = glossy(wi, wo)
+    values[3] = np.nan
+    assert np.all(np.isfinite(gridded(Samples(wi, wo, values, False)).values))
+    one = gridded(Samples(wi[:1], wo[:1], values[:1], False))
+    np.testing.assert_allclose(one.values, np.broadcast_to(values[0], one.values.shape))
+    with pytest.raises(ValueError, match="No sample has a value"):
+        gridded(Samples(wi[3:4], wo[3:4], values[3:4], False))
+
+
+@pytest.mark.parametrize("parts", [("cornell", "krylon_blue.brdf"), ("retro", "retro-3M-jaune.dat")])
+def test_left_out_samples(parts):
+    """Every tenth sample is predicted better than by its nearest neighbour, by a ninth at least."""
+    samples = read(shared(*parts)).data
+    delta = samples.wi[:, 0] * samples.wo[:, 1] - samples.wi[:, 1] * samples.wo[:, 0]
+    # One of each mirrored pair, lest the other one tell.
+    used = np.all(np.isfinite(samples.values), axis=1) & (delta < 1e-9)
+    wi, wo, f = samples.wi[used], samples.wo[used], samples.values[used].mean(axis=1, keepdims=True)
+    order = np.random.default_rng(1).permutation(len(f))
+    left, kept = order[::10], np.delete(order, np.s_[::10])
+    points = embedded(wi, wo, False)
+    neighbour = f[kept][nearest(points[kept], points[left], 1)[:, 0]]
+    grid = gridded(Samples(wi[kept], wo[kept], f[kept], False))
+
+    def error(found):
+        return np.sqrt(np.mean(np.log((found + 1e-3) / (f[left] + 1e-3)) ** 2))
+
+    assert error(grid.evaluate(wi[left], wo[left])) < 0.9 * error(neighbour)
