@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,16 @@ __all__ = ["FOLDER", "NOTEBOOKS", "code_cells", "read_notebook", "run_notebook"]
 
 
 def run_notebook(path: Path) -> dict[str, Any]:
-    """Execute the code cells of a notebook in order, in ``llvm_ad_rgb``; the namespace that they leave."""
+    """Execute the code cells of a notebook in order, in ``llvm_ad_rgb`` and in its folder; the namespace that they
+    leave."""
     names: dict[str, Any] = {}
+    folder = os.getcwd()
+    os.chdir(path.parent)
     try:
         with mi.variant_context("llvm_ad_rgb"):
             for cell in code_cells(read_notebook(path)):
                 exec(compile("".join(cell["source"]), f"{path.name}: {cell['id']}", "exec"), names)
     finally:
+        os.chdir(folder)
         plt.close("all")
     return names

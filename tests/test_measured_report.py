@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from mi_brdfs import plot
-from mi_brdfs.measured import Axis, FileError, Grid, Measurement, read, summarize
+from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
 from mi_brdfs.measured.albedo import albedos
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
+from mi_brdfs.measured.reciprocity import reciprocity_error
 
 SCALE = np.array([1, 1.15, 1.66]) / 1500
 DIMENSIONS = 30, 30, 60
@@ -55,6 +56,10 @@ def goniometer(values=1 / np.pi, radial=60.0, anisotropic=False, stated=None, ch
     shape = *(len(axis.nodes) for axis in axes), channels
     grid = Grid(SpecularPolar(not anisotropic, anisotropic), tuple(axes), np.broadcast_to(values, shape).copy())
     return Measurement(Path("paint.bsdf"), "Zemax", grid, wavelengths=np.array([650.0]), stated_albedos=stated or {})
+
+
+def directions(theta, phi):
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
 
 
 def rows(measurement):
@@ -155,6 +160,38 @@ def test_half_a_turn_of_merls_is_reciprocal_by_construction(lambert):
     found = summarize(read(lambert))
     assert found.reciprocal and found.reciprocity is None
     assert dict(found.rows())["reciprocity"] == "exact, by the coordinates of the table"
+
+
+def test_reciprocity_of_scattered_samples():
+    """Only of those with a partner: 0.2 and 0.3 differ by a third, however an isotropic sample is turned."""
+    theta_i, phi_i, theta_o, phi_o = np.radians([[20, 0, 50, 90], [50, 10, 20, -80], [50, 0, 20, 40], [30, 0, 70, 0]]).T
+    wi, wo = directions(theta_i, phi_i), directions(theta_o, phi_o)
+    samples = Samples(wi, wo, np.array([[0.2], [0.3], [9.0], [9.0]]), anisotropic=False)
+    found = reciprocity_error(samples)
+    assert found.pairs == 2
+    assert found.median == found.percentile95 == pytest.approx(1 / 3)
+    assert reciprocity_error(dataclasses.replace(samples, anisotropic=True)) is None
+
+
+def test_scattered_samples(tmp_path):
+    """Are counted as they are, and drawn within the angles that were measured, up to a cell of their grid: a grey of
+    albedo .3, less what lies beyond 70°."""
+    angles = np.meshgrid([10, 40], np.arange(0, 71, 10), np.arange(0, 181, 15))
+    theta_i, theta_o, phi = np.radians(angles).reshape(3, -1)
+    f = np.full((len(phi), 1), 0.3 / np.pi)
+    samples = Samples(directions(theta_i, 0 * phi), directions(theta_o, phi), f, anisotropic=False)
+    measurement = Measurement(tmp_path / "felt.csv", "CSV", samples, wavelengths=np.array([550.0]))
+    words = rows(measurement)
+    assert words["values"] == "208, of 208 pairs of directions"
+    assert words["measured"].startswith("θi 10 to 40°, θo 0 to 70°; ")
+    albedo = summarize(measurement).largest_albedo
+    assert 0.3 * np.sin(np.radians(70)) ** 2 < albedo.value < 0.3 * np.sin(np.radians(82)) ** 2
+    _, first, _, second, *nodes = lines(plot.measured(measurement).axes[1])
+    for curve in (first, second, *nodes):
+        seen = np.isfinite(curve[1])
+        np.testing.assert_allclose(curve[1][seen], 0.3 / np.pi, rtol=1e-4)
+        assert abs(curve[0][seen]).max() == pytest.approx(70, abs=6)
+    assert all(set(range(-70, 71, 10)) <= set(theta.round()) for theta, _ in nodes)
 
 
 def test_nothing_was_measured_both_ways():

@@ -101,6 +101,20 @@ def efficiencies(report):
     return list(report.of("efficiency")[0].data.values())
 
 
+def from_a_goniometer_to_a_picture(names):
+    stated = [it.stated for it in names["summary"].scatter]
+    assert names["sums"] == pytest.approx(stated, rel=1e-3)
+    ratio = [it.integrated / it.stated for it in names["summary"].scatter]
+    assert ratio[0] == pytest.approx(4 / 3, abs=0.03) and ratio[3] == pytest.approx(3 / 4, abs=0.03)
+    hold, zero = (np.array(names["gaps"][name])[..., 0] for name in ("hold", "zero"))
+    assert (zero < hold + 0.05).mean() > 0.99
+    assert zero[120:136, 120:136].mean() < 0.01 < 0.1 < hold[120:136, 120:136].mean()
+    peak, middle = (names["f"][k].max() / names["f"][0].max() for k in (3, 2))
+    assert 45 < peak < 60 and names["at_70"] > 10 * names["at_50"] and middle < 10
+    assert (names["at_30"] + names["at_70"]) / 2 == pytest.approx(7 * names["at_50"], rel=0.05)
+    assert np.sqrt(names["at_30"] * names["at_70"]) > 2 * names["at_50"]
+
+
 def coming_from_mitsuba_06(names):
     assert names["difference"] < 1e-4  # of the same scene with the names of Mitsuba 3
 
@@ -119,6 +133,7 @@ SAYS = {
         is_my_sampler_right,
         recover_a_material,
         write_your_own_brdf,
+        from_a_goniometer_to_a_picture,
         coming_from_mitsuba_06,
         anatomy_of_a_microfacet_brdf,
     )

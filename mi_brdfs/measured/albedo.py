@@ -47,7 +47,7 @@ def coverage(grid: Grid, theta_i: np.ndarray, phi_i: float = 0) -> np.ndarray:
 def _nodes(theta_i: np.ndarray, phi_i: float) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     for theta in np.maximum(theta_i, 1e-6):  # the normal has no azimuth
         wo, solid_angle = hemisphere(theta, phi_i)
-        yield np.broadcast_to(stacked(spherical(theta, phi_i)), wo.shape), wo, solid_angle
+        yield stacked(spherical(theta, phi_i)), wo, solid_angle
 
 
 def hemisphere(theta_i: float, phi_i: float = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -104,12 +104,14 @@ class Grid:
         return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * values
 
     def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        """Return whether directions of shape (N, 3) are above the horizon, on all axes in the range that was measured,
-        and nearest to a node with values in all channels: shape (N,)."""
+        """Return whether directions of shape (…, 3), or (3,) for one wi and many wo, are above the horizon, on all axes
+        in the range that was measured, and nearest to a node with values in all channels: shape (…)."""
         places, _ = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
-        nearest = tuple(axis.steps(place, "nearest")[0][0] for axis, place in zip(self.axes, places, strict=True))
-        inside = np.all([axis.measured(place) for axis, place in zip(self.axes, places, strict=True)], axis=0)
-        return inside & (wi[:, 2] > 0) & (wo[:, 2] > 0) & np.isfinite(self.values[nearest]).all(axis=-1)
+        inside, nearest = (wi[..., 2] > 0) & (wo[..., 2] > 0), []
+        for axis, place in zip(self.axes, places, strict=True):
+            inside = inside & axis.measured(place)
+            nearest.append(axis.steps(place, "nearest")[0][0])
+        return inside & np.isfinite(self.values[tuple(nearest)]).all(axis=-1)
 
     @cached_property
     def usable(self) -> np.ndarray:

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .measurement import Grid
+from .coordinates import TWO_PI
+from .measurement import Grid, Samples, usable
 
 PAIRS = 1 << 17
 """The most nodes that are compared."""
+SAME = np.radians(0.1)
+"""By how much angles of samples may differ that count as the same."""
 
 
 @dataclass(frozen=True)
@@ -23,21 +26,24 @@ class ReciprocityError:
     """How many pairs of directions were compared."""
 
 
-def reciprocity_error(grid: Grid) -> ReciprocityError | None:
-    """Return how far the values at nodes are from what the table says with the directions exchanged, over the nodes
-    where both were measured. Channels count alike, and nodes in proportion to both cosines: light near the horizon
-    matters little, and is measured worst.
+def reciprocity_error(data: Grid | Samples) -> ReciprocityError | None:
+    """Return how far values are from those with the directions exchanged, over the nodes of a grid where both were
+    measured, or over the pairs of samples whose directions are each other's. Channels count alike, and directions in
+    proportion to both cosines: light near the horizon matters little, and is measured worst.
 
-    Return None if the coordinates make it 0, or nothing was measured both ways.
+    Return None if a grid's coordinates make it 0, or nothing was measured both ways.
     """
-    if grid.coordinates.reciprocal:
+    if isinstance(data, Samples):
+        wi, wo, f, reverse = _exchanged(data)
+    elif data.coordinates.reciprocal:
         return None
-    count = math.prod(grid.values.shape[:-1])
-    chosen = np.sort(np.random.default_rng(1).permutation(count)[:PAIRS]) if count > PAIRS else np.arange(count)
-    wi, wo, _ = grid.pairs(chosen)
-    both = grid.measured(wi, wo) & grid.measured(wo, wi)
-    wi, wo = wi[both], wo[both]
-    f, reverse = grid.evaluate(wi, wo), grid.evaluate(wo, wi)
+    else:
+        count = math.prod(data.values.shape[:-1])
+        chosen = np.sort(np.random.default_rng(1).permutation(count)[:PAIRS]) if count > PAIRS else np.arange(count)
+        wi, wo, _ = data.pairs(chosen)
+        both = data.measured(wi, wo) & data.measured(wo, wi)
+        wi, wo = wi[both], wo[both]
+        f, reverse = data.evaluate(wi, wo), data.evaluate(wo, wi)
     larger = np.maximum(abs(f), abs(reverse))
     lit = larger > 0
     if not lit.any():
@@ -48,3 +54,24 @@ def reciprocity_error(grid: Grid) -> ReciprocityError | None:
     share = np.cumsum(weight[order]) / weight.sum()
     median, most = (float(error[order][np.searchsorted(share, level)]) for level in (0.5, 0.95))
     return ReciprocityError(median, most, len(f))
+
+
+def _exchanged(samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``(wi, wo, f, reverse)`` of the samples for which there is one with the directions exchanged; isotropic
+    ones may also be turned and mirrored."""
+    wi, wo, f = samples.pairs()
+    theta_i, theta_o = (np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (wi, wo))
+    phi_i, phi_o = (np.arctan2(w[:, 1], w[:, 0]) for w in (wi, wo))
+    if not samples.anisotropic:
+        delta = np.mod(phi_o - phi_i, TWO_PI)
+        phi_i, phi_o = np.zeros_like(delta), np.minimum(delta, TWO_PI - delta)
+        there, back = (theta_i, phi_i, theta_o, phi_o), (theta_o, phi_i, theta_i, phi_o)
+    else:
+        there, back = (theta_i, phi_i, theta_o, phi_o), (theta_o, phi_o, theta_i, phi_i)
+    steps = np.round(np.concatenate([np.stack(there, axis=1), np.stack(back, axis=1)]) / SAME).astype(np.int64)
+    _, group = np.unique(steps, axis=0, return_inverse=True)
+    one, other = np.split(group.ravel(), 2)
+    _, here, exchanged = np.intersect1d(one, other, return_indices=True)
+    different = here != exchanged
+    here, exchanged = here[different], exchanged[different]
+    return wi[here], wo[here], usable(f[here]), usable(f[exchanged])

@@ -11,6 +11,7 @@ from .albedo import albedos, coverage
 from .counts import Counts, Range, census
 from .measurement import FileError, Grid, Measurement, Samples
 from .reciprocity import ReciprocityError, reciprocity_error
+from .scattered import gridded
 
 ANGLES = np.arange(0, 86, 5)
 """The angles of incidence at which albedos are integrated, in degrees, where they were measured."""
@@ -155,7 +156,7 @@ def summarize(measurement: Measurement) -> Summary:
     if found.least > found.most:
         raise FileError(f"{measurement.path}: no value above the horizon is a number.")
     grid = table(data)
-    theta_i, theta_o = (ends(grid, name, seen) for name, seen in
+    theta_i, theta_o = (ends(data, name, seen) for name, seen in
                         (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
     angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
     turns = azimuths(grid)
@@ -175,8 +176,8 @@ def summarize(measurement: Measurement) -> Summary:
         above=found.above,
         below=found.below,
         most_negative=min(found.least, 0) / found.most if found.most > 0 else 0,
-        reciprocal=grid.coordinates.reciprocal,
-        reciprocity=reciprocity_error(grid),
+        reciprocal=isinstance(data, Grid) and data.coordinates.reciprocal,
+        reciprocity=reciprocity_error(data),
         largest_albedo=_largest(measurement, grid, angles, turns),
         scatter=_stated(measurement, grid),
         notes=dict(measurement.notes),
@@ -184,12 +185,8 @@ def summarize(measurement: Measurement) -> Summary:
 
 
 def table(data: Grid | Samples) -> Grid:
-    """Return a measurement's values on a grid."""
-    if isinstance(data, Grid):
-        return data
-    from .scattered import gridded
-
-    return gridded(data)
+    """Return a measurement's values on a grid, without any beyond the measured range."""
+    return data if isinstance(data, Grid) else gridded(data, "zero")
 
 
 def channel_names(measurement: Measurement) -> list[str]:
@@ -225,13 +222,16 @@ def _wavelengths(measurement: Measurement) -> str:
     return f"{nm[0]:g} nm" if len(nm) == 1 else f"{len(nm)} from {min(nm):g} to {max(nm):g} nm"
 
 
-def ends(grid: Grid, name: str, seen: Range = (0, 90)) -> Range:
-    """Return the measured range of an angle, in degrees: the ends of its axis if it has one, all of it in half and
-    difference angles, which no direction escapes, and else what values were seen at."""
-    if name in grid.coordinates.names:
-        axis = grid.axes[grid.coordinates.names.index(name)]
-        return round(float(np.degrees(axis.low)), 4), round(float(np.degrees(axis.high)), 4)
-    return (0, 90) if "theta_d" in grid.coordinates.names else seen
+def ends(data: Grid | Samples, name: str, seen: Range) -> Range:
+    """Return the measured range of an angle, in degrees: the ends of its axis if a grid has one, all of it for half and
+    difference angles, which no direction escapes, and else what values were ``seen`` at."""
+    if isinstance(data, Grid):
+        if name in data.coordinates.names:
+            axis = data.axes[data.coordinates.names.index(name)]
+            return round(float(np.degrees(axis.low)), 4), round(float(np.degrees(axis.high)), 4)
+        if "theta_d" in data.coordinates.names:
+            return 0, 90
+    return round(seen[0], 4), round(seen[1], 4)
 
 
 def azimuths(grid: Grid) -> np.ndarray:

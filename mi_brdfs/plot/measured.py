@@ -13,16 +13,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from ..measured import Measurement, read
+from ..measured import Measurement, Samples, read
 from ..measured.albedo import albedos
-from ..measured.arrays import stacked
+from ..measured.arrays import components, stacked
 from ..measured.colour import LUMINANCE
-from ..measured.coordinates import HalfDifference, spherical
-from ..measured.counts import batches
+from ..measured.coordinates import HalfDifference, polar_angle, spherical
+from ..measured.counts import batches, census
 from ..measured.measurement import usable
 from ..measured.observer import to_srgb
 from ..measured.summary import azimuths, ends, table
-from .lobes import Curve, refined
+from .lobes import Curve, largest, refined
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
 from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title
@@ -81,6 +81,7 @@ class _Table:
         self.measurement, self.grid = measurement, table(measurement.data)
         path, material = measurement.path, measurement.material
         self.name = path.name if material in ("", path.stem) else f"{material} ({path.name})"
+        self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
         self.phi = float(azimuths(self.grid)[0])
         self.coloured = self.grid.values.shape[-1] > 1
         self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")
@@ -96,16 +97,16 @@ class _Table:
         colour = self.colour(f)
         return colour @ LUMINANCE if colour.shape[-1] == 3 else colour.mean(axis=-1)
 
-    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        return self.grid.measured(wi.reshape(-1, 3), wo.reshape(-1, 3)).reshape(wo.shape[:-1])
-
     @property
     def angles(self) -> np.ndarray:
         """The angles of incidence of lobes, in degrees."""
-        names = self.grid.coordinates.names
-        if "theta_i" not in names:
-            return np.array(ANGLES)
-        nodes = np.degrees(self.grid.axes[names.index("theta_i")].nodes)
+        data, names = self.measurement.data, self.grid.coordinates.names
+        if isinstance(data, Samples):
+            nodes = np.unique(np.round(np.degrees(polar_angle(components(data.wi))), 1))
+        elif "theta_i" in names:
+            nodes = np.degrees(self.grid.axes[names.index("theta_i")].nodes)
+        else:
+            nodes = np.array(ANGLES)
         nodes = nodes[nodes < max(85, nodes[0] + 1)]
         return nodes[np.unique(np.linspace(0, len(nodes) - 1, LOBES).round().astype(int))]
 
@@ -115,7 +116,7 @@ def _draw_slice(ax: Axes, it: _Table) -> None:
     theta_h, theta_d = np.meshgrid(middles, middles)
     pair = HalfDifference().directions(np.sqrt(theta_h), theta_d * np.pi / 2, np.full_like(theta_h, np.pi / 2))
     wi, wo = map(stacked, pair)
-    f, seen = it.grid.evaluate(wi, wo), it.measured(wi, wo)
+    f, seen = it.grid.evaluate(wi, wo), it.grid.measured(wi, wo)
     luminance, colour = it.luminance(f), it.colour(f)
     norm = _norm(luminance[seen])
     brightness = norm(np.maximum(luminance, norm.vmin)).filled(0)
@@ -144,11 +145,12 @@ def _draw_slice(ax: Axes, it: _Table) -> None:
 
 
 def _norm(luminance: np.ndarray) -> LogNorm:
-    """Return the scale of a slice: up to its peak, or as many decades as can be told apart above what is dim."""
+    """Return the scale of a slice: from black, well below what is dim, up to its peak or as many decades as can be told
+    apart."""
     lit = luminance[luminance > 0]
     if not len(lit):
         return LogNorm(0.1, 1, clip=True)
-    low = max(np.quantile(lit, 0.1), np.median(lit) / 30)
+    low = max(np.quantile(lit, 0.1), np.median(lit) / 30) / 10
     return LogNorm(low, np.clip(lit.max(), 10 * low, 10**DECADES * low), clip=True)
 
 
@@ -158,24 +160,22 @@ def _draw_lobes(ax: Axes, it: _Table) -> None:
     draw_cartesian(ax, curves, True, False, it.quantity)
     for line, nodes in zip(curves, _nodes(it), strict=True):
         ax.plot(*nodes, color=line.look["color"], **NODE)
+        ax.set_ylim(top=max(ax.get_ylim()[1], 1.3 * largest([nodes.value])))
     marks = [Line2D([], [], linestyle="", color=FAINT, **MIRROR), Line2D([], [], color=FAINT, **NODE)]
     _legend(ax, [*ax.get_lines()[1 : 2 * len(curves) : 2], *marks], [*(c.label for c in curves), "mirror", "nodes"])
 
 
 def _curve(it: _Table, theta_i: float) -> Curve:
     """Return the luminance of f in the plane of incidence, and NaN where nothing was measured."""
-    wi = stacked(spherical(np.radians(theta_i), it.phi))
+    wi, near = stacked(spherical(np.radians(theta_i), it.phi)), np.geomspace(0.01, 20, 40)
 
-    def pairs(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        wo = stacked(spherical(np.radians(-theta), it.phi))
-        return np.broadcast_to(wi, wo.shape), wo
+    def toward(theta: np.ndarray) -> np.ndarray:
+        return stacked(spherical(np.radians(-theta), it.phi))
 
-    near = np.geomspace(0.01, 20, 40)
-    theta = np.concatenate(
-        [np.linspace(-90, 90, 361), *(end + near * side for end in (-theta_i, theta_i) for side in (-1, 1))]
-    )
-    curve = refined(lambda t: it.luminance(it.grid.evaluate(*pairs(t))), np.unique(theta[abs(theta) < 90]))
-    return curve._replace(value=np.where(it.measured(*pairs(curve.theta)), curve.value, np.nan))
+    peaks = [end + near * side for end in (-theta_i, theta_i) for side in (-1, 1)]
+    theta = np.unique(np.concatenate([np.linspace(-90, 90, 361), *peaks]))
+    curve = refined(lambda t: it.luminance(it.grid.evaluate(wi, toward(t))), theta[abs(theta) < 90])
+    return curve._replace(value=np.where(it.grid.measured(wi, toward(curve.theta)), curve.value, np.nan))
 
 
 def _nodes(it: _Table) -> list[Curve]:
@@ -200,7 +200,7 @@ def _nodes(it: _Table) -> list[Curve]:
 
 
 def _draw_albedo(ax: Axes, it: _Table) -> None:
-    low, high = ends(it.grid, "theta_i")
+    low, high = it.incidence
     angles = np.unique(np.append(np.arange(0, 90, 3), [low, min(high, 89)]))
     angles = angles[(angles >= low) & (angles <= high)]
     values = albedos(it.grid, np.radians(angles), it.phi, extrapolate="zero")
