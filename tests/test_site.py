@@ -76,7 +76,7 @@ def test_nothing_is_fetched_by_styles_or_scripts(site):
 
 @needs_site
 def test_every_part_is_there(site):
-    for name in (*(model.plugins[0] for model in own_models()), "shading"):
+    for name in (*(model.plugins[0] for model in own_models()), "tabulated", "shading"):
         assert (site / "reference" / f"{name}.html").is_file()
     for path in NOTEBOOKS:
         page = (site / "notebooks" / f"{path.stem}.html").read_text(encoding="utf-8")

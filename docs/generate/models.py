@@ -16,6 +16,7 @@ from mi_brdfs.gallery import overview, sheet, shot, sweep_row
 from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
+from mi_brdfs.measured.tabulated import Tabulated
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
 from mi_brdfs.models.microfacet import BROUGHT, Microfacet
@@ -92,7 +93,7 @@ def _draw_gallery(path: Path) -> None:
 def reference() -> str:
     """Return the text of the plugin reference."""
     models = own_models()
-    pages = [*map(model_page, models), integrator_page(), CHAPTER.read_text(encoding="utf-8")]
+    pages = [*map(model_page, models), data_page(), integrator_page(), CHAPTER.read_text(encoding="utf-8")]
     parts = [INTRODUCTION, _overview(models), *pages]
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
@@ -149,6 +150,11 @@ def _overview(models: list[type[Model]]) -> str:
 def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
     return _page(model, _picture(model), strip_picture(model), _table(model.energy.rows()), ENERGY_NOTE)
+
+
+def data_page() -> str:
+    """Return the part of the reference on ``tabulated``."""
+    return _page(Tabulated, "[![tabulated](../../docs/scenes/measured.jpg)](../../docs/scenes/large/measured.jpg)")
 
 
 def integrator_page() -> str:

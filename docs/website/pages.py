@@ -13,6 +13,7 @@ from generate.made import ROOT
 
 from mi_brdfs.gallery import by_family
 from mi_brdfs.integrators.shading import Shading
+from mi_brdfs.measured.tabulated import Tabulated
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Plugin
 
@@ -23,6 +24,7 @@ GUIDE = {
     "index": ["", "First light", "Models", "Noise and speed"],
     "guide/python": ["From Python"],
     "guide/command_line": ["From the command line"],
+    "guide/measured": ["Measured materials"],
     "guide/mitsuba_06": ["Scenes of Mitsuba 0.6"],
     "guide/questions": ["Questions"],
     "development": ["What is tested", "Adding a model", "Licence"],
@@ -41,6 +43,9 @@ FILES = {
     "notebooks/README.md": "notebooks/index",
 }
 """Pages by file or folder of the repository."""
+
+OTHERS: tuple[type[Plugin], ...] = (Tabulated, Shading)
+"""The plugins that are no models."""
 
 CONTENTS = """
 ```{{toctree}}
@@ -74,6 +79,7 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
     pages["reference/index"] = ("mi_brdfs/models/README.md", _reference())
     for model in own_models():
         pages[f"reference/{model.plugins[0]}"] = ("mi_brdfs/models/README.md", _model(model, models.model_page))
+    pages["reference/tabulated"] = ("mi_brdfs/models/README.md", _model(Tabulated, lambda _: models.data_page()))
     pages["reference/shading"] = ("mi_brdfs/models/README.md", _model(Shading, lambda _: models.integrator_page()))
     index = pages["notebooks/index"][1]
     pages["notebooks/index"] = ("notebooks/README.md", f"{index}\n{_hidden(notebook_order())}\n")
@@ -157,14 +163,14 @@ def _thumbnails() -> str:
 
 
 def _reference() -> str:
-    names = [model.plugins[0] for model in own_models()] + ["shading"]
+    names = [model.plugins[0] for model in own_models()] + [plugin.plugins[0] for plugin in OTHERS]
     introduction = with_formulas(models.INTRODUCTION, ()).rstrip() + " In a terminal, $\\omega_i$ is wi."
     listed = "\n".join(f"* [`{name}`](#{name}): {_summary(name)}" for name in names)
     return "\n\n".join([introduction, _thumbnails(), listed, _hidden(names)]) + "\n"
 
 
 def _summary(name: str) -> str:
-    plugin = {model.plugins[0]: model for model in own_models()}.get(name, Shading)
+    plugin = next(plugin for plugin in [*own_models(), *OTHERS] if plugin.plugins[0] == name)
     return re.sub(r"``(.+?)``", r"`\1`", plugin.summary())
 
 
