@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 
 from mi_brdfs import plot
+from mi_brdfs.cli import measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
 from mi_brdfs.measured.albedo import albedos
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
+from mi_brdfs.measured.formats import FORMATS
 from mi_brdfs.measured.reciprocity import reciprocity_error
+from mi_brdfs.parameters.messages import listed
 
 SCALE = np.array([1, 1.15, 1.66]) / 1500
 DIMENSIONS = 30, 30, 60
@@ -270,6 +273,10 @@ def test_the_command_tells_of_each_file_and_goes_on_after_a_bad_one(lambert, tmp
     assert one == other == json.loads(json.dumps(summarize(read(lambert)).to_dict()))
     assert one["above"]["values"] + one["below"]["values"] == 162_000
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_help_names_the_formats():
+    assert listed([format.NAME for format in FORMATS]) == measured.FORMATS
 
 
 @pytest.mark.parametrize("option, file, words", [

@@ -17,10 +17,13 @@ from .terminal import Exit, err, fail, out, print_table
 if TYPE_CHECKING:
     from ..measured import Measurement
 
+FORMATS = "MERL, RGL, MBSDF, Zemax, LightTools, ALTA, Cornell, CSV or UTIA"
+"""Those that can be read, as the help says, which does not wait for the readers."""
+
 
 @command()
 def measured(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help=f"Measured BRDFs: {FORMATS}.")],
     plot_file: Annotated[
         Path | None,
         typer.Option("--plot", metavar="FILE", help="Also draw slices, lobes and albedos: .png, .svg, .pdf or .jpg."),
