@@ -151,6 +151,21 @@ def test_directions_are_where_they_are_located(tmp_path, kind):
     np.testing.assert_allclose(found[:, seen], places[:, seen], rtol=0, atol=1e-9)
 
 
+def test_two_azimuths_that_differ_are_interpolated(tmp_path):
+    """Normals stay relative to wi: turning both directions about the normal changes the share of the two alone."""
+    fields = material(phi_i=(-np.pi, np.pi))
+    fields["rgb"][1] *= 3
+    grid = read(written(tmp_path, fields)).data
+    assert grid.coordinates.names == ("phi_i", "theta_i", "u1", "u2")
+    wi, wo = pairs(100)
+    azimuth = np.arctan2(wi[:, 1], wi[:, 0])[:, None]
+    found, turned = grid.evaluate(wi, wo), grid.evaluate(wi * [-1, -1, 1], wo * [-1, -1, 1])
+    share = azimuth / (2 * np.pi) + 0.5
+    others = share + np.where(share < 0.5, 0.5, -0.5)
+    # The nodes are float32.
+    np.testing.assert_allclose(found / (1 + 2 * share), turned / (1 + 2 * others), rtol=1e-5)
+
+
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb", "llvm_ad_mono_polarized"])
 def test_at_the_poles(tmp_path, variant):
     """Places, scales and their derivatives are finite for directions along the axes, also below the horizon."""
