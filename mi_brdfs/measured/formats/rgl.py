@@ -20,7 +20,7 @@ DESCRIPTION = "the words 'tensor_file', then named arrays"
 THETA_I = np.radians([*np.linspace(0, 80, 25), 82, 84, 86, 87, 88, 89, 90])
 """The angles that are written. RGL's own files have 8, and 32 x 32 values at each."""
 STEP_PHI_I = np.radians(10)
-RESOLUTION, RESOLUTION_ANISOTROPIC = 64, 32
+RESOLUTION, RESOLUTION_ANISOTROPIC = 64, 48
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -32,7 +32,7 @@ def read(path: Path) -> Measurement:
 
 
 def write(path: Path, source: Source, resolution: int | None = None) -> None:
-    """Write ``resolution`` x ``resolution`` values for each of 32 angles θi, by default 64, and 32 for each of the φi
+    """Write ``resolution`` x ``resolution`` values for each of 32 angles θi, by default 64, and 48 for each of the φi
     too if the source is anisotropic: 3 MB and more in rgb.
 
     Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones. What is of one
