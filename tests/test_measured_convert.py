@@ -79,6 +79,16 @@ def test_a_measurement_keeps_its_values(tmp_path):
     assert result.losses == () and result.rms < 0.002 and result.largest < 0.02
 
 
+@pytest.mark.parametrize("name, format", [("x.csv", "CSV"), ("x.bsdf", "Zemax"), ("x.bsdf", "RGL")])
+def test_every_format_keeps_a_smooth_measurement(tmp_path, name, format):
+    bands = None if format == "Zemax" else np.array([450.0, 500, 550, 600])
+    given = measurement(lambda i, o, d: 1 + np.cos(i) * np.cos(o), 4 if bands is not None else 3, bands)
+    result = convert(given, tmp_path / name, format.lower())
+    assert result.format == format and result.losses == () and result.largest < 0.02
+    if bands is not None:
+        np.testing.assert_allclose(read(tmp_path / name).wavelengths, bands)
+
+
 def test_scattered_samples_are_put_on_a_grid(tmp_path):
     wi, wo = (hemisphere(400, seed, 0.2).astype(np.float64) for seed in (5, 6))
     samples = Samples(wi, wo, np.full((400, 3), 0.25), anisotropic=False)
