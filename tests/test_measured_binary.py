@@ -1,6 +1,5 @@
 """MERL, UTIA and MBSDF files: their values in the right places, and what is wrong with damaged ones."""
 
-import re
 import struct
 import timeit
 import tracemalloc
@@ -315,9 +314,7 @@ def test_a_damaged_file_is_refused_in_a_sentence(tmp_path, case):
     with pytest.raises(FileError) as caught:
         read(path)
     text = str(caught.value)
-    assert (
-        re.match(rf"{re.escape(str(path))}: (at byte|in line) \d+, ", text) and text.endswith(".") and "\n" not in text
-    )
+    assert text.startswith(f"{path}: at byte ") and text.endswith(".") and "\n" not in text
 
 
 @pytest.mark.filterwarnings("error")

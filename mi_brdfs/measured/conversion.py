@@ -19,8 +19,8 @@ from ..variants import is_measurable
 from .arrays import NUMPY, components
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
+from .scattered import gridded
 from .source import Source
-from .summary import table
 
 LANES = 1 << 20
 """Pairs of directions that a BSDF is evaluated for at once."""
@@ -142,12 +142,16 @@ def _source(given: Any) -> tuple[Source, list[str]]:
 
 
 def _of_measurement(measurement: Measurement) -> Source:
-    grid = table(measurement.data)
+    grid = _grid(measurement)
     if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
     source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
     stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
     return source if stated else source.rgb()
+
+
+def _grid(measurement: Measurement) -> Grid:
+    return measurement.data if isinstance(measurement.data, Grid) else gridded(measurement.data)
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
@@ -184,7 +188,7 @@ def _writer(path: Path, format: str | None) -> ModuleType:
 
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:
     """Return the root mean square error, the largest, and what was lost on the way."""
-    grid = table(written.data)
+    grid = _grid(written)
     losses = []
     if source.wavelengths is not None and written.wavelengths is None:
         count = len(source.wavelengths)
