@@ -62,10 +62,11 @@ def read(path: Path) -> Measurement:
     theta_i, theta_o, phi_i, phi_o = (angle(w) for angle in (polar_angle, azimuth) for w in (light, view))
     if not anisotropic:
         phi_i, phi_o = 0 * phi_i, phi_o - phi_i
-    checked_angles(file, np.stack([theta_i, theta_o], axis=1), np.stack([phi_i, phi_o], axis=1))
-    values = table[:, inputs:]
+    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
+    values = table[:, inputs:].copy()
+    del light, view, table
     if quantity == "INV_STERADIAN_COSINE_FACTOR":
-        values = without_cosine(values, view.z)
+        values = without_cosine(values, np.cos(theta_o))
     elif quantity == "XYZ_COLOR":
         values = values @ XYZ_TO_SRGB.T
     return Measurement(
