@@ -44,8 +44,7 @@ def arranged(
     """
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
-    start = wrapped(phi_i - phi_i[0] + SAME / 2, TWO_PI)
-    anisotropic = bool(np.ptp(start) > SAME)
+    anisotropic = bool(np.ptp(around_zero(phi_i - phi_i[0])) > SAME)
     if not anisotropic:
         phi_o, phi_i = phi_o - phi_i, np.zeros_like(phi_i)
     return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
@@ -67,11 +66,11 @@ def gathered(
     anisotropic: bool,
 ) -> Grid | None:
     """Return the grid that rows fill, None if they do not."""
-    delta = np.pi - (np.pi - phi_o + phi_i + SAME / 2) % TWO_PI
+    delta = np.pi - around_zero(np.pi - phi_o + phi_i)
     mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
-    delta = abs(delta) if mirrored else wrapped(delta, TWO_PI)
+    delta = abs(delta) if mirrored else around_zero(delta)
     nodes, place, size = [], np.zeros(len(values), dtype=np.int64), 1
-    for column in (theta_i, theta_o, delta, *([wrapped(phi_i + SAME / 2, TWO_PI)] if anisotropic else [])):
+    for column in (theta_i, theta_o, delta, *([around_zero(phi_i)] if anisotropic else [])):
         different, rank = nodes_of(column)
         nodes.append(different)
         size *= len(different)
@@ -96,6 +95,11 @@ def gathered(
         if k == 2 and axes[k].period is None and shape[k] > 1:
             return None
     return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
+
+
+def around_zero(angle: np.ndarray) -> np.ndarray:
+    """Return an azimuth in [0, 2π), or negative by rounding."""
+    return wrapped(angle + SAME / 2, TWO_PI) - SAME / 2
 
 
 def nodes_of(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
