@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -28,7 +29,7 @@ def checked_angles(file: TextFile, polar: Iterable[np.ndarray], azimuths: Iterab
             good = abs(angles) <= most + SAME
             if not np.all(good):
                 k = int(np.argmin(good))
-                found, end = np.degrees(angles[k]), np.degrees(most)
+                found, end = math.degrees(angles[k]), math.degrees(most)
                 raise file.error(
                     f"{name} is {found:.4g}°; it must be from {-end:.0f}° to {end:.0f}°", file.row_lines[k]
                 )

@@ -92,7 +92,7 @@ def read(path: Path) -> Measurement:
     coordinates = SpecularPolar(mirrored, anisotropic)
     values[unseen(coordinates, axes) & np.all(values == 0, axis=-1)] = np.nan
     if content == "XYZ":
-        values = values @ XYZ_TO_SRGB.T
+        values = srgb_of(values)
     states = np.all(np.isfinite(stated)) and content != "RGB"
     return Measurement(
         path,
@@ -103,6 +103,12 @@ def read(path: Path) -> Measurement:
         stated_albedos=dict(zip(theta_i.axis.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
         notes=header.notes,
     )
+
+
+def srgb_of(xyz: np.ndarray) -> np.ndarray:
+    """Return linear sRGB, in which what is infinite or missing in XYZ is so, too."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return xyz @ XYZ_TO_SRGB.T
 
 
 def unseen(coordinates: Coordinates, axes: tuple[Axis, ...]) -> np.ndarray:
