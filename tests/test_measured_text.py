@@ -3,6 +3,7 @@ ones."""
 
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from support import shared
@@ -120,6 +121,36 @@ def test_zemax_rotations_turn_the_sample():
             np.testing.assert_allclose(
                 looked_up(measurement, table, k, i)[:, 1:], table.values[k, i][:, 1:], rtol=1e-5, atol=0
             )
+
+
+@pytest.mark.parametrize("k", [0, 3, 7, 20])
+def test_a_turned_sample_renders_as_its_rotation(llvm_rgb, k):
+    """A camera where the file's light is, and light from one of its directions: a rectangle that is turned by
+    SampleRotation shows the row for it."""
+    path = shared("loft", "IMX455.bsdf")
+    table = Table(path)
+    for i, j, r in ((1, 4, 3), (2, 8, 5), (0, 30, 4)):
+        wi, wo = directions(0, table.incidences[i], table.azimuths[j], table.radials[r])
+        look = mi.ScalarTransform4f().look_at(origin=list(2 * wi), target=[0, 0, 0], up=[0.1, 0.2, 0.9])
+        scene = mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "direct"},
+                "sensor": {
+                    "type": "orthographic",
+                    "to_world": look @ mi.ScalarTransform4f().scale([0.01, 0.01, 1]),
+                    "film": {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}},
+                },
+                "light": {"type": "directional", "direction": list(-wo), "irradiance": 1.0},
+                "sample": {
+                    "type": "rectangle",
+                    "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], float(table.rotations[k])),
+                    "bsdf": {"type": "tabulated", "filename": str(path)},
+                },
+            }
+        )
+        pixel = np.array(mi.render(scene, spp=1)).ravel()
+        np.testing.assert_allclose(pixel / wo[2], table.values[k, i, j, r], rtol=2e-3)
 
 
 def test_imx455_diffracts_as_its_rotations_say():

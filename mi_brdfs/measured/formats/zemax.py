@@ -56,8 +56,8 @@ def read(path: Path) -> Measurement:
 
     ScatterRadial is the angle from the mirror direction of the light, and ScatterAzimuth the angle about it,
     counter-clockwise from the side of the normal: just :class:`~mi_brdfs.measured.coordinates.SpecularPolar`.
-    SampleRotation ψ is the angle from the normal of the plane of incidence to the sample's x axis, counter-clockwise
-    seen from above. So the light turns clockwise over the sample, and comes from the azimuth φi = 90° - ψ.
+    SampleRotation ψ is the angle from the normal of the plane of incidence, wi × n, to the x axis of the sample,
+    counter-clockwise seen from above. So the light turns clockwise over the sample, and comes from φi = 90° - ψ.
 
     The grid reaches below the horizon, where files have 0: these count as missing. The TIS lines are kept as they are.
     They mean ∫ f cosθo dωo, but not every program that writes such files computes that.
