@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support import direction, hemisphere, shared
 
-from mi_brdfs.measured import Samples, read
+from mi_brdfs.measured import Samples, read, scattered
 from mi_brdfs.measured.scattered import embedded, gridded, nearest, weights
 
 
@@ -74,7 +74,8 @@ def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
     np.testing.assert_allclose(grid.evaluate(wo_2, wi_2), found, rtol=1e-6)
 
 
-def test_beyond_the_measured_range():
+def test_beyond_the_measured_range(monkeypatch):
+    monkeypatch.setattr(scattered, "MOST_NODES", 20_000)
     wi, wo = pairs(2000, 13, lowest=0.5)
     samples = Samples(wi, wo, glossy(wi, wo), False)
     inside, outside = direction(30)[None], direction(80, 60)[None]

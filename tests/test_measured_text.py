@@ -3,6 +3,7 @@ ones."""
 
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from support import shared
@@ -122,6 +123,36 @@ def test_zemax_rotations_turn_the_sample():
             )
 
 
+@pytest.mark.parametrize("k", [0, 3, 7, 20])
+def test_a_turned_sample_renders_as_its_rotation(llvm_rgb, k):
+    """A camera where the file's light is, and light from one of its directions: a rectangle that is turned by
+    SampleRotation shows the row for it."""
+    path = shared("loft", "IMX455.bsdf")
+    table = Table(path)
+    for i, j, r in ((1, 4, 3), (2, 8, 5), (0, 30, 4)):
+        wi, wo = directions(0, table.incidences[i], table.azimuths[j], table.radials[r])
+        look = mi.ScalarTransform4f().look_at(origin=list(2 * wi), target=[0, 0, 0], up=[0.1, 0.2, 0.9])
+        scene = mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "direct"},
+                "sensor": {
+                    "type": "orthographic",
+                    "to_world": look @ mi.ScalarTransform4f().scale([0.01, 0.01, 1]),
+                    "film": {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}},
+                },
+                "light": {"type": "directional", "direction": list(-wo), "irradiance": 1.0},
+                "sample": {
+                    "type": "rectangle",
+                    "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], float(table.rotations[k])),
+                    "bsdf": {"type": "tabulated", "filename": str(path)},
+                },
+            }
+        )
+        pixel = np.array(mi.render(scene, spp=1)).ravel()
+        np.testing.assert_allclose(pixel / wo[2], table.values[k, i, j, r], rtol=2e-3)
+
+
 def test_imx455_diffracts_as_its_rotations_say():
     """A lenslet array diffracts towards wo with wi + wo, in the plane of the sample, on a lattice. In the sample's
     frame, measurements at different rotations explain each other better than if the sample were turned the other
@@ -143,3 +174,108 @@ def test_imx455_diffracts_as_its_rotations_say():
 
     for i in range(4):
         assert explained(i, 1) > explained(i, -1)
+
+
+def zemax_text(symmetry="PlaneSymmetrical", rotations=(0,), azimuths=(0, 180), content="Monochrome", comment=""):
+    """A file with two angles of incidence in falling order and three radial angles, whose values count."""
+    channels = ["TristimulusX", "TristimulusY", "TristimulusZ"] if content == "XYZ" else [content]
+    lines = [comment, f"Symmetry {symmetry}", f"SpectralContent {content}", "ScatterType BRDF"]
+    lists = {"SampleRotation": rotations, "AngleOfIncidence": (40, 10), "ScatterAzimuth": azimuths}
+    for name, angles in (lists | {"ScatterRadial": (0, 10, 20)}).items():
+        lines += [f"{name} {len(angles)}", " ".join(map(str, angles))]
+    value = 0
+    for channel in channels:
+        lines += ["", channel, "DataBegin"]
+        for _ in range(2 * len(rotations)):
+            lines.append(f"TIS {len(lines)}")
+            for _ in azimuths:
+                lines.append(f"{value + 1} {value + 2} {value + 3}")
+                value += 3
+        lines.append("DataEnd")
+    return "\n".join(lines)
+
+
+def zemax(folder, **choices):
+    path = folder / "x.bsdf"
+    path.write_text(zemax_text(**choices))
+    return read(path), Table(path)
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {},
+        {"symmetry": "ASymmetrical", "azimuths": (0, 90, 180, 270)},
+        {"symmetry": "asymmetrical", "azimuths": (0, 90, 180, 270, 360)},
+        {"symmetry": "ASymmetrical", "azimuths": (-90, 0, 90, 180)},
+        {"symmetry": "Asymmetrical4D", "rotations": (0, 45, 90), "azimuths": (0, 120, 240, 360)},
+        {"symmetry": "ASymmetrical4D", "rotations": (270, 180, 90, 0), "azimuths": (0, 120, 240)},
+        {"symmetry": "PlaneSymmetrical", "rotations": (0, 90), "azimuths": (0, 90, 180)},
+    ],
+)
+def test_zemax_symmetries_and_orders(tmp_path, choices):
+    measurement, table = zemax(tmp_path, **choices)
+    azimuth, radial = np.meshgrid(table.azimuths % 360, table.radials, indexing="ij")
+    kept = np.unique(table.azimuths % 360, return_index=True)[1]  # of 0 and 360, the first
+    for k, rotation in enumerate(table.rotations):
+        for i, incidence in enumerate(table.incidences):
+            found = measurement.data.evaluate(*directions(rotation, incidence, azimuth, radial), "nearest")
+            np.testing.assert_array_equal(found[kept, 1:, 0], table.values[k, i][kept, 1:])
+
+
+def test_zemax_xyz_is_a_colour(tmp_path):
+    path = tmp_path / "x.bsdf"
+    path.write_text(zemax_text(content="XYZ"))
+    measurement = read(path)
+    assert measurement.wavelengths is None
+    xyz = np.array([2, 14, 26])  # at the first angle of incidence and azimuth, 10° from the mirror direction
+    found = measurement.data.evaluate(*directions(0, 40, 0, 10), "nearest")
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    inverse = np.linalg.inv(to_xyz) @ xyz
+    np.testing.assert_allclose(found[inverse > 0], inverse[inverse > 0], rtol=2e-3)
+    stated = [float(line.split()[1]) for line in path.read_text().splitlines() if line.startswith("TIS")]
+    assert measurement.stated_albedos[np.radians(40)] == [stated[2]]  # of Y
+
+
+@pytest.mark.parametrize(
+    "comment, wavelength",
+    [
+        ("# Light source: red laser (650 nm, 3.5 mm)", 650),
+        ("# Wavelength = 0.633 um", 633),
+        ("# HeNe 632.8nm", 632.8),
+        ("# Laser 532 nm\n# laser line at 532 nm", 532),
+        ("# Lasers: 532 nm and 650 nm", np.nan),
+        ("# Coating 550 nm thick", np.nan),
+        ("", np.nan),
+    ],
+)
+def test_wavelength_in_a_comment(tmp_path, comment, wavelength):
+    measurement, _ = zemax(tmp_path, comment=comment)
+    np.testing.assert_array_equal(measurement.wavelengths, [wavelength])
+
+
+def test_lighttools(tmp_path):
+    """Azimuths begin at x, and the light comes from y."""
+    lines = ["Symmetry PlaneSymmetrical", "SpectralContent Monochrome", "ScatterAzimuth 3", "-90 0 90"]
+    lines += ["ScatterRadial 2", "20 60", "DataBegin"]
+    for incidence, wavelength in ((30, 450), (30, 650), (0, 450), (0, 650)):
+        lines += [f"AOI {incidence}", "POI 0", "Side Front", f"Wavelength {wavelength}", "ScatterType BRDF", "TIS 0.5"]
+        for azimuth in (-90, 0, 90):
+            lines.append(" ".join(str(wavelength + incidence / 100 + azimuth / 1e5 + o / 1e7) for o in (20, 60)))
+    lines += ["Side Back", "TIS 0.5", "9 9 9 9 9 9", "DataEnd"]
+    path = tmp_path / "x.bsdf"
+    path.write_text("\n".join(lines))
+    measurement = read(path)
+    assert measurement.format == "LightTools"
+    np.testing.assert_array_equal(measurement.wavelengths, [450, 650])
+    assert measurement.stated_albedos[np.radians(30)] == [0.5]
+
+    def unit(theta, phi):
+        theta, phi = np.radians(theta), np.radians(phi)
+        return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+    for azimuth in (-90, 0, 90, 180):  # 180° mirrors 0°
+        found = measurement.data.evaluate(unit(30, 90), unit(60, azimuth), "nearest")
+        np.testing.assert_allclose(
+            found, np.array([450, 650]) + 0.3 + {-90: -90, 0: 0, 90: 90, 180: 0}[azimuth] / 1e5 + 6e-6
+        )

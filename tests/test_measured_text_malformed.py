@@ -1,6 +1,9 @@
 """Text files that are damaged, or written in another way: one sentence with the file's name and the place, or the same
 values."""
 
+import re
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -57,6 +60,33 @@ TIS 0.2
 0.2 0.7
 DataEnd
 """
+CORNELL = """# A test
+# num wls
+3
+# wls
+400 500
+600
+# rows
+
+0.3 0 0.2 3.1 0.1 0.2 0.3
+0.3 0 0.6 -1 0.3 0.4 0.5
+0.6 0 0.2 -2 0.5 0.6 0.7
+"""
+ALTA = """#SAMPLE "A test"
+#DIM 3 1
+#VS 0
+#PARAM_IN ISOTROPIC_TL_TV_PROJ_DPHI
+#PARAM_OUT INV_STERADIAN
+0.3  -0.5  0.1  0.1
+0.3  -0.2  0.0  0.2
+0.6  0.5  -0.1  0.3
+"""
+CSV = """# material: a test
+theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b
+0,0,10,20,0.1,0.2,0.3
+30,0,40,180,0.2,0.3,0.4
+30,0,50,170,0.3,0.4,0.5
+"""
 
 
 def replaced(text, old, new):
@@ -64,15 +94,17 @@ def replaced(text, old, new):
     return text.replace(old, new, 1)
 
 
-def any_table(text):
-    """What can happen to every text table: (name, bytes, whether a line is at fault)."""
+def any_table(text, counted=True):
+    """What can happen to every text table: (name, text, whether a line is at fault). Some say how many rows there
+    are."""
     rows = text.splitlines(keepends=True)
     last = max(k for k, row in enumerate(rows) if row[0].isdigit())
-    yield "half", text[: len(text) // 2], True
-    yield "a third", text[: len(text) // 3], True
-    yield "without its last row", "".join(rows[:last]), True
+    if counted:
+        yield "a third", text[: len(text) // 3], True
+        yield "half", text[: len(text) // 2], True
+        yield "without its last row", "".join(rows[:last]), True
     yield "a word for a number", "".join([*rows[:last], rows[last].replace("0.", "O.", 1), *rows[last + 1 :]]), True
-    yield "a row too short", "".join([*rows[:last], rows[last].split()[0] + "\n", *rows[last + 1 :]]), True
+    yield "a row too short", "".join([*rows[:last], re.split("[ ,]", rows[last])[0] + "\n", *rows[last + 1 :]]), True
     yield "a row twice as long", "".join([*rows[:last], rows[last].strip() + " " + rows[last], *rows[last + 1 :]]), True
     yield "bytes in a row", "".join([*rows[:last], "\x00\x01\x80\xff\n", *rows[last + 1 :]]), True
     yield "a line without end", "".join([*rows[:last], "1" * (1 << 20) + "\n", *rows[last + 1 :]]), True
@@ -116,17 +148,75 @@ LIGHTTOOLS_DAMAGE = [
     ("an unknown keyword", replaced(LIGHTTOOLS, "Side Front", "Face Front"), True),
     ("tristimulus values with one missing", replaced(LIGHTTOOLS, "Monochrome", "XYZ"), False),
 ]
+CORNELL_DAMAGE = [
+    *any_table(CORNELL, counted=False),
+    ("a negative count", replaced(CORNELL, "\n3\n", "\n-3\n"), True),
+    ("a broken count", replaced(CORNELL, "\n3\n", "\n3.5\n"), True),
+    ("a third", CORNELL[: len(CORNELL) // 3], True),
+    ("half a row", CORNELL[: CORNELL.index("0.6 -1")], True),
+    ("rows of other columns", replaced(CORNELL, "0.3 0 0.2", "0.3 0.2"), True),
+    ("a count of 10 GB", replaced(CORNELL, "\n3\n", "\n1250000000\n"), True),
+    ("a count of none", replaced(CORNELL, "\n3\n", "\n0\n"), True),
+    ("more wavelengths than the file can have", replaced(CORNELL, "\n3\n", "\n4000\n"), True),
+    ("a wavelength too many", replaced(CORNELL, "\n600", "\n600 700"), True),
+    ("wavelengths in disorder", replaced(CORNELL, "400 500", "500 400"), True),
+    ("a wavelength that is none", replaced(CORNELL, "400", "blue"), True),
+    ("a wavelength of NaN", replaced(CORNELL, "400", "nan"), True),
+    ("no rows", CORNELL.partition("0.3 0")[0], True),
+    ("an angle in degrees", replaced(CORNELL, "0.3 0 0.6", "17 0 34"), True),
+    ("an angle that is NaN", replaced(CORNELL, "0.3 0 0.6", "0.3 0 nan"), True),
+    ("an angle that is infinite", replaced(CORNELL, "0.3 0 0.6", "0.3 inf 0.6"), True),
+]
+ALTA_DAMAGE = [
+    ("an uncertainty without its value", replaced(ALTA, "0  0.2", "0").replace("#VS 0", "#VS 1"), True),
+    *any_table(ALTA, counted=False),
+    ("a cut", ALTA.replace("3 1", "1 3").replace("ISOTROPIC_TL_TV_PROJ_DPHI", "COS_TH"), False),
+    ("an unknown parametrisation", replaced(ALTA, "TL_TV_PROJ", "SOMETHING"), False),
+    ("no parametrisation", replaced(ALTA, "#PARAM_IN", "#PARAM"), False),
+    ("an unknown output", replaced(ALTA, "INV_STERADIAN", "ENERGY"), False),
+    ("no output", replaced(ALTA, "#PARAM_OUT", "#PARAM"), False),
+    ("no dimensions", replaced(ALTA, "#DIM 3 1", "#DIM"), False),
+    ("dimensions that are no numbers", replaced(ALTA, "3 1", "three one"), False),
+    ("a dimension of 10 GB", replaced(ALTA, "3 1", "3 1250000000"), False),
+    ("dimensions of another parametrisation", replaced(ALTA, "3 1", "4 1"), False),
+    ("outputs without wavelengths", replaced(ALTA, "3 1", "3 5"), False),
+    ("a fitted function", replaced(ALTA, "#VS 0", "#TYPE function"), False),
+    ("binary data", replaced(ALTA, "#VS 0", "#FORMAT binary"), False),
+    ("a view below the surface", replaced(ALTA, "-0.2", "-2.2"), True),
+    ("a view that is NaN", replaced(ALTA, "-0.2", "nan"), True),
+]
+CSV_DAMAGE = [
+    ("half a row", CSV[: CSV.index(",0.4,0.5")], True),
+    *any_table(CSV, counted=False),
+    ("no unit", replaced(CSV, "theta_i_deg", "theta_i"), True),
+    ("no theta_i", replaced(CSV, "theta_i_deg", "theta_o_rad"), True),
+    ("no phi_o", replaced(CSV, "phi_o_deg", "450"), True),
+    ("both phi_o and delta_phi", replaced(CSV, "phi_i_deg", "delta_phi_deg"), True),
+    ("of no direction", replaced(CSV, "theta_o_deg", "theta_deg"), True),
+    ("an unknown column", replaced(CSV, ",b", ",temperature"), True),
+    ("two of the same", replaced(CSV, ",b", ",r"), True),
+    ("rgb and wavelengths", replaced(CSV, ",b", ",450"), True),
+    ("f and f cos", replaced(CSV, ",b", ",b_cos"), True),
+    ("an unknown quantity", "# quantity: reflectance\n" + CSV, True),
+    ("a quantity that contradicts", "# quantity: f\n" + CSV.replace("r,g,b", "r_cos,g_cos,b_cos"), True),
+    ("no rows", "".join(CSV.splitlines(keepends=True)[:2]), True),
+    ("an angle below the surface", replaced(CSV, "30,0,40", "30,0,140"), True),
+    ("an angle that is missing", replaced(CSV, "30,0,40", "30,,40"), True),
+]
+ENDINGS = {"zemax": "bsdf", "lighttools": "bsdf", "cornell": "brdf", "alta": "dat", "csv": "csv"}
 
 
 def damage():
-    for format, cases in (("zemax", ZEMAX_DAMAGE), ("lighttools", LIGHTTOOLS_DAMAGE)):
+    each = ZEMAX_DAMAGE, LIGHTTOOLS_DAMAGE, CORNELL_DAMAGE, ALTA_DAMAGE, CSV_DAMAGE
+    for (format, ending), cases in zip(ENDINGS.items(), each, strict=True):
+        assert len(cases) >= 20
         for name, text, at_a_line in cases:
-            yield pytest.param(text, at_a_line, id=f"{format}: {name}")
+            yield pytest.param(text, ending, at_a_line, id=f"{format}: {name}")
 
 
-@pytest.mark.parametrize("text, at_a_line", list(damage()))
-def test_damage_is_one_sentence(tmp_path, text, at_a_line):
-    path = tmp_path / "x.bsdf"
+@pytest.mark.parametrize("text, ending, at_a_line", list(damage()))
+def test_damage_is_one_sentence(tmp_path, text, ending, at_a_line):
+    path = tmp_path / f"x.{ending}"
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(FileError) as caught:
         read(path)
@@ -138,8 +228,8 @@ def test_damage_is_one_sentence(tmp_path, text, at_a_line):
     assert ("in line " in message) == at_a_line
 
 
-def written(folder, text):
-    path = folder / "x.bsdf"
+def written(folder, text, ending="bsdf"):
+    path = folder / f"x.{ending}"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return read(path)
 
@@ -168,7 +258,29 @@ def test_spellings_read_the_same(tmp_path, text, change):
     assert found.stated_albedos == expected.stated_albedos
 
 
-def test_missing_and_negative_values_are_kept(tmp_path):
-    for text in (ZEMAX, LIGHTTOOLS):
-        values = written(tmp_path, text.replace("0.5", "nan").replace("0.6", "-0.6").replace("0.7", "inf")).data.values
-        assert [np.isnan(values).sum(), (values < 0).sum(), np.isinf(values).sum()] == [1, 1, 1]
+@pytest.mark.parametrize(
+    "text, ending", [(ZEMAX, "bsdf"), (LIGHTTOOLS, "bsdf"), (CORNELL, "brdf"), (ALTA, "dat"), (CSV, "csv")], ids=ENDINGS
+)
+def test_missing_and_negative_values_are_kept(tmp_path, text, ending):
+    mark = "," if ending == "csv" else " "
+    head, _, _ = text.removesuffix("DataEnd\n").rstrip().rpartition(mark)
+    for number in (np.nan, np.inf, -0.3):
+        values = written(tmp_path, f"{head}{mark}{number}\n", ending).data.values
+        np.testing.assert_array_equal(values[~np.isfinite(values) | (values < 0)], [number])
+
+
+@pytest.mark.parametrize(
+    "text, ending", [(CORNELL, "brdf"), (ALTA, "dat"), (CSV, "csv")], ids=["cornell", "alta", "csv"]
+)
+def test_memory(tmp_path, text, ending):
+    """Reading takes no more than twice the file beyond what it returns."""
+    head, _, row = text.rstrip().rpartition("\n")
+    path, row = tmp_path / f"x.{ending}", re.sub(r"(\.\d)", r"\g<1>000000000", row)
+    path.write_text(head + "\n" + 40_000 * (row + "\n"))
+    read(path)
+    tracemalloc.start()
+    measurement = read(path)
+    left, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(measurement.data.values) > 40_000
+    assert peak - left < 2 * path.stat().st_size

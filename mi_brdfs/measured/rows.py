@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
 import numpy as np
 
 from .arrays import stacked
@@ -15,20 +18,21 @@ LEAST_COSINE = 1e-4
 """Below it, f cosθ says nothing of f."""
 
 
-def checked_angles(file: TextFile, polar: np.ndarray, azimuths: np.ndarray) -> None:
-    """Refuse rows with angles, in radians and of shape (N, any), that no directions above the surface have.
+def checked_angles(file: TextFile, polar: Iterable[np.ndarray], azimuths: Iterable[np.ndarray]) -> None:
+    """Refuse rows with angles, in radians and of shape (N,), that no direction above the surface has.
 
     Raises:
         FileError: if there are some.
     """
-    bad = ~np.all(abs(polar) <= np.pi / 2 + SAME, axis=1) | ~np.all(abs(azimuths) <= 4 * np.pi + SAME, axis=1)
-    if np.any(bad):
-        k = int(np.argmax(bad))
-        theta = " and ".join(f"{np.degrees(angle):.4g}°" for angle in polar[k])
-        phi = " and ".join(f"{np.degrees(angle):.4g}°" for angle in azimuths[k])
-        raise file.error(
-            f"θ is {theta}, and φ is {phi}: θ must be from -90° to 90°, φ from -720° to 720°", file.row_lines[k]
-        )
+    for name, columns, most in (("θ", polar, np.pi / 2), ("φ", azimuths, 4 * np.pi)):
+        for angles in columns:
+            good = abs(angles) <= most + SAME
+            if not np.all(good):
+                k = int(np.argmin(good))
+                found, end = math.degrees(angles[k]), math.degrees(most)
+                raise file.error(
+                    f"{name} is {found:.4g}°; it must be from {-end:.0f}° to {end:.0f}°", file.row_lines[k]
+                )
 
 
 def arranged(
@@ -41,8 +45,7 @@ def arranged(
     """
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
-    start = wrapped(phi_i - phi_i[0] + SAME / 2, TWO_PI)
-    anisotropic = bool(np.ptp(start) > SAME)
+    anisotropic = bool(np.ptp(around_zero(phi_i - phi_i[0])) > SAME)
     if not anisotropic:
         phi_o, phi_i = phi_o - phi_i, np.zeros_like(phi_i)
     return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
@@ -52,7 +55,7 @@ def arranged(
 
 def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return directions with a polar angle that is not negative."""
-    return abs(theta), np.where(theta < 0, phi + np.pi, phi)
+    return (abs(theta), np.where(theta < 0, phi + np.pi, phi)) if np.any(theta < 0) else (theta, phi)
 
 
 def gathered(
@@ -64,18 +67,20 @@ def gathered(
     anisotropic: bool,
 ) -> Grid | None:
     """Return the grid that rows fill, None if they do not."""
-    delta = np.pi - (np.pi - phi_o + phi_i + SAME / 2) % TWO_PI
+    delta = np.pi - around_zero(np.pi - phi_o + phi_i)
     mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
-    delta = abs(delta) if mirrored else wrapped(delta, TWO_PI)
-    columns = [theta_i, theta_o, delta, *([wrapped(phi_i + SAME / 2, TWO_PI)] if anisotropic else [])]
-    nodes, places = zip(*(nodes_of(column) for column in columns), strict=True)
+    delta = abs(delta) if mirrored else around_zero(delta)
+    nodes, place, size = [], np.zeros(len(values), dtype=np.int64), 1
+    for column in (theta_i, theta_o, delta, *([around_zero(phi_i)] if anisotropic else [])):
+        different, rank = nodes_of(column)
+        nodes.append(different)
+        size *= len(different)
+        if size > 2 * len(values) + 4:  # more than single rows at poles could stand for
+            return None
+        place = place * len(different) + rank
     shape = tuple(len(each) for each in nodes)
-    size = np.prod(shape, dtype=np.float64)
-    if size > 2 * len(values) + sum(shape) * shape[2]:  # more than rows at poles could stand for
-        return None
-    place = np.ravel_multi_index(places, shape)
-    count = np.bincount(place, minlength=int(size))
-    table = np.zeros((int(size), values.shape[1]))
+    count = np.bincount(place, minlength=size)
+    table = np.zeros((size, values.shape[1]))
     np.add.at(table, place, values)
     table, count = table.reshape(*shape, -1), count.reshape(*shape, 1)
     for polar in (0, 1):
@@ -91,6 +96,11 @@ def gathered(
         if k == 2 and axes[k].period is None and shape[k] > 1:
             return None
     return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
+
+
+def around_zero(angle: np.ndarray) -> np.ndarray:
+    """Return an azimuth in [0, 2π), or negative by rounding."""
+    return wrapped(angle + SAME / 2, TWO_PI) - SAME / 2
 
 
 def nodes_of(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

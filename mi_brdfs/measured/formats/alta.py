@@ -14,7 +14,7 @@ from ..coordinates import HalfDifference, polar_angle, spherical
 from ..measurement import FileError, Measurement
 from ..rows import arranged, checked_angles, without_cosine
 from ..text import TextFile, opening, shortened
-from .zemax import XYZ_TO_SRGB
+from .zemax import srgb_of
 
 NAME = "ALTA"
 DESCRIPTION = "text with the lines #DIM, #PARAM_IN and #PARAM_OUT"
@@ -58,16 +58,20 @@ def read(path: Path) -> Measurement:
     uncertain = any(word not in ("0", "0.0") for word in settings.get("VS", []))
     what = f"{inputs} of #PARAM_IN and {outputs} of #PARAM_OUT"
     table = file.table(itertools.chain([first], rows), inputs + outputs, what, more=uncertain)
+    known = np.all(np.isfinite(table[:, :inputs]), axis=1)
+    if not np.all(known):
+        raise file.error("a coordinate is infinite or missing", file.row_lines[int(np.argmin(known))])
     light, view = directions(*table[:, :inputs].T)
     theta_i, theta_o, phi_i, phi_o = (angle(w) for angle in (polar_angle, azimuth) for w in (light, view))
     if not anisotropic:
         phi_i, phi_o = 0 * phi_i, phi_o - phi_i
-    checked_angles(file, np.stack([theta_i, theta_o], axis=1), np.stack([phi_i, phi_o], axis=1))
-    values = table[:, inputs:]
+    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
+    values = table[:, inputs:].copy()
+    del light, view, table
     if quantity == "INV_STERADIAN_COSINE_FACTOR":
-        values = without_cosine(values, view.z)
+        values = without_cosine(values, np.cos(theta_o))
     elif quantity == "XYZ_COLOR":
-        values = values @ XYZ_TO_SRGB.T
+        values = srgb_of(values)
     return Measurement(
         path,
         NAME,

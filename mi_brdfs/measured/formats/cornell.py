@@ -8,7 +8,7 @@ import numpy as np
 
 from ..measurement import Measurement
 from ..rows import arranged, checked_angles
-from ..text import TextFile, first_words, opening
+from ..text import TextFile, first_words, is_number, opening
 
 NAME = "Cornell"
 DESCRIPTION = "text: the number of wavelengths, these in nm, then rows of θi, φi, θo, φo and a spectrum"
@@ -20,7 +20,7 @@ def recognizes(path: Path, head: bytes) -> bool:
     lines = opening(path, head)
     words = first_words(lines)
     named = path.suffix.lower() == ".brdf" or any("num wls" in line for line in lines)
-    return named and len(words) == 1 and words[0].isdecimal()
+    return named and len(words) == 1 and is_number(words[0])
 
 
 def read(path: Path) -> Measurement:
@@ -49,7 +49,7 @@ def read(path: Path) -> Measurement:
     end = next((k for k, comment in enumerate(file.comments) if "wl" in comment.lower()), 0)
     material = " ".join(comment for comment in file.comments[:end] if "university" not in comment.lower())
     table = file.table(rows, 4 + count, f"four angles and {count} values")
-    checked_angles(file, table[:, [0, 2]], table[:, [1, 3]])
     theta_i, phi_i, theta_o, phi_o = table[:, :4].T
+    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
     data = arranged(theta_i, phi_i, theta_o, phi_o, table[:, 4:])
     return Measurement(path, NAME, data, np.array(wavelengths), material=material or path.stem)

@@ -60,8 +60,9 @@ def read(path: Path) -> Measurement:
     phi_i = angles.get("phi_i", np.zeros(len(table)))
     phi_o = angles["phi_o"] if "phi_o" in angles else phi_i + angles["delta_phi"]
     theta_i, theta_o = angles["theta_i"], angles["theta_o"]
-    checked_angles(file, np.stack([theta_i, theta_o], axis=1), np.stack([phi_i, phi_o], axis=1))
+    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
     values = table[:, columns.values]
+    del table
     if columns.quantity == "f cos":
         values = without_cosine(values, np.cos(theta_o))
     return Measurement(

@@ -11,7 +11,7 @@ import numpy as np
 from ..coordinates import Spherical
 from ..measurement import FileError, Grid, Measurement
 from ..text import TextFile, is_number, opening, shortened
-from .zemax import XYZ_TO_SRGB, Header, Ordered, Round, has_incidence_lines, is_table
+from .zemax import Header, Ordered, Round, has_incidence_lines, is_table, srgb_of
 
 NAME = "LightTools"
 DESCRIPTION = "as Zemax, with the lines AOI, POI, Side above each block of data"
@@ -67,7 +67,7 @@ def read(path: Path) -> Measurement:
     stated = [table[incidence, luminance].tis for incidence in header.angles["AOI"]]
     wavelengths = np.array([wavelength or np.nan for _, wavelength in channels])
     if content == "XYZ":
-        values = values @ XYZ_TO_SRGB.T
+        values = srgb_of(values)
     return Measurement(
         path,
         NAME,

@@ -56,8 +56,8 @@ def read(path: Path) -> Measurement:
 
     ScatterRadial is the angle from the mirror direction of the light, and ScatterAzimuth the angle about it,
     counter-clockwise from the side of the normal: just :class:`~mi_brdfs.measured.coordinates.SpecularPolar`.
-    SampleRotation ψ is the angle from the normal of the plane of incidence to the sample's x axis, counter-clockwise
-    seen from above. So the light turns clockwise over the sample, and comes from the azimuth φi = 90° - ψ.
+    SampleRotation ψ is the angle from the normal of the plane of incidence, wi × n, to the x axis of the sample,
+    counter-clockwise seen from above. So the light turns clockwise over the sample, and comes from φi = 90° - ψ.
 
     The grid reaches below the horizon, where files have 0: these count as missing. The TIS lines are kept as they are.
     They mean ∫ f cosθo dωo, but not every program that writes such files computes that.
@@ -92,7 +92,7 @@ def read(path: Path) -> Measurement:
     coordinates = SpecularPolar(mirrored, anisotropic)
     values[unseen(coordinates, axes) & np.all(values == 0, axis=-1)] = np.nan
     if content == "XYZ":
-        values = values @ XYZ_TO_SRGB.T
+        values = srgb_of(values)
     states = np.all(np.isfinite(stated)) and content != "RGB"
     return Measurement(
         path,
@@ -103,6 +103,12 @@ def read(path: Path) -> Measurement:
         stated_albedos=dict(zip(theta_i.axis.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
         notes=header.notes,
     )
+
+
+def srgb_of(xyz: np.ndarray) -> np.ndarray:
+    """Return linear sRGB, in which what is infinite or missing in XYZ is so, too."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return xyz @ XYZ_TO_SRGB.T
 
 
 def unseen(coordinates: Coordinates, axes: tuple[Axis, ...]) -> np.ndarray:

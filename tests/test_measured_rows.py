@@ -1,0 +1,275 @@
+"""Text formats with a row for each pair of directions, and what is written as text: values at known rows, units,
+f cosθ, grids, and files read back."""
+
+import itertools
+
+import numpy as np
+import pytest
+from support import hemisphere, shared
+
+from mi_brdfs.measured import Grid, Samples, read
+from mi_brdfs.measured.formats import csv, zemax
+from mi_brdfs.measured.source import Source
+
+
+def unit(theta, phi):
+    """The direction of a polar angle and an azimuth in degrees."""
+    theta, phi = np.radians(theta), np.radians(phi)
+    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+
+def written(folder, text, name):
+    path = folder / name
+    path.write_text(text)
+    return read(path)
+
+
+def value_at(measurement, wi, wo):
+    """The value of the sample, or the node, at a pair of directions."""
+    data = measurement.data
+    if isinstance(data, Grid):
+        return data.evaluate(wi, wo, "nearest")
+    row = np.flatnonzero(np.all(abs(data.wi - wi) < 1e-6, axis=1) & np.all(abs(data.wo - wo) < 1e-6, axis=1))
+    return data.values[row].squeeze(0)
+
+
+# --- Cornell and ALTA -----------------------------------------------------------------------------------------------
+
+
+def test_cornell(tmp_path):
+    text = "# num wls\n2\n450 650\n0.3 0 0.2 3 0.1 0.2\n0.5 0.5 0.4 -1 0.3 0.4\n"
+    measurement = written(tmp_path, text, "x.brdf")
+    assert measurement.format == "Cornell"
+    np.testing.assert_array_equal(measurement.wavelengths, [450, 650])
+    wi, wo = unit(*np.degrees([0.5, 0.5])), unit(*np.degrees([0.4, -1]))
+    np.testing.assert_array_equal(value_at(measurement, wi, wo), [0.3, 0.4])
+    assert measurement.data.anisotropic
+
+
+def test_cornell_highlights_are_at_the_mirror_direction():
+    samples = read(shared("cornell", "krylon_blue.brdf")).data
+    assert not samples.anisotropic
+    for wi in np.unique(samples.wi, axis=0):
+        of = np.flatnonzero(np.all(samples.wi == wi, axis=1))
+        brightest = samples.wo[of[np.argmax(samples.values[of].mean(axis=1))]]
+        assert brightest @ (wi * [-1, -1, 1]) > np.cos(np.radians(5))
+
+
+def alta(parametrisation, rows, outputs=1, quantity="INV_STERADIAN"):
+    lines = [" ".join(f"{number:.12g}" for number in row) for row in rows]
+    header = f"#DIM {len(rows[0]) - outputs} {outputs}\n#PARAM_IN {parametrisation}\n#PARAM_OUT {quantity}\n"
+    return header + "\n".join(lines) + "\n"
+
+
+L, V = unit(50, 20), unit(30, 100)
+H = (L + V) / np.linalg.norm(L + V)
+
+
+def rusinkiewicz():
+    """θh, φh, θd and φd of V, by turning the half vector to the normal."""
+    theta, phi = np.arccos(H[2]), np.arctan2(H[1], H[0])
+    x, y = V[0] * np.cos(phi) + V[1] * np.sin(phi), V[1] * np.cos(phi) - V[0] * np.sin(phi)
+    x, z = x * np.cos(theta) - V[2] * np.sin(theta), x * np.sin(theta) + V[2] * np.cos(theta)
+    return theta, phi, np.arccos(z), np.arctan2(y, x)
+
+
+def about_light():
+    """The angle of V from L, and its azimuth about L from the side of the normal on."""
+    towards = np.array([0, 0, 1]) - L[2] * L
+    towards /= np.linalg.norm(towards)
+    return np.arccos(L @ V), np.arctan2(V @ np.cross(towards, L), V @ towards)
+
+
+def places():
+    theta_l, phi_l, theta_v, phi_v = np.radians([50, 20, 30, 100])
+    theta_h, phi_h, theta_d, phi_d = rusinkiewicz()
+    delta, (angle, azimuth) = phi_v - phi_l, about_light()
+    yield "SPHERICAL_TL_PL_TV_PV", (theta_l, phi_l, theta_v, phi_v)
+    yield "ISOTROPIC_TV_TL_DPHI", (theta_v, theta_l, -delta)
+    yield "ISOTROPIC_TL_TV_PROJ_DPHI", (theta_l, theta_v * np.cos(delta), theta_v * np.sin(delta))
+    yield "RETRO_TL_TVL_PROJ_DPHI", (theta_l, angle * np.cos(azimuth), angle * np.sin(azimuth))
+    yield "RUSIN_TH_TD_PD", (theta_h, theta_d, phi_d)
+    yield "RUSIN_TH_PH_TD_PD", (theta_h, phi_h, theta_d, phi_d)
+    yield "CARTESIAN", (*V, *L)
+
+
+@pytest.mark.parametrize("name, place", list(places()))
+def test_alta_parametrisations(tmp_path, name, place):
+    rows = [(*place, 0.5), (*([0.3] * len(place)), 0.25)]
+    measurement = written(tmp_path, alta(name, rows), "x.dat")
+    assert measurement.format == "ALTA"
+    data = measurement.data
+    assert isinstance(data, Samples)
+    wi, wo = data.wi[data.values[:, 0] == 0.5][0], data.wo[data.values[:, 0] == 0.5][0]
+    assert data.anisotropic == (len(place) > 3)
+    if data.anisotropic:
+        np.testing.assert_allclose([wi, wo], [L, V], atol=1e-9)
+    # Up to a turn, which leaves the polar angles and the angle from azimuth to azimuth.
+    np.testing.assert_allclose([wi[2], wo[2], wi @ wo], [L[2], V[2], L @ V], atol=1e-9)
+    assert np.cross(wi, wo)[2] == pytest.approx(np.cross(L, V)[2], abs=1e-9)
+
+
+def test_alta_values(tmp_path):
+    rows = [(0.3, 0.2, 0.1, 0.5), (0.3, np.pi / 2, 0, 0.5)]
+    f_cos = written(tmp_path, alta("ISOTROPIC_TL_TV_PROJ_DPHI", rows, quantity="INV_STERADIAN_COSINE_FACTOR"), "x.dat")
+    assert f_cos.quantity == "f cos"
+    np.testing.assert_allclose(f_cos.data.values[:, 0], [0.5 / np.cos(np.hypot(0.2, 0.1)), np.nan], rtol=1e-9)
+    assert np.isnan(f_cos.wavelengths).tolist() == [True]
+    rgb = written(tmp_path, alta("ISOTROPIC_TV_TL_DPHI", [(0.1, 0.2, 0.3, 1, 2, 3)], 3, "RGB_COLOR"), "y.dat")
+    assert rgb.wavelengths is None
+    with_deltas = alta("ISOTROPIC_TV_TL_DPHI", [(0.1, 0.2, 0.3, 1, 0.1)]).replace("#DIM 4 1", "#DIM 3 1\n#VS 1")
+    np.testing.assert_array_equal(written(tmp_path, with_deltas, "z.dat").data.values.ravel(), [1])
+
+
+def test_retroreflection_of_the_tape():
+    """At 30°, the brightest direction is that of the light: Δφ is 0 there."""
+    samples = read(shared("retro", "retro-3M-jaune.dat")).data
+    of = np.flatnonzero(abs(samples.wi[:, 2] - np.cos(np.pi / 6)) < 1e-6)
+    brightest = of[np.nanargmax(samples.values[of, 0])]
+    assert samples.wi[brightest] @ samples.wo[brightest] > np.cos(np.radians(2))
+
+
+# --- CSV ------------------------------------------------------------------------------------------------------------
+
+ROWS = list(itertools.product((0, 30, 60), (0, 20, 40), (0, 90, 180)))
+
+
+def f_of(theta_i, theta_o, delta):
+    """Something that is symmetric, and does not depend on an azimuth at the normal."""
+    return 1 + theta_i / 100 + theta_o / 1000 + theta_i * theta_o * delta / 1e8
+
+
+def table(header="theta_i_deg,theta_o_deg,phi_o_deg,f", scale=1.0, mark=",", factor=lambda i, o, d: 1.0):
+    rows = [[i * scale, o * scale, d * scale, f_of(i, o, d) * factor(i, o, d)] for i, o, d in ROWS]
+    return header + "\n" + "\n".join(mark.join(f"{x:.12g}" for x in row) for row in rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        table(),
+        table("theta_i_rad,theta_o_rad,phi_o_rad,f", np.pi / 180),
+        table("# angles: radians\ntheta_i,theta_o,phi_o,f", np.pi / 180),
+        table("# Angles = degrees\ntheta_i,theta_o,delta_phi,brdf"),
+        table("Theta_in [deg],Theta_r [deg],Phi_r [deg],f [1/sr]"),
+        table("theta_l (deg)\ttheta_v (deg)\tphi_v (deg)\tf", mark="\t"),
+        table("theta_i_deg theta_o_deg phi_o_deg f", mark=" "),
+        table("theta_i_deg;theta_o_deg;phi_o_deg;f", mark=";").replace(".", ","),
+        table("theta_i_deg,theta_o_deg,phi_o_deg,f_cos", factor=lambda i, o, d: np.cos(np.radians(o))),
+        table("# quantity: f cos\n" + table().splitlines()[0], factor=lambda i, o, d: np.cos(np.radians(o))),
+        table().replace("phi_o_deg", "phi_o_deg").replace("\n", "\r\n"),
+    ],
+    ids=range(11),
+)
+def test_csv_spellings(tmp_path, text):
+    measurement = written(tmp_path, text, "x.csv")
+    assert isinstance(measurement.data, Grid)
+    for i, o, d in ROWS:
+        np.testing.assert_allclose(value_at(measurement, unit(i, 0), unit(o, d)), f_of(i, o, d), rtol=1e-9)
+
+
+def test_csv_values(tmp_path):
+    row = "\n30,10,40,100,0.1,0.2,0.3\n"
+    angles = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg"
+    wi, wo = unit(30, 0), unit(40, 90)  # turned: a single φi is that of an isotropic material
+    rgb = written(tmp_path, angles + ",b,g,r" + row, "x.csv")
+    assert rgb.wavelengths is None
+    np.testing.assert_allclose(value_at(rgb, wi, wo), [0.3, 0.2, 0.1])
+    spectral = written(tmp_path, angles + ",650nm,450 nm,f_550" + row, "x.csv")
+    np.testing.assert_array_equal(spectral.wavelengths, [450, 550, 650])
+    np.testing.assert_allclose(value_at(spectral, wi, wo), [0.2, 0.3, 0.1])
+    grey = written(tmp_path, "# wavelength: 633 nm\n# material: Black Paint\n" + table(), "x.csv")
+    assert (grey.wavelengths.tolist(), grey.material) == ([633], "Black Paint")
+    assert np.isnan(written(tmp_path, table(), "x.csv").wavelengths).all()
+
+
+def test_rows_that_are_no_grid_are_samples(tmp_path):
+    for text in (table().rsplit("\n", 2)[0], table().replace("\n60,40,90", "\n60,41,90")):
+        measurement = written(tmp_path, text, "x.csv")
+        assert isinstance(measurement.data, Samples)
+        np.testing.assert_allclose(value_at(measurement, unit(30, 0), unit(20, 90)), f_of(30, 20, 90))
+
+
+def test_rows_of_anisotropic_materials(tmp_path):
+    """A turn may be closed by 360°; a single row may stand for all azimuths at the pole, in isotropic tables."""
+    angles = itertools.product((10, 40), range(0, 361, 90), (20, 50), range(0, 361, 60))
+    rows = [f"{i},{p},{o},{p + d},{i + o / 100 + (p % 360) / 1e5 + (d % 360) / 1e7}" for i, p, o, d in angles]
+    data = written(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows), "x.csv").data
+    assert data.anisotropic
+    assert [len(axis.nodes) for axis in data.axes] == [2, 2, 6, 4]
+    assert [axis.period for axis in data.axes[2:]] == [2 * np.pi, 2 * np.pi]
+    found = data.evaluate(unit(40, 270), unit(20, 270 + 300), "nearest")
+    np.testing.assert_allclose(found, 40 + 0.2 + 270e-5 + 300e-7, rtol=1e-9)
+    once = "\n".join(line for line in table().splitlines() if ",0,90," not in line and ",0,180," not in line)
+    assert isinstance(written(tmp_path, once, "x.csv").data, Grid)
+
+
+def test_angles_on_the_other_side_of_the_normal(tmp_path):
+    rows = "\n".join(f"{i},{o},0,{i + o + 100}" for i, o in itertools.product((20, 40), (-60, -20, 20, 60)))
+    measurement = written(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv")
+    assert isinstance(measurement.data, Grid)
+    np.testing.assert_allclose(value_at(measurement, unit(40, 0), unit(60, 180)), 80)
+
+
+# --- Writers --------------------------------------------------------------------------------------------------------
+
+
+def colours(wi, wo):
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
+    lobe = np.exp(-10 * (1 - half[..., 2:] ** 2))
+    return np.concatenate([0.1 + lobe, 0.2 + 0.1 * lobe, 0.3 - 0.2 * lobe], axis=-1)
+
+
+def streaks(wi, wo):
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
+    return 0.1 + np.exp(-10 * half[..., :1] ** 2 - half[..., 1:2] ** 2)
+
+
+SOURCES = {
+    "rgb": Source(colours, material="A test"),
+    "one wavelength": Source(lambda wi, wo: colours(wi, wo)[..., :1], np.array([650.0])),
+    "anisotropic": Source(streaks, np.array([np.nan]), anisotropic=True),
+    "grey": Source(lambda wi, wo: np.repeat(colours(wi, wo)[..., :1], 3, axis=-1)),
+    "spectral": Source(colours, np.array([450.0, 550.0, 650.0])),
+}
+
+
+@pytest.mark.parametrize(
+    "format, name", [(csv, name) for name in SOURCES] + [(zemax, name) for name in SOURCES if name != "spectral"]
+)
+def test_files_are_read_back(tmp_path, monkeypatch, format, name):
+    source, path = SOURCES[name], tmp_path / ("x.csv" if format is csv else "x.bsdf")
+    if source.anisotropic:  # what matters, in a tenth of the time
+        monkeypatch.setattr(zemax, "hemisphere", lambda *angles: (np.array([[0, 0, 1.0]]), np.ones(1)))
+    format.write(path, source)
+    measurement = read(path)
+    grid = measurement.data
+    assert (measurement.format, grid.anisotropic) == (format.NAME, source.anisotropic)
+    wi, wo, f = grid.pairs(np.random.default_rng(1).integers(0, grid.values[..., 0].size, 5000))
+    seen = np.isfinite(f[:, 0])
+    assert seen.mean() > 0.3
+    expected = source.evaluate(wi[seen], wo[seen])
+    if format is zemax and name == "grey":
+        expected = expected[:, :1]
+    np.testing.assert_allclose(f[seen], expected, rtol=3e-6, atol=1e-6)
+    if name in ("one wavelength", "spectral"):
+        np.testing.assert_array_equal(measurement.wavelengths, source.wavelengths)
+    assert not source.material or measurement.material == source.material
+
+
+def test_written_tis_is_the_albedo(tmp_path):
+    lambertian = Source(lambda wi, wo: np.full((len(wi), 1), 0.3 / np.pi), np.array([np.nan]))
+    zemax.write(tmp_path / "x.bsdf", lambertian)
+    stated = read(tmp_path / "x.bsdf").stated_albedos
+    assert len(stated) == 18
+    np.testing.assert_allclose(list(stated.values()), 0.3, rtol=1e-3)
+
+
+def test_a_written_zemax_file_evaluates_as_its_source(tmp_path):
+    """Across the horizon too, where the file has 0."""
+    zemax.write(tmp_path / "x.bsdf", SOURCES["rgb"])
+    wi, wo = (hemisphere(3000, seed, 0.1).astype(np.float64) for seed in (1, 2))
+    expected = colours(wi, wo)
+    found = read(tmp_path / "x.bsdf").data.evaluate(wi, wo)
+    assert np.median(abs(found / expected - 1)) < 1e-3
+    assert np.max(abs(found - expected)) < 0.05 * expected.max()
