@@ -28,7 +28,7 @@ from .planar import MIRROR, LabelledCurve, draw_cartesian
 from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title
 
 PIXELS = 256
-DECADES = 4
+DECADES = 5
 """The most decades of brightness that a slice shows."""
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -61,7 +61,7 @@ def measured(*files: str | Path | Measurement) -> Figure:
     if not files:
         raise ValueError("there is no measured file to draw")
     found = [file if isinstance(file, Measurement) else read(file) for file in files]
-    figure = new_figure(11, 3.9 * len(found) + 0.2)
+    figure = new_figure(9, 3.4 * len(found) + 0.2)
     for measurement, row in zip(found, figure.subplots(len(found), 3, squeeze=False), strict=True):
         it = _Table(measurement)
         _draw_slice(row[0], it)
