@@ -42,7 +42,7 @@ INTRODUCTION = """\
 Each picture shows, reduced in size and with labels, what the command beside it renders; a click shows it larger. The
 labels are the ids of shapes. `-Dspp=64`, `-Dwidth=640`, `-Dheight=360` and
 `-Dmax_depth=4` change the defaults at the top of a scene; `legacy_06` has none. Objects are listed from left to
-right and from top to bottom. `textures/make_textures.py` makes the textures; [measured](measured/README.md) has
+right and from top to bottom. `textures/make_textures.py` makes the textures; [measured](measured/LICENSE) has
 measured files, with their licence. [shading](shading/README.md) has scenes shaded as in the textbooks, beside the same
 scenes path-traced.
 """
