@@ -22,7 +22,9 @@ class Tabulated(Model):
     Reads MERL's ``.binary`` and every other format that ``mi-brdfs measured -h`` lists; which one, it finds from what
     the file contains. A relative name is looked for where Mitsuba looks for textures: beside the scene.
 
-        f(wi, wo) = scale · table(wi, wo)
+        f(wi, wo) = s T(wi, wo)
+
+    with ``scale`` s and the table T.
 
     ``trilinear`` interpolates linearly between the neighbouring nodes of the file's own grid: half and difference
     angles for MERL, angles about the mirror direction for goniometers, adaptive coordinates for RGL; four-dimensional
@@ -40,7 +42,7 @@ class Tabulated(Model):
     format is (MERL with half a turn of φd), else as good as the measurement. One-sided.
 
     A file that several BSDFs name is in memory once. With ``differentiable`` a BSDF has its own copy, and
-    :func:`mitsuba.traverse` shows it as ``values``: a tensor with the file's axes, and the channels last. Directions
+    ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last. Directions
     are then drawn as the file says, whatever the values become.
 
     Sampling: from a table over the half vector for 27 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
