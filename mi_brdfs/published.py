@@ -21,23 +21,12 @@ class Provenance(NamedTuple):
     """What is known to be wrong with them, and how they differ from the printed ones."""
 
 
-def presets(model: str | None = None) -> list[str]:
-    """Return the names of the published materials, as in ``ngan/ward/blue-acrylic``: the paper, the model that was
-    fitted, the material.
-
-    Args:
-        model: only those of this plugin, by type or alias.
-
-    Raises:
-        ValueError: if there is no such plugin; the message has the closest one.
-    """
-    from .mitsuba.registry import find_model
-
-    wanted = model and find_model(model).plugins[0]
+def names(plugin: str | None = None) -> list[str]:
+    """Return the names of the published materials, as in ``ngan/ward/blue-acrylic``, or only those of a plugin."""
     return [
         f"{name}/{material}"
         for name, entry in _data()["sets"].items()
-        if not wanted or entry["plugin"]["type"] == wanted
+        if plugin in (None, entry["plugin"]["type"])
         for material in entry["materials"]
     ]
 
@@ -76,7 +65,7 @@ def _find(name: str) -> tuple[dict[str, Any], str]:
         return entry, material
     if reason := data["left_out"].get(family) or entry["left_out"].get(material):
         raise ValueError(f"There is no preset {name!r}: {reason}.")
-    near = closest(str(name), presets())
+    near = closest(str(name), names())
     hint = f"did you mean {near!r}?" if near else "mi_brdfs.presets() lists them."
     raise ValueError(f"There is no preset {name!r}; {hint}")
 

@@ -264,7 +264,7 @@ def test_names():
 
 
 def test_they_are_read_when_used():
-    code = "import mi_brdfs.published as it; assert not it._data.cache_info().currsize; assert it.presets()"
+    code = "import mi_brdfs.published as it; assert not it._data.cache_info().currsize; assert it.names()"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 

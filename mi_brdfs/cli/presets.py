@@ -8,7 +8,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..published import preset, presets, provenance
+from ..mitsuba.registry import presets
+from ..published import preset, provenance
 from .app import command
 from .errors import one_line
 from .terminal import Exit, err, fail, out, print_paragraph, print_table

@@ -26,10 +26,10 @@ except ImportError:
     raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
 
 from ..measure.arrays import luminance
-from ..mitsuba.registry import find_models
+from ..mitsuba.registry import find_models, presets
 from ..model import Model
 from ..preview import preview_scene
-from ..published import preset, presets
+from ..published import preset
 from ..render import ctrl_c, display_image, write
 from .families import by_family, portrait, stage_of, year
 from .html import Section, page

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import mitsuba as mi
 
-from .. import models
+from .. import models, published
 from ..integrators.shading import Shading
 from ..measured.tabulated import Tabulated
 from ..microfacet.distributions import Distribution
@@ -177,6 +177,19 @@ def info(name: str) -> str:
         ValueError: if there is no such plugin, with the closest name there is.
     """
     return _find(name, MODELS | DATA | INTEGRATORS).manual()
+
+
+def presets(model: str | None = None) -> list[str]:
+    """Return the names of the published materials, as in ``ngan/ward/blue-acrylic``: the paper, the model that was
+    fitted, the material.
+
+    Args:
+        model: only those of this plugin, by type or alias.
+
+    Raises:
+        ValueError: if there is no such plugin; the message has the closest one.
+    """
+    return published.names(model and find_model(model).plugins[0])
 
 
 def _find(name: str, plugins: dict) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..published import closest, preset, presets
+from ..published import closest, names, preset
 from .messages import shown
 from .parameter import Parameter, ParameterRow
 from .reader import PropertyReader
@@ -40,9 +40,9 @@ class Preset(Parameter):
     def _values(self, reader: PropertyReader) -> dict:
         name, plugin = reader.text(self.name), reader.plugin
         wanted = f"it must be a material that `mi-brdfs presets --model {plugin}` lists"
-        known = presets()
+        known = names()
         if name not in known:
-            near = closest(name, presets(plugin)) or closest(name, known)
+            near = closest(name, names(plugin)) or closest(name, known)
             hint = f'did you mean "{near}"? {wanted[0].upper()}{wanted[1:]}' if near else wanted
             raise reader.error(self.name, f"= {shown(name)} is unknown; {hint}")
         values = preset(name)
