@@ -31,8 +31,8 @@ from . import lobes, microfacet, parameters  # noqa: E402
 from .mitsuba.guests import register_installed  # noqa: E402
 from .mitsuba.registry import info, install, list_models, presets, register  # noqa: E402
 from .model import Energy, EnergyWarning, Model  # noqa: E402
+from .parameters.published import preset  # noqa: E402
 from .preview import preview_scene  # noqa: E402
-from .published import preset  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
 
 install()

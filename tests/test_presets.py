@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.cli import app
-from mi_brdfs.published import provenance
+from mi_brdfs.parameters.published import provenance
 from mi_brdfs.testing import assert_bsdf
 
 ROOT = Path(__file__).parent.parent
@@ -78,7 +78,7 @@ def test_numbers_are_those_of_the_paper(name):
 
 def test_every_material_that_fits_is_there():
     assert {name: len(of_set(name)) for name in SETS} == COUNTS
-    data = json.loads((ROOT / "mi_brdfs" / "published.json").read_text(encoding="utf-8"))
+    data = json.loads((ROOT / "mi_brdfs" / "parameters" / "published.json").read_text(encoding="utf-8"))
     left_out = {
         f"{name}/{material}": why for name, it in data["sets"].items() for material, why in it["left_out"].items()
     }
@@ -264,7 +264,7 @@ def test_names():
 
 
 def test_they_are_read_when_used():
-    code = "import mi_brdfs.published as it; assert not it._data.cache_info().currsize; assert it.names()"
+    code = "import mi_brdfs.parameters.published as it; assert not it._data.cache_info().currsize; assert it.names()"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-FILE = Path(__file__).parents[2] / "mi_brdfs" / "published.json"
+FILE = Path(__file__).parents[2] / "mi_brdfs" / "parameters" / "published.json"
 DIGITS = 7
 
 Fit = dict[str, Any]
@@ -226,7 +226,7 @@ def _lines(members: dict[str, str]) -> str:
 def main(
     folder: Annotated[Path, typer.Argument(help="The folder of the .fit files.", exists=True, file_okay=False)],
 ) -> None:
-    """Make mi_brdfs/published.json."""
+    """Make mi_brdfs/parameters/published.json."""
     FILE.write_text(text_of(folder), encoding="utf-8")
 
 

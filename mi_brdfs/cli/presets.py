@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..mitsuba.registry import presets
-from ..published import preset, provenance
+from ..parameters.published import preset, provenance
 from .app import command
 from .errors import one_line
 from .terminal import Exit, err, fail, out, print_paragraph, print_table

@@ -28,8 +28,8 @@ except ImportError:
 from ..measure.arrays import luminance
 from ..mitsuba.registry import find_models, presets
 from ..model import Model
+from ..parameters.published import preset
 from ..preview import preview_scene
-from ..published import preset
 from ..render import ctrl_c, display_image, write
 from .families import by_family, portrait, stage_of, year
 from .html import Section, page

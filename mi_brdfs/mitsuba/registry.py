@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import mitsuba as mi
 
-from .. import models, published
+from .. import models
 from ..integrators.shading import Shading
 from ..measured.tabulated import Tabulated
 from ..microfacet.distributions import Distribution
@@ -23,6 +23,7 @@ from ..microfacet.shadowing import Shadowing
 from ..microfacet.term import Term
 from ..model import Model, Plugin, full_name
 from ..models.microfacet import add_term
+from ..parameters import published
 from ..parameters.messages import meant
 from . import llvm
 from .bsdf import bsdf_class

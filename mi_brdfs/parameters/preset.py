@@ -7,9 +7,9 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..published import closest, names, preset
 from .messages import shown
 from .parameter import Parameter, ParameterRow
+from .published import closest, names, preset
 from .reader import PropertyReader
 
 

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .parameters.messages import meant
+from .messages import meant
 
 
 class Provenance(NamedTuple):
