@@ -64,8 +64,8 @@ def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
     wi, wo = pairs(2000, 5)
     values = f(wi, wo)
     grid = gridded(Samples(wi, wo, values, anisotropic))
-    assert grid.values.min() >= values.min()
-    assert grid.values.max() <= values.max()
+    assert np.nanmin(grid.values) >= values.min()
+    assert np.nanmax(grid.values) <= values.max()
     wi_2, wo_2 = pairs(1000, 9, lowest=0.2)
     found, expected = grid.evaluate(wi_2, wo_2), f(wi_2, wo_2)
     points, others = embedded(wi, wo, anisotropic), embedded(wi_2, wo_2, anisotropic)
@@ -90,9 +90,9 @@ def test_missing_values_and_few_samples():
     wi, wo = pairs(30, 15)
     values = glossy(wi, wo)
     values[3] = np.nan
-    assert np.all(np.isfinite(gridded(Samples(wi, wo, values, False)).values))
+    assert np.all(gridded(Samples(wi, wo, values, False)).evaluate(wi, wo) > 0.05)
     one = gridded(Samples(wi[:1], wo[:1], values[:1], False))
-    np.testing.assert_allclose(one.values, np.broadcast_to(values[0], one.values.shape))
+    np.testing.assert_allclose(one.evaluate(wi, wo), np.broadcast_to(values[0], values.shape))
     with pytest.raises(ValueError, match="No sample has a value"):
         gridded(Samples(wi[3:4], wo[3:4], values[3:4], False))
 

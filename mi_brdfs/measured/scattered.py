@@ -32,7 +32,7 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     are averaged. The axes are finer where samples are dense or bright.
 
     What was measured are pairs of polar angles within the ranges of the samples'. Beyond them, nodes have the mean of
-    the nearest samples (``hold``), or no value (NaN, ``zero``).
+    the nearest samples (``hold``), or no value (NaN, ``zero``), like those below the horizon.
 
     Raises:
         ValueError: if no sample has a value.
@@ -48,12 +48,13 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     half = len(axes[2].nodes) // 2 + 1
     # Isotropic tables are symmetric about φd = π/2.
     counted = [axis.nodes if k != 2 or anisotropic else axis.nodes[:half] for k, axis in enumerate(axes)]
-    directions = coordinates.directions(*np.meshgrid(*counted, indexing="ij"))
-    shape = tuple(len(nodes) for nodes in counted)
-    nodes = embedded(stacked(directions[0]), stacked(directions[1]), anisotropic).reshape(-1, points.shape[1])
-    table = interpolated(points, values, nodes).reshape(*shape, -1)
+    light, view = coordinates.directions(*np.meshgrid(*counted, indexing="ij"))
+    asked = (light.z > 0) & (view.z > 0)
     if extrapolate == "zero":
-        table[~measured(wi, wo, *(polar_angle(w) for w in directions))] = np.nan
+        asked &= measured(wi, wo, polar_angle(light), polar_angle(view))
+    nodes = embedded(stacked(light)[asked], stacked(view)[asked], anisotropic)
+    table = np.full((*asked.shape, values.shape[1]), np.nan)
+    table[asked] = interpolated(points, values, nodes)
     if not anisotropic:
         table = np.concatenate([table, table[:, :, half - 2 : 0 : -1]], axis=2)
     return Grid(coordinates, axes, table)
