@@ -49,13 +49,13 @@ def lambert(tmp_path):
     return merl(tmp_path / "lambert.binary", REFLECTANCE / np.pi)
 
 
-def goniometer(values=1 / np.pi, radial=60.0, anisotropic=False, stated=None, channels=1):
+def goniometer(values=1 / np.pi, radial=60.0, anisotropic=False, stated=None, channels=1, turns=4):
     """Values at θi = 0, 30 and 60° within a cone about the mirror direction."""
     radii, azimuths = np.radians(np.linspace(0, radial, 13)), np.radians(np.arange(0, 181, 15))
     axes = [Axis(np.radians([0, 30, 60])), Axis(azimuths), Axis(radii)]
     if anisotropic:
         axes = [axes[0], Axis(np.radians(np.arange(0, 360, 15)), period=2 * np.pi), axes[2],
-                Axis(np.radians([0, 90, 180, 270]), period=2 * np.pi)]  # fmt: skip
+                Axis(np.arange(turns) * 2 * np.pi / turns, period=2 * np.pi)]  # fmt: skip
     shape = *(len(axis.nodes) for axis in axes), channels
     grid = Grid(SpecularPolar(not anisotropic, anisotropic), tuple(axes), np.broadcast_to(values, shape).copy())
     return Measurement(Path("paint.bsdf"), "Zemax", grid, wavelengths=np.array([650.0]), stated_albedos=stated or {})
@@ -245,6 +245,14 @@ def test_each_rotation_has_its_stated_albedo():
     assert [it.phi_i for it in found.scatter] == [0, 90, 180, 270]
     np.testing.assert_allclose([it.integrated for it in found.scatter], [0.1, 0.2, 0.3, 0.4], rtol=1e-3)
     assert (found.largest_albedo.value, found.largest_albedo.phi_i) == (pytest.approx(0.4, rel=1e-3), 270)
+
+
+def test_the_largest_albedo_may_be_at_any_azimuth():
+    """Also at one of 36 that the first look leaves out."""
+    phi = np.arange(36)
+    values = 0.1 + 0.01 * np.maximum(5 - abs(phi - 13), 0)
+    found = summarize(goniometer(values[:, None] / np.pi, radial=150, anisotropic=True, turns=36)).largest_albedo
+    assert (found.value, found.phi_i) == (pytest.approx(0.15, rel=1e-3), 130)
 
 
 def test_a_file_without_numbers(tmp_path):

@@ -245,11 +245,18 @@ def azimuths(grid: Grid) -> np.ndarray:
 
 
 def _largest(measurement: Measurement, grid: Grid, angles: np.ndarray, turns: np.ndarray) -> Albedo | None:
+    """Return the largest albedo at some angles and azimuths, or at the same angle and any azimuth."""
     if not len(angles):
         return None
-    values = np.array([albedos(grid, np.radians(angles), phi, extrapolate="zero") for phi in turns])
-    turn, angle, channel = np.unravel_index(values.argmax(), values.shape)
-    phi = round(float(np.degrees(turns[turn])), 4)
+
+    def found(theta: np.ndarray, phis: np.ndarray) -> np.ndarray:
+        return np.array([albedos(grid, np.radians(theta), phi, extrapolate="zero") for phi in phis])
+
+    values, every = found(angles, turns), azimuths(grid)
+    angle = values.max(axis=(0, 2)).argmax()
+    values = found(angles[[angle]], every)[:, 0]
+    turn, channel = np.unravel_index(values.argmax(), values.shape)
+    phi = round(float(np.degrees(every[turn])), 4)
     return Albedo(float(values.max()), float(angles[angle]), phi, channel_names(measurement)[channel])
 
 

@@ -3,7 +3,8 @@
 :func:`polar` and :func:`cartesian` draw the plane of incidence, :func:`hemisphere` maps all directions, :func:`albedo`
 draws the directional albedo, and :func:`sphere` the lobe as a body to turn with the mouse. Each takes one BSDF or
 several to compare, and returns a Matplotlib figure (``figure.savefig("ward.pdf")``) or, in the case of :func:`sphere`,
-a Plotly figure (``figure.write_html("ward.html")``). They need ``pip install 'mi_brdfs[plot]'``.
+a Plotly figure (``figure.write_html("ward.html")``). :func:`measured` draws what measured files hold. They need
+``pip install 'mi_brdfs[plot]'``.
 """
 
 try:
