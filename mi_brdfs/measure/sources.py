@@ -25,7 +25,7 @@ class BSDFSource(NamedTuple):
     word: str
     """What a user may give for it."""
     source: str
-    """The type of a plugin, XML text, or the path of a scene."""
+    """The type of a plugin, XML text, or the path of a scene or of a measured file."""
     material: int | None = None
     """Which of the scene's materials."""
     parameters: Mapping[str, str] = {}
@@ -38,7 +38,11 @@ class BSDFSource(NamedTuple):
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
             return mi.load_string(_versioned(self.source), **self.parameters)
-        return {"type": self.source} | {name: value_of(text) for name, text in self.parameters.items()}
+        values = {name: value_of(text) for name, text in self.parameters.items()}
+        if is_measured(self.source):
+            path = Path(self.source)  # or a name that the plugin looks for elsewhere
+            return {"type": "tabulated", "filename": str(path.resolve() if path.exists() else path)} | values
+        return {"type": self.source} | values
 
 
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
@@ -61,11 +65,8 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
         raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
-    if is_data:
-        filename = str(path.resolve()) if path.exists() else word  # the plugin looks elsewhere, too
-        source = BSDFSource(path.name, word, "tabulated", None, {"filename": filename, **parameters})
-    else:
-        source = BSDFSource(path.name if is_file else word, word, str(path) if is_file else word, None, parameters)
+    name = path.name if is_file or is_data else word
+    source = BSDFSource(name, word, str(path) if is_file or is_data else word, None, parameters)
     suffix = "".join(f" {name}={value}" for name, value in parameters.items())
     loaded = source.load()
     loaded = mi.load_dict(loaded) if isinstance(loaded, dict) else loaded

@@ -37,9 +37,6 @@ class Proposal:
         thetas = NODES_I_ANISOTROPIC if self.anisotropic else NODES_I
         phis = AZIMUTHS_I[:-1] if self.anisotropic else np.zeros(1)
         density = _tabulated(brightness, phis, thetas, interpolation, extrapolate)
-        # A slice without light cannot be normalized: make it even.
-        dark = density.sum(axis=(-1, -2), keepdims=True) <= 0
-        density = np.where(dark, np.float32(1), density)
         if self.anisotropic:
             self.warp = mi.MarginalContinuous2D2(np.concatenate([density, density[:1]]), [AZIMUTHS_I, thetas])
         else:
@@ -77,14 +74,16 @@ class Proposal:
 def _tabulated(
     brightness: Grid, phis: np.ndarray, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation
 ) -> np.ndarray:
-    """Return the density at the nodes, not normalized: shape (azimuths, angles θi, u, v)."""
+    """Return the density at the nodes, not normalized: shape (azimuths, angles θi, u, v). Where the table is dark, it
+    is in proportion to the cosine."""
     u, v = np.meshgrid(np.linspace(0, 1, NODES_U), np.linspace(0, 1, NODES_V), indexing="ij")
     density = np.empty((len(phis), len(thetas), *u.shape), np.float32)
     for j, phi in enumerate(phis):
         for k, theta in enumerate(thetas):
             wi, wo, solid_angle = half_vectors(theta, phi, u, v)
             f = brightness.evaluate(wi, wo, interpolation, extrapolate)[..., 0]
-            density[j, k] = f * np.maximum(wo[..., 2], 0) * solid_angle
+            cosine = np.maximum(wo[..., 2], 0) * solid_angle
+            density[j, k] = f * cosine if np.any(f * cosine > 0) else cosine
     return density
 
 
@@ -99,9 +98,11 @@ def half_vectors(theta: float, phi: float, u: np.ndarray, v: np.ndarray) -> tupl
     return stacked(wi), wo, solid_angle
 
 
-def albedos(grid: Grid, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation) -> np.ndarray:
-    """Return ∫ f cosθo dωo for each channel at angles θi, by the midpoint rule over the half vector, and the mean over
-    φi where the table is anisotropic: shape (angles, channels)."""
+def estimated_albedos(
+    grid: Grid, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation
+) -> np.ndarray:
+    """Return estimates of ∫ f cosθo dωo for each channel at angles θi, by 1,024 half vectors each, and the mean over φi
+    where the table is anisotropic: shape (angles, channels)."""
     u, v = np.meshgrid((np.arange(64) + 0.5) / 64, (np.arange(16) + 0.5) / 16, indexing="ij")
     azimuths = AZIMUTHS_I[:-1:3] if grid.anisotropic else [0.0]
     result = np.zeros((len(thetas), grid.values.shape[-1]))

@@ -12,7 +12,7 @@ from .coordinates import PolarAngle
 from .files import checked
 from .formats import read
 from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
-from .proposal import NODES_I, Proposal, albedos
+from .proposal import NODES_I, Proposal, estimated_albedos
 from .scattered import gridded
 from .table import Table
 
@@ -45,6 +45,7 @@ class Tables:
         converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)
         self.f = Table(converted, self.channels.spectrum, interpolation == "nearest", extrapolate == "hold")
         self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
-        albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos(converted, NODES_I, interpolation, extrapolate))
+        albedos = estimated_albedos(converted, NODES_I, interpolation, extrapolate)
+        albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos)
         self.albedo = Table(albedo, self.channels.spectrum, nearest=False, hold=True)
         self.captured = [*self.f.captured, *self.albedo.captured, *self.channels.basis, self.proposal.warp]
