@@ -123,6 +123,10 @@ def test_delta_functions_are_skipped_with_a_reason():
 ALARMS = {
     "minnaert 6": ({"type": "minnaert", "exponent": 6.0}, "continuity"),
     "minnaert 8": ({"type": "minnaert", "exponent": 8.0}, "continuity"),
+    "a narrow lobe at grazing": (
+        {"type": "microfacet", "preset": "low/ashikhmin-shirley-e1/white-marble"},
+        "continuity",
+    ),
     "wrap 8": ({"type": "wrap", "exponent": 8.0, "wrap": 0.0}, "continuity"),
     "lafortune cz = 1": ({"type": "lafortune", "cx": 0.0, "cy": 0.0, "cz": 1.0, "exponent": 8.0}, "continuity"),
     "lafortune anisotropic": ({"type": "lafortune", "cx": -0.9, "cy": -0.3, "cz": 1.0}, "flags"),

@@ -250,8 +250,9 @@ def reciprocity(run: Run) -> Findings:
 
 STEP = 5e-4
 """The distance, in radians, over which ``continuity`` looks for jumps: the cosine of a smaller one is 1 in float32."""
-OCTAVES = 16, 8, 4, 2, 1, 0.5
-"""The heights above the horizon that it looks at, in such steps."""
+OCTAVES = 32, 16, 8, 4, 2, 1, 0.5
+"""The heights above the horizon that it looks at, in such steps; how values change from the first to the second is only
+compared with."""
 
 
 def continuity(run: Run) -> Findings:
@@ -301,6 +302,7 @@ def _check_octaves(outcome: Outcome, word: str, values: Array, heights: list[Arr
     lit = high > 1e-2 * values.max()  # a soft edge may end between two heights
     beside = np.pad(change, ((1, 1), (0, 0)))
     jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
+    jump[0] = False  # a highlight may end there: without what lies above, a slope is no jump
     if (jump.sum(axis=1) > 0.01 * np.maximum(lit.sum(axis=1), 1)).any():
         octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
         upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
