@@ -1,0 +1,117 @@
+"""From measured BRDFs to parameters of models: :func:`fit`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..measured import FileError, Measurement
+from .engine import fit_configuration
+from .isotropy import isotropic
+from .lanes import rgb_variant
+from .metrics import METRICS, Metric, find_metric
+from .observations import FitError, Observations, Source, observe
+from .result import Fit, Starts
+from .unknowns import Configuration, configurations
+
+__all__ = ["METRICS", "FileError", "Fit", "FitError", "Metric", "Observations", "Starts", "fit"]
+
+CUT, PAIRS, STARTS = 80.0, 4096, 10
+"""The defaults of :func:`fit`."""
+
+
+def fit(
+    data: Source | Observations | Sequence[Source | Observations],
+    model: str | Sequence[str],
+    *,
+    metric: str = "log",
+    given: Mapping[str, Any] | None = None,
+    tied: Mapping[str, str] | None = None,
+    start: Mapping[str, Any] | Sequence[Mapping[str, Any]] = (),
+    lobes: int = 1,
+    starts: int = STARTS,
+    seed: int = 0,
+    cut: float = CUT,
+    pairs: int = PAIRS,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Fit]:
+    """Fit models to measured BRDFs, each model to all materials at once.
+
+    Free are all numbers and colours that a model declares, within their ranges, a colour with a value for each channel
+    of the data: also parameters without a default, as the diffuse lobe that a model may have. Anisotropic data have
+    the values for both tangent directions and the rotation; numbers that would make a model anisotropic stay at their
+    defaults for isotropic data. A Fresnel term has the parameters of ``given["fresnel"]``: "schlick" (the default),
+    "dielectric", "conductor" or "none".
+
+    Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
+    ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are
+    nearest to the data among many, from random ones, and from the nearest published material; the best end counts.
+    Negative and missing values have no weight. It runs in the active variant if that is an rgb one with derivatives,
+    and else in the fastest that works here.
+
+    Args:
+        data: a file, a :class:`mi_brdfs.measured.Measurement` or a tuple of arrays ``(wi, wo, f)``, of shapes (N, 3),
+            (N, 3) and (N,) or (N, channels), with one channel or linear sRGB, f in 1/sr, as of an isotropic material;
+            or a list of these.
+        model: the name of a plugin of this package or of a guest, or several.
+        metric: "log", "l2", "ngan" or "cube-root".
+        given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.
+        tied: parameters that equal another one, as ``{"cy": "cx"}``.
+        start: a plugin dict to start from, besides others, or several. No fit is worse than any of them.
+        lobes: the number of lobes of models that have several of a kind.
+        starts: the number of the other starts.
+        seed: of the choice of pairs and of the random starts.
+        cut: the largest angle of wi and wo to the normal, in degrees.
+        pairs: the most pairs of directions of a material, fitted and held out.
+        progress: called with how many of how many starts have ended.
+
+    Returns:
+        The fits, those of a material together, and of these first the one with the least error on what was held out.
+
+    Raises:
+        FitError: if nothing can be fitted, and why, in a sentence.
+        FileError: if a file cannot be read.
+        ValueError: if there is no such model or metric.
+    """
+    from ..mitsuba.registry import find_model
+
+    find_metric(metric)
+    several = isinstance(data, Sequence) and not isinstance(data, (str, tuple))
+    sources: list[Any] = list(data) if several else [data]  # type: ignore[arg-type]
+    if not sources:
+        raise FitError("There are no data to fit.")
+    if starts < 0 or lobes < 1 or pairs < 2 or not 0 < cut <= 90:
+        raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2 and a cut in (0, 90] degrees.")
+    models = [find_model(name) for name in ([model] if isinstance(model, str) else model)]
+    given_starts = [start] if isinstance(start, Mapping) else list(start)
+    if not starts and not given_starts:
+        raise FitError("There is nothing to start from: starts is 0, and no start is given.")
+    materials = [it if isinstance(it, Observations) else observe(it, cut, pairs, seed) for it in sources]
+    with rgb_variant():
+        todo = []
+        for kind in dict.fromkeys((it.channels, it.anisotropic) for it in materials):
+            alike = [k for k, it in enumerate(materials) if (it.channels, it.anisotropic) == kind]
+            for each in models:
+                todo += [(it, alike) for it in configurations(each, given or {}, tied or {}, lobes, *kind)]
+        ended, found = 0, []
+        total = sum(len(alike) for _, alike in todo) * (starts + len(given_starts))
+
+        def advance(count: int) -> None:
+            nonlocal ended
+            ended = min(ended + count, total)
+            if progress:
+                progress(ended, total)
+
+        for configuration, alike in todo:
+            own = [materials[k] for k in alike]
+            reduced = configuration if own[0].anisotropic else isotropic(configuration)
+            names = {unknown.name for unknown in reduced.unknowns} | set(reduced.tied)
+            fixed = list(dict.fromkeys(u.name for u in configuration.unknowns if u.name not in names))
+            fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, cut, advance, fixed)
+            found += list(zip(alike, fits, strict=True))
+    return [it for _, it in sorted(found, key=lambda pair: (pair[0], _rank(pair[1])))]
+
+
+def _rank(it: Fit) -> tuple[bool, float]:
+    return it.held_out != it.held_out, it.held_out

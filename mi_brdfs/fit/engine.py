@@ -1,0 +1,121 @@
+"""Fits of one configuration to several materials, all in the same kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..measure.arrays import Array, luminance
+from .metrics import METRICS
+from .observations import Observations
+from .problem import Problem
+from .result import Fit, Starts
+from .solver import solve
+from .starts import starts
+from .unknowns import Configuration
+
+AGREEMENT = 1.02
+"""The error, relative to the best, up to which a start agrees with it."""
+
+Advance = Callable[[int], None]
+
+
+def fit_configuration(
+    configuration: Configuration,
+    materials: Sequence[Observations],
+    metric: str,
+    count: int,
+    given: list[Mapping[str, Any]],
+    seed: int,
+    cut: float,
+    advance: Advance = lambda ended: None,
+    fixed: Sequence[str] = (),
+) -> list[Fit]:
+    """Return the best fit for each of some materials with the same number of channels."""
+    problem = Problem(configuration, materials, METRICS[metric])
+    owners, points, warm = starts(problem, count, given, seed)
+    low, high = problem.box
+    points, costs = solve(lambda which, at: problem.sums(owners[which], at), points, low, high, advance)
+    values = problem.values_of(points)
+    best = [int(np.flatnonzero(owners == m)[costs[owners == m].argmin()]) for m in range(len(materials))]
+    errors = problem.errors(range(len(materials)), values[best])
+    spread = {m: rest for m, *rest in _uncertainties(problem, values[best])}
+    fits = []
+    for m, material in enumerate(materials):
+        x, own = values[best[m]], costs[owners == m]
+        sigma, correlations = spread[m]
+        residuals = int(material.usable[: material.fitted].sum())
+        fits.append(Fit(
+            file=material.name,
+            model=configuration.title,
+            metric=metric,
+            bsdf=configuration.bsdf(x),
+            errors=errors[m],
+            sigma=_by_parameter(configuration, sigma),
+            correlations=correlations,
+            bounds=[u.label for u, value in zip(configuration.unknowns, x, strict=True) if u.at_end(float(value))],
+            starts=Starts(len(own), warm, int((own <= AGREEMENT**2 * own.min() + 1e-16).sum())),
+            bic=float(residuals * np.log(max(own.min(), 1e-300)) + len(x) * np.log(residuals)),
+            cut=cut,
+            pairs=material.fitted,
+            negative=material.negative,
+            missing=material.missing,
+            in_highlight=_in_highlight(problem, material, x),
+            anisotropic=material.anisotropic,
+            fixed=list(fixed),
+        ))  # fmt: skip
+    return fits
+
+
+def _uncertainties(
+    problem: Problem, values: Array
+) -> list[tuple[int, list[float | None], dict[str, dict[str, float]]]]:
+    """Return ``(material, standard deviations, correlations)`` of the best settings, but for unknowns at the end of
+    their range: from the Jacobian and from how far the data are from the model at each pair of directions, so that
+    noise may differ from pair to pair and be common to the channels.
+
+    H. White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48(4), 1980,
+    doi:10.2307/1912934.
+    """
+    unknowns, found = problem.configuration.unknowns, []
+    for m, residuals, jacobian in problem.residuals(range(len(values)), values):
+        channels = problem.lanes.channels
+        free = [k for k, u in enumerate(unknowns) if not u.at_end(float(values[m, k]))]
+        scale = np.sqrt((jacobian[:, free] ** 2).sum(axis=0))
+        scale = np.where(scale > 0, scale, 1)
+        scaled = jacobian[:, free] / scale
+        scores = (scaled * residuals[:, None]).reshape(-1, channels, len(free)).sum(axis=1)
+        bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
+        freedom = len(scores) / max(len(scores) - len(free), 1)
+        covariance = freedom * (bread @ (scores.T @ scores) @ bread) / np.outer(scale, scale)
+        deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
+        sigma: list[float | None] = [None] * len(unknowns)
+        for k, deviation in zip(free, deviations, strict=True):
+            sigma[k] = float(deviation)
+        ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
+        labels = [unknowns[k].label for k in free]
+        rows = {a: {b: float(np.clip(ratio[i, j], -1, 1)) for j, b in enumerate(labels)} for i, a in enumerate(labels)}
+        found.append((m, sigma, rows))
+    return found
+
+
+def _by_parameter(configuration: Configuration, sigma: list[float | None]) -> dict[str, Any]:
+    """Return the standard deviations by parameter, a list for a colour with several channels."""
+    found: dict[str, Any] = {}
+    for name in configuration.names:
+        numbers = [sigma[k] for k in configuration.indices(name)]
+        found[name] = numbers[0] if len(numbers) == 1 else numbers
+    return found
+
+
+def _in_highlight(problem: Problem, material: Observations, x: Array) -> int:
+    """Return the number of pairs of directions with more than half of the value at the mirror direction."""
+    mirror = material.wi * np.array([-1, -1, 1], np.float32)
+    settings, count = np.stack([x, x]), len(material.wi)
+    pairs = [(material.wi, material.wo), (material.wi, mirror)]
+    values, _ = problem.lanes.evaluate(settings, pairs, derivatives=False)
+    values = luminance(values)
+    own, at_mirror = values[:count] / material.wo[:, 2], values[count:] / mirror[:, 2]
+    return int((own > 0.5 * at_mirror).sum())

@@ -1,0 +1,154 @@
+"""A model's values and derivatives for many settings at once: one kernel, with a lane for each pair of directions of
+each setting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..measure.arrays import Array, context, interaction, numbers, per_lane, vectors
+from ..measure.directions import hemisphere
+from ..mitsuba import llvm
+from .observations import FitError
+from .unknowns import Configuration
+
+LANES = 1 << 18
+"""The most lanes of a kernel: memory does not grow with the number of materials."""
+
+
+@contextmanager
+def rgb_variant() -> Iterator[None]:
+    """Activate an rgb variant with derivatives, unless one is: the one of the device that there is."""
+    active = mi.variant()
+    if active is not None and active.endswith("_ad_rgb"):
+        yield
+        return
+    for name in ("cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb"):
+        if name not in mi.variants() or (name.startswith("llvm") and llvm.problem()):
+            continue
+        try:
+            mi.set_variant(name)
+        except ImportError:
+            continue
+        try:
+            yield
+        finally:
+            if active is not None:
+                mi.set_variant(active)
+        return
+    raise FitError(f"A fit needs a variant with derivatives: {llvm.problem() or 'none works on this machine'}.")
+
+
+class Lanes:
+    """A configuration's plugin, with a texture for each of its unknowns.
+
+    Settings are arrays of shape (P, unknowns), and pairs lists of P pairs of arrays ``(wi, wo)`` of shape (N, 3), where
+    the N may differ. Values are f cosθo, of one channel or three.
+    """
+
+    def __init__(self, configuration: Configuration, channels: int):
+        self.configuration, self.channels = configuration, channels
+        self.textures = {name: per_lane() for name in configuration.names}
+        self.bsdf = mi.load_dict({"type": configuration.plugin, **configuration.given, **self.textures})
+        self._sweeps = self._find_sweeps()
+
+    def batches(self, pairs: Sequence[tuple[Array, Array]]) -> Iterator[range]:
+        """Yield ranges of settings that fit into a kernel together."""
+        first, lanes = 0, 0
+        for k, (wi, _) in enumerate(pairs):
+            if k > first and lanes + len(wi) > LANES:
+                yield range(first, k)
+                first, lanes = k, 0
+            lanes += len(wi)
+        if first < len(pairs):
+            yield range(first, len(pairs))
+
+    def evaluate(
+        self, settings: Array, pairs: Sequence[tuple[Array, Array]], derivatives: bool = True
+    ) -> tuple[Array, Array | None]:
+        """Return the values of all lanes, shape (lanes, channels), and the derivatives by the unknowns, shape (lanes,
+        channels, unknowns); float32."""
+        return self._evaluated(settings, pairs, self._sweeps if derivatives else [])
+
+    def _evaluated(
+        self, settings: Array, pairs: Sequence[tuple[Array, Array]], sweeps: list[list[int]]
+    ) -> tuple[Array, Array | None]:
+        counts = [len(wi) for wi, _ in pairs]
+        si, wo = interaction(np.concatenate([wi for wi, _ in pairs])), vectors(np.concatenate([wo for _, wo in pairs]))
+        dr.make_opaque(si)
+        inputs = self._set(np.repeat(np.asarray(settings, np.float32), counts, axis=0), bool(sweeps))
+        value = self.bsdf.eval(context(), si, wo, True)
+        tangents = [self._tangent(value, inputs, sweep) for sweep in sweeps]
+        value = dr.detach(value)
+        dr.eval(value, tangents)
+        for texture in self.textures.values():
+            texture.value = None  # what lives on is part of other kernels
+        found = self._array(value)
+        if not sweeps:
+            return found, None
+        jacobian = np.zeros((*found.shape, len(self.configuration.unknowns)), np.float32)
+        for sweep, tangent in zip(sweeps, tangents, strict=True):
+            columns = self._array(tangent)
+            if len(sweep) == 1:
+                jacobian[..., sweep[0]] = columns
+            else:
+                for channel, k in enumerate(sweep):
+                    jacobian[:, channel, k] = columns[:, channel]
+        return found, jacobian
+
+    def _array(self, value: mi.Color3f) -> Array:
+        return np.ascontiguousarray(numbers(value)[:, : self.channels])
+
+    def _set(self, settings: Array, differentiable: bool) -> dict[str, mi.Float | mi.Color3f]:
+        """Give the textures the values of a setting for each lane, and return these."""
+        inputs = {}
+        for name, texture in self.textures.items():
+            columns = [mi.Float(np.ascontiguousarray(settings[:, k])) for k in self.configuration.indices(name)]
+            colour = self.configuration.is_colour(name)
+            value = mi.Color3f(columns if len(columns) == 3 else columns * 3) if colour else columns[0]
+            dr.make_opaque(value)
+            if differentiable:
+                dr.enable_grad(value)
+            inputs[name] = texture.value = value
+        return inputs
+
+    def _tangent(self, value: mi.Color3f, inputs: dict[str, mi.Float | mi.Color3f], sweep: list[int]) -> mi.Color3f:
+        """Return the derivative of the value by some unknowns together."""
+        for name, each in inputs.items():
+            own = self.configuration.indices(name)
+            ones = [float(k in sweep) for k in own]
+            if not self.configuration.is_colour(name):
+                dr.set_grad(each, ones[0])
+            else:
+                dr.set_grad(each, mi.Color3f(ones if len(ones) == 3 else ones * 3))
+        tangent = dr.forward_to(value, flags=dr.ADFlag.ClearVertices)
+        for each in (value, *inputs.values()):
+            dr.clear_grad(each)
+        return tangent
+
+    def _find_sweeps(self) -> list[list[int]]:
+        """Return the unknowns of each sweep of differentiation: the channels of a colour together, unless some channel
+        of the value depends on another one of the colour."""
+        unknowns = self.configuration.unknowns
+        alone = [[k] for k in range(len(unknowns))]
+        names = list(dict.fromkeys(unknown.name for unknown in unknowns))
+        together = [self.configuration.indices(name) for name in names]
+        if len(together) == len(alone):
+            return alone
+        rng = np.random.default_rng(1)
+        ends = np.array([np.clip(unknown.ends, -3, 8) for unknown in unknowns])
+        points = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * rng.uniform(0.2, 0.8, (8, len(unknowns)))
+        settings = np.stack([u.from_scale(points[:, k]) for k, u in enumerate(unknowns)], axis=-1)
+        pairs = [(hemisphere(64, 1, 0.2), hemisphere(64, 2, 0.2))] * 8
+        _, found = self._evaluated(settings, pairs, alone)
+        jacobian = np.nan_to_num(np.asarray(found))
+        for sweep in together:
+            if len(sweep) > 1 and any(
+                jacobian[:, channel, k].any() for channel in range(3) for j, k in enumerate(sweep) if j != channel
+            ):
+                return alone
+        return together

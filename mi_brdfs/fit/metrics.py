@@ -1,0 +1,71 @@
+"""The metrics of fits: how far a model's values are from measured ones.
+
+An error is √(Σ w (T(f cosθi) - T(f' cosθi))² / Σ w), over pairs of directions and channels, where f' is the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..parameters.messages import meant
+
+
+class Metric(NamedTuple):
+    """What is compared, and with which weight."""
+
+    transform: Callable[[np.ndarray], np.ndarray]
+    """T of f cosθi."""
+    derivative: Callable[[np.ndarray], np.ndarray]
+    """T'."""
+    solid_angle: bool
+    """Whether pairs weigh by the solid angles of both directions, or by that of wi and the polar angle of wo alone."""
+    text: str
+    """What it is, and whose."""
+
+    def weights(self, wo: np.ndarray, solid_angle: np.ndarray) -> np.ndarray:
+        """Return the weights w of pairs, for the solid angles dωi dωo that each stands for."""
+        if self.solid_angle:
+            return solid_angle
+        return solid_angle / np.maximum(np.hypot(wo[:, 0], wo[:, 1]), 1e-4)
+
+
+def _same(x: np.ndarray) -> np.ndarray:
+    return x
+
+
+SMALLEST = 1e-6
+"""The f cosθi below which a root is steep enough to be held."""
+
+
+def _cube_root_slope(x: np.ndarray) -> np.ndarray:
+    return np.maximum(np.abs(x), SMALLEST) ** (-2 / 3) / 3
+
+
+METRICS = {
+    "log": Metric(np.log1p, lambda x: 1 / (1 + x), False,
+                  "ln(1 + f cosθi), weighted by sinθi (E2 of Löw et al. 2012)"),
+    "l2": Metric(_same, np.ones_like, False, "f cosθi, weighted by sinθi (E1 of Löw et al. 2012)"),
+    "ngan": Metric(_same, np.ones_like, True, "f cosθi, weighted by solid angle (Ngan et al. 2005)"),
+    "cube-root": Metric(np.cbrt, _cube_root_slope, True,
+                        "the cube root of f cosθi, weighted by solid angle (Fores et al. 2012)"),
+}  # fmt: skip
+"""By name. J. Löw, J. Kronander, A. Ynnerman, J. Unger, BRDF models for accurate and efficient rendering of glossy
+surfaces, ACM TOG 31(1), 2012, doi:10.1145/2077341.2077350. A. Ngan, F. Durand, W. Matusik, Experimental analysis of
+BRDF models, EGSR 2005, doi:10.2312/EGWR/EGSR05/117-126. A. Fores, J. Ferwerda, J. Gu, Toward a perceptually based
+metric for BRDF modeling, CIC 20, 2012, doi:10.2352/CIC.2012.20.1.art00025."""
+
+
+def find_metric(name: str) -> Metric:
+    """Return the metric of a name.
+
+    Raises:
+        ValueError: if there is none.
+    """
+    if name not in METRICS:
+        near = meant(str(name), METRICS)
+        hint = f"did you mean {near!r}? There" if near else "there"
+        raise ValueError(f"There is no metric {name!r}; {hint} are {', '.join(METRICS)}.")
+    return METRICS[name]

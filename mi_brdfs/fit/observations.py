@@ -1,0 +1,180 @@
+"""What a fit sees of a material: pairs of directions with values, their weights, and which of them are held out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..measured import Axis, Grid, Measurement, read
+from ..measured.arrays import stacked
+from ..measured.observer import to_srgb
+
+Arrays: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike]
+Source: TypeAlias = str | Path | Measurement | Arrays
+"""A file, what was read from it, or arrays (wi, wo, f)."""
+
+TRIED = 8
+"""Nodes of a large grid that are looked at for each pair that is wanted: many lie below the horizon."""
+STEP = 1e-2
+"""The part of a cell's width over which directions are differentiated."""
+
+
+class FitError(ValueError):
+    """Data and a model that cannot be fitted. The message is one sentence that says why."""
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Usable pairs of directions of one material, in random order: the first ``fitted`` are fitted, the others held
+    out."""
+
+    name: str
+    wi: np.ndarray
+    """Float32, shape (N, 3), as ``wo``."""
+    wo: np.ndarray
+    f: np.ndarray
+    """Shape (N, channels), of one channel or linear sRGB; 0 where it has no weight."""
+    usable: np.ndarray
+    """Which of these have a weight, shape (N, channels)."""
+    solid_angle: np.ndarray
+    """What each pair stands for, dωi dωo up to a common scale, shape (N,)."""
+    anisotropic: bool
+    fitted: int
+    negative: int
+    """Values below 0 within the cut, which get no weight."""
+    missing: int
+    """Values within the cut that are no numbers, which get none either."""
+
+    @property
+    def channels(self) -> int:
+        return self.f.shape[1]
+
+
+def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
+    """Return at most ``pairs`` random pairs of a material with both angles up to ``cut`` degrees.
+
+    Raises:
+        FitError: if there is none, or arrays have other shapes.
+        FileError: if a file cannot be read.
+    """
+    if isinstance(source, (str, Path)):
+        source = read(source)
+    rng = np.random.default_rng(seed)
+    if isinstance(source, Measurement):
+        name, signed, anisotropic = str(source.path), False, source.data.anisotropic
+        if isinstance(source.data, Grid):
+            signed = source.data.signed
+            wi, wo, f, solid_angle = _nodes(source.data, pairs, rng)
+        else:
+            wi, wo, f = source.data.pairs()
+            solid_angle = np.ones(len(f))
+        f = _colours(f, source.wavelengths)
+    else:
+        name, signed, anisotropic = "arrays", False, False
+        wi, wo, f, solid_angle = _arrays(source)
+    lowest = math.cos(math.radians(cut))
+    if not np.any((wi[:, 2] > 0) & (wo[:, 2] > 0)):
+        raise FitError(f"{name}: no pair of directions has both above the horizon.")
+    kept = np.flatnonzero((wi[:, 2] >= lowest) & (wo[:, 2] >= lowest) & (solid_angle > 0))
+    if not len(kept):
+        raise FitError(f"{name}: all pairs of directions are beyond the cut at {cut:g}°; give a larger one.")
+    kept = rng.permutation(kept)[:pairs]
+    wi, wo, f, solid_angle = wi[kept], wo[kept], f[kept], solid_angle[kept]
+    missing = ~np.isfinite(f)
+    negative = ~missing & (f < 0) & (not signed)
+    usable = ~missing & ~negative
+    if not f[usable].any():
+        raise FitError(f"{name}: no value within the cut at {cut:g}° is a positive number.")
+    some = usable.any(axis=1)
+    return Observations(
+        name=name,
+        wi=wi[some].astype(np.float32),
+        wo=wo[some].astype(np.float32),
+        f=np.where(usable, f, 0)[some],
+        usable=usable[some],
+        solid_angle=solid_angle[some],
+        anisotropic=anisotropic,
+        fitted=-(-int(some.sum()) // 2),
+        negative=int(negative.sum()),
+        missing=int(missing.sum()),
+    )
+
+
+def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return checked arrays, with equal solid angles."""
+    if not isinstance(source, tuple) or len(source) != 3:
+        raise FitError(f"Data are files, measurements or tuples of arrays (wi, wo, f), not {type(source).__name__}.")
+    wi, wo, f = (np.asarray(array, np.float64) for array in source)
+    f = f[:, None] if f.ndim == 1 else f
+    if wi.ndim != 2 or wi.shape[1:] != (3,) or wo.shape != wi.shape or f.ndim != 2 or len(f) != len(wi):
+        shapes = ", ".join(str(np.shape(array)) for array in source)
+        raise FitError(f"Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,) or (N, channels), not {shapes}.")
+    if f.shape[1] not in (1, 3):
+        raise FitError(f"Arrays of f have one channel or three, linear sRGB, not {f.shape[1]}.")
+    return wi, wo, f, np.ones(len(f))
+
+
+def _colours(f: np.ndarray, wavelengths: np.ndarray | None) -> np.ndarray:
+    """Return one channel, or linear sRGB where there are several that have wavelengths. Of others the mean counts."""
+    if f.shape[1] == 1 or (wavelengths is None and f.shape[1] == 3):
+        return f
+    if wavelengths is None or np.isnan(wavelengths).any():
+        return f.mean(axis=1, keepdims=True)
+    return f @ to_srgb(wavelengths)
+
+
+def _nodes(grid: Grid, pairs: int, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """Return ``(wi, wo, f, solid angle)`` of random nodes of a grid, or of all if there are few."""
+    shape = grid.values.shape[:-1]
+    total, wanted = math.prod(shape), TRIED * pairs
+    chosen = np.arange(total) if total <= 2 * wanted else np.unique(rng.integers(total, size=wanted))
+    wi, wo, f = grid.pairs(chosen)
+    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    places = np.unravel_index(chosen[above], shape)
+    return wi[above], wo[above], f[above], solid_angles(grid, places)
+
+
+def solid_angles(grid: Grid, indices: Sequence[np.ndarray]) -> np.ndarray:
+    """Return dωi dωo of the cells about some nodes, by their indices on each axis: the volume that directions sweep
+    over a cell in its coordinates, and over a turn about the normal where the coordinates leave that out."""
+    ends = [_cells(axis, k) for axis, k in zip(grid.axes, indices, strict=True)]
+    centres = [(low + high) / 2 for low, high in ends]
+    tangents = []
+    for k, (low, high) in enumerate(ends):
+        step = STEP * (high - low)
+        ahead, behind = (
+            _directions(grid, [centre + sign * step * (j == k) for j, centre in enumerate(centres)]) for sign in (1, -1)
+        )
+        tangents.append((ahead - behind) / (2 * STEP))
+    if len(tangents) < 4:
+        w = _directions(grid, centres)
+        tangents.append(np.stack([-w[..., 1], w[..., 0], 0 * w[..., 0]], axis=-1))
+    matrix = np.stack([t.reshape(len(t), 6) for t in tangents], axis=1)
+    volume = np.sqrt(np.maximum(np.linalg.det(matrix @ matrix.transpose(0, 2, 1)), 0))
+    return np.where(np.isfinite(volume), volume, 0)
+
+
+def _directions(grid: Grid, places: Sequence[np.ndarray]) -> np.ndarray:
+    """Return wi and wo, shape (N, 2, 3)."""
+    return np.stack([stacked(w) for w in grid.coordinates.directions(*places)], axis=1)
+
+
+def _cells(axis: Axis, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the cells about nodes: half way to the next, or the end of the axis."""
+    nodes = axis.nodes
+    if len(nodes) == 1:
+        return nodes[k] - 0.5, nodes[k] + 0.5
+    between = (nodes[1:] + nodes[:-1]) / 2
+    if axis.period is None:
+        low, high = min(axis.low, nodes[0]), max(axis.high, nodes[-1])
+    else:
+        high = (nodes[-1] + nodes[0] + axis.period) / 2
+        low = high - axis.period
+    edges = np.concatenate([[low], between, [high]])
+    return edges[k], edges[k + 1]

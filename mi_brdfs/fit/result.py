@@ -1,0 +1,162 @@
+"""A fitted material, and what the fit says of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+from xml.sax.saxutils import quoteattr
+
+import mitsuba as mi
+import numpy as np
+
+from ..measure.directions import direction
+from ..measure.probe import BSDFProbe
+from ..measure.variates import sobol
+from .lanes import rgb_variant
+
+ANGLES = 0, 20, 40, 60, 70, 80
+"""The angles at which the albedo is looked at, in degrees."""
+LOG2_COUNT = 10
+"""Samples for each of them."""
+FEW = 5
+"""Pairs of directions in a highlight below which its width is a guess."""
+CORRELATED = 0.95
+"""The correlation from which two parameters are told to be hard to tell apart."""
+
+
+class Starts(NamedTuple):
+    """From where a fit was tried."""
+
+    count: int
+    warm: int
+    """Of these, plugin dicts that were given, and a published material."""
+    agree: int
+    """Those that ended within 2 % of the best error."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to a material."""
+
+    file: str
+    """The file, or "arrays"."""
+    model: str
+    """The plugin, with the words of its choices that are not the defaults."""
+    metric: str
+    """What was made as small as possible."""
+    bsdf: dict[str, Any]
+    """The plugin dict."""
+    errors: dict[str, dict[str, float]]
+    """In every metric, by name, on the pairs that were ``fitted`` and on those ``held_out``; NaN if none was."""
+    sigma: dict[str, float | list[float | None] | None]
+    """The standard deviation of each parameter; None at the end of a range."""
+    correlations: dict[str, dict[str, float]]
+    """Of the fitted numbers: "alpha", "diffuse_reflectance.r" …"""
+    bounds: list[str]
+    """Numbers that ended at an end of their range."""
+    starts: Starts
+    bic: float
+    """n ln(E²) + k ln n, for the error E of the fit, n values and k parameters: the lower, the better."""
+    cut: float
+    """Up to which angle of wi and wo pairs count, in degrees."""
+    pairs: int
+    """Pairs of directions that were fitted; about as many were held out."""
+    negative: int
+    """Values below 0, which had no weight."""
+    missing: int
+    """Values that are no numbers, which had none either."""
+    in_highlight: int
+    """The pairs whose value exceeds half of that of the mirror direction."""
+    anisotropic: bool
+    fixed: list[str] = field(default_factory=list)
+    """Parameters that isotropic data say nothing about, left at their defaults."""
+
+    @property
+    def held_out(self) -> float:
+        """The error on what was held out, in the fitted metric, by which fits are ranked."""
+        return self.errors[self.metric]["held_out"]
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the highlight is wide enough for the data to tell its width."""
+        return self.in_highlight >= FEW
+
+    @cached_property
+    def albedo(self) -> float:
+        """The largest directional albedo of any channel, at angles up to 80°."""
+        turns = (0, 45, 90) if self.anisotropic else (0,)
+        return float(self._albedos([direction(theta, phi) for theta in ANGLES for phi in turns]).max())
+
+    def albedos(self, theta_i: float, phi_i: float = 0) -> list[float]:
+        """Return the directional albedo of each channel, linear sRGB, at an angle of incidence in degrees."""
+        return [float(albedo) for albedo in self._albedos([direction(theta_i, phi_i)])[0]]
+
+    def _albedos(self, wi: list[np.ndarray]) -> np.ndarray:
+        with rgb_variant():
+            probe = BSDFProbe(mi.load_dict(self.bsdf))
+            return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
+
+    def remarks(self) -> list[str]:
+        """Return what to know of this fit, in sentences."""
+        found = []
+        if self.albedo > 1:
+            found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
+        if not self.resolved:
+            found.append(f"The highlight is narrower than the data resolve: {self.in_highlight} pairs lie in it.")
+        if self.bounds:
+            found.append(f"At the end of the range: {', '.join(self.bounds)}.")
+        close = [f"{a} and {b} ({r:.3f})" for a, row in self.correlations.items() for b, r in row.items()
+                 if a < b and abs(r) > CORRELATED and a.partition(".")[0] != b.partition(".")[0]]  # fmt: skip
+        if close:
+            found.append(f"Hard to tell apart: {', '.join(close)}.")
+        if self.fixed:
+            found.append(f"Isotropic data leave at the default: {', '.join(self.fixed)}.")
+        if self.negative or self.missing:
+            found.append(f"Without weight: {self.negative} negative and {self.missing} missing values.")
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as what JSON can hold; ``bsdf`` is the dict for ``mi.load_dict``."""
+        finite = {
+            name: {part: value if np.isfinite(value) else None for part, value in parts.items()}
+            for name, parts in self.errors.items()
+        }
+        return {
+            "file": self.file,
+            "model": self.model,
+            "metric": self.metric,
+            "bsdf": self.bsdf,
+            "errors": finite,
+            "sigma": self.sigma,
+            "starts": self.starts._asdict(),
+            "bic": self.bic,
+            "correlations": self.correlations,
+            "bounds": self.bounds,
+            "albedo": self.albedo,
+            "resolved": self.resolved,
+            "cut": self.cut,
+            "pairs": self.pairs,
+            "negative": self.negative,
+            "missing": self.missing,
+            "remarks": self.remarks(),
+        }
+
+    def to_xml(self) -> str:
+        """Return the BSDF as XML, to paste into a scene."""
+        lines = [f"<bsdf type={quoteattr(self.bsdf['type'])}>"]
+        lines += [f"    {_element(name, value)}" for name, value in self.bsdf.items() if name != "type"]
+        return "\n".join([*lines, "</bsdf>"])
+
+
+def _element(name: str, value: Any) -> str:
+    """Return a parameter as an XML element."""
+    if isinstance(value, dict):
+        kind, text = "rgb", ", ".join(f"{number:.7g}" for number in value["value"])
+    elif isinstance(value, bool):
+        kind, text = "boolean", str(value).lower()
+    elif isinstance(value, str):
+        kind, text = "string", value
+    else:
+        kind, text = "float", f"{value:.7g}"
+    return f"<{kind} name={quoteattr(name)} value={quoteattr(text)}/>"

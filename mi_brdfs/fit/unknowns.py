@@ -1,0 +1,294 @@
+"""The unknowns of a fit, by a model's declarations: which numbers are free, and on which scale they are sought."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..measure import settings
+from ..model import Model
+from ..parameters import Choice, Colour, Flag, FresnelSet, Number, OneOf, Parameter, PerLobe, Reflectance, Rotation
+from ..parameters.fresnel import OTHERS
+from ..parameters.messages import listed, meant
+from .observations import FitError
+
+FRESNEL = "fresnel"
+"""The choice among the sets of parameters of a Fresnel term, Schlick's by default, which has every reflectance at
+normal incidence with one colour."""
+FRESNEL_SETS: dict[str, tuple[Parameter, ...]] = {
+    "schlick": (Reflectance(None, "").replace(name="f0"),),
+    "dielectric": (Number(None, FresnelSet.INDEX, "").replace(name="int_ior"),),
+    "conductor": (
+        Colour(None, FresnelSet.INDEX, "").replace(name="eta"),
+        Colour(None, FresnelSet.EXTINCTION, "").replace(name="k"),
+    ),
+    "none": (),
+}
+"""The free parameters of each word."""
+SMALLEST, LARGEST = 1e-3, 1e6
+"""Where a search on a logarithmic scale begins if a range begins at 0, and ends if it has no end."""
+EDGE = 1e-5
+"""How near to its ends a share is sought, as a part of its range; so near, it counts as at the end."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that is sought, within ``low`` and ``high``."""
+
+    name: str
+    """Of the parameter."""
+    channel: int | None
+    """Of a colour with several channels."""
+    colour: bool
+    low: float
+    high: float
+    scale: str
+    """"log", "logit" (a share of the range), "asinh" (numbers of both signs) or "turns"."""
+    default: float | None = None
+
+    @property
+    def label(self) -> str:
+        return self.name if self.channel is None else f"{self.name}.{'rgb'[self.channel]}"
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The ends of the range on the scale."""
+        low, high = self.to_scale(np.array([self.low, self.high]))
+        return float(low), float(high)
+
+    def to_scale(self, x: np.ndarray) -> np.ndarray:
+        x = np.asarray(x, np.float64)
+        if self.scale == "turns":
+            return x
+        x = np.clip(x, self.low, self.high)
+        if self.scale == "log":
+            return np.log(x)
+        if self.scale == "asinh":
+            return np.arcsinh(x)
+        share = x / (self.high + self.low)
+        return np.log(share / (1 - share))
+
+    def from_scale(self, u: np.ndarray) -> np.ndarray:
+        if self.scale == "turns":
+            return u
+        if self.scale == "log":
+            x = np.exp(u)
+        elif self.scale == "asinh":
+            x = np.sinh(u)
+        else:
+            x = (self.high + self.low) / (1 + np.exp(-u))
+        return np.clip(x, self.low, self.high)
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """Return dx/du."""
+        if self.scale == "turns":
+            return np.ones_like(x)
+        if self.scale == "log":
+            return x
+        if self.scale == "asinh":
+            return np.sqrt(1 + x * x)
+        return x * (1 - x / (self.high + self.low))
+
+    def at_end(self, x: float) -> bool:
+        """Return whether a value is at an end of the range."""
+        if self.scale == "turns":
+            return False
+        u, (low, high) = float(self.to_scale(np.array(x))), self.ends
+        return min(u - low, high - u) < 1e-3 * (high - low)
+
+
+def _unknown(name: str, channel: int | None, colour: bool, limits: tuple[float, float]) -> Unknown:
+    """Return an unknown on the scale that suits a declared range: shares up to 1 on a logit scale, positive numbers on
+    a logarithmic one."""
+    low, high = limits
+    if low < 0:
+        return Unknown(name, channel, colour, low, high, "asinh")
+    if low == 0 and high <= 1:
+        return Unknown(name, channel, colour, EDGE * high, (1 - EDGE) * high, "logit")
+    if math.isinf(high):
+        return Unknown(name, channel, colour, max(low, 1 / LARGEST), LARGEST, "log")
+    return Unknown(name, channel, colour, max(low, SMALLEST * min(high, 1)), high, "log")
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A model with its choices, what is fixed, and the unknowns."""
+
+    model: type[Model]
+    given: dict[str, Any]
+    """The words and fixed parameters, as the plugin takes them."""
+    words: dict[str, Any]
+    """The choices among these that the model leaves open, and the one of the Fresnel term."""
+    unknowns: tuple[Unknown, ...]
+    tied: dict[str, str]
+    """Parameters that are equal to another one."""
+
+    @property
+    def plugin(self) -> str:
+        return self.model.plugins[0]
+
+    @property
+    def title(self) -> str:
+        """The plugin's name, and the words that differ from the defaults."""
+        usual = default_words(self.model)
+        return " ".join([self.plugin, *(str(word) for name, word in self.words.items() if usual.get(name) != word)])
+
+    def indices(self, name: str) -> list[int]:
+        """Return where the unknowns of a parameter are, one or one a channel."""
+        name = self.tied.get(name, name)
+        return [k for k, unknown in enumerate(self.unknowns) if unknown.name == name]
+
+    @property
+    def names(self) -> list[str]:
+        """The parameters that are sought, with those that are tied to them."""
+        return [*dict.fromkeys(unknown.name for unknown in self.unknowns), *self.tied]
+
+    def is_colour(self, name: str) -> bool:
+        return self.unknowns[self.indices(name)[0]].colour
+
+    def bsdf(self, x: np.ndarray) -> dict[str, Any]:
+        """Return the plugin dict for values of the unknowns."""
+        values: dict[str, Any] = {}
+        for name in self.names:
+            numbers = [float(f"{x[k]:.7g}") for k in self.indices(name)]
+            values[name] = numbers[0] if len(numbers) == 1 else {"type": "rgb", "value": numbers}
+        return {"type": self.plugin, **self.given, **values}
+
+    def without(self, names: Iterable[str], tied: Mapping[str, str]) -> Configuration:
+        """Return it without some unknowns, and with others tied."""
+        dropped = {*names, *tied}
+        return replace(
+            self, unknowns=tuple(u for u in self.unknowns if u.name not in dropped), tied={**self.tied, **tied}
+        )
+
+
+def default_words(model: type[Model]) -> dict[str, Any]:
+    """Return the word of each choice that stands where none is given."""
+    return {name: words[0] for name, words in _choices(model.declared())}
+
+
+def _choices(declared: Iterable[Parameter]) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Yield choices with their words, the default first."""
+    for parameter in declared:
+        if isinstance(parameter, PerLobe):
+            yield from _choices(parameter.declared.values())
+        elif isinstance(parameter, OneOf):
+            yield parameter.name, tuple(parameter.words)
+            for own in parameter.words.values():
+                yield from _choices(own.values())
+        elif isinstance(parameter, Choice):
+            yield parameter.name, parameter.choices
+        elif isinstance(parameter, Flag):
+            yield parameter.name, (parameter.default, not parameter.default)
+        elif isinstance(parameter, FresnelSet):
+            yield FRESNEL, (*FRESNEL_SETS, *OTHERS.words)
+
+
+def configurations(
+    model: type[Model],
+    given: Mapping[str, Any],
+    tied: Mapping[str, str],
+    lobes: int,
+    channels: int,
+    anisotropic: bool,
+) -> list[Configuration]:
+    """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
+    with the default of those that are not given.
+
+    Raises:
+        FitError: if a parameter does not exist, or nothing is left to fit.
+    """
+    name = model.plugins[0]
+    known = {FRESNEL, *(it for parameter in model.declared() for it in parameter.names)}
+    for wrong in [it for it in (*given, *tied, *tied.values()) if it not in known]:
+        near = meant(wrong, known)
+        raise FitError(f"{name}: there is no parameter {wrong}" + (f"; did you mean {near}?" if near else "."))
+    words = {choice: allowed[:1] for choice, allowed in _choices(model.declared())}
+    for choice, allowed in _choices(model.declared()):
+        if choice in given:
+            wanted = given[choice] if isinstance(given[choice], tuple) else (given[choice],)
+            for word in wanted:
+                if word not in allowed:
+                    raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
+            words[choice] = wanted
+    fixed = {key: value for key, value in given.items() if key not in words}
+    found = []
+    for combination in _combinations(model.declared(), words, fixed):
+        free = list(_free(model.declared(), combination, fixed, lobes, anisotropic))
+        unknowns = [u for parameter in free for u in _unknowns_of(parameter, fixed, channels, anisotropic)]
+        usable = {u.name for u in unknowns}
+        if missing := {*tied, *tied.values()} - usable:
+            raise FitError(
+                f"{name}: {sorted(missing)[0]} is tied, but not free here; free are {listed(usable, 'and')}."
+            )
+        unknowns = [u for u in unknowns if u.name not in tied]
+        if not unknowns:
+            raise FitError(f"{name} has nothing to fit: all its parameters are given.")
+        plain = {k: v for k, v in combination.items() if k != FRESNEL or v in OTHERS.words}
+        passed = {key: value for key, value in fixed.items() if value is not None}
+        found.append(Configuration(model, {**plain, **passed}, combination, tuple(unknowns), dict(tied)))
+    return found
+
+
+def _combinations(
+    declared: list[Parameter], words: Mapping[str, tuple[Any, ...]], fixed: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Return all combinations of words, each with those of the choices that belong to its words."""
+    combinations: list[dict[str, Any]] = settings.choices(declared, words)
+    sets = [p for p in _nested(declared) if isinstance(p, FresnelSet)]
+    if not sets:
+        return combinations
+    own = next((kind for kind, names in FresnelSet.SETS.items() if any(fixed.get(n) is not None for n in names)), None)
+    if own:
+        return [one | {FRESNEL: "none" if own == "material" else own} for one in combinations]
+    return [one | {FRESNEL: word} for one in combinations for word in words[FRESNEL]]
+
+
+def _nested(declared: Iterable[Parameter]) -> Iterator[Parameter]:
+    """Yield parameters with those of all words and lobes."""
+    for parameter in declared:
+        yield parameter
+        if isinstance(parameter, OneOf):
+            for own in parameter.words.values():
+                yield from _nested(own.values())
+        elif isinstance(parameter, PerLobe):
+            yield from _nested(parameter.declared.values())
+
+
+def _free(
+    declared: Iterable[Parameter], words: Mapping[str, Any], fixed: Mapping[str, Any], lobes: int, anisotropic: bool
+) -> Iterator[Parameter]:
+    """Yield the numbers and colours that exist with some words, with those of each lobe."""
+    for parameter in declared:
+        if isinstance(parameter, PerLobe):
+            for number in [""] if lobes == 1 else [f"_{k + 1}" for k in range(lobes)]:
+                own = (it.numbered(number) for it in parameter.declared.values())
+                yield from _free(own, words, fixed, lobes, anisotropic)
+        elif isinstance(parameter, OneOf):
+            yield from _free(parameter.words[words[parameter.name]].values(), words, fixed, lobes, anisotropic)
+        elif isinstance(parameter, FresnelSet):
+            word = words[FRESNEL]
+            own_words = OTHERS.words[word].values() if word in OTHERS.words else FRESNEL_SETS[word]
+            yield from own_words
+        elif isinstance(parameter, (Number, Colour)) or (isinstance(parameter, Rotation) and anisotropic):
+            yield parameter
+
+
+def _unknowns_of(parameter: Parameter, fixed: Mapping[str, Any], channels: int, anisotropic: bool) -> Iterator[Unknown]:
+    """Yield the unknowns of a parameter: none if it is given under one of its names, and both of a pair where the data
+    are anisotropic."""
+    if any(name in fixed for name in parameter.names):
+        return
+    if isinstance(parameter, Rotation):
+        yield Unknown(parameter.name, None, False, -0.5, 0.5, "turns")
+    elif isinstance(parameter, Number):
+        names = parameter.pair if anisotropic and parameter.pair else parameter.names[:1]
+        for name in names:
+            yield replace(_unknown(name, None, False, parameter.limits), default=parameter.default)
+    elif isinstance(parameter, Colour):
+        for channel in range(channels) if channels > 1 else (None,):
+            yield _unknown(parameter.names[0], channel, True, parameter.limits)
