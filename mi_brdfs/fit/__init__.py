@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
-from ..measured import FileError, Measurement
+from ..measured import FileError
 from .engine import fit_configuration
 from .isotropy import isotropic
 from .lanes import rgb_variant
 from .metrics import METRICS, Metric, find_metric
 from .observations import FitError, Observations, Source, observe
 from .result import Fit, Starts
-from .unknowns import Configuration, configurations
+from .unknowns import configurations
 
-__all__ = ["METRICS", "FileError", "Fit", "FitError", "Metric", "Observations", "Starts", "fit"]
+__all__ = [
+    "METRICS",
+    "PAIRS",
+    "FileError",
+    "Fit",
+    "FitError",
+    "Metric",
+    "Observations",
+    "Starts",
+    "find_metric",
+    "fit",
+    "observe",
+]
 
 CUT, PAIRS, STARTS = 80.0, 4096, 10
 """The defaults of :func:`fit`."""

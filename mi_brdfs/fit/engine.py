@@ -41,7 +41,7 @@ def fit_configuration(
     values = problem.values_of(points)
     best = [int(np.flatnonzero(owners == m)[costs[owners == m].argmin()]) for m in range(len(materials))]
     errors = problem.errors(range(len(materials)), values[best])
-    spread = {m: rest for m, *rest in _uncertainties(problem, values[best])}
+    spread = _uncertainties(problem, values[best])
     fits = []
     for m, material in enumerate(materials):
         x, own = values[best[m]], costs[owners == m]
@@ -69,10 +69,8 @@ def fit_configuration(
     return fits
 
 
-def _uncertainties(
-    problem: Problem, values: Array
-) -> list[tuple[int, list[float | None], dict[str, dict[str, float]]]]:
-    """Return ``(material, standard deviations, correlations)`` of the best settings, but for unknowns at the end of
+def _uncertainties(problem: Problem, values: Array) -> list[tuple[list[float | None], dict[str, dict[str, float]]]]:
+    """Return ``(standard deviations, correlations)`` of the best settings, but for unknowns at the end of
     their range: from the Jacobian and from how far the data are from the model at each pair of directions, so that
     noise may differ from pair to pair and be common to the channels.
 
@@ -86,7 +84,11 @@ def _uncertainties(
         scale = np.sqrt((jacobian[:, free] ** 2).sum(axis=0))
         scale = np.where(scale > 0, scale, 1)
         scaled = jacobian[:, free] / scale
-        scores = (scaled * residuals[:, None]).reshape(-1, channels, len(free)).sum(axis=1)
+        scores = (
+            (scaled * residuals[:, None]).reshape(len(residuals) // channels, channels, -1).sum(axis=1)
+            if free
+            else scaled
+        )
         bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
         freedom = len(scores) / max(len(scores) - len(free), 1)
         covariance = freedom * (bread @ (scores.T @ scores) @ bread) / np.outer(scale, scale)
@@ -97,7 +99,7 @@ def _uncertainties(
         ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
         labels = [unknowns[k].label for k in free]
         rows = {a: {b: float(np.clip(ratio[i, j], -1, 1)) for j, b in enumerate(labels)} for i, a in enumerate(labels)}
-        found.append((m, sigma, rows))
+        found.append((sigma, rows))
     return found
 
 

@@ -45,7 +45,7 @@ def isotropic(configuration: Configuration) -> Configuration:
         values, _ = lanes.evaluate(np.array(settings), pairs, derivatives=False)
         straight, turned = np.moveaxis(values.reshape(len(settings), 2, PAIRS, -1), 1, 0)
         scale = np.maximum(np.abs(straight), 1e-3 * np.abs(straight).max(axis=1, keepdims=True))
-        return (np.abs(straight - turned) > TOLERANCE * scale).any(axis=(1, 2))
+        return np.asarray((np.abs(straight - turned) > TOLERANCE * scale).any(axis=(1, 2)))
 
     def moved(*together: str) -> list[np.ndarray]:
         """Return the base with some parameters at the same other places."""
@@ -60,16 +60,18 @@ def isotropic(configuration: Configuration) -> Configuration:
     found = turns([base, *(setting for name in names for setting in moved(name))])
     if found[0]:  # no matter what they are
         return configuration
-    tried = found[1:].reshape(len(names), len(PLACES)).any(axis=1)
-    breaking = [name for name, broken in zip(names, tried, strict=True) if broken]
+    tried = np.any(found[1:].reshape(len(names), len(PLACES)), axis=1)
+    breaking = [name for name, breaks in zip(names, tried, strict=True) if breaks]
     limits = {name: (configuration.unknowns[indices[name]].low, configuration.unknowns[indices[name]].high)
               for name in breaking}  # fmt: skip
     alike = [(a, b) for a, b in combinations(breaking, 2) if limits[a] == limits[b]]
     tied: dict[str, str] = {}
     if alike:
-        kept = ~turns([setting for pair in alike for setting in moved(*pair)]).reshape(len(alike), -1).any(axis=1)
-        for (a, b), together in zip(alike, kept, strict=True):
-            if together and a not in tied and b not in tied:
+        broken = np.any(turns([setting for pair in alike for setting in moved(*pair)]).reshape(len(alike), -1).any(
+            axis=1
+        )
+        for (a, b), apart in zip(alike, broken, strict=True):
+            if not apart and a not in tied and b not in tied:
                 tied[b] = a
     dropped = [name for name in breaking if name not in tied and name not in tied.values()]
     return configuration.without(dropped, tied)

@@ -69,14 +69,14 @@ class Lanes:
 
     def evaluate(
         self, settings: Array, pairs: Sequence[tuple[Array, Array]], derivatives: bool = True
-    ) -> tuple[Array, Array | None]:
+    ) -> tuple[Array, Array]:
         """Return the values of all lanes, shape (lanes, channels), and the derivatives by the unknowns, shape (lanes,
-        channels, unknowns); float32."""
+        channels, unknowns), or none of them; float32."""
         return self._evaluated(settings, pairs, self._sweeps if derivatives else [])
 
     def _evaluated(
         self, settings: Array, pairs: Sequence[tuple[Array, Array]], sweeps: list[list[int]]
-    ) -> tuple[Array, Array | None]:
+    ) -> tuple[Array, Array]:
         counts = [len(wi) for wi, _ in pairs]
         si, wo = interaction(np.concatenate([wi for wi, _ in pairs])), vectors(np.concatenate([wo for _, wo in pairs]))
         dr.make_opaque(si)
@@ -88,9 +88,7 @@ class Lanes:
         for texture in self.textures.values():
             texture.value = None  # what lives on is part of other kernels
         found = self._array(value)
-        if not sweeps:
-            return found, None
-        jacobian = np.zeros((*found.shape, len(self.configuration.unknowns)), np.float32)
+        jacobian = np.zeros((*found.shape, len(self.configuration.unknowns) if sweeps else 0), np.float32)
         for sweep, tangent in zip(sweeps, tangents, strict=True):
             columns = self._array(tangent)
             if len(sweep) == 1:

@@ -36,6 +36,11 @@ def _same(x: np.ndarray) -> np.ndarray:
     return x
 
 
+def _log(x: np.ndarray) -> np.ndarray:
+    """Return ln(1 + x), and its mirror image for the negative channels of colours outside sRGB."""
+    return np.copysign(np.log1p(np.abs(x)), x)
+
+
 SMALLEST = 1e-6
 """The f cosθi below which a root is steep enough to be held."""
 
@@ -45,7 +50,7 @@ def _cube_root_slope(x: np.ndarray) -> np.ndarray:
 
 
 METRICS = {
-    "log": Metric(np.log1p, lambda x: 1 / (1 + x), False,
+    "log": Metric(_log, lambda x: 1 / (1 + np.abs(x)), False,
                   "ln(1 + f cosθi), weighted by sinθi (E2 of Löw et al. 2012)"),
     "l2": Metric(_same, np.ones_like, False, "f cosθi, weighted by sinθi (E1 of Löw et al. 2012)"),
     "ngan": Metric(_same, np.ones_like, True, "f cosθi, weighted by solid angle (Ngan et al. 2005)"),

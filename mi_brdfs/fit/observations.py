@@ -91,7 +91,8 @@ def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
     usable = ~missing & ~negative
     if not f[usable].any():
         raise FitError(f"{name}: no value within the cut at {cut:g}° is a positive number.")
-    some = usable.any(axis=1)
+    some = np.flatnonzero(usable.any(axis=1))
+    some, fitted = _halves(some, wi[some] + wo[some], rng)
     return Observations(
         name=name,
         wi=wi[some].astype(np.float32),
@@ -100,10 +101,21 @@ def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
         usable=usable[some],
         solid_angle=solid_angle[some],
         anisotropic=anisotropic,
-        fitted=-(-int(some.sum()) // 2),
+        fitted=fitted,
         negative=int(negative.sum()),
         missing=int(missing.sum()),
     )
+
+
+def _halves(rows: np.ndarray, half: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, int]:
+    """Return rows in random order, a half of them first, and how many that are: of each two whose half vectors are at
+    about the same angle to the normal, one is in either half, so that highlights are in both."""
+    sorted_rows = rows[np.argsort(np.hypot(half[:, 0], half[:, 1]) / half[:, 2], kind="stable")]
+    first = np.zeros(len(rows), bool)
+    first[::2] = rng.random(len(first[::2])) < 0.5
+    first[1::2] = ~first[: len(first[1::2]) * 2 : 2]
+    fitted = first.sum()
+    return np.concatenate([rng.permutation(sorted_rows[first]), rng.permutation(sorted_rows[~first])]), int(fitted)
 
 
 def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

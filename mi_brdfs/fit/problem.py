@@ -38,7 +38,7 @@ class Problem:
         columns = [u.to_scale(values[..., k]) for k, u in enumerate(self.configuration.unknowns)]
         return np.stack(columns, axis=-1)
 
-    def sums(self, which: Sequence[int], points: Array) -> Normal:
+    def sums(self, which: Sequence[int] | Array, points: Array) -> Normal:
         """Return the sums over the fitted pairs of some materials at points of shape (P, K)."""
         count, unknowns = len(points), points.shape[1]
         found = Normal(np.zeros(count), np.zeros((count, unknowns)), np.zeros((count, unknowns, unknowns)))
@@ -50,7 +50,7 @@ class Problem:
             found.gradient[p], found.matrix[p] = jacobian.T @ residuals, jacobian.T @ jacobian
         return found
 
-    def residuals(self, which: Sequence[int], values: Array) -> Iterator[tuple[int, Array, Array]]:
+    def residuals(self, which: Sequence[int] | Array, values: Array) -> Iterator[tuple[int, Array, Array]]:
         """Yield ``(setting, residuals, derivatives by the unknowns)`` of the fitted pairs, of shapes (N channels,) and
         (N channels, K): their squares add to the square of the error."""
         targets = [self.targets[m] for m in which]
@@ -63,7 +63,7 @@ class Problem:
                 yield p, *target.compared(model[first:last], jacobian[first:last], self.metric)
                 first = last
 
-    def costs(self, which: Sequence[int], values: Array, pairs: int) -> Array:
+    def costs(self, which: Sequence[int] | Array, values: Array, pairs: int) -> Array:
         """Return the squares of the errors on the first of the fitted pairs alone."""
         targets, found = [self.targets[m] for m in which], np.empty(len(values))
         given = [(t.fitted[0][:pairs], t.fitted[1][:pairs]) for t in targets]
@@ -76,7 +76,7 @@ class Problem:
                 first += len(wi)
         return np.where(np.isfinite(found), found, np.inf)
 
-    def errors(self, which: Sequence[int], values: Array) -> list[dict[str, dict[str, float]]]:
+    def errors(self, which: Sequence[int] | Array, values: Array) -> list[dict[str, dict[str, float]]]:
         """Return the errors of settings in every metric, on the fitted pairs and on those held out."""
         found = []
         for m, setting in zip(which, values, strict=True):

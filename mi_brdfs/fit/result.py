@@ -28,7 +28,7 @@ CORRELATED = 0.95
 class Starts(NamedTuple):
     """From where a fit was tried."""
 
-    count: int
+    tried: int
     warm: int
     """Of these, plugin dicts that were given, and a published material."""
     agree: int
