@@ -67,9 +67,8 @@ def isotropic(configuration: Configuration) -> Configuration:
     alike = [(a, b) for a, b in combinations(breaking, 2) if limits[a] == limits[b]]
     tied: dict[str, str] = {}
     if alike:
-        broken = np.any(turns([setting for pair in alike for setting in moved(*pair)]).reshape(len(alike), -1).any(
-            axis=1
-        )
+        found = turns([setting for pair in alike for setting in moved(*pair)])
+        broken = np.any(found.reshape(len(alike), len(PLACES)), axis=1)
         for (a, b), apart in zip(alike, broken, strict=True):
             if not apart and a not in tied and b not in tied:
                 tied[b] = a
