@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from .unknowns import Configuration
 
 AGREEMENT = 1.02
 """The error, relative to the best, up to which a start agrees with it."""
+
+BLIND = 1e-10
+"""The part of the largest eigenvalue of JᵀJ, its columns of length 1, below which a direction is rounding."""
 
 Advance = Callable[[int], None]
 
@@ -41,11 +44,12 @@ def fit_configuration(
     values = problem.values_of(points)
     best = [int(np.flatnonzero(owners == m)[costs[owners == m].argmin()]) for m in range(len(materials))]
     errors = problem.errors(range(len(materials)), values[best])
-    spread = _uncertainties(problem, values[best])
+    spread = [
+        _uncertainty(problem, values[best[m]], *sums) for m, *sums in problem.residuals(range(len(best)), values[best])
+    ]
     fits = []
     for m, material in enumerate(materials):
         x, own = values[best[m]], costs[owners == m]
-        sigma, correlations = spread[m]
         residuals = int(material.usable[: material.fitted].sum())
         fits.append(Fit(
             file=material.name,
@@ -53,8 +57,9 @@ def fit_configuration(
             metric=metric,
             bsdf=configuration.bsdf(x),
             errors=errors[m],
-            sigma=_by_parameter(configuration, sigma),
-            correlations=correlations,
+            sigma=_by_parameter(configuration, spread[m].sigma),
+            correlations=spread[m].correlations,
+            undetermined=spread[m].undetermined,
             bounds=[u.label for u, value in zip(configuration.unknowns, x, strict=True) if u.at_end(float(value))],
             starts=Starts(len(own), warm, int((own <= AGREEMENT**2 * own.min() + 1e-16).sum())),
             bic=float(residuals * np.log(max(own.min(), 1e-300)) + len(x) * np.log(residuals)),
@@ -69,38 +74,47 @@ def fit_configuration(
     return fits
 
 
-def _uncertainties(problem: Problem, values: Array) -> list[tuple[list[float | None], dict[str, dict[str, float]]]]:
-    """Return ``(standard deviations, correlations)`` of the best settings, but for unknowns at the end of
-    their range: from the Jacobian and from how far the data are from the model at each pair of directions, so that
-    noise may differ from pair to pair and be common to the channels.
+class Uncertainty(NamedTuple):
+    """Of the unknowns at the best setting, but for those at the end of their range."""
 
-    H. White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48(4), 1980,
-    doi:10.2307/1912934.
+    sigma: list[float | None]
+    """The standard deviations; None where the data do not tell."""
+    correlations: dict[str, dict[str, float]]
+    undetermined: list[str]
+    """Unknowns that can change together without a change of the values."""
+
+
+def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Array) -> Uncertainty:
+    """Return the uncertainty from the Jacobian and from how far the data are from the model at each pair of directions,
+    so that noise may differ from pair to pair and be common to the channels.
+
+    J. G. MacKinnon, H. White, Some heteroskedasticity-consistent covariance matrix estimators with improved finite
+    sample properties, Journal of Econometrics 29(3), 1985, doi:10.1016/0304-4076(85)90158-7.
     """
-    unknowns, found = problem.configuration.unknowns, []
-    for m, residuals, jacobian in problem.residuals(range(len(values)), values):
-        channels = problem.lanes.channels
-        free = [k for k, u in enumerate(unknowns) if not u.at_end(float(values[m, k]))]
-        scale = np.sqrt((jacobian[:, free] ** 2).sum(axis=0))
-        scale = np.where(scale > 0, scale, 1)
-        scaled = jacobian[:, free] / scale
-        scores = (
-            (scaled * residuals[:, None]).reshape(len(residuals) // channels, channels, -1).sum(axis=1)
-            if free
-            else scaled
-        )
-        bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
-        freedom = len(scores) / max(len(scores) - len(free), 1)
-        covariance = freedom * (bread @ (scores.T @ scores) @ bread) / np.outer(scale, scale)
-        deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
-        sigma: list[float | None] = [None] * len(unknowns)
-        for k, deviation in zip(free, deviations, strict=True):
-            sigma[k] = float(deviation)
-        ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
-        labels = [unknowns[k].label for k in free]
-        rows = {a: {b: float(np.clip(ratio[i, j], -1, 1)) for j, b in enumerate(labels)} for i, a in enumerate(labels)}
-        found.append((sigma, rows))
-    return found
+    unknowns, channels = problem.configuration.unknowns, problem.lanes.channels
+    free = [k for k, u in enumerate(unknowns) if not u.at_end(float(values[k]))]
+    sigma: list[float | None] = [None] * len(unknowns)
+    labels = [unknowns[k].label for k in free]
+    if not free:
+        return Uncertainty(sigma, {}, [])
+    scale = np.sqrt((jacobian[:, free] ** 2).sum(axis=0))
+    scale = np.where(scale > 0, scale, 1)
+    scaled = jacobian[:, free] / scale
+    lengths, axes = np.linalg.eigh(scaled.T @ scaled)
+    blind = lengths < BLIND * lengths.max()
+    lost = (np.abs(axes[:, blind]) > 0.1).any(axis=1)
+    bread = (axes / np.where(blind, np.inf, lengths)) @ axes.T
+    leverage = ((scaled @ bread) * scaled).sum(axis=1).reshape(-1, channels).sum(axis=1)
+    scores = (scaled * residuals[:, None]).reshape(len(leverage), channels, -1).sum(axis=1)
+    scores = scores / np.maximum(1 - leverage, 0.1)[:, None]  # a pair with weight pulls the model to itself
+    covariance = bread @ (scores.T @ scores) @ bread / np.outer(scale, scale)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
+    ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
+    known = [i for i in range(len(free)) if not lost[i]]
+    for i in known:
+        sigma[free[i]] = float(deviations[i])
+    rows = {labels[i]: {labels[j]: float(np.clip(ratio[i, j], -1, 1)) for j in known} for i in known}
+    return Uncertainty(sigma, rows, [label for label, gone in zip(labels, lost, strict=True) if gone])
 
 
 def _by_parameter(configuration: Configuration, sigma: list[float | None]) -> dict[str, Any]:

@@ -50,9 +50,11 @@ class Fit:
     errors: dict[str, dict[str, float]]
     """In every metric, by name, on the pairs that were ``fitted`` and on those ``held_out``; NaN if none was."""
     sigma: dict[str, float | list[float | None] | None]
-    """The standard deviation of each parameter; None at the end of a range."""
+    """The standard deviation of each parameter; None at the end of a range, and where the data do not tell."""
     correlations: dict[str, dict[str, float]]
     """Of the fitted numbers: "alpha", "diffuse_reflectance.r" …"""
+    undetermined: list[str]
+    """Numbers that can change together without a change of the values."""
     bounds: list[str]
     """Numbers that ended at an end of their range."""
     starts: Starts
@@ -104,6 +106,8 @@ class Fit:
             found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
         if not self.resolved:
             found.append(f"The highlight is narrower than the data resolve: {self.in_highlight} pairs lie in it.")
+        if self.undetermined:
+            found.append(f"Not determined by the data: {', '.join(self.undetermined)}.")
         if self.bounds:
             found.append(f"At the end of the range: {', '.join(self.bounds)}.")
         close = [f"{a} and {b} ({r:.3f})" for a, row in self.correlations.items() for b, r in row.items()
@@ -132,6 +136,7 @@ class Fit:
             "starts": self.starts._asdict(),
             "bic": self.bic,
             "correlations": self.correlations,
+            "undetermined": self.undetermined,
             "bounds": self.bounds,
             "albedo": self.albedo,
             "resolved": self.resolved,
