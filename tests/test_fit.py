@@ -1,6 +1,5 @@
 """Fits of known materials: what was put in comes out, within the stated uncertainty."""
 
-import numpy as np
 import pytest
 from fits import MODELS, measured
 

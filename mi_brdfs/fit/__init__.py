@@ -12,6 +12,7 @@ from .lanes import rgb_variant
 from .metrics import METRICS, Metric, find_metric
 from .observations import FitError, Observations, Source, observe
 from .result import Fit, Starts
+from .starts import warm
 from .unknowns import configurations
 
 __all__ = [
@@ -105,6 +106,9 @@ def fit(
             alike = [k for k, it in enumerate(materials) if (it.channels, it.anisotropic) == kind]
             for each in models:
                 todo += [(it, alike) for it in configurations(each, given or {}, tied or {}, lobes, *kind)]
+        for each_start in given_starts:
+            if not any(warm(configuration, each_start) for configuration, _ in todo):
+                raise FitError(f"No fit can start at {each_start}: it is of another plugin, or has other parameters.")
         ended, found = 0, []
         total = sum(len(alike) for _, alike in todo) * (starts + len(given_starts))
 

@@ -53,7 +53,13 @@ class Lanes:
     def __init__(self, configuration: Configuration, channels: int):
         self.configuration, self.channels = configuration, channels
         self.textures = {name: per_lane() for name in configuration.names}
-        self.bsdf = mi.load_dict({"type": configuration.plugin, **configuration.given, **self.textures})
+        try:
+            self.bsdf = mi.load_dict({"type": configuration.plugin, **configuration.given, **self.textures})
+        except RuntimeError as error:
+            _, refused, sentence = str(error).rpartition("ParameterError: ")
+            if not refused:
+                raise
+            raise FitError(sentence.strip()) from None
         self._sweeps = self._find_sweeps()
 
     def batches(self, pairs: Sequence[tuple[Array, Array]]) -> Iterator[range]:

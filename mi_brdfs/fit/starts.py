@@ -71,6 +71,8 @@ def warm(configuration: Configuration, given: Mapping[str, Any]) -> dict[int, fl
     usual, found = default_words(configuration.model) | configuration.words, dict[int, float]()
     for name, value in given.items():
         if name == "type":
+            if value not in configuration.model.plugins:
+                return None
             continue
         indices = configuration.indices(name) if name in configuration.names else []
         if not indices:

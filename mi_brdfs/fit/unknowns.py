@@ -93,6 +93,10 @@ class Unknown:
             return np.sqrt(1 + x * x)
         return x * (1 - x / (self.high + self.low))
 
+    def shown(self, x: float) -> float:
+        """Return a value as a plugin dict has it: half turns change nothing."""
+        return x - round(2 * x) / 2 if self.scale == "turns" else x
+
     def at_end(self, x: float) -> bool:
         """Return whether a value is at an end of the range."""
         if self.scale == "turns":
@@ -154,7 +158,7 @@ class Configuration:
         """Return the plugin dict for values of the unknowns."""
         values: dict[str, Any] = {}
         for name in self.names:
-            numbers = [float(f"{x[k]:.7g}") for k in self.indices(name)]
+            numbers = [float(f"{self.unknowns[k].shown(float(x[k])):.7g}") for k in self.indices(name)]
             values[name] = numbers[0] if len(numbers) == 1 else {"type": "rgb", "value": numbers}
         return {"type": self.plugin, **self.given, **values}
 

@@ -1,0 +1,251 @@
+"""Fits of files and arrays: weights, metrics, starts, what is told, and what is refused."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mitsuba as mi
+import numpy as np
+import pytest
+import reference as ref
+from fits import MODELS, measured, pairs
+from support import ROOT, interaction, numbers, shared
+
+import mi_brdfs
+from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
+from mi_brdfs.fit.observations import solid_angles
+from mi_brdfs.measured import Axis, Grid, Measurement, Samples, read
+from mi_brdfs.measured.coordinates import HalfDifference, Spherical
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
+LOFT = ROOT / "tests" / "data" / "loft" / "AnoBlackEC1onAlum.bsdf"
+WARD = MODELS["ward"].drawn(1)
+
+
+@pytest.fixture(scope="module")
+def ward():
+    return measured("ward", WARD, 1000)
+
+
+def anisotropic(wi, wo, **parameters):
+    """A measurement of single pairs, of Ward's model."""
+    f = ref.ward(wi, wo, **parameters, variant="balanced") / wo[:, 2]
+    return Measurement(Path("brushed"), "made", Samples(wi, wo, f[:, None], True), np.array([550.0]))
+
+
+def test_weights_are_solid_angles():
+    """4 cosθd sinθh sinθd ΔθhΔθdΔφd of half and difference angles, and sinθi sinθo ΔθiΔθoΔφ of polar ones."""
+    u, theta, phi = (np.arange(count) + 0.5 for count in (40, 30, 20))
+    axes = (Axis(u / 40, low=0, high=1), Axis(theta / 60 * np.pi, low=0, high=np.pi / 2), Axis(phi / 20 * np.pi, np.pi))
+    indices = np.unravel_index(np.arange(40 * 30 * 20), (40, 30, 20))
+    place = [axis.nodes[index] for axis, index in zip(axes, indices, strict=True)]
+    found = solid_angles(Grid(HalfDifference(), axes, np.zeros((40, 30, 20, 1))), indices)
+    theta_h = np.pi / 2 * place[0] ** 2
+    expected = (
+        4 * np.cos(place[1]) * np.sin(theta_h) * np.sin(place[1]) * np.pi * place[0] / 40 * np.pi / 60 * np.pi / 20
+    )
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
+    axes = (axes[1], axes[1], Axis(phi / 10 * np.pi, 2 * np.pi))
+    indices = np.unravel_index(np.arange(30 * 30 * 20), (30, 30, 20))
+    found = solid_angles(Grid(Spherical(mirrored=False), axes, np.zeros((30, 30, 20, 1))), indices)
+    assert found.sum() == pytest.approx(2 * np.pi, rel=1e-3)
+
+
+def test_metrics_are_what_they_say():
+    """Of a Lambertian surface that is fitted as black but for a fixed albedo."""
+    wi, wo = pairs(400, 5)
+    f = np.random.default_rng(1).uniform(0.1, 0.5, 400)
+    (it,) = fit((wi, wo, f), "orennayar", given={"sigma": 0.0}, starts=1)
+    rho, material = it.bsdf["reflectance"], observe((wi, wo, f), 80, 4096, 0)
+    i, o = material.wi.astype(float), material.wo.astype(float)
+    x, y = material.f[:, 0] * i[:, 2], rho / np.pi * i[:, 2]
+    flat, solid = 1 / np.hypot(o[:, 0], o[:, 1]), np.ones(len(x))
+    for name, difference, weight in (
+        ("log", np.log(1 + x) - np.log(1 + y), flat),
+        ("l2", x - y, flat),
+        ("ngan", x - y, solid),
+        ("cube-root", x ** (1 / 3) - y ** (1 / 3), solid),
+    ):
+        half = slice(0, material.fitted)
+        error = np.sqrt((weight * difference**2)[half].sum() / weight[half].sum())
+        assert it.errors[name]["fitted"] == pytest.approx(error, rel=1e-4)
+    assert set(it.errors) == set(METRICS)
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_each_metric_is_made_small(metric):
+    data = measured("walter", MODELS["walter"].drawn(3), 800, noise=0.1)
+    best = {name: fit(data, "ward", metric=name, starts=4)[0].errors[metric]["fitted"] for name in METRICS}
+    assert best[metric] == min(best.values())
+
+
+def test_colours_and_json(ward):
+    wi, wo, _ = ward
+    truth = [WARD | {"diffuse_reflectance": d} for d in (0.1, 0.2, 0.3)]
+    f = np.stack([MODELS["ward"].reference(wi, wo, **each) / wo[:, 2] for each in truth], axis=-1)
+    (it,) = fit((wi, wo, f), "ward", starts=2)
+    assert it.bsdf["diffuse_reflectance"]["value"] == pytest.approx([0.1, 0.2, 0.3], rel=1e-3)
+    row = json.loads(json.dumps(it.to_dict(), allow_nan=False))
+    assert {"file", "model", "metric", "bsdf", "errors", "sigma", "starts"} <= row.keys()
+    assert row["errors"]["log"].keys() == {"fitted", "held_out"}
+    assert len(row["sigma"]["diffuse_reflectance"]) == 3 and row["starts"]["tried"] == 2
+    loaded, again = mi.load_dict(row["bsdf"]), mi.load_string(f'<scene version="3.0.0">{it.to_xml()}</scene>').bsdfs()
+    assert ElementTree.fromstring(it.to_xml()).attrib == {"type": "ward"}
+    assert str(loaded) == str(again[0] if again else loaded)
+
+
+def test_tinted_models_have_all_derivatives():
+    """Burley's tints mix the channels of a colour."""
+    wi, wo = pairs(600, 3)
+    colour, tint = np.array([0.6, 0.3, 0.1]), 0.7
+    f = ref.burley(wi, wo, colour, 0, 0, 0.5, tint, 0.4, 0, 0.8, 0.5, 0, 1) / wo[:, 2:]
+    given = {"subsurface": 0.0, "metallic": 0.0, "clearcoat": None, "clearcoat_gloss": None}
+    (it,) = fit((wi, wo, f), "burley", given=given, starts=2)
+    assert it.bsdf["base_color"]["value"] == pytest.approx(colour, rel=1e-3)
+    assert it.bsdf["spec_tint"] == pytest.approx(tint, rel=1e-2)
+
+
+def test_anisotropic_data_have_anisotropic_parameters():
+    wi, wo = pairs(3000, 4)
+    turned = [ref.rotate(w, 0.1).astype(np.float32) for w in (wi, wo)]
+    data = anisotropic(*turned, diffuse_reflectance=0.2, specular_reflectance=0.4, alpha_u=0.1, alpha_v=0.3)
+    data = Measurement(data.path, "made", Samples(wi, wo, data.data.values, True), data.wavelengths)
+    (it,) = fit(data, "ward", starts=6)
+    u, v, turn = (it.bsdf[name] for name in ("alpha_u", "alpha_v", "rotation"))
+    if u > v:  # the same lobe, a quarter of a turn on
+        u, v, turn = v, u, turn + 0.25
+    assert (u, v) == (pytest.approx(0.1, rel=1e-3), pytest.approx(0.3, rel=1e-3))
+    assert np.cos(4 * np.pi * (turn - 0.1)) == pytest.approx(1, abs=1e-5)
+
+
+def test_choices_and_several_models_are_ranked():
+    data = measured("ward", WARD, 1000)
+    found = fit(data, "ward", given={"variant": ("ward", "balanced")}, starts=2)
+    assert [it.bsdf["variant"] for it in found] == ["balanced", "ward"]
+    assert [it.model for it in found] == ["ward", "ward ward"]
+    several = fit([data, LOFT], ["lambert", "ward"], starts=2)
+    assert [it.file for it in several] == ["arrays"] * 2 + [str(LOFT)] * 2
+    assert several[0].model == "ward" and several[0].held_out < several[1].held_out
+    assert several[0].bic < several[1].bic
+
+
+def test_tied_and_several_lobes():
+    wi, wo = pairs(600, 6)
+    lobe = {"specular_reflectance": 0.3, "cx": -1.0, "cy": -1.0, "cz": 1.0, "exponent": 40.0}
+    back = {"specular_reflectance": 0.2, "cx": 1.0, "cy": 1.0, "cz": 1.0, "exponent": 10.0}
+    f = ref.lafortune(wi, wo, 0.2, [lobe, back], "energy") / wo[:, 2]
+    fixed = {f"{name}_{k + 1}": it[name] for k, it in enumerate((lobe, back)) for name in ("cx", "cy", "cz")}
+    (it,) = fit((wi, wo, f), "lafortune", given=fixed, lobes=2, starts=3)
+    assert it.bsdf["exponent_1"] == pytest.approx(40, rel=1e-3) and it.bsdf["exponent_2"] == pytest.approx(10, rel=1e-3)
+    (tied,) = fit((wi, wo, f), "lafortune", given=fixed, tied={"exponent_2": "exponent_1"}, lobes=2, starts=2)
+    assert tied.bsdf["exponent_2"] == tied.bsdf["exponent_1"]
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        {"type": "ward", "variant": "ward", "diffuse_reflectance": 0.01, "specular_reflectance": 0.05, "alpha": 0.3},
+        mi_brdfs.preset(mi_brdfs.presets("ward")[0]),
+    ],
+    ids=["given", "published"],
+)
+def test_no_worse_than_a_warm_start(start):
+    (it,) = fit(LOFT, "ward", given={"variant": "ward"}, start=start, starts=0)
+    assert it.starts.tried == it.starts.warm == 2  # and the nearest published material
+    grey = {name: np.mean(value["value"]) if isinstance(value, dict) else value for name, value in start.items()}
+    material = observe(LOFT, 80, 4096, 0)
+    value = numbers(mi.load_dict(grey).eval(mi.BSDFContext(), interaction(material.wi), mi.Vector3f(material.wo.T)))
+    cos = material.wi[:, 2].astype(float)
+    residual = np.log(1 + material.f[:, 0] * cos) - np.log(1 + value[:, 0] * cos / material.wo[:, 2])
+    weight = material.solid_angle / np.hypot(material.wo[:, 0], material.wo[:, 1])
+    half = slice(0, material.fitted)
+    at_start = np.sqrt((weight * residual**2)[half].sum() / weight[half].sum())
+    assert it.errors["log"]["fitted"] <= at_start
+
+
+def test_negatives_and_gaps_have_no_weight(ward):
+    wi, wo, f = ward
+    dirty = f.copy()
+    dirty[::7], dirty[1::7], dirty[2::7] = np.nan, -50.0, np.inf
+    (it,) = fit((wi, wo, dirty), "ward", starts=2)
+    assert it.bsdf["alpha"] == pytest.approx(WARD["alpha"], rel=1e-3)
+    assert it.negative == len(f[1::7]) and it.missing == len(f[::7]) + len(f[2::7])
+    assert any(sentence.startswith("Without weight: ") for sentence in it.remarks())
+
+
+def test_tells_of_ends_albedos_and_narrow_lobes():
+    wi, wo = pairs(1500, 8)
+    bright = ref.lambert(wi, wo, 1.3) / wo[:, 2]
+    (it,) = fit((wi, wo, bright), "lambert", starts=2)
+    assert it.bounds == ["reflectance"] and it.sigma["reflectance"] is None
+    (it,) = fit((wi, wo, bright), "low", given={"normalization": "paper"}, starts=4)
+    assert it.albedo > 1 and any("albedo" in sentence for sentence in it.remarks())
+    assert it.albedo == pytest.approx(1.3, rel=0.05)
+    narrow = (0.1 * np.ones(1500)) / np.pi
+    narrow[3] = 1e3
+    mirror = wi * np.array([-1, -1, 1], np.float32)
+    towards = wo.copy()
+    towards[3] = mirror[3]
+    (it,) = fit((wi, towards, narrow), "ward", given={"alpha": 0.001, "specular_reflectance": 0.5}, starts=1)
+    assert not it.resolved and any("narrower" in sentence for sentence in it.remarks())
+
+
+def test_predicts_the_scatter_that_files_state():
+    """LOFT's rows give its total integrated scatter."""
+    measurement = read(LOFT)
+    (it,) = fit(measurement, "walter", starts=6)
+    for theta, (stated,) in measurement.stated_albedos.items():
+        print(np.degrees(theta), stated, it.albedos(np.degrees(theta))[0])
+
+
+def test_the_same_seed_gives_the_same_fit(ward):
+    first, second = (fit(ward, "ward", starts=2, seed=5)[0] for _ in range(2))
+    assert first.bsdf == second.bsdf and first.sigma == second.sigma
+
+
+def test_runs_without_a_variant_for_it(ward):
+    with mi.variant_context("scalar_rgb"):
+        (it,) = fit(ward, "ward", starts=1)
+        assert it.albedo < 1 and mi.variant() == "scalar_rgb"
+
+
+@pytest.mark.parametrize(
+    ("data", "model", "options", "sentence"),
+    [
+        ("below", "ward", {}, "arrays: no pair of directions has both above the horizon."),
+        ("grazing", "ward", {}, "arrays: all pairs of directions are beyond the cut at 80°; give a larger one."),
+        ("dark", "ward", {}, "arrays: no value within the cut at 80° is a positive number."),
+        ("good", "lambert", {"given": {"reflectance": 0.5}}, "lambert has nothing to fit: all its parameters are"),
+        ("good", "ward", {"given": {"alfa": 0.5}}, "ward: there is no parameter alfa; did you mean alpha?"),
+        ("good", "ward", {"given": {"variant": "wards"}}, "ward: variant = 'wards' is unknown; it is balanced, ward, "
+                                                          "ward-duer or approximate."),
+        ("good", "ward", {"given": {"alpha": 7.0}}, "ward: alpha = 7 is not allowed; it must be a number in"),
+        ("good", "ward", {"tied": {"alpha": "beta"}}, "ward: there is no parameter beta"),
+        ("good", "ward", {"start": {"exponent": 3}}, "No fit can start at {'exponent': 3}: it is of another plugin"),
+        ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),
+        ("good", "wart", {}, "There is no model 'wart'; did you mean 'ward'?"),
+        ("good", "ward", {"starts": 0}, "There is nothing to start from"),
+        ("shapes", "ward", {}, "Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,) or (N, channels), not"),
+        ("nothing", "ward", {}, "There are no data to fit."),
+        ("file", "ward", {}, "none.bsdf: No such file or directory."),
+    ],
+)  # fmt: skip
+def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_path):
+    wi, wo, f = (array[:50] for array in ward)
+    sources = {
+        "good": (wi, wo, f), "below": (-wi, wo, f), "dark": (wi, wo, -f), "shapes": (wi, wo[:4], f), "nothing": [],
+        "grazing": (wi, np.tile(np.float32([0.995, 0, 0.0999]), (50, 1)), f), "file": tmp_path / "none.bsdf",
+    }  # fmt: skip
+    with pytest.raises((FitError, FileError, ValueError)) as caught:
+        fit(sources[data], model, **options)
+    text = str(caught.value)
+    assert sentence in text and "\n" not in text
+
+
+@pytest.mark.slow
+def test_real_materials_held_out():
+    """Models fitted to half of the directions suit the other half as well, in the median."""
+    files = sorted(shared("rgl").glob("*.bsdf"))
+    ratios = [it.held_out / it.errors["log"]["fitted"] for it in fit(files, ["ward", "walter", "low"], starts=4)]
+    assert np.median(ratios) < 1.05
