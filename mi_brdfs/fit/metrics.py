@@ -12,6 +12,9 @@ import numpy as np
 
 from ..parameters.messages import meant
 
+POLE = float(np.sin(np.radians(2)))
+"""The least sine of θo that weights are divided by: a pair at the normal stands for a cell about it."""
+
 
 class Metric(NamedTuple):
     """What is compared, and with which weight."""
@@ -29,7 +32,7 @@ class Metric(NamedTuple):
         """Return the weights w of pairs, for the solid angles dωi dωo that each stands for."""
         if self.solid_angle:
             return solid_angle
-        return solid_angle / np.maximum(np.hypot(wo[:, 0], wo[:, 1]), 1e-4)
+        return solid_angle / np.maximum(np.hypot(wo[:, 0], wo[:, 1]), POLE)
 
 
 def _same(x: np.ndarray) -> np.ndarray:
