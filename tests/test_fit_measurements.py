@@ -20,7 +20,7 @@ from mi_brdfs.measured.coordinates import HalfDifference, Spherical
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
-LOFT = ROOT / "tests" / "data" / "loft" / "AnoBlackEC1onAlum.bsdf"
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 WARD = MODELS["ward"].drawn(1)
 
 

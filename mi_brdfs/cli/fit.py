@@ -67,7 +67,7 @@ def fit_(
         _print_medians(ranked, metric)
     write_json(json_file, [it.to_dict() for it in fits])
     if not complete:
-        err.print(f"Interrupted; {len(fits)} fits were finished.")
+        err.print(f"Interrupted; {len(fits)} of {len(files) * len(names)} fits were finished.")
         raise typer.Exit(Exit.INTERRUPTED)
     if failed:
         raise typer.Exit(Exit.ERROR)

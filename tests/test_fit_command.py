@@ -1,0 +1,58 @@
+"""``mi-brdfs fit``, as a user types it."""
+
+import json
+import re
+
+import mitsuba as mi
+import pytest
+from support import ROOT
+from test_cli import interrupted, run
+
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
+
+
+def test_ranks_models_and_writes_rows(tmp_path):
+    (tmp_path / "cut.bsdf").write_bytes(LOFT.read_bytes()[:3000])
+    done = run("fit", LOFT, "cut.bsdf", "--model", "ward,lambert", "--starts", 2, "--json", "fits.json", cwd=tmp_path)
+    assert done.returncode == 1 and "cut.bsdf" in done.stderr and "Traceback" not in done.stderr
+    rows = [line.split()[0] for line in done.stdout.splitlines() if re.match(r"(ward|lambert)\b", line)]
+    assert rows == ["ward", "lambert"]
+    assert "Error of log up to 80°" in done.stdout and '<bsdf type="ward">' in done.stdout
+    fits = json.loads((tmp_path / "fits.json").read_text(encoding="utf-8"))
+    assert [row["model"] for row in fits] == ["ward", "lambert"]
+    for row in fits:
+        assert row["file"] == str(LOFT) and row["metric"] == "log"
+        assert row["errors"]["log"]["held_out"] > 0 and row["sigma"] and row["starts"]["tried"] == 2
+        with mi.variant_context("scalar_rgb"):
+            mi.load_dict(row["bsdf"])
+
+
+def test_a_guest_is_fitted(tmp_path):
+    guest = ROOT / "tests" / "guest" / "mi_brdfs_guest.py"
+    done = run("fit", LOFT, "--import", guest, "--model", "regolith", "--starts", 1, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert '<bsdf type="regolith">' in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--model", "wart"), "There is no model 'wart'; did you mean 'ward'?"),
+        (("--metric", "loglog"), "There is no metric 'loglog'; did you mean 'log'?"),
+        (("--variant", "scalar_rgb"), "this needs a vectorized and unpolarized variant, not scalar_rgb"),
+        (("--json", "nowhere/x.json"), "--json nowhere/x.json: there is no folder nowhere"),
+    ],
+)
+def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
+    done = run("fit", LOFT, *arguments, cwd=tmp_path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_keeps_what_is_finished(tmp_path):
+    options = "--model", "lambert,burley", "--starts", 400, "--json", "fits.json"
+    status, out, err = interrupted(tmp_path, "fit", LOFT, *options, running="Fitting burley")
+    assert status == 130 and "Interrupted; 1 of 2 fits were finished." in err and "Traceback" not in err
+    assert "lambert" in out
+    assert [row["model"] for row in json.loads((tmp_path / "fits.json").read_text())] == ["lambert"]
