@@ -14,8 +14,7 @@ from support import ROOT, interaction, numbers, shared
 import mi_brdfs
 from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
 from mi_brdfs.fit.observations import solid_angles
-from mi_brdfs.measured import Axis, Grid, Measurement, Samples, read
-from mi_brdfs.measured.albedo import albedos
+from mi_brdfs.measured import Axis, Grid, Measurement, Samples
 from mi_brdfs.measured.coordinates import HalfDifference, Spherical
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -192,13 +191,21 @@ def test_tells_of_ends_albedos_and_narrow_lobes():
     assert not it.resolved and any("narrower" in sentence for sentence in it.remarks())
 
 
-@pytest.mark.parametrize("theta", [10, 30])
-def test_predicts_how_much_is_scattered(theta):
-    """The albedo of a fit is the integral over what was measured, where nearly all of it was."""
-    measurement = read(LOFT)
-    (it,) = fit(measurement, "walter", starts=4)
-    ((expected,),), _ = albedos(measurement.data, np.radians([theta]), extrapolate="zero")
-    assert it.albedos(theta)[0] == pytest.approx(expected, rel=0.1)
+def test_predicts_how_much_is_scattered():
+    """The albedo of a fit is the integral over what was measured, where nearly all of it was. What LOFT states is
+    another one, and this is told."""
+    (it,) = fit(LOFT, "walter", starts=4)
+    assert [theta for theta, _, _ in it.scatter] == [10, 30, 50, 70]
+    for theta, stated, values in it.scatter[:2]:
+        assert it.albedos(theta)[0] == pytest.approx(values, rel=0.1)
+        told = [sentence for sentence in it.remarks() if sentence.startswith(f"At {theta:g}° ")]
+        assert len(told) == 1 and f"states {stated:.3g}" in told[0]
+
+
+def test_materials_do_not_depend_on_others():
+    noisy = measured("ward", WARD, 500, noise=0.05)
+    alone, together = fit(noisy, "ward", starts=3)[0], fit([LOFT, noisy], "ward", starts=3)[1]
+    assert alone == together
 
 
 def test_the_same_seed_gives_the_same_fit(ward):

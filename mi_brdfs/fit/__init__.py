@@ -13,7 +13,7 @@ from .metrics import METRICS, Metric, find_metric
 from .observations import FitError, Observations, Source, observe
 from .result import Fit, Starts
 from .starts import warm
-from .unknowns import configurations
+from .unknowns import check_names, configurations
 
 __all__ = [
     "METRICS",
@@ -69,6 +69,7 @@ def fit(
         model: the name of a plugin of this package or of a guest, or several.
         metric: "log", "l2", "ngan" or "cube-root".
         given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.
+            They hold for the models that have them.
         tied: parameters that equal another one, as ``{"cy": "cx"}``.
         start: a plugin dict to start from, besides others, or several. No fit is worse than any of them.
         lobes: the number of lobes of models that have several of a kind.
@@ -96,6 +97,7 @@ def fit(
     if starts < 0 or lobes < 1 or pairs < 2 or not 0 < cut <= 90:
         raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2 and a cut in (0, 90] degrees.")
     models = [find_model(name) for name in ([model] if isinstance(model, str) else model)]
+    check_names(models, [*(given or {}), *(tied or {}), *(tied or {}).values()])
     given_starts = [start] if isinstance(start, Mapping) else list(start)
     if not starts and not given_starts:
         raise FitError("There is nothing to start from: starts is 0, and no start is given.")

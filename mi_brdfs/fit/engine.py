@@ -67,6 +67,7 @@ def fit_configuration(
             pairs=material.fitted,
             negative=material.negative,
             missing=material.missing,
+            scatter=list(material.scatter),
             in_highlight=_in_highlight(problem, material, x),
             anisotropic=material.anisotropic,
             fixed=list(fixed),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..measured import Axis, Grid, Measurement, read
+from ..measured.albedo import albedos
 from ..measured.arrays import stacked
 from ..measured.observer import to_srgb
 
@@ -50,6 +51,8 @@ class Observations:
     """Values below 0 within the cut, which get no weight."""
     missing: int
     """Values within the cut that are no numbers, which get none either."""
+    scatter: tuple[tuple[float, float, float], ...] = ()
+    """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, at the first azimuth."""
 
     @property
     def channels(self) -> int:
@@ -104,7 +107,19 @@ def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
         fitted=fitted,
         negative=int(negative.sum()),
         missing=int(missing.sum()),
+        scatter=_scatter(source) if isinstance(source, Measurement) and isinstance(source.data, Grid) else (),
     )
+
+
+def _scatter(measurement: Measurement) -> tuple[tuple[float, float, float], ...]:
+    """Return the albedos that a file states for its first azimuth of incidence, where it states any."""
+    grid, found = measurement.data, []
+    assert isinstance(grid, Grid)
+    phi = float(grid.axes[grid.coordinates.names.index("phi_i")].nodes[0]) if "phi_i" in grid.coordinates.names else 0
+    for theta, stated in measurement.stated_albedos.items():
+        (values,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
+        found.append((round(float(np.degrees(theta)), 4), float(stated[0]), float(values.mean())))
+    return tuple(found)
 
 
 def _halves(rows: np.ndarray, half: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, int]:

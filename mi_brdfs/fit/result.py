@@ -71,6 +71,8 @@ class Fit:
     in_highlight: int
     """The pairs whose value exceeds half of that of the mirror direction."""
     anisotropic: bool
+    scatter: list[tuple[float, float, float]] = field(default_factory=list)
+    """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, where it states any."""
     fixed: list[str] = field(default_factory=list)
     """Parameters that isotropic data say nothing about, left at their defaults."""
 
@@ -114,6 +116,11 @@ class Fit:
                  if a < b and abs(r) > CORRELATED and a.partition(".")[0] != b.partition(".")[0]]  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(close)}.")
+        for theta, stated, values in self.scatter:
+            own = float(np.mean(self.albedos(theta)))
+            if abs(own - stated) > 0.1 * stated:
+                told = f"the file states {stated:.3g}, its values add to {values:.3g}"
+                found.append(f"At {theta:g}° the albedo is {own:.3g}; {told}.")
         if self.fixed:
             found.append(f"Isotropic data leave at the default: {', '.join(self.fixed)}.")
         if self.negative or self.missing:
@@ -140,6 +147,10 @@ class Fit:
             "bounds": self.bounds,
             "albedo": self.albedo,
             "resolved": self.resolved,
+            "scatter": [
+                {"theta_i": theta, "stated": stated, "values": values, "fit": float(np.mean(self.albedos(theta)))}
+                for theta, stated, values in self.scatter
+            ],
             "cut": self.cut,
             "pairs": self.pairs,
             "negative": self.negative,

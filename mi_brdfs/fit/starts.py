@@ -112,7 +112,7 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
     own = [values for values in (warm(configuration, each) for each in given) if values]
     owners, points = [], []
     for m, material in enumerate(problem.materials):
-        rng = np.random.default_rng([seed, m])
+        rng = np.random.default_rng(seed)  # the same with other materials beside
         tried = candidates(problem, material, rng)
         order = np.argsort(_scores(problem, m, tried), kind="stable")
         chosen = [_completed(problem, tried[order[0]], values) for values in own]

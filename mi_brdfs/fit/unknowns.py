@@ -201,16 +201,14 @@ def configurations(
     anisotropic: bool,
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
-    with the default of those that are not given.
+    with the default of those that are not given. Names that it does not have are left out.
 
     Raises:
-        FitError: if a parameter does not exist, or nothing is left to fit.
+        FitError: if there is no such word, or nothing is left to fit.
     """
-    name = model.plugins[0]
-    known = {FRESNEL, *(it for parameter in model.declared() for it in parameter.names)}
-    for wrong in [it for it in (*given, *tied, *tied.values()) if it not in known]:
-        near = meant(wrong, known)
-        raise FitError(f"{name}: there is no parameter {wrong}" + (f"; did you mean {near}?" if near else "."))
+    name, known = model.plugins[0], known_names(model)
+    given = {key: value for key, value in given.items() if key in known}
+    tied = {key: value for key, value in tied.items() if {key, value} <= known}
     words = {choice: allowed[:1] for choice, allowed in _choices(model.declared())}
     for choice, allowed in _choices(model.declared()):
         if choice in given:
@@ -236,6 +234,24 @@ def configurations(
         passed = {key: value for key, value in fixed.items() if value is not None}
         found.append(Configuration(model, {**plain, **passed}, combination, tuple(unknowns), dict(tied)))
     return found
+
+
+def known_names(model: type[Model]) -> set[str]:
+    """Return the names of all parameters of a model, and of the choice among Fresnel terms if it has one."""
+    return {
+        *(name for name, _ in _choices(model.declared())),
+        *(name for parameter in model.declared() for name in parameter.names),
+    }
+
+
+def check_names(models: Iterable[type[Model]], names: Iterable[str]) -> None:
+    """Raise a FitError for a name that is no parameter of any of some models."""
+    models = list(models)
+    known = {name for model in models for name in known_names(model)}
+    for wrong in names:
+        if wrong not in known:
+            near, plugins = meant(wrong, known), ", ".join(model.plugins[0] for model in models)
+            raise FitError(f"{plugins}: there is no parameter {wrong}" + (f"; did you mean {near}?" if near else "."))
 
 
 def _combinations(
