@@ -134,7 +134,15 @@ def _print_ranking(fits: list[Fit], metric: str) -> None:
         )  # fmt: skip
     print_table(table)
     out.print(f"Error of {metric} up to {best.cut:g}°; {best.pairs} pairs of directions fitted.")
-    out.print(f"\n{best.to_xml()}")
+    out.print()
+    parameters = Table(best.model, "", "", box=None, pad_edge=False)
+    for name, sigma in best.sigma.items():
+        value = best.bsdf[name]
+        for k, number in enumerate(value["value"] if isinstance(value, dict) else [value]):
+            spread = sigma[k] if isinstance(sigma, list) else sigma
+            parameters.add_row("" if k else name, f"{number:.4g}", "" if spread is None else f"± {spread:.2g}")
+    print_table(parameters)
+    out.print(f"\n{best.to_xml()}\n")
     for sentence in best.remarks():
         out.print(sentence)
     out.print()
