@@ -123,7 +123,7 @@ def test_choices_and_several_models_are_ranked():
     data = measured("ward", WARD, 1000)
     found = fit(data, "ward", given={"variant": ("ward", "balanced")}, starts=2)
     assert [it.bsdf["variant"] for it in found] == ["balanced", "ward"]
-    assert [it.model for it in found] == ["ward", "ward ward"]
+    assert [it.model for it in found] == ["ward", "ward variant=ward"]
     several = fit([data, LOFT], ["lambert", "ward"], starts=2)
     assert [it.file for it in several] == ["arrays"] * 2 + [str(LOFT)] * 2
     assert several[0].model == "ward" and several[0].held_out < several[1].held_out
@@ -234,6 +234,8 @@ def test_runs_without_a_variant_for_it(ward):
         ("good", "ward", {"start": {"exponent": 3}}, "No fit can start at {'exponent': 3}: it is of another plugin"),
         ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),
         ("good", "wart", {}, "There is no model 'wart'; did you mean 'ward'?"),
+        ("good", "kurt", {"lobes": 9}, "There can be 8 lobes at most, not 9."),
+        ("one", "ward", {}, "arrays: only one pair of directions has a value within the cut at 80°."),
         ("good", "ward", {"starts": 0}, "There is nothing to start from"),
         ("shapes", "ward", {}, "Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,) or (N, channels), not"),
         ("nothing", "ward", {}, "There are no data to fit."),
@@ -244,6 +246,7 @@ def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_p
     wi, wo, f = (array[:50] for array in ward)
     sources = {
         "good": (wi, wo, f), "below": (-wi, wo, f), "dark": (wi, wo, -f), "shapes": (wi, wo[:4], f), "nothing": [],
+        "one": (wi[:1], wo[:1], f[:1]),
         "grazing": (wi, np.tile(np.float32([0.995, 0, 0.0999]), (50, 1)), f), "file": tmp_path / "none.bsdf",
     }  # fmt: skip
     with pytest.raises((FitError, FileError, ValueError)) as caught:

@@ -121,6 +121,8 @@ def _fit_all(
 
 def _print_ranking(fits: list[Fit], metric: str) -> None:
     """Print the models by their error, and the best one to paste."""
+    from ..fit import METRICS
+
     best = fits[0]
     out.print(best.file, style="bold")
     table = Table("model", "held out", "fitted", "ΔBIC", "albedo", "agree", "notes", box=None, pad_edge=False)
@@ -133,7 +135,7 @@ def _print_ranking(fits: list[Fit], metric: str) -> None:
             f"{it.albedo:.2f}", f"{it.starts.agree}/{it.starts.tried}", _notes(it),
         )  # fmt: skip
     print_table(table)
-    out.print(f"Error of {metric} up to {best.cut:g}°; {best.pairs} pairs of directions fitted.")
+    out.print(f"Error of {METRICS[metric].text}, up to {best.cut:g}°; {best.pairs} pairs of directions fitted.")
     out.print()
     parameters = Table(best.model, "", "", box=None, pad_edge=False)
     for name, sigma in best.sigma.items():

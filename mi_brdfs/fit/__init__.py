@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..measured import FileError
+from ..mitsuba.registry import find_model
 from .engine import fit_configuration
 from .isotropy import isotropic
 from .lanes import rgb_variant
@@ -51,7 +52,8 @@ def fit(
     """Fit models to measured BRDFs, each model to all materials at once.
 
     Free are all numbers and colours that a model declares, within their ranges, a colour with a value for each channel
-    of the data: also parameters without a default, as the diffuse lobe that a model may have. Anisotropic data have
+    of the data: also parameters without a default, as the diffuse lobe that a model may have; models without one, as
+    the diffuse ones, get none. Anisotropic data have
     the values for both tangent directions and the rotation; numbers that would make a model anisotropic stay at their
     defaults for isotropic data. A Fresnel term has the parameters of ``given["fresnel"]``: "schlick" (the default),
     "dielectric", "conductor" or "none".
@@ -65,7 +67,7 @@ def fit(
     Args:
         data: a file, a :class:`mi_brdfs.measured.Measurement` or a tuple of arrays ``(wi, wo, f)``, of shapes (N, 3),
             (N, 3) and (N,) or (N, channels), with one channel or linear sRGB, f in 1/sr, as of an isotropic material;
-            or a list of these.
+            or a list of these. Values of files weigh by the solid angles of their cells, and scattered ones alike.
         model: the name of a plugin of this package or of a guest, or several.
         metric: "log", "l2", "ngan" or "cube-root".
         given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.
@@ -87,8 +89,6 @@ def fit(
         FileError: if a file cannot be read.
         ValueError: if there is no such model or metric.
     """
-    from ..mitsuba.registry import find_model
-
     find_metric(metric)
     several = isinstance(data, Sequence) and not isinstance(data, (str, tuple))
     sources: list[Any] = list(data) if several else [data]  # type: ignore[arg-type]
@@ -127,8 +127,4 @@ def fit(
             fixed = list(dict.fromkeys(u.name for u in configuration.unknowns if u.name not in names))
             fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, cut, advance, fixed)
             found += list(zip(alike, fits, strict=True))
-    return [it for _, it in sorted(found, key=lambda pair: (pair[0], _rank(pair[1])))]
-
-
-def _rank(it: Fit) -> tuple[bool, float]:
-    return it.held_out != it.held_out, it.held_out
+    return [it for _, it in sorted(found, key=lambda pair: (pair[0], pair[1].held_out))]

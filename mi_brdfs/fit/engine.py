@@ -93,6 +93,7 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     sample properties, Journal of Econometrics 29(3), 1985, doi:10.1016/0304-4076(85)90158-7.
     """
     unknowns, channels = problem.configuration.unknowns, problem.lanes.channels
+    residuals, jacobian = np.nan_to_num(residuals), np.nan_to_num(jacobian)
     free = [k for k, u in enumerate(unknowns) if not u.at_end(float(values[k]))]
     sigma: list[float | None] = [None] * len(unknowns)
     labels = [unknowns[k].label for k in free]

@@ -95,6 +95,8 @@ def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
     if not f[usable].any():
         raise FitError(f"{name}: no value within the cut at {cut:g}° is a positive number.")
     some = np.flatnonzero(usable.any(axis=1))
+    if len(some) < 2:
+        raise FitError(f"{name}: only one pair of directions has a value within the cut at {cut:g}°.")
     some, fitted = _halves(some, wi[some] + wo[some], rng)
     return Observations(
         name=name,

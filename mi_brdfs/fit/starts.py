@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..measure.arrays import Array
-from ..published import preset, presets
+from ..mitsuba.registry import MODELS, presets
+from ..parameters.published import preset
 from .observations import Observations
 from .problem import Problem
 from .unknowns import Configuration, Unknown, default_words
@@ -88,18 +89,10 @@ def warm(configuration: Configuration, given: Mapping[str, Any]) -> dict[int, fl
 
 def published(configuration: Configuration) -> list[dict[int, float]]:
     """Return the published materials that the unknowns describe."""
-    found = (
-        (warm(configuration, preset(name)) for name in presets(configuration.plugin))
-        if _is_known(configuration)
-        else ()
-    )
+    if MODELS.get(configuration.plugin) is not configuration.model:
+        return []
+    found = (warm(configuration, preset(name)) for name in presets(configuration.plugin))
     return [values for values in found if values]
-
-
-def _is_known(configuration: Configuration) -> bool:
-    from ..mitsuba.registry import MODELS
-
-    return MODELS.get(configuration.plugin) is configuration.model
 
 
 def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: int) -> tuple[Array, Array, int]:

@@ -137,9 +137,10 @@ class Configuration:
 
     @property
     def title(self) -> str:
-        """The plugin's name, and the words that differ from the defaults."""
+        """The plugin's name, and the choices that differ from the defaults."""
         usual = default_words(self.model)
-        return " ".join([self.plugin, *(str(word) for name, word in self.words.items() if usual.get(name) != word)])
+        chosen = (f"{name}={word}" for name, word in self.words.items() if usual.get(name) != word)
+        return " ".join([self.plugin, *chosen])
 
     def indices(self, name: str) -> list[int]:
         """Return where the unknowns of a parameter are, one or one a channel."""
@@ -285,6 +286,8 @@ def _free(
     """Yield the numbers and colours that exist with some words, with those of each lobe."""
     for parameter in declared:
         if isinstance(parameter, PerLobe):
+            if lobes >= len(parameter.numbers):
+                raise FitError(f"There can be {len(parameter.numbers) - 1} lobes at most, not {lobes}.")
             for number in [""] if lobes == 1 else [f"_{k + 1}" for k in range(lobes)]:
                 own = (it.numbered(number) for it in parameter.declared.values())
                 yield from _free(own, words, fixed, lobes, anisotropic)
