@@ -16,6 +16,7 @@ from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
 from mi_brdfs.fit.observations import solid_angles
 from mi_brdfs.measured import Axis, Grid, Measurement, Samples
 from mi_brdfs.measured.coordinates import HalfDifference, Spherical
+from mi_brdfs.measured.observer import to_srgb
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -93,6 +94,19 @@ def test_colours_and_json(ward):
     assert ElementTree.fromstring(it.to_xml()).attrib == {"type": "ward"}
     pasted = mi.load_string(it.to_xml().replace("<bsdf ", '<bsdf version="3.0.0" ', 1))
     assert str(pasted) == str(mi.load_dict(row["bsdf"]))
+
+
+def test_spectra_become_colours():
+    """A reflectance of 0.4 below 600 nm and 0.1 above is cyan, in linear sRGB."""
+    wi, wo = pairs(200, 2)
+    wavelengths = np.arange(400.0, 701.0, 20)
+    spectrum = np.where(wavelengths < 600, 0.4, 0.1)
+    f = np.tile(spectrum / np.pi, (200, 1))
+    f[:20, 5] = -0.1
+    (it,) = fit(Measurement(Path("cyan"), "made", Samples(wi, wo, f, False), wavelengths), "lambert", starts=2)
+    assert it.bsdf["reflectance"]["value"] == pytest.approx(spectrum @ to_srgb(wavelengths), rel=1e-4)
+    assert it.bsdf["reflectance"]["value"][0] < 0.2 < it.bsdf["reflectance"]["value"][2]
+    assert it.missing == 60 and it.negative == 0
 
 
 def test_tinted_models_have_all_derivatives():

@@ -77,7 +77,8 @@ def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
         else:
             wi, wo, f = source.data.pairs()
             solid_angle = np.ones(len(f))
-        f = _colours(f, source.wavelengths)
+        f, converted = _colours(f, source.wavelengths)
+        signed = signed or converted
     else:
         name, signed, anisotropic = "arrays", False, False
         wi, wo, f, solid_angle = _arrays(source)
@@ -149,13 +150,15 @@ def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
     return wi, wo, f, np.ones(len(f))
 
 
-def _colours(f: np.ndarray, wavelengths: np.ndarray | None) -> np.ndarray:
-    """Return one channel, or linear sRGB where there are several that have wavelengths. Of others the mean counts."""
+def _colours(f: np.ndarray, wavelengths: np.ndarray | None) -> tuple[np.ndarray, bool]:
+    """Return one channel, or linear sRGB where there are several that have wavelengths, and whether it is converted:
+    then a negative channel is a colour outside sRGB, and a spectrum with a negative value is missing. Of others the
+    mean counts."""
     if f.shape[1] == 1 or (wavelengths is None and f.shape[1] == 3):
-        return f
+        return f, False
     if wavelengths is None or np.isnan(wavelengths).any():
-        return f.mean(axis=1, keepdims=True)
-    return f @ to_srgb(wavelengths)
+        return f.mean(axis=1, keepdims=True), False
+    return np.where(f < 0, np.nan, f) @ to_srgb(wavelengths), True
 
 
 def _nodes(grid: Grid, pairs: int, rng: np.random.Generator) -> tuple[np.ndarray, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ import numpy as np
 from ..measure.directions import direction
 from ..measure.probe import BSDFProbe
 from ..measure.variates import sobol
+from ..model import EnergyWarning
 from .lanes import rgb_variant
 
 ANGLES = 0, 20, 40, 60, 70, 80
@@ -97,7 +99,8 @@ class Fit:
         return [float(albedo) for albedo in self._albedos([direction(theta_i, phi_i)])[0]]
 
     def _albedos(self, wi: list[np.ndarray]) -> np.ndarray:
-        with rgb_variant():
+        with rgb_variant(), warnings.catch_warnings():
+            warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
             probe = BSDFProbe(mi.load_dict(self.bsdf))
             return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
 
