@@ -38,28 +38,31 @@ class Problem:
         columns = [u.to_scale(values[..., k]) for k, u in enumerate(self.configuration.unknowns)]
         return np.stack(columns, axis=-1)
 
-    def sums(self, which: Sequence[int] | Array, points: Array) -> Normal:
-        """Return the sums over the fitted pairs of some materials at points of shape (P, K)."""
+    def sums(self, which: Sequence[int] | Array, points: Array, pairs: int | None = None) -> Normal:
+        """Return the sums over the fitted pairs of some materials, or the first of them, at points of shape (P, K)."""
         count, unknowns = len(points), points.shape[1]
         found = Normal(np.zeros(count), np.zeros((count, unknowns)), np.zeros((count, unknowns, unknowns)))
         values = self.values_of(points)
         slopes = np.stack([u.slope(values[:, k]) for k, u in enumerate(self.configuration.unknowns)], axis=-1)
-        for p, residuals, jacobian in self.residuals(which, values):
+        for p, residuals, jacobian in self.residuals(which, values, pairs):
             jacobian = jacobian * slopes[p]
             found.cost[p] = residuals @ residuals
             found.gradient[p], found.matrix[p] = jacobian.T @ residuals, jacobian.T @ jacobian
         return found
 
-    def residuals(self, which: Sequence[int] | Array, values: Array) -> Iterator[tuple[int, Array, Array]]:
+    def residuals(
+        self, which: Sequence[int] | Array, values: Array, pairs: int | None = None
+    ) -> Iterator[tuple[int, Array, Array]]:
         """Yield ``(setting, residuals, derivatives by the unknowns)`` of the fitted pairs, of shapes (N channels,) and
         (N channels, K): their squares add to the square of the error."""
         targets = [self.targets[m] for m in which]
-        for batch in self.lanes.batches([target.fitted for target in targets]):
+        given = [(t.fitted[0][:pairs], t.fitted[1][:pairs]) for t in targets]
+        for batch in self.lanes.batches(given):
             own = targets[batch.start : batch.stop]
-            model, jacobian = self.lanes.evaluate(values[batch.start : batch.stop], [t.fitted for t in own])
+            model, jacobian = self.lanes.evaluate(values[batch.start : batch.stop], given[batch.start : batch.stop])
             first = 0
             for p, target in zip(batch, own, strict=True):
-                last = first + len(target.fitted[0])
+                last = first + len(given[p][0])
                 yield p, *target.compared(model[first:last], jacobian[first:last], self.metric)
                 first = last
 
@@ -104,10 +107,12 @@ class _Target:
         self.root = np.sqrt(_weights(material, metric, rows))
 
     def compared(self, model: Array, jacobian: Array, metric: Metric) -> tuple[Array, Array]:
-        """Return the residuals and their derivatives by the unknowns, flat."""
-        seen = model.astype(np.float64) * self.factor
-        residuals = self.root * (metric.transform(seen) - self.transformed)
-        scale = self.root * metric.derivative(seen) * self.factor
+        """Return the residuals and their derivatives by the unknowns, flat, of the first of the pairs, as many as there
+        are values."""
+        root, factor = self.root[: len(model)], self.factor[: len(model)]
+        seen = model.astype(np.float64) * factor
+        residuals = root * (metric.transform(seen) - self.transformed[: len(model)])
+        scale = root * metric.derivative(seen) * factor
         return residuals.ravel(), (scale[..., None] * jacobian).reshape(residuals.size, -1)
 
     def cost(self, model: Array, metric: Metric) -> float:

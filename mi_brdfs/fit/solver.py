@@ -14,7 +14,7 @@ import numpy as np
 from ..measure.arrays import Array
 
 STEPS = 80
-"""The most steps."""
+"""The most steps of a fit."""
 LONGEST = 1.5
 """The longest step along an unknown, on its scale."""
 DAMPING, WEAKER, STRONGER, STRONGEST = 1e-2, 0.2, 4.0, 1e8
@@ -35,7 +35,14 @@ Sums = Callable[[Array, Array], Normal]
 """Returns the sums of some problems, by their indices, at points of shape (len(indices), K)."""
 
 
-def solve(sums: Sums, start: Array, low: Array, high: Array, advance: Callable[[int], None]) -> tuple[Array, Array]:
+def solve(
+    sums: Sums,
+    start: Array,
+    low: Array,
+    high: Array,
+    advance: Callable[[int], None] = lambda ended: None,
+    steps: int = STEPS,
+) -> tuple[Array, Array]:
     """Return ``(points, costs)`` of P problems in K unknowns within a box: no cost is above that of its start.
 
     Each problem has its own damping, and ends by itself. An unknown at an end of its range takes no part in a step that
@@ -46,7 +53,7 @@ def solve(sums: Sums, start: Array, low: Array, high: Array, advance: Callable[[
     active = np.arange(count)
     costs, gradient, matrix = (np.array(array) for array in sums(active, points))
     costs = np.where(np.isfinite(costs), costs, np.inf)
-    for _ in range(STEPS):
+    for _ in range(steps):
         tried = np.clip(points[active] + _steps(points, gradient, matrix, damping, active, low, high), low, high)
         cost, new_gradient, new_matrix = sums(active, tried)
         cost = np.where(np.isfinite(cost), cost, np.inf)

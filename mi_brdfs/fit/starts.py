@@ -12,10 +12,13 @@ from ..mitsuba.registry import MODELS, presets
 from ..parameters.published import preset
 from .observations import Observations
 from .problem import Problem
+from .solver import solve
 from .unknowns import Configuration, Unknown, default_words
 
 CANDIDATES = 256
 """Settings that are compared with the data, of a Latin hypercube."""
+ADVANCED, STEPS = 32, 8
+"""How many of them go on by some steps, and by how many: the best of the candidates may be near to no good end."""
 COMPARED = 512
 """The pairs of directions at which they are."""
 DIFFUSE = "diffuse_reflectance"
@@ -98,7 +101,8 @@ def published(configuration: Configuration) -> list[dict[int, float]]:
 def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: int) -> tuple[Array, Array, int]:
     """Return ``(materials, points, warm)``: the index of the material of each start, the points of shape (P, K), and
     how many of a material's starts, its first ones, are warm: those that are ``given``, and the best published one.
-    Half of the other ``count`` are the candidates that suit the data best, and half are any of them."""
+    Half of the other ``count`` are the candidates that suit the data best after some steps on a part of them, and half
+    are any of these."""
     configuration = problem.configuration
     unknowns = len(configuration.unknowns)
     known = published(configuration)
@@ -106,7 +110,7 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
     owners, points = [], []
     for m, material in enumerate(problem.materials):
         rng = np.random.default_rng(seed)  # the same with other materials beside
-        tried = candidates(problem, material, rng)
+        tried = _advanced(problem, m, candidates(problem, material, rng), max(ADVANCED, 2 * count), rng)
         order = np.argsort(_scores(problem, m, tried), kind="stable")
         chosen = [_completed(problem, tried[order[0]], values) for values in own]
         if known:
@@ -118,6 +122,16 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
         owners += [m] * len(chosen)
         points += chosen
     return np.array(owners), np.array(points).reshape(-1, unknowns), len(own) + bool(known)
+
+
+def _advanced(problem: Problem, m: int, tried: Array, count: int, rng: np.random.Generator) -> Array:
+    """Return some of the candidates, half of them the best ones, some steps on."""
+    order = np.argsort(_scores(problem, m, tried), kind="stable")
+    best = order[: count // 2]
+    others = rng.choice(order[len(best) :], min(count - len(best), len(order) - len(best)), replace=False)
+    points = tried[[*best, *others]]
+    low, high = problem.box
+    return solve(lambda which, at: problem.sums([m] * len(which), at, COMPARED), points, low, high, steps=STEPS)[0]
 
 
 def _scores(problem: Problem, m: int, points: Array) -> Array:
