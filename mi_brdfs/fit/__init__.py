@@ -67,7 +67,8 @@ def fit(
     Args:
         data: a file, a :class:`mi_brdfs.measured.Measurement` or a tuple of arrays ``(wi, wo, f)``, of shapes (N, 3),
             (N, 3) and (N,) or (N, channels), with one channel or linear sRGB, f in 1/sr, as of an isotropic material;
-            or a list of these. Values of files weigh by the solid angles of their cells, and scattered ones alike.
+            or what :func:`observe` made of one of these; or a list of them. Values of files weigh by the solid angles
+            of their cells, and scattered ones alike.
         model: the name of a plugin of this package or of a guest, or several.
         metric: "log", "l2", "ngan" or "cube-root".
         given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.

@@ -105,12 +105,12 @@ class Unknown:
         return min(u - low, high - u) < 1e-3 * (high - low)
 
 
-def _unknown(name: str, channel: int | None, colour: bool, limits: tuple[float, float]) -> Unknown:
+def unknown_in(name: str, channel: int | None, colour: bool, limits: tuple[float, float]) -> Unknown:
     """Return an unknown on the scale that suits a declared range: shares up to 1 on a logit scale, positive numbers on
     a logarithmic one."""
     low, high = limits
     if low < 0:
-        return Unknown(name, channel, colour, low, high, "asinh")
+        return Unknown(name, channel, colour, max(low, -LARGEST), min(high, LARGEST), "asinh")
     if low == 0 and high <= 1:
         return Unknown(name, channel, colour, EDGE * high, (1 - EDGE) * high, "logit")
     if math.isinf(high):
@@ -234,7 +234,10 @@ def configurations(
         plain = {k: v for k, v in combination.items() if k != FRESNEL or v in OTHERS.words}
         passed = {key: value for key, value in fixed.items() if value is not None}
         found.append(Configuration(model, {**plain, **passed}, combination, tuple(unknowns), dict(tied)))
-    return found
+    # A choice may mean nothing beside another one.
+    return [
+        it for k, it in enumerate(found) if all((it.given, it.unknowns) != (o.given, o.unknowns) for o in found[:k])
+    ]
 
 
 def known_names(model: type[Model]) -> set[str]:
@@ -311,7 +314,7 @@ def _unknowns_of(parameter: Parameter, fixed: Mapping[str, Any], channels: int, 
     elif isinstance(parameter, Number):
         names = parameter.pair if anisotropic and parameter.pair else parameter.names[:1]
         for name in names:
-            yield replace(_unknown(name, None, False, parameter.limits), default=parameter.default)
+            yield replace(unknown_in(name, None, False, parameter.limits), default=parameter.default)
     elif isinstance(parameter, Colour):
         for channel in range(channels) if channels > 1 else (None,):
-            yield _unknown(parameter.names[0], channel, True, parameter.limits)
+            yield unknown_in(parameter.names[0], channel, True, parameter.limits)
