@@ -82,7 +82,7 @@ def test_metrics_are_what_they_say():
     wi, wo = pairs(400, 5)
     f = np.random.default_rng(1).uniform(0.1, 0.5, 400)
     (it,) = fit((wi, wo, f), "orennayar", given={"sigma": 0.0}, starts=1)
-    rho, material = it.bsdf["reflectance"], observe((wi, wo, f), 80, 4096, 0)
+    rho, material = it.bsdf["reflectance"], observe((wi, wo, f))
     i, o = material.wi.astype(float), material.wo.astype(float)
     x, y = material.f[:, 0] * i[:, 2], rho / np.pi * i[:, 2]
     flat, solid = 1 / np.maximum(np.hypot(o[:, 0], o[:, 1]), np.sin(np.radians(2))), np.ones(len(x))
@@ -192,7 +192,7 @@ def test_no_worse_than_a_warm_start(start):
     (it,) = fit(LOFT, "ward", given={"variant": "ward"}, start=start, starts=0)
     assert it.starts.tried == it.starts.warm == 2  # and the nearest published material
     grey = {name: np.mean(value["value"]) if isinstance(value, dict) else value for name, value in start.items()}
-    material = observe(LOFT, 80, 4096, 0)
+    material = observe(LOFT)
     value = numbers(mi.load_dict(grey).eval(mi.BSDFContext(), interaction(material.wi), mi.Vector3f(material.wo.T)))
     cos = material.wi[:, 2].astype(float)
     residual = np.log(1 + material.f[:, 0] * cos) - np.log(1 + value[:, 0] * cos / material.wo[:, 2])

@@ -66,6 +66,6 @@ def green(path):
     """A material's middle channel, at a thousand pairs of directions."""
     from dataclasses import replace
 
-    material = observe(path, 80, 2000, 0)
+    material = observe(path, pairs=2000)
     channel = [material.channels // 2]
     return replace(material, f=material.f[:, channel], usable=material.usable[:, channel])

@@ -57,7 +57,7 @@ def fit_(
     with stdout_to_stderr():
         try:
             materials, failed = _read(files, cut, seed)
-            failed += _fit_all(materials, names, metric, starts, cut, seed, fits)
+            failed += _fit_all(materials, names, metric, starts, seed, fits)
         except KeyboardInterrupt:
             complete = False
     ranked = [list(own) for _, own in groupby(sorted(fits, key=lambda it: it.file), key=lambda it: it.file)]
@@ -75,19 +75,19 @@ def fit_(
 
 def _read(files: list[Path], cut: float, seed: int) -> tuple[list[Observations], int]:
     """Return what is fitted, and how many files cannot be, of which it prints why."""
-    from ..fit import PAIRS, observe
+    from ..fit import observe
 
     materials = []
     for file in files:
         try:
-            materials.append(observe(file, cut, PAIRS, seed))
+            materials.append(observe(file, cut, seed=seed))
         except ValueError as error:
             err.print(f"mi-brdfs: {one_line(error)}")
     return materials, len(files) - len(materials)
 
 
 def _fit_all(
-    materials: list[Observations], names: list[str], metric: str, starts: int, cut: float, seed: int, fits: list[Fit]
+    materials: list[Observations], names: list[str], metric: str, starts: int, seed: int, fits: list[Fit]
 ) -> int:
     """Add the fits of all models to all materials, and return how many models cannot be fitted."""
     from ..fit import fit
@@ -107,7 +107,7 @@ def _fit_all(
 
                 progress.update(task, description=name)
                 try:
-                    found = fit(batch, name, metric=metric, starts=starts, cut=cut, seed=seed, progress=advance)
+                    found = fit(batch, name, metric=metric, starts=starts, seed=seed, progress=advance)
                     for it in found:
                         _ = it.albedo  # a kernel, whose time belongs to the progress
                     fits += found

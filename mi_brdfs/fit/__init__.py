@@ -11,14 +11,13 @@ from .engine import fit_configuration
 from .isotropy import isotropic
 from .lanes import rgb_variant
 from .metrics import METRICS, Metric, find_metric
-from .observations import FitError, Observations, Source, observe
+from .observations import CUT, PAIRS, FitError, Observations, Source, observe
 from .result import Fit, Starts
 from .starts import warm
 from .unknowns import check_names, configurations
 
 __all__ = [
     "METRICS",
-    "PAIRS",
     "FileError",
     "Fit",
     "FitError",
@@ -30,8 +29,8 @@ __all__ = [
     "observe",
 ]
 
-CUT, PAIRS, STARTS = 80.0, 4096, 10
-"""The defaults of :func:`fit`."""
+STARTS = 10
+"""How many starts a fit has where nothing else is asked for."""
 
 
 def fit(
@@ -53,10 +52,9 @@ def fit(
 
     Free are all numbers and colours that a model declares, within their ranges, a colour with a value for each channel
     of the data: also parameters without a default, as the diffuse lobe that a model may have; models without one, as
-    the diffuse ones, get none. Anisotropic data have
-    the values for both tangent directions and the rotation; numbers that would make a model anisotropic stay at their
-    defaults for isotropic data. A Fresnel term has the parameters of ``given["fresnel"]``: "schlick" (the default),
-    "dielectric", "conductor" or "none".
+    the diffuse ones, get none. Anisotropic data have the values for both tangent directions and the rotation; numbers
+    that would make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the parameters of
+    ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none".
 
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are
@@ -126,6 +124,6 @@ def fit(
             reduced = configuration if own[0].anisotropic else isotropic(configuration)
             names = {unknown.name for unknown in reduced.unknowns} | set(reduced.tied)
             fixed = list(dict.fromkeys(u.name for u in configuration.unknowns if u.name not in names))
-            fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, cut, advance, fixed)
+            fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, advance, fixed)
             found += list(zip(alike, fits, strict=True))
     return [it for _, it in sorted(found, key=lambda pair: (pair[0], pair[1].held_out))]

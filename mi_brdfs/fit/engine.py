@@ -32,7 +32,6 @@ def fit_configuration(
     count: int,
     given: list[Mapping[str, Any]],
     seed: int,
-    cut: float,
     advance: Advance = lambda ended: None,
     fixed: Sequence[str] = (),
 ) -> list[Fit]:
@@ -63,7 +62,7 @@ def fit_configuration(
             bounds=[u.label for u, value in zip(configuration.unknowns, x, strict=True) if u.at_end(float(value))],
             starts=Starts(len(own), warm, int((own <= AGREEMENT**2 * own.min() + 1e-16).sum())),
             bic=float(residuals * np.log(max(own.min(), 1e-300)) + len(x) * np.log(residuals)),
-            cut=cut,
+            cut=material.cut,
             pairs=material.fitted,
             negative=material.negative,
             missing=material.missing,

@@ -20,6 +20,8 @@ Arrays: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike]
 Source: TypeAlias = str | Path | Measurement | Arrays
 """A file, what was read from it, or arrays (wi, wo, f)."""
 
+CUT, PAIRS = 80.0, 4096
+"""The largest angle to the normal, in degrees, and the most pairs of directions, where nothing else is asked for."""
 TRIED = 8
 """Nodes of a large grid that are looked at for each pair that is wanted: many lie below the horizon."""
 STEP = 1e-2
@@ -51,6 +53,8 @@ class Observations:
     """Values below 0 within the cut, which get no weight."""
     missing: int
     """Values within the cut that are no numbers, which get none either."""
+    cut: float
+    """The largest angle of wi and wo to the normal, in degrees."""
     scatter: tuple[tuple[float, float, float], ...] = ()
     """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, at the first azimuth."""
 
@@ -59,7 +63,7 @@ class Observations:
         return self.f.shape[1]
 
 
-def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
+def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0) -> Observations:
     """Return at most ``pairs`` random pairs of a material with both angles up to ``cut`` degrees.
 
     Raises:
@@ -110,6 +114,7 @@ def observe(source: Source, cut: float, pairs: int, seed: int) -> Observations:
         fitted=fitted,
         negative=int(negative.sum()),
         missing=int(missing.sum()),
+        cut=cut,
         scatter=_scatter(source) if isinstance(source, Measurement) and isinstance(source.data, Grid) else (),
     )
 
