@@ -229,6 +229,17 @@ def test_tells_of_ends_albedos_and_narrow_lobes():
     assert not it.resolved and any("narrower" in sentence for sentence in it.remarks())
 
 
+def test_tells_what_the_data_do_not_determine():
+    """Lafortune's factors scale each other; of Burley's sheen's tint nothing is seen where there is no sheen."""
+    (it,) = fit(measured("lafortune", MODELS["lafortune"].drawn(1), 800), "lafortune", starts=2)
+    assert it.undetermined == ["cx", "cz"] and it.sigma["cx"] is it.sigma["cz"] is None and it.sigma["exponent"] > 0
+    assert "cx" not in it.correlations and it.correlations["exponent"]["exponent"] == pytest.approx(1)
+    given = {"metallic": 0.0, "sheen": 0.0, "specular": 0.5, "clearcoat": None, "clearcoat_gloss": None}
+    (it,) = fit(measured("lambert", {"reflectance": 0.4}, 300), "burley", given=given, starts=2)
+    assert "sheen_tint" in it.undetermined
+    json.dumps(it.to_dict(), allow_nan=False)
+
+
 def test_predicts_how_much_is_scattered():
     """The albedo of a fit is the integral over what was measured, where nearly all of it was. What LOFT states is
     another one, and this is told."""

@@ -102,7 +102,7 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     scale = np.where(scale > 0, scale, 1)
     scaled = jacobian[:, free] / scale
     lengths, axes = np.linalg.eigh(scaled.T @ scaled)
-    blind = lengths < BLIND * lengths.max()
+    blind = lengths <= BLIND * lengths.max()
     lost = (np.abs(axes[:, blind]) > 0.1).any(axis=1)
     bread = (axes / np.where(blind, np.inf, lengths)) @ axes.T
     leverage = ((scaled @ bread) * scaled).sum(axis=1).reshape(-1, channels).sum(axis=1)
