@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, ONE_MINUS_EPSILON, SMALL, clamp, expm1, expm1_ratio, log1p, log1p_ratio
+from ..math import EPSILON, ONE_MINUS_EPSILON, SMALL, clamp, expm1, expm1_ratio, log1p, log1p_ratio, safe_sqrt
 
 LARGEST_TAN2 = 1e30
 """tan²θ at the horizon: infinity would leave NaN."""
@@ -77,30 +78,38 @@ class BentLaw:
         return dr.select(above, 1 - value, value)
 
 
-class Steps:
-    """A density on [0, 1], constant on each of equal steps, of which the ``heights`` are given up to a factor."""
+class Ramps:
+    """A density on [0, 1], linear between equally spaced points, at which the ``heights`` are given up to a factor."""
 
     def __init__(self, heights: list[Any]) -> None:
         highest = functools.reduce(dr.maximum, heights)
-        self.heights = [dr.maximum(height, SMALL * highest) for height in heights]  # it must not vanish
-        self.total = sum(self.heights)
+        heights = [dr.maximum(height, SMALL * highest) for height in heights]  # it must not vanish
+        self.ramps = list(itertools.pairwise(heights))
+        self.masses = [0.5 * (left + right) for left, right in self.ramps]
+        self.sum = sum(self.masses)
+        self.total = self.sum / len(self.ramps)
 
     def eval(self, c: mi.Float) -> mi.Float:
-        value = self.heights[0]
-        for k, height in enumerate(self.heights[1:], start=1):
-            value = dr.select(c * len(self.heights) < k, value, height)
-        return value * len(self.heights) / self.total
+        c = c * len(self.ramps)
+        left, right = self.ramps[0]
+        for k, (next_left, next_right) in enumerate(self.ramps[1:], start=1):
+            left, right = dr.select(c < k, left, next_left), dr.select(c < k, right, next_right)
+        share = c - dr.clip(dr.floor(c), 0, len(self.ramps) - 1)
+        return dr.lerp(left, right, share) / self.total
 
     def cdf(self, c: mi.Float) -> mi.Float:
-        c = c * len(self.heights)
-        return sum(height * dr.clip(c - k, 0, 1) for k, height in enumerate(self.heights)) / self.total
+        shares = (dr.clip(c * len(self.ramps) - k, 0, 1) for k in range(len(self.ramps)))
+        ramps = zip(self.ramps, self.masses, shares, strict=True)
+        return sum(share * dr.lerp(left, mass, share) for (left, _), mass, share in ramps) / self.sum
 
     def inverse_cdf(self, mass: mi.Float) -> mi.Float:
-        left, c = mass * self.total, 0
-        for height in self.heights:
-            c += dr.clip(left / height, 0, 1)
-            left -= height
-        return c / len(self.heights)
+        remaining, c = mass * self.sum, 0
+        for (left, right), mass in zip(self.ramps, self.masses, strict=True):
+            here = dr.clip(remaining, 0, mass)
+            # Rounded, the square of the height there may be less than 0.
+            c += 2 * here / (left + safe_sqrt(left * left + 2 * (right - left) * here))
+            remaining -= mass
+        return c / len(self.ramps)
 
 
 class RootLaw:

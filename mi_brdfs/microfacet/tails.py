@@ -15,8 +15,8 @@ from .laws import (
     LARGEST_TAN2,
     BentLaw,
     PowerLaw,
+    Ramps,
     RootLaw,
-    Steps,
     cosine_power_cdf,
     inverse_cosine_power_cdf,
     tan2_of_versine,
@@ -133,11 +133,11 @@ class HemiEPD(Isotropic):
     """
 
     # tests/calibration/hemi_epd.py fits these.
-    STEP, SPREAD = 0.18, 0.2
-    """Of the quadrature's nodes, and how much closer to s = 1 they move for κ > 0."""
-    WEIGHTS = (0.0524317, 0.282794, 0.440690, 0.636919, 0.805338, 0.993224, 1.16625, 1.36169, 1.47076, 2.00971,
-               0.677638, 5.15025)  # fmt: skip
-    """Of the quadrature."""
+    STEP, CLOSER = 0.18, 0.2
+    """Of the quadrature's nodes, and how much closer to s = 1 they are for κ > 0."""
+    WEIGHTS = (0.0524025778, 0.282906942, 0.440408535, 0.637478053, 0.804718443, 0.993748450, 1.16546420, 1.36386522,
+               1.46351416, 2.03185765, 0.634488608, 5.13207934)  # fmt: skip
+    """Of the nodes; for κ = 0 they leave no error."""
     NARROWER, BROADER = 6.5, (0.6, 0.28)
     """Of the exponent that Blinn's distribution would have, for κ > 0 and for κ < 0."""
 
@@ -151,17 +151,17 @@ class HemiEPD(Isotropic):
         self.integral = self._integral()
 
     def _integral(self) -> mi.Float:
-        """J, good to 1.5e-5: a sum over s = exp(-n STEP/(1 + SPREAD κ⁺ p)), where n = 0, 1, 3, 6, 10, … are the triangular
-        numbers, of which these powers and those of s^p are products."""
-        closer = 1 / (1 + self.SPREAD * self.power * dr.maximum(self.kappa, 0))
+        """J, good to 2e-5: a sum over s = exp(-n STEP/(1 + CLOSER κ⁺ p)) with the triangular numbers n = 0, 1, 3, 6, …,
+        so that s and s^p are products of those before."""
+        scale = 1 / (1 + self.CLOSER * self.power * dr.maximum(self.kappa, 0))
         s, t, integral = 1, 1, 0  # t = s^p
-        root_s = step_s = dr.exp(-self.STEP * closer)
-        root_t = step_t = dr.exp(-self.STEP * closer * self.power)
+        factor_s = step_s = dr.exp(-self.STEP * scale)
+        factor_t = step_t = dr.exp(-self.STEP * scale * self.power)
         for weight in self.WEIGHTS:
             integral += weight * s * expm1_ratio(self.kappa * t, *self.scaled)
-            s, step_s = s * step_s, step_s * root_s
-            t, step_t = t * step_t, step_t * root_t
-        return integral * closer
+            s, factor_s = s * factor_s, factor_s * step_s
+            t, factor_t = t * factor_t, factor_t * step_t
+        return integral * scale
 
     def mean_square_slope(self) -> mi.Float:
         # That of Blinn's distribution with about the same mean of log(cosθ).
@@ -190,30 +190,33 @@ class EPD(Isotropic):
     """D = exp(-(tan²θ_h/α²)ᵞ) / (π α² Γ(1 + 1/γ) cos⁴θ_h), the exponential power distribution of slopes, of which γ = 1
     is Beckmann's (Holzschuch and Pacanowski 2017, doi:10.1145/3072959.3073621).
 
-    q follows D cosθ_h, by steps over a law that has a peak within tan²θ_h = α², as D has, and falls from where most
+    q follows D cosθ_h, by ramps over a law that has a peak within tan²θ_h = α², as D has, and falls from where most
     facets are: the lower γ, the further is one from the other.
     """
 
     long_tailed = True
-    STEPS = 18
-    """For which it is sampled as well as Beckmann's distribution where it is that."""
-    FAR = 1.5
-    """How far the law reaches; tests/calibration/epd.py fits it."""
+    RAMPS = 9
+    """For which it is sampled nearly as well as Beckmann's distribution where it is that."""
+    # tests/calibration/epd.py fits these.
+    FAR = 1.35
+    """How far the law reaches, in medians."""
+    END = 0.05
+    """How far from its end the last ramp's height there is that of D, in units of a ramp: D is nothing at infinity."""
 
     def __init__(self, alpha: mi.Float, gamma: mi.Float) -> None:
         super().__init__()
         self.alpha, self.alpha2, self.gamma = alpha, dr.square(alpha), gamma
         # tan²θ_h is distributed as α² Γ^(1/γ), where Γ is Gamma-distributed with parameter 1/γ and median 1/γ - 1/3
         # (Chen and Rubin 1986, doi:10.1016/0167-7152(86)90044-1), nearly.
-        self.median = self._limited(self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma))
+        median = self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma)
+        self.median, far = self._limited(median), self._limited(self.FAR * median)
         self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
 
-        far = self._limited(self.alpha2 * dr.exp(dr.log(self.FAR / gamma) / gamma))
         self.law = RootLaw(dr.minimum(self.alpha2, 0.5 * far), far)
-        borders = [0, *(self.law.inverse_cdf(k / self.STEPS) for k in range(1, self.STEPS))]
-        falls = [1, *(dr.exp(-dr.exp(gamma * dr.log(t / self.alpha2))) for t in borders[1:])]
-        at = [fall * self._rest(t) / self.law.eval(t) for fall, t in zip(falls, borders, strict=True)]
-        self.steps = Steps([0.5 * (left + right) for left, right in zip(at, [*at[1:], 0], strict=True)])
+        points = [k / self.RAMPS for k in (*range(1, self.RAMPS), self.RAMPS - self.END)]
+        slopes = [0, *(self.law.inverse_cdf(c) for c in points)]
+        falls = [1, *(dr.exp(-dr.exp(gamma * dr.log(t / self.alpha2))) for t in slopes[1:])]
+        self.ramps = Ramps([fall * self._rest(t) / self.law.eval(t) for fall, t in zip(falls, slopes, strict=True)])
 
     def _limited(self, tan2: mi.Float) -> mi.Float:
         return dr.minimum(tan2, 1e16)  # of which derivatives take the square
@@ -242,11 +245,11 @@ class EPD(Isotropic):
 
     def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         slope = facet.sin2_h, dr.square(facet.cos_h)
-        return dr.inv_pi * facet.cos_h * self.law.eval(*slope) * self.steps.eval(self.law.cdf(*slope))
+        return dr.inv_pi * facet.cos_h * self.law.eval(*slope) * self.ramps.eval(self.law.cdf(*slope))
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
-        c = dr.minimum(self.steps.cdf(self.law.cdf(dr.minimum(tan2, LARGEST_TAN2))), 1)
+        c = dr.minimum(self.ramps.cdf(self.law.cdf(dr.minimum(tan2, LARGEST_TAN2))), 1)
         return c, 1 - c
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
-        return self.law.inverse_cdf(self.steps.inverse_cdf(c))
+        return self.law.inverse_cdf(self.ramps.inverse_cdf(c))

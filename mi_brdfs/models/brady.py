@@ -88,5 +88,5 @@ class Exponential(EPD):
         return self.scale * dr.exp(-self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), EPSILON)))
 
     def estimated_albedo(self, cos):
-        """∫ D cosθ_h dω_h, as the steps have it."""
-        return self.scale * dr.pi * self.steps.total / self.STEPS
+        """∫ D cosθ_h dω_h, as the ramps have it."""
+        return self.scale * dr.pi * self.ramps.total
