@@ -76,8 +76,8 @@ def square(x: Any) -> Any:
 def log1p(x: Any) -> Any:
     """Return log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
     small = abs(x) < 0.5
-    near = dr.select(small, x, 0)
-    return dr.select(small, near * _log1p_series(near), dr.log(dr.select(small, 1, 1 + x)))
+    near, far = dr.select(small, x, 0), dr.select(small, 1, x)
+    return dr.select(small, near * _log1p_series(near), dr.log(1 + far))
 
 
 def expm1(x: Any) -> Any:
@@ -111,13 +111,6 @@ def _log1p_series(x: Any) -> Any:
 def _expm1_series(x: Any) -> Any:
     """Return (exp(x) - 1)/x for |x| <= 0.5; the next term is below 1e-8."""
     return 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8))))))
-
-
-def log_cos(cos: Any, sin2: Any) -> Any:
-    """Return log(cosθ), from sin²θ where the cosine has lost its digits."""
-    near = sin2 < 0.5
-    x = dr.select(near, -sin2, 0)
-    return dr.select(near, 0.5 * x * _log1p_series(x), dr.log(dr.select(near, 1, dr.maximum(cos, TINY))))
 
 
 def safe_sqrt(x: Any) -> Any:

@@ -13,9 +13,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import TINY, log1p_ratio, log_cos
+from ..math import TINY, log1p_ratio
 from .facet import Facet
-from .laws import LARGEST_TAN2, cosine_power_cdf, inverse_cosine_power_cdf, log_complement
+from .laws import LARGEST_TAN2, cosine_power, cosine_power_cdf, inverse_cosine_power_cdf, log_complement
 from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
 from .term import Term
 
@@ -143,10 +143,10 @@ class Blinn(Isotropic):
 
     def eval(self, facet: Facet) -> mi.Float:
         n = self.exponent
-        return (n + 2) * dr.inv_two_pi * dr.exp(n * log_cos(facet.cos_h, facet.sin2_h))
+        return (n + 2) * dr.inv_two_pi * cosine_power(facet.tan2_h, n)
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
-        return cosine_power_cdf(tan2, self.exponent + 2)
+        return cosine_power_cdf(tan2, self.exponent)
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return inverse_cosine_power_cdf(complement, self.exponent + 2)
@@ -175,17 +175,16 @@ class AshikhminShirleyNormals(Distribution):
 
     def eval(self, facet: Facet) -> mi.Float:
         # e log(cosθ), where steepness is (e + 1) sin²θ
-        sin2 = facet.sin2_h
-        near = -0.5 * log1p_ratio(-dr.minimum(sin2, 0.5))
-        far = log_cos(facet.cos_h, sin2) / dr.maximum(sin2, 0.5)
-        exponent = (self.steepness(facet) - sin2) * dr.select(sin2 < 0.5, near, far)
+        tan2 = dr.minimum(facet.tan2_h, LARGEST_TAN2)
+        exponent = -0.5 * (self.steepness(facet) - facet.sin2_h) * (1 + tan2) * log1p_ratio(tan2)
         return dr.inv_two_pi / (self.alpha_u * self.alpha_v) * dr.exp(exponent)
 
     def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         return self.eval(facet)
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
-        return cosine_power_cdf(tan2, g)
+        complement = cosine_power(tan2, g)
+        return 1 - complement, complement
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return inverse_cosine_power_cdf(complement, g)

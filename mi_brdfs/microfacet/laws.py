@@ -153,9 +153,14 @@ def tan2_of_versine(v: mi.Float) -> mi.Float:
     return v * (2 - v) / dr.square(1 - v)
 
 
+def cosine_power(tan2: mi.Float, power: mi.Float) -> mi.Float:
+    """cosθ^power."""
+    return dr.exp(-0.5 * power * log1p(dr.minimum(tan2, LARGEST_TAN2)))
+
+
 def cosine_power_cdf(tan2: mi.Float, power: mi.Float) -> tuple[mi.Float, mi.Float]:
-    """``(C, 1 - C)`` for 1 - C = cosθ^power."""
-    complement = dr.exp(-0.5 * power * log1p(dr.minimum(tan2, LARGEST_TAN2)))
+    """``(C, 1 - C)`` for 1 - C = cosθ^power·cos²θ; Dr.Jit computes a power that D has, too, once."""
+    complement = cosine_power(tan2, power) / (1 + dr.minimum(tan2, LARGEST_TAN2))
     return 1 - complement, complement
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import ONE_MINUS_EPSILON, clamp, expm1_ratio, gauss_legendre, log_cos
+from ..math import ONE_MINUS_EPSILON, clamp, expm1_ratio, gauss_legendre
 from .distributions import Isotropic
 from .facet import Facet
 from .laws import (
@@ -17,10 +17,10 @@ from .laws import (
     PowerLaw,
     Ramps,
     RootLaw,
+    cosine_power,
     cosine_power_cdf,
     inverse_cosine_power_cdf,
     tan2_of_versine,
-    versine,
     versine_of_tan2,
 )
 
@@ -110,10 +110,10 @@ class ABC(Isotropic):
         return super().estimated_albedo(cos) * self.total
 
     def eval(self, facet: Facet) -> mi.Float:
-        return self.scale * self.law.eval(versine(facet.cos_h, facet.sin2_h))
+        return self.scale * self.law.eval(versine_of_tan2(facet.tan2_h))
 
     def density(self, facet: Facet, g: mi.Float) -> mi.Float:
-        return self.law.eval(versine(facet.cos_h, facet.sin2_h)) * dr.inv_two_pi / self.law.norm
+        return self.law.eval(versine_of_tan2(facet.tan2_h)) * dr.inv_two_pi / self.law.norm
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         c = clamp(self.law.mass(versine_of_tan2(tan2)) / self.law.norm, 0, 1)
@@ -171,16 +171,16 @@ class HemiEPD(Isotropic):
         return 2 / (2 + self.gamma * narrower)
 
     def eval(self, facet: Facet) -> mi.Float:
-        power = dr.exp(self.gamma * log_cos(facet.cos_h, facet.sin2_h))
+        power = cosine_power(facet.tan2_h, self.gamma)
         bent = expm1_ratio(self.kappa * power, *self.scaled) / self.integral
         return (self.gamma + 2) * dr.inv_two_pi * power * bent
 
     def density(self, facet: Facet, g: mi.Float) -> mi.Float:
-        m, s = cosine_power_cdf(facet.tan2_h, self.gamma + 2)
+        m, s = cosine_power_cdf(facet.tan2_h, self.gamma)
         return (self.gamma + 2) * dr.inv_two_pi * s / facet.cos_h * self.law.eval(m, s)
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
-        return self.law.cdf(*cosine_power_cdf(tan2, self.gamma + 2))
+        return self.law.cdf(*cosine_power_cdf(tan2, self.gamma))
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return inverse_cosine_power_cdf(self.law.inverse_cdf(c, complement), self.gamma + 2)
