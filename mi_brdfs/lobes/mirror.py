@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, TINY, choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
+from ..math import EPSILON, ONE_MINUS_EPSILON, TINY, choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
 from .lobe import Lobe
 
 
@@ -32,10 +32,11 @@ class AxisFrame:
         versine = dr.select(inside, versine, 0)
         return log1p(-versine), versine, inside
 
-    def direction(self, log_a: mi.Float, b: mi.Float, c: mi.Float) -> mi.Vector3f:
-        """Return the direction of cosine A whose remainder points along ``b up + c side``, with b² + c² = 1."""
-        sin = dr.sqrt(dr.maximum(-expm1(2 * log_a), 0))
-        return self.axis * dr.exp(log_a) + self.up * (sin * b) + self.side * (sin * c)
+    def direction(self, versine: mi.Float, b: mi.Float, c: mi.Float) -> mi.Vector3f:
+        """Return the direction of cosine A = 1 - ``versine`` whose remainder points along ``b up + c side``, with
+        b² + c² = 1."""
+        sin = safe_sqrt(versine * (2 - versine))
+        return self.axis * (1 - versine) + self.up * (sin * b) + self.side * (sin * c)
 
     def mirrored_z(self, w: mi.Vector3f, versine: mi.Float) -> mi.Float:
         """Return the cosine to the normal of the mirror image of ``w``, or 0 below the horizon."""
@@ -106,7 +107,8 @@ class PowerLobe(MirrorLobe):
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         frame = self.frame(wi)
         u, log_a, b, c = self._draw(frame, u, v)
-        wo, mirrored = frame.direction(log_a, b, c), frame.direction(log_a, -b, c)
+        versine = -expm1(log_a)
+        wo, mirrored = frame.direction(versine, b, c), frame.direction(versine, -b, c)
         z, mirrored_z = dr.maximum(wo.z, 0), dr.maximum(mirrored.z, 0)
         return dr.select(u * (z + mirrored_z) < z, wo, mirrored)
 
@@ -117,15 +119,18 @@ class PowerLobe(MirrorLobe):
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
         c = dr.select(is_axial, sin_phi, 2 * v.y - 1)
         b = dr.select(is_axial, abs(cos_phi), safe_sqrt(1 - c * c))
-        return u, dr.select(is_axial, log1p(-v.x) / (n + 2), log1p(-dr.power(v.x, 2 / 3)) / (n + 1)), b, c
+        above = dr.select(is_axial, v.x, dr.square(dr.cbrt(v.x)))
+        return u, log1p(-above) / (n + dr.select(is_axial, 2, 1)), b, c
 
     def _pair(
         self, frame: AxisFrame, log_a: mi.Float, versine: mi.Float, power: mi.Float, cos_phi: mi.Float
     ) -> mi.Float:
         """Return the density of the mixture, where ``power`` is Aⁿ, or 0 for A < 0."""
         n = self.exponent
-        axial = (n + 2) * (1 - versine)
-        lateral = 0.75 * dr.pi * (n + 1) * dr.sqrt(dr.maximum(-expm1((n + 1) * log_a), TINY)) * cos_phi
+        cos = 1 - versine
+        axial = (n + 2) * cos
+        radial = dr.sqrt(dr.maximum(1 - power * cos, 1 - ONE_MINUS_EPSILON))  # not 0, where rounding leaves nothing
+        lateral = 0.75 * dr.pi * (n + 1) * radial * cos_phi
         share = self._share(frame)
         return power * dr.inv_pi * (share * axial + (1 - share) * lateral)
 
@@ -156,7 +161,7 @@ class PowerResponseLobe(MirrorLobe):
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         frame = self.frame(wi)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.y)
-        log_a = log1p(-v.x) / (self.exponent + 1)
-        wo, mirrored = frame.direction(log_a, cos_phi, sin_phi), frame.direction(log_a, -cos_phi, sin_phi)
+        versine = -expm1(log1p(-v.x) / (self.exponent + 1))
+        wo, mirrored = frame.direction(versine, cos_phi, sin_phi), frame.direction(versine, -cos_phi, sin_phi)
         # The azimuth has chosen one of the two at random; the other replaces it only if it lies below the horizon.
         return dr.select(wo.z > 0, wo, mirrored)
