@@ -90,9 +90,9 @@ class RoughDiffuseLobe(Lobe):
 
     Draw from a linearly transformed cosine, clipped to the horizon before the transform, in a mixture with uniform
     directions. The matrix and the fraction of uniform directions are the polynomials that Portsmouth, Kutz and Hill
-    fitted to their model, whose paper derives the density: that of the cosine before the transform M, times the
-    Jacobian 1/(det M |M⁻¹wo|³) (EON, 2025, https://jcgt.org/published/0014/01/06/). No sample falls below the horizon,
-    and ``retro`` = 0 is the cosine itself.
+    fitted to their model (the latter times an eighth root, not a tenth one, which takes logarithms), whose paper
+    derives the density: that of the cosine before the transform M, times the Jacobian 1/(det M |M⁻¹wo|³) (EON, 2025,
+    https://jcgt.org/published/0014/01/06/). No sample falls below the horizon, and ``retro`` = 0 is the cosine itself.
     """
 
     glossy = False
@@ -108,7 +108,8 @@ class RoughDiffuseLobe(Lobe):
         """Return the probability of the uniform directions."""
         mu, r = wi.z, self.retro
         share = 0.162925 + mu * (-0.372058 + mu * (0.538233 - 0.290822 * mu))
-        return dr.select(r > 0, dr.power(dr.maximum(r, TINY), 0.1), 0) * share
+        root = dr.sqrt(dr.sqrt(dr.sqrt(dr.maximum(r, TINY))))
+        return dr.select(r > 0, root, 0) * share
 
     def _matrix(self, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
         """Return ``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of
