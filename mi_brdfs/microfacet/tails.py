@@ -152,16 +152,21 @@ class HemiEPD(Isotropic):
 
     def _integral(self) -> mi.Float:
         """J, good to 2e-5: a sum over s = exp(-n STEP/(1 + CLOSER κ⁺ p)) with the triangular numbers n = 0, 1, 3, 6, …,
-        so that s and s^p are products of those before."""
-        scale = 1 / (1 + self.CLOSER * self.power * dr.maximum(self.kappa, 0))
-        s, t, integral = 1, 1, 0  # t = s^p
-        factor_s = step_s = dr.exp(-self.STEP * scale)
-        factor_t = step_t = dr.exp(-self.STEP * scale * self.power)
+        so that s and s^p are products of those before; or the series in κ where e(κ s^p) would cancel."""
+        kappa, p = dr.select(abs(self.kappa) < 0.5, 0.5, self.kappa), self.power
+        step = -self.STEP / (1 + self.CLOSER * p * dr.maximum(kappa, 0))
+        t, ratio, integral = 1, 1, 0  # s^p and s^(1-p)
+        factor_t = step_t = dr.exp(step * p)
+        factor_ratio = step_ratio = dr.exp(step * (1 - p))
+        shift, scale = self.scaled
         for weight in self.WEIGHTS:
-            integral += weight * s * expm1_ratio(self.kappa * t, *self.scaled)
-            s, factor_s = s * factor_s, factor_s * step_s
+            integral += weight * ratio * (dr.exp(kappa * t - shift) - scale)
             t, factor_t = t * factor_t, factor_t * step_t
-        return integral * scale
+            ratio, factor_ratio = ratio * factor_ratio, factor_ratio * step_ratio
+        integral *= -step / (self.STEP * kappa)
+        near = dr.select(abs(self.kappa) < 0.5, self.kappa, 0)
+        series = sum(near**n / (math.factorial(n + 1) * (1 + n * p)) for n in range(7))
+        return dr.select(abs(self.kappa) < 0.5, series, integral)
 
     def mean_square_slope(self) -> mi.Float:
         # That of Blinn's distribution with about the same mean of log(cosθ).
