@@ -464,8 +464,8 @@ class SumOfDensities(adapter.ModelBSDF):
     """The mixture's density leaves out the lobes' probabilities."""
 
     @staticmethod
-    def _eval_pdf(valid, mixture, frame, wo):
-        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
+    def _eval_pdf(valid, mixture, frame, wo, handed=None):
+        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo, handed)
         return value, pdf * len(mixture.lobes)
 
 
@@ -581,8 +581,8 @@ class OtherSharesDrawn(adapter.ModelBSDF):
         valid, mixture, components, frame = evaluated
         alike = Mixture(mixture.lobes, mixture.wi)
         alike.probabilities = [mi.Float(1 / len(mixture.lobes)) for _ in mixture.lobes]
-        wo, index = alike.sample(sample1, sample2)
-        mixture.sample = lambda u, v: (wo, index)
+        wo, index, _ = alike.sample(sample1, sample2)
+        mixture.sample = lambda u, v: (wo, index, {})
         return self._sample(valid, mixture, components, frame, sample1, sample2)
 
 
@@ -590,8 +590,8 @@ class ShareForgottenInOne(adapter.ModelBSDF):
     """The probability of the second lobe is left out of the density."""
 
     @staticmethod
-    def _eval_pdf(valid, mixture, frame, wo):
-        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
+    def _eval_pdf(valid, mixture, frame, wo, handed=None):
+        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo, handed)
         if len(mixture.lobes) < 2:
             return value, pdf
         second = mixture.lobes[1].eval_pdf(mixture.wi, frame.to_local(wo))[1] * (1 - mixture.probabilities[1])

@@ -3,11 +3,14 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, direction
+from support import call, direction, hemisphere
 
 import mi_brdfs
 from mi_brdfs.cli.errors import one_line
-from mi_brdfs.lobes import LambertLobe, Lobe
+from mi_brdfs.lobes import LambertLobe, Lobe, MicrofacetLobe
+from mi_brdfs.microfacet.distributions import Beckmann
+from mi_brdfs.microfacet.fresnel import Unit
+from mi_brdfs.microfacet.shadowing import VCavity
 from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Spelling
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb", "as_before")
@@ -160,3 +163,25 @@ def test_a_parameter_is_not_called_like_what_models_have(name):
 def test_plugins_are_a_tuple():
     with pytest.raises(TypeError, match=r'Slip: plugins is a tuple of names; write plugins = \("slip",\).'):
         model(matte, plugins="slip")
+
+
+class Dimmed(MicrofacetLobe):
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return wo.z * value, pdf
+
+
+@pytest.mark.parametrize("below", [(), (LambertLobe(0.3),)])
+def test_a_lobe_that_changes_only_what_another_one_evaluates(below):
+    """The weights of its samples are its own, not what the other one hands on as it draws."""
+    model(
+        lambda self, p: (*below, Dimmed(p.reflectance, Beckmann(p.alpha, p.alpha), VCavity(), Unit())),
+        reflectance=Reflectance(0.5, "ρ"),
+        alpha=Number(0.3, (0.01, 1), "α"),
+    )
+    bsdf, wi = mi.load_dict({"type": "slip"}), hemisphere(100, 1, 0.1)
+    u = np.random.default_rng(2).random((len(wi), 3), np.float32)
+    wo, density, weight = call(bsdf.sample, mi.BSDFContext(), wi, u[:, :1], u[:, 1:])
+    value, pdf = call(bsdf.eval_pdf, mi.BSDFContext(), wi, wo)
+    np.testing.assert_allclose(density, pdf, rtol=1e-3)
+    np.testing.assert_allclose(weight * pdf, value, rtol=1e-3)

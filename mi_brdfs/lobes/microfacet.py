@@ -12,6 +12,7 @@ from ..microfacet.choice import sampler_of
 from ..microfacet.distributions import Distribution
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Fresnel
+from ..microfacet.sampling import Sampler
 from ..microfacet.shadowing import Shadowing
 from .lobe import Lobe
 
@@ -75,11 +76,28 @@ class MicrofacetLobe(Lobe):
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         facet = Facet.between(wi, wo)
-        facets = self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
-        return self.reflectance * (self.fresnel(facet.cos_d) * facets), self.sampler.pdf(self, facet)
+        return self._eval(facet), self.sampler.pdf(self, facet)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.sampler.sample(self, wi, u, v)
+
+    def complete(
+        self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, wo: mi.Vector3f | None
+    ) -> tuple[mi.Vector3f, tuple[Any, mi.Float] | None]:
+        given = None if wo is None else Facet.between(wi, wo)
+        facet, pdf = self.sampler.complete(self, wi, u, v, drawn, given)
+        if (facet.cos_o > 0) is False:  # in scalar variants, where a division by zero is an error
+            return facet.wo, None
+        return facet.wo, (self._eval(facet), pdf)
+
+    @property
+    def hands_on(self) -> bool:
+        return super().hands_on and type(self.sampler).complete is not Sampler.complete
+
+    def _eval(self, facet: Facet) -> Any:
+        """Return f cosθ_o."""
+        facets = self.distribution.eval(facet) * self.shadowing(facet) / (4 * facet.cos_i)
+        return self.reflectance * (self.fresnel(facet.cos_d) * facets)
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
         return self.colour * self.fresnel(wi.z)

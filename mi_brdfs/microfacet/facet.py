@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..math import SMALL
+from ..math import SMALL, normalize_or, select
 
 
 class Cosines(NamedTuple):
@@ -63,6 +63,11 @@ class Facet:
         """Return the facet mirrored about the normal, which reflects the same ``wi``."""
         return self.reflecting(self.wi, mi.Vector3f(-self.h.x, -self.h.y, self.h.z))
 
+    def where(self, mask: mi.Bool, other: Facet) -> Facet:
+        """Return this facet where the mask is set, and elsewhere another one for the same ``wi``."""
+        pairs = (self.wo, other.wo), (self.h, other.h), (self.cos_d, other.cos_d)
+        return Facet(self.wi, *(select(mask, *pair) for pair in pairs))
+
     @property
     def cos_i(self) -> mi.Float:
         return self.wi.z
@@ -79,6 +84,11 @@ class Facet:
     def sin2_h(self) -> mi.Float:
         # Not 1 - cos², which loses the digits of narrow lobes.
         return self.h.x * self.h.x + self.h.y * self.h.y
+
+    @property
+    def azimuth(self) -> tuple[mi.Float, mi.Float]:
+        """The direction of the half vector in the surface."""
+        return normalize_or(self.h.x, self.h.y, (1, 0))
 
     @property
     def tan2_h(self) -> mi.Float:

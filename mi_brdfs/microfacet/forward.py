@@ -48,8 +48,18 @@ class WithForwardShare(Sampler):
         return dr.maximum(wi.z, 1e-3)
 
     def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        forward, u = choose(u, self._share(lobe, wi))
-        return select(forward, self._draw(wi, v), self.sampler.sample(lobe, wi, u, v))
+        return self.complete(lobe, wi, u, v, True, None)[0].wo
+
+    def complete(
+        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, given: Facet | None
+    ) -> tuple[Facet, mi.Float]:
+        share = self._share(lobe, wi)
+        forward, u = choose(u, share)
+        wo = self._draw(wi, v)
+        if given is not None:
+            wo = select(drawn, wo, given.wo)
+        facet, pdf = self.sampler.complete(lobe, wi, u, v, select(forward, False, drawn), Facet.between(wi, wo))
+        return facet, self._mixed(facet, pdf, share)
 
     def _draw(self, wi: mi.Vector3f, v: mi.Point2f) -> mi.Vector3f:
         z = self._cosine(wi)
@@ -63,6 +73,10 @@ class WithForwardShare(Sampler):
         return mi.Vector3f(sin * (x * cos_delta - y * sin_delta), sin * (y * cos_delta + x * sin_delta), cos)
 
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
+        return self._mixed(facet, self.sampler.pdf(lobe, facet), self._share(lobe, facet.wi))
+
+    def _mixed(self, facet: Facet, pdf: mi.Float, share: mi.Float) -> mi.Float:
+        """The density, where ``pdf`` is that of the other sampler."""
         wi, wo, z, cos = facet.wi, facet.wo, self._cosine(facet.wi), dr.maximum(facet.cos_o, 0)
         x_i, y_i = normalize_or(-wi.x, -wi.y, (1, 0))
         x_o, y_o = normalize_or(wo.x, wo.y, (1, 0))
@@ -71,4 +85,4 @@ class WithForwardShare(Sampler):
         inverse = dr.rsqrt(dr.lerp(width2, 1, sin2_half))
         azimuth = 0.25 * width2 * safe_sqrt(1 - sin2_half) * inverse * dr.square(inverse)
         forward = 2 * (z * scale) * (cos * scale) * dr.square(1 + z) * scale * azimuth
-        return dr.lerp(self.sampler.pdf(lobe, facet), forward, self._share(lobe, wi))
+        return dr.lerp(pdf, forward, share)

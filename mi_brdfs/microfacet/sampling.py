@@ -3,6 +3,7 @@ draws it with."""
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Protocol
 
 import drjit as dr
@@ -37,6 +38,15 @@ class Sampler:
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         """The density per solid angle with which it draws ``facet.wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define pdf.")
+
+    def complete(
+        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, given: Facet | None
+    ) -> tuple[Facet, mi.Float]:
+        """``(facet, pdf)``: a facet whose ``wo`` is drawn as by :meth:`sample` in the lanes of ``drawn``, and the
+        ``given`` one elsewhere, and its density: both together, where that is cheaper."""
+        wo = self.sample(lobe, wi, u, v)
+        facet = Facet.between(wi, wo if given is None else select(drawn, wo, given.wo))
+        return facet, self.pdf(lobe, facet)
 
 
 class AntitheticNormals(Sampler):
@@ -88,24 +98,38 @@ class AntitheticNormals(Sampler):
         """Of the half vectors drawn so, where ``q`` is that of the distribution."""
         return q * linear_density(self._bias(lobe, facet.wi), line.part(facet)) / line.mass
 
-    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+    def complete(
+        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, given: Facet | None
+    ) -> tuple[Facet, mi.Float]:
         distribution = lobe.distribution
         u, cos, sin, which = self._azimuth(lobe, wi, u, v.x)
         x, y = normalize_or(distribution.alpha_u * cos, distribution.alpha_v * sin, (1, 0))
-        tan = safe_sqrt(self._tan2(lobe, wi, Line(distribution, wi, x, y), which, v.y))
+        if given is not None:
+            x, y = (select(drawn, *it) for it in zip((x, y), given.azimuth, strict=True))
+        line = Line(distribution, wi, x, y)
+        tan = safe_sqrt(self._tan2(lobe, wi, line, which, v.y))
         facet = Facet.at(wi, tan * x, tan * y)
+        if given is not None:
+            facet = facet.where(drawn, given)
         image = facet.image()
         weight, other = reflected(lobe, facet), reflected(lobe, image)
-        return select(u * (weight + other) < weight, facet.wo, image.wo)
+        is_image = select(drawn, u * (weight + other) >= weight, False)
+        # Anew, as narrow distributions, and the weights of grazing images, see the rounding of the direction.
+        facet = Facet.between(wi, select(is_image, image.wo, facet.wo))
+        return facet, self._pdf(lobe, line.along(*facet.azimuth), facet)
+
+    def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+        return self.complete(lobe, wi, u, v, True, None)[0].wo
 
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
-        distribution = lobe.distribution
-        x, y = normalize_or(facet.h.x, facet.h.y, (1, 0))
-        line = Line(distribution, facet.wi, x, y)
-        cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
+        return self._pdf(lobe, Line(lobe.distribution, facet.wi, *facet.azimuth), facet)
 
-        weight, other = reflected_above(lobe, facet), reflected(lobe, facet.image())
+    def _pdf(self, lobe: FacetLobe, line: Line, facet: Facet) -> mi.Float:
+        """The density, where the facet is on the line."""
+        distribution, (x, y) = lobe.distribution, facet.azimuth
+        cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
         density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
+        weight, other = reflected_above(lobe, facet), reflected(lobe, facet.image())
         return density / (2 * facet.cos_d) * (weight / (weight + other))
 
 
@@ -118,9 +142,18 @@ class Line:
         limit2 = dr.square((along + dr.sqrt(along * along + z * z)) / z)
         self.lowest = dr.rsqrt(1 + limit2)
         """cosθ_h where tanθ_h is R."""
-        self.g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
+        self.g = self._g(x, y)
         self.mass, self.rest = distribution.cdf(limit2, self.g)
         """C(R), and what it lacks to one."""
+
+    def _g(self, x: mi.Float, y: mi.Float) -> mi.Float:
+        return dr.square(x / self.distribution.alpha_u) + dr.square(y / self.distribution.alpha_v)
+
+    def along(self, x: mi.Float, y: mi.Float) -> Line:
+        """The same line, where rounding has turned it."""
+        line = copy(self)
+        line.g = self._g(x, y)
+        return line
 
     def part(self, facet: Facet) -> mi.Float:
         """The m of a facet on the line."""
