@@ -34,10 +34,6 @@ class Problem:
         columns = [u.from_scale(points[..., k]) for k, u in enumerate(self.configuration.unknowns)]
         return np.stack(columns, axis=-1)
 
-    def points_of(self, values: Array) -> Array:
-        columns = [u.to_scale(values[..., k]) for k, u in enumerate(self.configuration.unknowns)]
-        return np.stack(columns, axis=-1)
-
     def sums(self, which: Sequence[int] | Array, points: Array, pairs: int | None = None) -> Normal:
         """Return the sums over the fitted pairs of some materials, or the first of them, at points of shape (P, K)."""
         count, unknowns = len(points), points.shape[1]

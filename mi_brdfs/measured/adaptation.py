@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from ..measure.arrays import luminance
 from .adaptive import Adaptive, on_phi, on_theta
 from .arrays import NUMPY, stacked
-from .colour import LUMINANCE
 from .coordinates import TWO_PI, HalfDifference, polar_angle, spherical
 from .measurement import usable
 from .source import Source
@@ -145,8 +145,7 @@ def turned(source: Source) -> float:
 
 def brightness(values: np.ndarray) -> np.ndarray:
     """Return the luminance of linear sRGB, the mean of other channels, and 0 where that is negative or missing."""
-    weighed = values @ LUMINANCE if values.shape[-1] == 3 else values.mean(axis=-1)
-    return usable(weighed)
+    return usable(luminance(values))
 
 
 def area(values: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..math import EPSILON
-from .coordinates import TWO_PI, Coordinates, polar_angle, spherical
+from .coordinates import TWO_PI, Coordinates, azimuth_of, polar_angle, spherical
 from .warp import Map, MitsubaMap, MitsubaWarp, Warp
 
 FLOOR = 1e-9
@@ -50,6 +50,7 @@ class Adaptive(Coordinates):
         self._relative, self._jacobian = len(phi_i) <= 2, jacobian
         self._symmetry = 1 if self._relative else round(TWO_PI / float(phi_i[-1] - phi_i[0]))
         self._nodes = (phi_i, theta_i) if len(phi_i) > 1 else (theta_i,)
+        self.anisotropic = len(self._nodes) > 1
         mean = vndf.mean(axis=(2, 3), dtype=np.float64, keepdims=True)
         vndf = np.maximum(vndf, (FLOOR * mean).astype(np.float32))
         self._tables = ndf, sigma, vndf if len(phi_i) > 1 else vndf[0]
@@ -57,10 +58,6 @@ class Adaptive(Coordinates):
         self._ndf: Map | MitsubaMap = Map(ndf)
         self._sigma: Map | MitsubaMap = Map(sigma)
         self.names = ("phi_i", "theta_i", "u1", "u2")[2 - len(self._nodes) :]
-
-    @property
-    def anisotropic(self) -> bool:
-        return len(self._nodes) > 1
 
     def prepared(self) -> Adaptive:
         ndf, sigma, vndf = self._tables
@@ -86,10 +83,7 @@ class Adaptive(Coordinates):
             x, y = x * flip_x, y * flip_y
             phi_i = -abs(xp.atan2(wi.y * flip_y, wi.x * flip_x))
         if self._relative:
-            sin = xp.sqrt(wi.x * wi.x + wi.y * wi.y)
-            upright = sin > 1e-7
-            sin = xp.select(upright, sin, 1)
-            cos_phi, sin_phi = xp.select(upright, wi.x / sin, 1), xp.select(upright, wi.y / sin, 0)
+            cos_phi, sin_phi = azimuth_of(wi, xp)
             x, y = x * cos_phi + y * sin_phi, y * cos_phi - x * sin_phi
         on_map = on_theta(theta_m, xp), on_phi(xp.atan2(y, x), xp)
         parameters = (phi_i, theta_i)[2 - len(self._nodes) :]

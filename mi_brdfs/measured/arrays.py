@@ -14,9 +14,7 @@ from ..math import EPSILON, TINY
 NUMPY = SimpleNamespace(
     sqrt=lambda x: np.sqrt(np.maximum(x, 0)),
     atan2=np.arctan2,
-    acos=lambda x: np.arccos(np.clip(x, -1, 1)),
     select=np.where,
-    minimum=np.minimum,
     maximum=np.maximum,
     floor=np.floor,
 )
@@ -31,9 +29,7 @@ def _atan2(y: Any, x: Any) -> Any:
 DRJIT = SimpleNamespace(
     sqrt=lambda x: dr.sqrt(dr.maximum(x, TINY)),
     atan2=_atan2,
-    acos=dr.safe_acos,
     select=dr.select,
-    minimum=dr.minimum,
     maximum=dr.maximum,
     floor=dr.floor,
 )

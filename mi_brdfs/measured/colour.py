@@ -8,13 +8,11 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ..measure.arrays import luminance
 from .basis import BASIS, WAVELENGTHS
 from .measurement import Axis, Grid
 from .observer import to_srgb
 from .table import Table, TableAxis, array, fetch
-
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
-"""The luminance of linear sRGB."""
 
 
 class Channels:
@@ -38,15 +36,14 @@ class Channels:
         if self.weights is not None:
             values = values @ self.weights
         if mi.is_monochromatic and values.shape[-1] == 3:
-            values = values @ LUMINANCE[:, None]
+            values = luminance(values)[..., None]
         return replace(grid, values=values, signed=signed)
 
     def brightness(self, grid: Grid) -> Grid:
         """Return a converted grid with one channel: the luminance of rgb, and else the mean."""
         values = grid.usable
-        rgb = self.spectrum is None and values.shape[-1] == 3
-        weighed = values @ LUMINANCE[:, None] if rgb else values.mean(-1, keepdims=True)
-        return replace(grid, values=weighed, signed=False)
+        weighed = luminance(values) if self.spectrum is None else values.mean(-1)
+        return replace(grid, values=weighed[..., None], signed=False)
 
     def colour(self, table: Table, wi: mi.Vector3f, wo: mi.Vector3f, wavelengths: Any) -> mi.UnpolarizedSpectrum:
         """Return a table's values as a colour, at ``wavelengths`` in spectral variants."""

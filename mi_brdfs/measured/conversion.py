@@ -19,7 +19,7 @@ from ..variants import is_measurable
 from .arrays import NUMPY, components
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
-from .scattered import gridded
+from .scattered import as_grid
 from .source import Source
 
 LANES = 1 << 20
@@ -142,16 +142,12 @@ def _source(given: Any) -> tuple[Source, list[str]]:
 
 
 def _of_measurement(measurement: Measurement) -> Source:
-    grid = _grid(measurement)
+    grid = as_grid(measurement.data)
     if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
     source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
     stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
     return source if stated else source.rgb()
-
-
-def _grid(measurement: Measurement) -> Grid:
-    return measurement.data if isinstance(measurement.data, Grid) else gridded(measurement.data)
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
@@ -188,7 +184,7 @@ def _writer(path: Path, format: str | None) -> ModuleType:
 
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:
     """Return the root mean square error, the largest, and what was lost on the way."""
-    grid = _grid(written)
+    grid = as_grid(written.data)
     losses = []
     if source.wavelengths is not None and written.wavelengths is None:
         count = len(source.wavelengths)

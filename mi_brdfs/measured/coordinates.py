@@ -26,15 +26,10 @@ class Coordinates:
     reciprocal = False
     """Whether exchanging the two directions changes nothing."""
 
-    @property
-    def anisotropic(self) -> bool:
-        """Whether turning both directions about the normal changes the place."""
-        return False
-
-    @property
-    def mirrored(self) -> bool:
-        """Whether mirroring both directions at a plane through the normal changes nothing."""
-        return False
+    anisotropic = False
+    """Whether turning both directions about the normal changes the place."""
+    mirrored = False
+    """Whether mirroring both directions at a plane through the normal changes nothing."""
 
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         """Return the value on each axis for directions by component, x, y and z, of NumPy arrays or Dr.Jit floats;
@@ -71,13 +66,9 @@ class HalfDifference(Coordinates):
     """
 
     def __init__(self, reciprocal: bool = True, anisotropic: bool = False) -> None:
-        self.reciprocal, self._anisotropic = reciprocal, anisotropic
+        self.reciprocal, self.anisotropic = reciprocal, anisotropic
         self.poles = () if anisotropic else ((0, 2), (1, 2))
         self.names = ("sqrt_theta_h", "theta_d", "phi_d", *(("phi_h",) if anisotropic else ()))
-
-    @property
-    def anisotropic(self) -> bool:
-        return self._anisotropic
 
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         sx, sy, sz = wi.x + wo.x, wi.y + wo.y, wi.z + wo.z
@@ -91,7 +82,7 @@ class HalfDifference(Coordinates):
         azimuthal = (dy * sx - dx * sy) * length
         phi_d = wrapped(xp.atan2(azimuthal, polar), np.pi if self.reciprocal else TWO_PI, xp)
         place = xp.sqrt(theta_h * (2 / np.pi)), theta_d, phi_d
-        return (*place, wrapped(xp.atan2(sy, sx), TWO_PI, xp)) if self._anisotropic else place
+        return (*place, wrapped(xp.atan2(sy, sx), TWO_PI, xp)) if self.anisotropic else place
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         root, theta_d, phi_d, *phi_h = places
@@ -123,23 +114,15 @@ class Spherical(Coordinates):
     """
 
     def __init__(self, mirrored: bool, anisotropic: bool = False) -> None:
-        self._mirrored, self._anisotropic = mirrored, anisotropic
+        self.mirrored, self.anisotropic = mirrored, anisotropic
         self.poles = () if anisotropic else ((0, 2), (1, 2))
         self.names = ("theta_i", "theta_o", "delta_phi", *(("phi_i",) if anisotropic else ()))
 
-    @property
-    def anisotropic(self) -> bool:
-        return self._anisotropic
-
-    @property
-    def mirrored(self) -> bool:
-        return self._mirrored
-
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         delta = xp.atan2(wo.y * wi.x - wo.x * wi.y, wo.x * wi.x + wo.y * wi.y)
-        delta = abs(delta) if self._mirrored else wrapped(delta, TWO_PI, xp)
+        delta = abs(delta) if self.mirrored else wrapped(delta, TWO_PI, xp)
         place = polar_angle(wi, xp), polar_angle(wo, xp), delta
-        return (*place, wrapped(xp.atan2(wi.y, wi.x), TWO_PI, xp)) if self._anisotropic else place
+        return (*place, wrapped(xp.atan2(wi.y, wi.x), TWO_PI, xp)) if self.anisotropic else place
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         theta_i, theta_o, delta, *phi_i = places
@@ -157,31 +140,21 @@ class SpecularPolar(Coordinates):
     """
 
     def __init__(self, mirrored: bool, anisotropic: bool = False) -> None:
-        self._mirrored, self._anisotropic = mirrored, anisotropic
+        self.mirrored, self.anisotropic = mirrored, anisotropic
         self.poles = ((2, 1),) if anisotropic else ((0, 1), (2, 1))
         self.names = ("theta_i", "azimuth", "radial", *(("phi_i",) if anisotropic else ()))
 
-    @property
-    def anisotropic(self) -> bool:
-        return self._anisotropic
-
-    @property
-    def mirrored(self) -> bool:
-        return self._mirrored
-
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         sin = xp.sqrt(wi.x * wi.x + wi.y * wi.y)
-        upright = sin > 1e-7
-        safe = xp.select(upright, sin, 1)
-        cos_phi, sin_phi = xp.select(upright, wi.x / safe, 1), xp.select(upright, wi.y / safe, 0)
+        cos_phi, sin_phi = azimuth_of(wi, xp)
         # wo in the frame whose x axis lies below wi, then turned so that the mirror direction is the pole.
         x, y = wo.x * cos_phi + wo.y * sin_phi, wo.y * cos_phi - wo.x * sin_phi
         towards, along = x * wi.z + wo.z * sin, wo.z * wi.z - x * sin
         azimuth = xp.atan2(y, towards)
-        azimuth = abs(azimuth) if self._mirrored else wrapped(azimuth, TWO_PI, xp)
+        azimuth = abs(azimuth) if self.mirrored else wrapped(azimuth, TWO_PI, xp)
         radial = xp.atan2(xp.sqrt(towards * towards + y * y), along)
         place = polar_angle(wi, xp), azimuth, radial
-        return (*place, wrapped(xp.atan2(wi.y, wi.x), TWO_PI, xp)) if self._anisotropic else place
+        return (*place, wrapped(xp.atan2(wi.y, wi.x), TWO_PI, xp)) if self.anisotropic else place
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         theta_i, azimuth, radial, *phi_i = places
@@ -198,6 +171,14 @@ class SpecularPolar(Coordinates):
 def polar_angle(w: Any, xp: SimpleNamespace = NUMPY) -> Any:
     """Return the angle from the normal, with the digits that the arc cosine loses near it."""
     return xp.atan2(xp.sqrt(w.x * w.x + w.y * w.y), w.z)
+
+
+def azimuth_of(w: Any, xp: SimpleNamespace = NUMPY) -> tuple[Any, Any]:
+    """Return the cosine and the sine of the azimuth, which is 0 at the normal."""
+    sin = xp.sqrt(w.x * w.x + w.y * w.y)
+    upright = sin > 1e-7
+    sin = xp.select(upright, sin, 1)
+    return xp.select(upright, w.x / sin, 1), xp.select(upright, w.y / sin, 0)
 
 
 def wrapped(angle: Any, period: float, xp: SimpleNamespace = NUMPY) -> Any:

@@ -20,6 +20,11 @@ RIDGE = 1e-2
 rim of what was measured cannot balance."""
 
 
+def as_grid(data: Grid | Samples, extrapolate: Extrapolation = "hold") -> Grid:
+    """Return measured values on a grid: their own, or for samples that of :func:`gridded`."""
+    return data if isinstance(data, Grid) else gridded(data, extrapolate)
+
+
 def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     """Return samples as a grid of half and difference angles, in which highlights stay in place.
 

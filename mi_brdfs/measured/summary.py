@@ -11,7 +11,7 @@ from .albedo import albedos, coverage
 from .counts import Counts, Range, census
 from .measurement import FileError, Grid, Measurement, Samples
 from .reciprocity import ReciprocityError, reciprocity_error
-from .scattered import gridded
+from .scattered import as_grid
 
 ANGLES = np.arange(0, 86, 5)
 """The angles of incidence at which albedos are integrated, in degrees, where they were measured."""
@@ -186,7 +186,7 @@ def summarize(measurement: Measurement) -> Summary:
 
 def table(data: Grid | Samples) -> Grid:
     """Return a measurement's values on a grid, without any beyond the measured range."""
-    return data if isinstance(data, Grid) else gridded(data, "zero")
+    return as_grid(data, "zero")
 
 
 def channel_names(measurement: Measurement) -> list[str]:

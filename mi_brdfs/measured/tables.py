@@ -13,7 +13,7 @@ from .files import checked
 from .formats import read
 from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
 from .proposal import NODES_I, Proposal, estimated_albedos
-from .scattered import gridded
+from .scattered import as_grid
 from .table import Table
 
 
@@ -39,7 +39,7 @@ class Tables:
         data = measurement.data
         if not np.any(data.values > 0):
             raise FileError(f"{measurement.path}: no value is positive; there is nothing to render.")
-        grid = data if isinstance(data, Grid) else gridded(data, extrapolate)
+        grid = as_grid(data, extrapolate)
         self.channels = Channels(measurement.wavelengths)
         self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal
         converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)

@@ -140,7 +140,12 @@ def list_models() -> list[str]:
 
 def plugin_names() -> set[str]:
     """Return the names of all plugins, of the pack, of guests, and of Mitsuba."""
-    return {*MODELS, *DATA, *INTEGRATORS, *_builtins()}
+    return {*_own_plugins(), *_builtins()}
+
+
+def _own_plugins() -> dict[str, type[Plugin]]:
+    """Return all plugins but Mitsuba's, by name."""
+    return MODELS | DATA | INTEGRATORS
 
 
 def all_models() -> list[type[Model]]:
@@ -177,7 +182,7 @@ def info(name: str) -> str:
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
     """
-    return _find(name, MODELS | DATA | INTEGRATORS).manual()
+    return _find(name, _own_plugins()).manual()
 
 
 def presets(model: str | None = None) -> list[str]:
@@ -238,7 +243,7 @@ def _register_in(variant: str) -> None:
     """Register in a variant all classes whose current version is not registered there."""
     module = importlib.import_module(f"mitsuba.{variant}")
     known = _variants.setdefault(variant, {})
-    for name, plugin in (MODELS | DATA | INTEGRATORS).items():
+    for name, plugin in _own_plugins().items():
         if known.get(name) is plugin:
             continue
         if issubclass(plugin, Model):

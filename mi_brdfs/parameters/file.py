@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import mitsuba as mi
 
 from .parameter import Parameter, ParameterRow
@@ -20,7 +18,7 @@ class File(Parameter):
         name = reader.text(self.name)
         if not name:
             raise reader.error(self.name, f"is empty; give the path of {self.text}")
-        return str(Path(str(mi.file_resolver().resolve(name))))
+        return str(mi.file_resolver().resolve(name))
 
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "string", "must be given", "a file", self.text)]

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from ..measure.arrays import luminance
 from ..measured import Measurement, Samples, read
 from ..measured.albedo import albedos
 from ..measured.arrays import components, stacked
-from ..measured.colour import LUMINANCE
 from ..measured.coordinates import HalfDifference, polar_angle, spherical
 from ..measured.counts import batches, census
 from ..measured.measurement import usable
@@ -94,8 +94,7 @@ class _Table:
         return np.maximum(f, 0)
 
     def luminance(self, f: np.ndarray) -> np.ndarray:
-        colour = self.colour(f)
-        return colour @ LUMINANCE if colour.shape[-1] == 3 else colour.mean(axis=-1)
+        return luminance(self.colour(f))
 
     @property
     def angles(self) -> np.ndarray:
@@ -117,9 +116,9 @@ def _draw_slice(ax: Axes, it: _Table) -> None:
     pair = HalfDifference().directions(np.sqrt(theta_h), theta_d * np.pi / 2, np.full_like(theta_h, np.pi / 2))
     wi, wo = map(stacked, pair)
     f, seen = it.grid.evaluate(wi, wo), it.grid.measured(wi, wo)
-    luminance, colour = it.luminance(f), it.colour(f)
-    norm = _norm(luminance[seen])
-    brightness = norm(np.maximum(luminance, norm.vmin)).filled(0)
+    lit, colour = it.luminance(f), it.colour(f)
+    norm = _norm(lit[seen])
+    brightness = norm(np.maximum(lit, norm.vmin)).filled(0)
     if colour.shape[-1] == 3:
         # Of a grey, the display's value is the brightness, as in the bar.
         hue = colour / np.maximum(colour.max(axis=-1, keepdims=True), 1e-30)
