@@ -44,7 +44,8 @@ def run(
         workers: the number of processes to start on this machine.
         scheduler: the address of a Dask scheduler, ``tcp://host:8786``, whose workers have one thread for tasks
             (``--nthreads 1``), and the versions of mi_brdfs, Mitsuba, Dr.Jit and Python that there are here.
-        threads: of Dr.Jit in each worker. Default: as many as a worker has cores to itself.
+        threads: of Dr.Jit in each worker. Default: its share of the cores, or what a scheduler's worker has. At least
+            two, as Mitsuba loads no bitmaps with one; see :func:`mi_brdfs.render.one_thread`.
         shared: arguments that all calls have in common, sent to each worker once.
 
     Yields:
@@ -54,7 +55,6 @@ def run(
     Raises:
         ImportError: without the extra.
         ClusterError: see there.
-        ValueError: for an address that is none.
     """
     pairs = iter(tasks.items() if isinstance(tasks, Mapping) else tasks)
     if not workers and not scheduler:

@@ -8,7 +8,6 @@ import queue
 import time
 import uuid
 import warnings
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -23,7 +22,7 @@ from .worker import Failed, Setup, call_as, problem, setup, versions
 
 CONNECTING = 5
 """Seconds to wait for a scheduler."""
-JOINING = 30
+JOINING = 10
 """Seconds to wait for a first worker."""
 ROUNDS = 4
 """How often a task is given to workers anew after those that had it died, each time as often as the scheduler allows,
@@ -55,7 +54,7 @@ def run_on_workers(
                 LocalCluster(n_workers=0, processes=True, host="127.0.0.1", scheduler_port=0, dashboard_address=None)
             )
             client = stack.enter_context(Client(cluster, timeout=CONNECTING))
-            here = setup(threads or max((os.cpu_count() or 1) // workers, 1))
+            here = setup(threads or (os.cpu_count() or 1) // workers)
             processes = Processes(cluster.scheduler_address, workers)
             stack.callback(processes.end)
             processes.start()
@@ -109,7 +108,9 @@ class _Run:
     def _submit(self, key: str, arguments: tuple, rounds: int = 1) -> None:
         self.count += 1
         task = f"{self.id}-{self.count}"
-        future = self.client.submit(call_as, self.common, self.function, arguments, key=task, pure=False)
+        future = self.client.submit(
+            call_as, self.common, self.function.__module__, self.function.__name__, arguments, key=task, pure=False
+        )
         self.pending[future] = key, arguments, rounds
         future.add_done_callback(self.ended.put)
 
@@ -145,9 +146,12 @@ class _Run:
 def _connected(address: str) -> Iterator[Client]:
     try:
         client = Client(address, timeout=CONNECTING)
-    except (OSError, ImportError) as error:  # also a scheduler of another version
-        text = "does not answer" if isinstance(error, OSError) else f"cannot be used: {error}"
-        raise ClusterError(f"The scheduler at {address} {text}.") from None
+    except OSError:
+        raise ClusterError(f"The scheduler at {address} does not answer.") from None
+    except ValueError:
+        raise ClusterError(f"{address} is not the address of a scheduler; write tcp://HOST:PORT.") from None
+    except Exception:  # whatever the bytes of another protocol are taken for
+        raise ClusterError(f"What answers at {address} is not a Dask scheduler of a similar version.") from None
     with client:
         yield client
 

@@ -38,7 +38,7 @@ class Processes:
         for index, process in enumerate(self.running):
             if process is None or process.poll() is not None:
                 self.deaths += process is not None
-                with open(self._log(index), "w") as log:
+                with open(self._log(index), "a") as log:
                     self.running[index] = subprocess.Popen(
                         self.command, env=self.environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log, **DETACHED
                     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import platform
 import tempfile
@@ -67,15 +68,15 @@ def call(function: Callable, arguments: tuple) -> Any:
         return Failed(str(error) or type(error).__name__)
 
 
-def call_as(common: tuple[Setup, tuple], function: Callable, arguments: tuple) -> Any:
-    """Do the same in a worker.
+def call_as(common: tuple[Setup, tuple], module: str, name: str, arguments: tuple) -> Any:
+    """Do the same in a worker, with a function's name.
 
     The preparation happens here, in the thread that runs the tasks, and not when a worker starts: so it also reaches
     workers that join late or are shared with others.
     """
     wanted, shared = common
     _prepare(wanted)
-    return call(function, (*shared, *arguments))
+    return call(getattr(importlib.import_module(module), name), (*shared, *arguments))
 
 
 def _prepare(wanted: Setup) -> None:
@@ -90,8 +91,8 @@ def _prepare(wanted: Setup) -> None:
         guests.import_models(source if text is None else _file(source, text))
     if wanted.variant and wanted.variant != mi.variant():
         mi.set_variant(wanted.variant)
-    if wanted.threads:
-        dr.set_thread_count(wanted.threads)
+    if wanted.threads is not None:
+        dr.set_thread_count(max(wanted.threads, 2))  # with one, Mitsuba waits forever for its bitmaps
     _current = wanted
 
 
