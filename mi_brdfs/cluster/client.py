@@ -138,8 +138,8 @@ class _Run:
             raise ClusterError(_gone(self.client))
         if self.processes:
             self.processes.start()
-            if self.processes.deaths > 3 * len(self.processes.running) and not self._worker_count():
-                raise ClusterError(f"The worker processes end at once; the last words: {self.processes.last_words()}")
+            if self.processes.failures > 3 * len(self.processes.running):
+                raise ClusterError(f"The worker processes fail: {self.processes.last_words()}")
 
 
 @contextmanager

@@ -31,13 +31,14 @@ class Processes:
         path = os.pathsep.join(each or os.getcwd() for each in sys.path)
         self.environment = os.environ | {"PYTHONPATH": path, "DASK_LOGGING__DISTRIBUTED": "error"}
         self.running: list[subprocess.Popen | None] = [None] * count
-        self.deaths = 0
+        self.failures = 0
+        """How often one ended with an error, and not by a signal."""
 
     def start(self) -> None:
         """Start those that do not run."""
         for index, process in enumerate(self.running):
             if process is None or process.poll() is not None:
-                self.deaths += process is not None
+                self.failures += process is not None and process.returncode > 0
                 with open(self._log(index), "a") as log:
                     self.running[index] = subprocess.Popen(
                         self.command, env=self.environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log, **DETACHED
