@@ -12,6 +12,9 @@ from typing import Any
 
 import mitsuba as mi
 
+RESERVED = ("config", "filename")
+"""Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""
+
 
 @dataclass(frozen=True)
 class SceneFile:

@@ -29,7 +29,6 @@ from mi_brdfs.mitsuba.registry import info
 from mi_brdfs.render import one_thread, render
 from mi_brdfs.scene_file import SceneFile
 
-
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
 SCENE = """<scene version="3.0.0">
@@ -262,3 +261,16 @@ def test_without_the_extra(monkeypatch):
     assert dict(run(powers, {"a": (2, 1)})).keys() == {"a"}
     with pytest.raises(ImportError, match=r'^workers need the extra "cluster": pip install "mi_brdfs\[cluster\]"$'):
         run(powers, {"a": (2, 1)}, workers=2)
+
+
+@pytest.mark.slow
+def test_two_workers_render_at_least_1_7_times_as_fast_as_one():
+    """On a machine with two idle cores; ``-s`` shows the times, which include the start of the processes."""
+    file = SceneFile(str(ROOT / "scenes/cornell_box.xml"), {"width": "256", "height": "256"})
+    loaded, seconds = file.load(), {1: [], 2: []}
+    for workers in (1, 2) * 3:
+        start = time.perf_counter()
+        render(loaded, spp=640, passes=passes_on(file, workers=workers))
+        seconds[workers].append(time.perf_counter() - start)
+    print({workers: [round(each, 2) for each in all_of] for workers, all_of in seconds.items()})
+    assert min(seconds[1]) >= 1.7 * min(seconds[2])

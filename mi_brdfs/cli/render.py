@@ -8,15 +8,13 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
-from ..scene_file import SceneFile
+from ..scene_file import RESERVED, SceneFile
 from .app import command
 from .errors import one_line
 from .options import parameters_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail
 from .variants import AnyVariant, set_variant
-
-LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: a -D parameter cannot have these names
 
 
 @command()
@@ -53,7 +51,7 @@ def render(
         fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
     parameters = parameters_of(define)
     for name in parameters:
-        if name in LOAD_FILE_ARGUMENTS:
+        if name in RESERVED:
             fail(f"-D {name}: Mitsuba reserves this name; rename the parameter in the scene", Exit.USAGE)
     window = _window(crop)
     files = output_files(output or Path(scene.stem + ".exr"))
