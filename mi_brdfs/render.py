@@ -17,6 +17,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .cluster import ClusterError
 from .variants import is_scalar
 
 SHOULDER = 0.8
@@ -48,7 +50,7 @@ class Picture:
     total: int | None
     """Samples per pixel requested, rounded up as the sampler needs; None if only the time was."""
     interrupted: bool = False
-    """Whether Ctrl-C ended it."""
+    """Whether Ctrl-C ended it, or the end of a cluster."""
 
 
 def render(
@@ -80,7 +82,8 @@ def render(
 
     ``passes`` computes the passes elsewhere, as of :func:`mi_brdfs.cluster.passes.passes_on`: called with the scene,
     the sensor's index, and the seed and samples per pixel of each pass, it yields their sums in this order. The result
-    is that of one thread, bit for bit, on processors of the same instruction set.
+    is that of one thread, bit for bit, on processors of the same instruction set. If a
+    :class:`mi_brdfs.cluster.ClusterError` ends it, the finished passes are returned, with a warning.
     """
     camera = scene.sensors()[sensor]
     film, sampler, integrator = camera.film(), camera.sampler(), scene.integrator()
@@ -106,16 +109,22 @@ def render(
         ahead, behind = itertools.tee(counts)
         jobs = ((_pass_seed(seed, index), count) for index, count in enumerate(ahead))
         with ctrl_c() as interrupt, closing((passes or here)(scene, sensor, jobs)) as sums:
-            for passed, count in zip(sums, behind, strict=False):
-                if interrupt.pressed and cut_short:
-                    break
-                raw += passed
-                dr.eval(raw)
-                dr.sync_thread()
-                done += count
-                on_pass(done, total)
-                if interrupt.pressed or (seconds is not None and time.perf_counter() - start >= seconds):
-                    break
+            try:
+                for passed, count in zip(sums, behind, strict=False):
+                    if interrupt.pressed and cut_short:
+                        break
+                    raw += passed
+                    dr.eval(raw)
+                    dr.sync_thread()
+                    done += count
+                    on_pass(done, total)
+                    if interrupt.pressed or (seconds is not None and time.perf_counter() - start >= seconds):
+                        break
+            except ClusterError as error:
+                if not done:
+                    raise
+                warnings.warn(str(error), stacklevel=2)
+                interrupt.pressed = True
     finally:
         sampler.set_sample_count(own_count)
     if not done:

@@ -26,7 +26,7 @@ from mi_brdfs.cluster.passes import passes_on
 from mi_brdfs.cluster.worker import _file
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.mitsuba.registry import info
-from mi_brdfs.render import one_thread, render
+from mi_brdfs.render import one_thread, pass_source, render
 from mi_brdfs.scene_file import SceneFile
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -158,6 +158,21 @@ def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, addre
     assert np.array(picture.image).std() > 0.05
 
 
+def test_a_scene_and_its_copy_are_found_from_any_folder(scene, tmp_path, monkeypatch):
+    """Also with box filters; the copy does without the files."""
+    monkeypatch.chdir(tmp_path.parent)
+    name = str(scene.relative_to(tmp_path.parent))
+    file = SceneFile(name, {"radius": "0.9"}, box_filter=True)
+    copy, expected = file.copied(), np.array(mi.render(mi.load_file(name, radius="0.9"), spp=4)).mean()
+    loaded = file.load()
+    assert loaded.sensors()[0].film().rfilter().is_box_filter()
+    for path in tmp_path.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    monkeypatch.chdir("/")
+    pictures = [np.array(mi.render(each, spp=4)) for each in (loaded, copy.load())]
+    assert np.array_equal(*pictures) and pictures[0].mean() == pytest.approx(expected, rel=0.01)
+
+
 @pytest.mark.usefixtures("small_passes", "ctrl_c")
 def test_also_with_a_worker_killed_in_a_crop_with_aovs(scene):
     scene.write_text(
@@ -254,6 +269,25 @@ def test_a_scheduler_that_goes(tmp_path):
         worker.kill()
         worker.wait()
         scheduler.wait()
+
+
+@pytest.mark.usefixtures("small_passes")
+def test_what_is_finished_when_the_scheduler_goes_is_kept(scene):
+    """Unless nothing is."""
+    loaded, left = SceneFile(str(scene)).load(), 3
+    source = pass_source(loaded.integrator())
+
+    def passes(scene, sensor, jobs):
+        for _, (seed, spp) in zip(range(left), jobs, strict=False):
+            yield source.sums(scene, scene.sensors()[sensor], seed=seed, spp=spp)
+        raise ClusterError("The scheduler has gone.")
+
+    with pytest.warns(UserWarning, match=r"^The scheduler has gone\.$"):
+        picture = render(loaded, spp=32, passes=passes)
+    assert (picture.spp, picture.total, picture.interrupted) == (12, 32, True)
+    left = 0
+    with pytest.raises(ClusterError):
+        render(loaded, spp=32, passes=passes)
 
 
 def test_without_the_extra(monkeypatch):

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import dask
-from distributed import Client, Future, LocalCluster
+from distributed import CancelledError, Client, Future, LocalCluster
 from distributed.scheduler import KilledWorker
 
 from . import ClusterError
@@ -115,20 +115,23 @@ class _Run:
         future.add_done_callback(self.ended.put)
 
     def _result(self, future: Future) -> Any:
-        if future.cancelled() or self.client.status != "running":
-            raise ClusterError(_gone(self.client))
-        if (error := future.exception()) is None:
-            return future.result()
+        """Return the result, or that the workers that had the task died."""
+        try:
+            error = future.exception()
+            if error is None:
+                return future.result()
+        except (CancelledError, OSError, TimeoutError):
+            raise ClusterError(_gone(self.client)) from None
         if isinstance(error, KilledWorker):
             return error
-        raise ClusterError(_of_worker(error))
+        raise ClusterError(_gone(self.client) if isinstance(error, CancelledError) else _of_worker(error))
 
     def _worker_count(self) -> int:
         """Return the number of workers, asked for once a second."""
         if time.monotonic() - self.asked > 1:
             try:
                 self.workers = len(self.client.nthreads())
-            except OSError:
+            except (OSError, TimeoutError):
                 raise ClusterError(_gone(self.client)) from None
             self.asked = time.monotonic()
         return self.workers
