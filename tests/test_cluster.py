@@ -147,15 +147,19 @@ def small_passes(monkeypatch):
 
 
 @pytest.mark.usefixtures("small_passes")
-@pytest.mark.parametrize("integrator", ["path", "shading", "ptracer"])
-def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, address, integrator):
+@pytest.mark.parametrize(
+    "integrator, variant",
+    [("path", "llvm_ad_rgb"), ("shading", "llvm_ad_rgb"), ("ptracer", "llvm_ad_rgb"), ("path", "scalar_rgb")],
+)
+def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, address, integrator, variant):
     file = SceneFile(str(scene_in(tmp_path, integrator)), {"radius": "1.2"})
-    loaded = file.load()
-    with one_thread():
-        expected = render(loaded, spp=32, seed=5)
-    picture = render(loaded, spp=32, seed=5, passes=passes_on(file, scheduler=address))
-    assert np.array_equal(np.array(expected.bitmap), np.array(picture.bitmap))
-    assert np.array(picture.image).std() > 0.05
+    with mi.variant_context(variant):
+        loaded = file.load()
+        with one_thread():
+            expected = render(loaded, spp=32, seed=5)
+        picture = render(loaded, spp=32, seed=5, passes=passes_on(file, scheduler=address))
+        assert np.array_equal(np.array(expected.bitmap), np.array(picture.bitmap))
+        assert np.array(picture.image).std() > 0.05
 
 
 def test_a_scene_and_its_copy_are_found_from_any_folder(scene, tmp_path, monkeypatch):
