@@ -80,17 +80,17 @@ def sweep(
         fail(one_line(error), Exit.USAGE)
     except OSError as error:
         fail(f"{output}: {error.strerror}")
-    complete, errors = True, dict[str, int]()
+    complete, errors, wall = True, list[str](), None
     with stdout_to_stderr():
         try:
             _follow(plan.fit(workers, scheduler), "fits", plan.total, plan.finished(), errors)
             if render:
                 wall = Wall(plan)
-                _follow(wall.render(workers, scheduler), "pictures", len(wall.missing()), 0, errors)
+                _follow(wall.render(workers, scheduler), "pictures", wall.total, wall.finished(), errors)
                 for path in wall.write():
                     err.print(str(path))
         except ClusterError as error:
-            errors[one_line(error)] = 0
+            errors.append(one_line(error))
             err.print(f"mi-brdfs: {one_line(error)}")
         except KeyboardInterrupt:
             complete = False
@@ -99,12 +99,14 @@ def sweep(
             out.print(line)
     else:
         out.print(medians(plan.rows(MEDIANS)))
-    finished, again = plan.finished(), "the same command goes on from there"
+    kept = f"{plan.finished()} of {plan.total} fits" + (
+        f" and {wall.finished()} of {wall.total} pictures" if wall else ""
+    )
     if not complete:
-        err.print(f"Interrupted; {finished} of {plan.total} fits are finished: {again}.")
+        err.print(f"Interrupted; {kept} are finished: the same command goes on from there.")
         raise typer.Exit(Exit.INTERRUPTED)
     if errors:
-        err.print(f"{finished} of {plan.total} fits are finished; {again}.")
+        err.print(f"{kept} are finished; the same command tries the others again.")
         raise typer.Exit(Exit.ERROR)
 
 
@@ -119,18 +121,14 @@ def _numbers(text: str) -> list[int]:
     return list(dict.fromkeys(found))
 
 
-def _follow(
-    outcomes: Generator[Outcome, None, None], what: str, total: int, finished: int, errors: dict[str, int]
-) -> None:
-    """Show how far something has come; count what fails by its sentence, and print each sentence once."""
+def _follow(outcomes: Generator[Outcome, None, None], what: str, total: int, finished: int, errors: list[str]) -> None:
+    """Show how far something has come, and why parts of it fail, each reason once."""
     columns: list[Any] = [TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
     columns += [TextColumn(f"{what},"), TimeRemainingColumn(), TextColumn("left")]
     with closing(outcomes), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
         task = progress.add_task("Sweep", total=total, completed=finished)
         for outcome in outcomes:
             progress.advance(task, outcome.size)
-            if outcome.error:
-                sentence = one_line(RuntimeError(outcome.error))
-                if sentence not in errors:
-                    progress.console.print(f"mi-brdfs: {sentence}")
-                errors[sentence] = errors.get(sentence, 0) + outcome.size
+            if outcome.error and (sentence := one_line(RuntimeError(outcome.error))) not in errors:
+                errors.append(sentence)
+                progress.console.print(f"mi-brdfs: {sentence}")

@@ -18,7 +18,7 @@ from ..gallery.sheet import Row, sheet
 from ..render import write
 from .plan import Outcome, Sweep, digest
 
-SIZE, SPP = 144, 64
+SIZE, SPP = 144, 16
 ROWS = 64
 """The most rows of a picture: JPEG has no more than 65,535 lines."""
 
@@ -64,18 +64,25 @@ class Wall:
             errors.setdefault(model, []).append(row["error"])
         return sorted(errors, key=lambda model: (median(errors[model]), model))
 
-    def missing(self) -> dict[str, dict[str, Any]]:
-        """Return the plugin dicts that there is no picture of, by key."""
-        cells = (cell for rows in self.cells.values() for row in rows.values() for cell in row)
-        return {cell.key: cell.bsdf for cell in cells if not self._path(cell).exists()}
+    def _cells(self) -> dict[str, Cell]:
+        """Return all pictures by key: metrics share the measured ones."""
+        return {cell.key: cell for rows in self.cells.values() for row in rows.values() for cell in row}
+
+    @property
+    def total(self) -> int:
+        return len(self._cells())
+
+    def finished(self) -> int:
+        """Return how many of the pictures are in the folder."""
+        return sum(self._path(cell).exists() for cell in self._cells().values())
 
     def render(self, workers: int | None = None, scheduler: str | None = None) -> Generator[Outcome, None, None]:
-        """Render what is missing.
+        """Render what is not in the folder.
 
         Args:
             workers: as :func:`mi_brdfs.cluster.run` has it; ``scheduler``, too. Its workers need the files.
         """
-        tasks = {key: (bsdf,) for key, bsdf in self.missing().items()}
+        tasks = {key: (cell.bsdf,) for key, cell in self._cells().items() if not self._path(cell).exists()}
         if not tasks:
             return
         self.folder.mkdir(parents=True, exist_ok=True)
