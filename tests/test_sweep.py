@@ -105,18 +105,14 @@ def test_a_fit_does_not_depend_on_those_beside_it(serial, tmp_path):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-def test_a_fit_made_again_compiles_nothing():
-    """Nor does it need memory: kernels do not depend on where NumPy's arrays are."""
-    material = observe(LOFT[0])
-    fit(material, "phong", starts=1)
+def test_a_fit_compiles_two_kernels():
+    """Values, and values with derivatives: neither the number of lanes nor the addresses of NumPy's arrays matter, so
+    that the memory of a process that makes many fits stays as it is."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        beside = []
-        for k in range(5):
-            beside.append(np.empty(1000 + 7 * k, np.uint8))  # moves what comes after
-            fit(material, "phong", starts=1)
+        fit(observe(LOFT[0]), "phong", starts=4)
         kernels = [each for each in dr.kernel_history() if each["type"] == dr.KernelType.JIT]
-    assert kernels and all(each["cache_hit"] for each in kernels)
+    assert len(kernels) > 20 and len({each["hash"] for each in kernels}) == 2
 
 
 GUEST = '''

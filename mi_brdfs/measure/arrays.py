@@ -82,7 +82,12 @@ def numbers(value: Any, count: int | None = None) -> Array:
     (count, channels), by default with as many rows as it has lanes."""
     if mi.is_polarized and isinstance(value, mi.Spectrum):
         value = value[0, 0]
-    array = np.array(value, np.float64)
+    if dr.depth_v(value) > 1:
+        dr.eval(value)
+        # By channel: for all at once, Dr.Jit compiles a kernel for each number of lanes.
+        array = np.array(np.broadcast_arrays(*map(np.array, value)), np.float64)
+    else:
+        array = np.array(value, np.float64)
     if array.ndim < 2:
         array = array.reshape((-1, 1) if is_scalar() else (1, -1))
     return array.T if count is None else np.broadcast_to(array, (len(array), count)).T
