@@ -41,7 +41,7 @@ def sweep(
         int | None, typer.Option(min=0, help="Processes; 0 for none but this. Default: one for each core, up to 8.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Use the workers of this Dask scheduler: tcp://host:8786.")
+        str | None, typer.Option(metavar="ADDRESS", help="Fit on the workers of a Dask scheduler, tcp://HOST:PORT.")
     ] = None,
     render: Annotated[
         bool, typer.Option("--render", help="Also render the materials and their fits: wall_METRIC.jpg.")
@@ -63,7 +63,7 @@ def sweep(
     if table not in TABLES:
         fail(f"--table {table}: there is no such table; there are {', '.join(TABLES)}", Exit.USAGE)
     if workers and scheduler:
-        fail("--workers and --scheduler exclude each other", Exit.USAGE)
+        fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
     seeds = _numbers(seed)
     chosen = set_tracing_variant(variant)
     if not chosen.endswith("_ad_rgb"):

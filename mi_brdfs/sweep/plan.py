@@ -165,10 +165,10 @@ def digest(data: Any) -> str:
     return hashlib.sha256(json.dumps(data).encode()).hexdigest()[:24]
 
 
-def versions(model: type[Model]) -> str:
-    """Return all versions that a fit of a model depends on; a guest's is its module's source."""
+def versions(model: type[Model] | None = None) -> str:
+    """Return all versions that a result depends on, with a guest's, which is the source of its module."""
     found = f"mi_brdfs {__version__}, Mitsuba {mi.__version__}"
-    if is_own(model):
+    if model is None or is_own(model):
         return found
     try:
         source = inspect.getsource(inspect.getmodule(model) or model)

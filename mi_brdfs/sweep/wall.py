@@ -16,7 +16,7 @@ from ..cluster import Failed, run
 from ..gallery import shot
 from ..gallery.sheet import Row, sheet
 from ..render import write
-from .plan import Outcome, Sweep, digest
+from .plan import Outcome, Sweep, digest, versions
 
 SIZE, SPP = 144, 16
 ROWS = 64
@@ -53,7 +53,7 @@ class Wall:
                 if fits:
                     least = min(row["error"] for row in fits.values())
                     self.cells[metric][content] = [
-                        _cell({"type": "tabulated", "filename": str(Path(file).absolute())}, "measured", content),
+                        _measured(file, content),
                         *(_fit(model, fits[model], least) for model in self._order(own) if model in fits),
                     ]
 
@@ -124,6 +124,11 @@ class Wall:
 
 def _cell(bsdf: dict[str, Any], caption: str, identity: str) -> Cell:
     return Cell(digest([identity, SIZE, SPP, mi.variant()]), bsdf, caption)
+
+
+def _measured(file: str, content: str) -> Cell:
+    bsdf = {"type": "tabulated", "filename": str(Path(file).absolute())}
+    return _cell(bsdf, "measured", f"{versions()} {content}")
 
 
 def _fit(model: str, row: dict[str, Any], least: float) -> Cell:
