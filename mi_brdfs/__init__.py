@@ -37,7 +37,7 @@ from .ranges import project, ranges  # noqa: E402
 
 install()
 
-_LAZY = ("bench", "fit", "gallery", "plot", "testing", "validation")
+_LAZY = ("bench", "cluster", "fit", "gallery", "plot", "sweep", "testing", "validation")
 """Modules that are imported when they are used: some need extras, and all take time."""
 
 

@@ -17,19 +17,24 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .cluster import ClusterError
 from .variants import is_scalar
 
 SHOULDER = 0.8
+
+Passes = Callable[["mi.Scene", int, Iterable[tuple[int, int]]], Generator[Any, None, None]]
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ class Picture:
     total: int | None
     """Samples per pixel requested, rounded up as the sampler needs; None if only the time was."""
     interrupted: bool = False
-    """Whether Ctrl-C ended it."""
+    """Whether Ctrl-C ended it, or the end of a cluster."""
 
 
 def render(
@@ -55,6 +60,7 @@ def render(
     sensor: int = 0,
     on_pass: Callable[[int, int | None], None] = lambda done, total: None,
     seconds: float | None = None,
+    passes: Passes | None = None,
 ) -> Picture:
     """Render ``scene`` in passes of about a second and combine them without bias.
 
@@ -70,43 +76,81 @@ def render(
 
     The result depends on scene, variant, ``spp``, ``seed`` and, in LLVM variants, the number of threads, and on timing
     only as to the number of passes, with ``seconds``: the size of a pass follows from the size of the image, and pass
-    ``k`` uses a seed computed from ``seed`` and ``k``. Two runs agree up to the order in which floats are added.
-    Samplers that stratify do so within a pass.
+    ``k`` uses a seed computed from ``seed`` and ``k``. Two runs agree up to the order in which floats are added; with
+    one thread (:func:`one_thread`) also in that, and in every bit, in LLVM and scalar variants. Samplers that stratify
+    do so within a pass.
+
+    ``passes`` computes the passes elsewhere, as of :func:`mi_brdfs.cluster.passes.passes_on`: called with the scene,
+    the sensor's index, and the seed and samples per pixel of each pass, it yields their sums in this order. The result
+    is that of one thread, bit for bit, on processors of the same instruction set. If a
+    :class:`mi_brdfs.cluster.ClusterError` ends it, the finished passes are returned, with a warning.
     """
     camera = scene.sensors()[sensor]
     film, sampler, integrator = camera.film(), camera.sampler(), scene.integrator()
-    source = integrator if hasattr(integrator, "sums") else FilmPasses(integrator)
+    source = pass_source(integrator)
     # Mitsuba's own handler cuts a pass of a scalar variant short.
-    cut_short = is_scalar() and isinstance(source, FilmPasses)
+    cut_short = is_scalar() and isinstance(source, FilmPasses) and not passes
     own_count = sampler.sample_count()
+
+    def here(scene: mi.Scene, sensor: int, jobs: Iterable[tuple[int, int]]) -> Generator[Any, None, None]:
+        return (source.sums(scene, camera, seed=seed, spp=count) for seed, count in jobs)
+
     try:
         particles = isinstance(integrator, mi.AdjointIntegrator)
-        limit = _samples_per_pass() // _pixel_count(film, particles)
-        passes: Iterable[int]
+        threads = 1 if passes else dr.thread_count()
+        limit = _samples_per_pass(threads) // _pixel_count(film, particles)
+        counts: Iterable[int]
         if seconds is not None and spp is None:
-            passes, total = itertools.repeat(_rounded(sampler, _power_of_2(limit))), None
+            counts, total = itertools.repeat(_rounded(sampler, _power_of_2(limit))), None
         else:
-            passes = _pass_sizes(sampler, spp or own_count, limit)
-            total = sum(passes)
+            counts = _pass_sizes(sampler, spp or own_count, limit)
+            total = sum(counts)
         done, raw, start = 0, 0, time.perf_counter()
-        with ctrl_c() as interrupt:
-            for index, count in enumerate(passes):
-                passed = source.sums(scene, camera, seed=_pass_seed(seed, index), spp=count)
-                if interrupt.pressed and cut_short:
-                    break
-                raw += passed
-                dr.eval(raw)
-                dr.sync_thread()
-                done += count
-                on_pass(done, total)
-                if interrupt.pressed or (seconds is not None and time.perf_counter() - start >= seconds):
-                    break
+        ahead, behind = itertools.tee(counts)
+        jobs = ((_pass_seed(seed, index), count) for index, count in enumerate(ahead))
+        with ctrl_c() as interrupt, closing((passes or here)(scene, sensor, jobs)) as sums:
+            try:
+                for passed, count in zip(sums, behind, strict=False):
+                    if interrupt.pressed and cut_short:
+                        break
+                    raw += passed
+                    dr.eval(raw)
+                    dr.sync_thread()
+                    done += count
+                    on_pass(done, total)
+                    if interrupt.pressed or (seconds is not None and time.perf_counter() - start >= seconds):
+                        break
+            except ClusterError as error:
+                if not done:
+                    raise
+                warnings.warn(str(error), stacklevel=2)
+                interrupt.pressed = True
     finally:
         sampler.set_sample_count(own_count)
     if not done:
         raise KeyboardInterrupt
     source.put(film, raw, done)
     return Picture(film.develop(), film.bitmap(), done, total, interrupt.pressed and done != total)
+
+
+def pass_source(integrator: mi.Integrator) -> Any:
+    """Return what has the methods ``sums`` and ``put`` for an integrator's passes."""
+    return integrator if hasattr(integrator, "sums") else FilmPasses(integrator)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Compute with one thread of Dr.Jit. Several add to a pixel in the order in which they get there, and float sums
+    depend on it; the sums of one are the same each time.
+
+    Do not load scenes in it: Mitsuba decodes bitmaps in another thread, and would wait for it forever.
+    """
+    before = dr.thread_count()
+    dr.set_thread_count(1)
+    try:
+        yield
+    finally:
+        dr.set_thread_count(before)
 
 
 class FilmPasses:
@@ -208,12 +252,12 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _samples_per_pass() -> int:
+def _samples_per_pass(threads: int) -> int:
     """Return about a second's worth on an ordinary scene: fixed numbers, so that results do not depend on timing."""
     if is_scalar():
         return 1 << 14
     if mi.variant().startswith("llvm"):
-        return (1 << 20) * dr.thread_count()
+        return (1 << 20) * threads
     return 1 << 24
 
 

@@ -152,7 +152,7 @@ ERRORS = {
     "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
     "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
     "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),
-    "reserved -D": (["scenes/box.xml", "-Doptimize=1"], 2, "-D optimize: "),
+    "reserved -D": (["scenes/box.xml", "-Dfilename=1"], 2, "-D filename: "),
     "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "a.bmp: unknown image format"),
     "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 1, "cannot write to the folder gone"),
     "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 1, "taken.exr is a folder"),

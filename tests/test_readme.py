@@ -68,7 +68,7 @@ def test_shell(line, tmp_path):
 def test_no_command_is_left_out():
     assert {line.split()[1] for line in lines()} == {
         "list", "info", "presets", "doctor", "show", "render", "plot", "gallery", "measured", "convert", "fit",
-        "check", "energy", "bench",
+        "sweep", "check", "energy", "bench",
     }  # fmt: skip
     assert all(more.strip() in README for more in SHORTER.values())
 
@@ -96,7 +96,7 @@ def test_the_gate_finds_its_command():
 
 def test_extras_are_there():
     extras = set(re.findall(r"^(\w+) = ", PROJECT.split("[project.optional-dependencies]")[1].split("\n[")[0], re.M))
-    assert set(re.findall(r'"\.\[(\w+)\]"', README)) == {"llvm", "all", "dev"} <= extras
+    assert set(re.findall(r'"\.\[(\w+)\]"', README)) == {"llvm", "all", "cluster", "dev"} <= extras
 
 
 def test_links_lead_to_files():

@@ -24,7 +24,7 @@ def variant(request):
 
 @pytest.fixture(autouse=True)
 def four_samples_a_pass(monkeypatch):
-    monkeypatch.setattr(module, "_samples_per_pass", lambda: 4 * WIDTH * HEIGHT)
+    monkeypatch.setattr(module, "_samples_per_pass", lambda threads: 4 * WIDTH * HEIGHT)
 
 
 def scene(integrator=None, sampler="independent", **film):

@@ -24,6 +24,7 @@ GUIDE = {
     "index": ["", "First light", "Models", "Noise and speed"],
     "guide/python": ["From Python"],
     "guide/command_line": ["From the command line"],
+    "guide/machines": ["On several machines"],
     "guide/measured": ["Measured materials"],
     "guide/mitsuba_06": ["Scenes of Mitsuba 0.6"],
     "guide/questions": ["Questions"],

@@ -8,14 +8,13 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
+from ..scene_file import RESERVED, SceneFile
 from .app import command
 from .errors import one_line
 from .options import parameters_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail
 from .variants import AnyVariant, set_variant
-
-LOAD_FILE_ARGUMENTS = ("path", "parallel", "optimize")  # of mi.load_file: a -D parameter cannot have these names
 
 
 @command()
@@ -38,24 +37,41 @@ def render(
     ] = None,
     denoise: Denoise = False,
     seed: Seed = 0,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Render with N processes of one thread each, on this machine."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Render on the workers of a Dask scheduler, tcp://HOST:PORT."),
+    ] = None,
 ) -> None:
     """Render a scene progressively; Ctrl-C keeps the finished passes."""
+    if workers and scheduler:
+        fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
     parameters = parameters_of(define)
     for name in parameters:
-        if name in LOAD_FILE_ARGUMENTS:
+        if name in RESERVED:
             fail(f"-D {name}: Mitsuba reserves this name; rename the parameter in the scene", Exit.USAGE)
     window = _window(crop)
     files = output_files(output or Path(scene.stem + ".exr"))
     set_variant(variant)
 
+    file = SceneFile(str(scene), parameters, box_filter=denoise)
+
     def load() -> tuple[mi.Scene, int]:
-        loaded = _load(scene, parameters, box_filter=denoise)
+        loaded = _load(file)
         index = _index(loaded, sensor)
         if window:
             _crop(loaded.sensors()[index], window)
         return loaded, index
 
-    render_to(files, load, denoise, spp=spp, seed=seed, seconds=seconds)
+    passes = None
+    if workers or scheduler:
+        from ..cluster.passes import passes_on  # imports numpy
+
+        passes = passes_on(file, window=window, workers=workers, scheduler=scheduler)
+    render_to(files, load, denoise, spp=spp, seed=seed, seconds=seconds, passes=passes)
 
 
 def _window(text: str | None) -> list[int] | None:
@@ -87,11 +103,12 @@ def _index(scene: mi.Scene, sensor: str) -> int:
     return int(sensor)
 
 
-def _load(path: Path, parameters: dict[str, str], box_filter: bool) -> mi.Scene:
+def _load(file: SceneFile) -> mi.Scene:
+    path = Path(file.path)
     if not path.is_file():
         fail(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     try:
-        scene = (_load_with_box_filter if box_filter else mi.load_file)(str(path), **parameters)
+        scene = file.load()
     except Exception as error:
         fail(one_line(error))
     if not isinstance(scene, mi.Scene):
@@ -101,20 +118,3 @@ def _load(path: Path, parameters: dict[str, str], box_filter: bool) -> mi.Scene:
     if not scene.integrator():
         fail(f"{path}: the scene has no <integrator>")
     return scene
-
-
-def _load_with_box_filter(path: str, **parameters: str) -> mi.Object:
-    """Load a file with box filters in place of its films': a denoiser expects pixels that share no samples."""
-    config = mi.parser.ParserConfig(mi.variant())
-    state = mi.parser.parse_file(config, path, **parameters)
-    mi.parser.transform_all(config, state)
-    for node in state.nodes:
-        if node.type == mi.ObjectType.ReconstructionFilter:
-            node.props = mi.Properties("box")
-    for node in state.nodes:
-        children = [node.props[name] for name in node.props.keys()]
-        places = [it.index() for it in children if isinstance(it, mi.Properties.ResolvedReference)]
-        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in places)
-        if node.type == mi.ObjectType.Film and not filtered:
-            node.props["rfilter"] = mi.load_dict({"type": "box"})
-    return mi.parser.instantiate(config, state)

@@ -10,7 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, context, interaction, numbers, per_lane, vectors
+from ..measure.arrays import Array, context, floats, interaction, numbers, per_lane, vectors
 from ..measure.directions import hemisphere
 from ..mitsuba import llvm
 from .observations import FitError
@@ -111,7 +111,7 @@ class Lanes:
         """Give the textures the values of a setting for each lane, and return these."""
         inputs = {}
         for name, texture in self.textures.items():
-            columns = [mi.Float(np.ascontiguousarray(settings[:, k])) for k in self.configuration.indices(name)]
+            columns = [floats(settings[:, k]) for k in self.configuration.indices(name)]
             colour = self.configuration.is_colour(name)
             value = mi.Color3f(columns if len(columns) == 3 else columns * 3) if colour else columns[0]
             dr.make_opaque(value)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from .arrays import Array, luminance, per_lane
+from .arrays import Array, floats, luminance, per_lane
 from .directions import angles_of, direction
 from .probe import BSDFProbe
 from .settings import VIEW, accepted, axes, load, view
@@ -145,7 +145,7 @@ class _Search:
     def _batch(self, points: Array, log2_count: int, seed: int) -> Array:
         numbers = self._numbers(points)
         for name, texture in self.textures.items():
-            texture.value = mi.Float(np.repeat(np.float32(numbers[name]), 1 << log2_count))
+            texture.value = floats(np.repeat(numbers[name], 1 << log2_count))
         found = albedos(self.bsdf, view(numbers["cosine"], numbers["azimuth"]), log2_count, seed)
         for texture in self.textures.values():
             texture.value = None  # what lives on is part of other kernels

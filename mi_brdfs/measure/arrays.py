@@ -17,6 +17,8 @@ CENTRE = 0.4, 0.3
 """The texture coordinates of what is measured where no others are given."""
 WAVELENGTHS = 450, 520, 580, 640
 """Those of spectral variants, in nanometres."""
+ALIGNMENT = 64
+"""Of Dr.Jit's arrays, in bytes."""
 
 
 def context(component: int | None = None, mask: int | None = None) -> mi.BSDFContext:
@@ -54,7 +56,7 @@ def vectors(w: ArrayLike) -> mi.Vector3f:
 def sample_arguments(variates: Array) -> tuple[mi.Float, mi.Point2f]:
     """Return rows of three uniform variates, shape (N, 3), as the two arguments of ``sample``. Vectorized variants
     only."""
-    return mi.Float(variates[:, 0].copy()), mi.Point2f(_columns(variates[:, 1:]))
+    return floats(variates[:, 0]), mi.Point2f(_columns(variates[:, 1:]))
 
 
 def per_lane() -> mi.Texture:
@@ -80,7 +82,12 @@ def numbers(value: Any, count: int | None = None) -> Array:
     (count, channels), by default with as many rows as it has lanes."""
     if mi.is_polarized and isinstance(value, mi.Spectrum):
         value = value[0, 0]
-    array = np.array(value, np.float64)
+    if dr.depth_v(value) > 1:
+        dr.eval(value)
+        # By channel: for all at once, Dr.Jit compiles a kernel for each number of lanes.
+        array = np.array(np.broadcast_arrays(*map(np.array, value)), np.float64)
+    else:
+        array = np.array(value, np.float64)
     if array.ndim < 2:
         array = array.reshape((-1, 1) if is_scalar() else (1, -1))
     return array.T if count is None else np.broadcast_to(array, (len(array), count)).T
@@ -91,6 +98,18 @@ def luminance(colours: Array) -> Array:
     return colours @ [0.212671, 0.715160, 0.072169] if colours.shape[-1] == 3 else colours.mean(axis=-1)
 
 
-def _columns(rows: ArrayLike) -> Array:
-    """Return rows as the columns that Dr.Jit's arrays are made of."""
-    return np.ascontiguousarray(np.asarray(rows, np.float32).T)
+def floats(x: ArrayLike) -> mi.Float:
+    """Return numbers of shape (N,) as an array of a vectorized variant, aligned as Dr.Jit's own arrays are: it uses
+    NumPy's memory, and would compile a kernel anew for each combination of inputs that are aligned and that are not."""
+    x = np.asarray(x, np.float32)
+    memory = np.empty(x.nbytes + ALIGNMENT, np.uint8)
+    first = -memory.ctypes.data % ALIGNMENT
+    aligned = memory[first : first + x.nbytes].view(np.float32)
+    aligned[:] = x
+    return mi.Float(aligned)
+
+
+def _columns(rows: ArrayLike) -> Any:
+    """Return rows as the columns that Dr.Jit's arrays are made of, and a single row as it is."""
+    columns = np.asarray(rows, np.float32).T
+    return columns if columns.ndim == 1 else [floats(column) for column in columns]

@@ -1,0 +1,134 @@
+"""``mi-brdfs sweep``"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Generator
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from .app import command
+from .errors import one_line
+from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .variants import TracingVariant, set_tracing_variant
+
+if TYPE_CHECKING:
+    from ..sweep import Outcome
+
+TABLES = "md", "csv"
+
+
+@command()
+def sweep(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
+    model: Annotated[str, typer.Option(metavar="TYPE,…|all", help="The models, as `list` shows them.")] = "all",
+    metric: Annotated[
+        str, typer.Option(metavar="METRIC,…", help="The errors to make small: log, l2, ngan, cube-root.")
+    ] = "log",
+    starts: Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")] = 10,
+    cut: Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")] = 80,
+    seed: Annotated[
+        str, typer.Option(metavar="NUMBER,…", help="Of the random starts, and of what is held out: a fit for each.")
+    ] = "0",
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Results go there, and finished ones are used.")
+    ] = Path("sweep"),
+    workers: Annotated[
+        int | None, typer.Option(min=0, help="Processes; 0 for none but this. Default: one for each core, up to 8.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Fit on the workers of a Dask scheduler, tcp://HOST:PORT.")
+    ] = None,
+    render: Annotated[
+        bool, typer.Option("--render", help="Also render the materials and their fits: wall_METRIC.jpg.")
+    ] = False,
+    table: Annotated[
+        str, typer.Option(metavar="md|csv", help="Print medians by model and metric, or all fits, a line for each.")
+    ] = "md",
+    variant: TracingVariant = None,
+) -> None:
+    """Fit many models to many measured BRDFs, in parallel, and compare them. The same command goes on where it was
+    interrupted, and fits only what is new or has changed."""
+    try:
+        from ..sweep import MEDIANS, ClusterError, FileError, Sweep, csv, medians
+
+        if render:
+            from ..sweep.wall import Wall
+    except ImportError as error:
+        fail(str(error))
+    if table not in TABLES:
+        fail(f"--table {table}: there is no such table; there are {', '.join(TABLES)}", Exit.USAGE)
+    if workers and scheduler:
+        fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
+    seeds = _numbers(seed)
+    chosen = set_tracing_variant(variant)
+    if not chosen.endswith("_ad_rgb"):
+        fail(f"this needs an rgb variant with derivatives, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
+    if workers is None and not scheduler:
+        workers = min(os.cpu_count() or 1, 8)
+    try:
+        names = [] if model == "all" else model.split(",")
+        plan = Sweep(files, names, output, metrics=metric.split(","), seeds=seeds, starts=starts, cut=cut)
+        output.mkdir(parents=True, exist_ok=True)
+    except FileError as error:
+        fail(one_line(error))
+    except ValueError as error:
+        fail(one_line(error), Exit.USAGE)
+    except OSError as error:
+        fail(f"{output}: {error.strerror}")
+    complete, errors, wall = True, list[str](), None
+    with stdout_to_stderr():
+        try:
+            _follow(plan.fit(workers, scheduler), "fits", plan.total, plan.finished(), errors)
+            if render:
+                wall = Wall(plan)
+                _follow(wall.render(workers, scheduler), "pictures", wall.total, wall.finished(), errors)
+                for path in wall.write():
+                    err.print(str(path))
+        except ClusterError as error:
+            errors.append(one_line(error))
+            err.print(f"mi-brdfs: {one_line(error)}")
+        except KeyboardInterrupt:
+            complete = False
+    if table == "csv":
+        for line in csv(plan.rows()):
+            out.print(line)
+    else:
+        out.print(medians(plan.rows(MEDIANS)))
+    kept = f"{plan.finished()} of {plan.total} fits" + (
+        f" and {wall.finished()} of {wall.total} pictures" if wall else ""
+    )
+    if not complete:
+        err.print(f"Interrupted; {kept} are finished: the same command goes on from there.")
+        raise typer.Exit(Exit.INTERRUPTED)
+    if errors:
+        err.print(f"{kept} are finished; the same command tries the others again.")
+        raise typer.Exit(Exit.ERROR)
+
+
+def _numbers(text: str) -> list[int]:
+    """Return the seeds of the option."""
+    try:
+        found = [int(number) for number in text.split(",")]
+    except ValueError:
+        found = [-1]
+    if min(found) < 0:
+        fail(f"--seed {text}: write whole numbers, 0 or larger, as in 0,1,2", Exit.USAGE)
+    return list(dict.fromkeys(found))
+
+
+def _follow(outcomes: Generator[Outcome, None, None], what: str, total: int, finished: int, errors: list[str]) -> None:
+    """Show how far something has come, and why parts of it fail, each reason once."""
+    columns: list[Any] = [TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
+    columns += [TextColumn(f"{what},"), TimeRemainingColumn(), TextColumn("left")]
+    with closing(outcomes), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        task = progress.add_task("Sweep", total=total, completed=finished)
+        for outcome in outcomes:
+            progress.advance(task, outcome.size)
+            if outcome.error and (sentence := one_line(RuntimeError(outcome.error))) not in errors:
+                errors.append(sentence)
+                progress.console.print(f"mi-brdfs: {sentence}")

@@ -1,0 +1,205 @@
+"""The client's side of a run on Dask workers."""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+import dask
+from distributed import CancelledError, Client, Future, LocalCluster
+from distributed.scheduler import KilledWorker
+
+from . import ClusterError
+from .processes import Processes
+from .worker import Failed, Setup, call_as, problem, setup, versions
+
+CONNECTING = 5
+"""Seconds to wait for a scheduler."""
+JOINING = 10
+"""Seconds to wait for a first worker."""
+ROUNDS = 4
+"""How often a task is given to workers anew after those that had it died, each time as often as the scheduler allows,
+four times by default."""
+AHEAD = 3
+"""Tasks submitted per worker: one runs, and the next ones are there when it ends."""
+
+
+def run_on_workers(
+    function: Callable,
+    tasks: Iterator[tuple[str, tuple]],
+    workers: int | None,
+    scheduler: str | None,
+    threads: int | None,
+    shared: tuple,
+) -> Iterator[tuple[str, Any]]:
+    """See :func:`mi_brdfs.cluster.run`."""
+    with ExitStack() as stack:
+        stack.enter_context(_quiet())
+        stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": CONNECTING}))
+        processes = None
+        if scheduler:
+            client = stack.enter_context(_connected(scheduler))
+            here = setup(threads)
+            _check_workers(client, scheduler, here)
+        else:
+            assert workers
+            cluster = stack.enter_context(
+                LocalCluster(n_workers=0, processes=True, host="127.0.0.1", scheduler_port=0, dashboard_address=None)
+            )
+            client = stack.enter_context(Client(cluster, timeout=CONNECTING))
+            here = setup(threads or (os.cpu_count() or 1) // workers)
+            processes = Processes(cluster.scheduler_address, workers)
+            stack.callback(processes.end)
+            processes.start()
+        run = _Run(client, processes, function, (here, shared))
+        stack.callback(run.cancel)
+        yield from run.results(tasks)
+
+
+class _Run:
+    """The tasks that workers have, and how they fare."""
+
+    def __init__(self, client: Client, processes: Processes | None, function: Callable, common: tuple[Setup, tuple]):
+        self.client, self.processes, self.function = client, processes, function
+        self.id = f"mi_brdfs-{uuid.uuid4().hex}"
+        self.count = 0
+        self.common = client.submit(_same, common, key=f"{self.id}-common")
+        self.pending: dict[Future, tuple[str, tuple, int]] = {}
+        self.ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
+        self.workers, self.asked = 0, -1.0
+
+    def results(self, tasks: Iterator[tuple[str, tuple]]) -> Iterator[tuple[str, Any]]:
+        """Yield keys and results."""
+        left = True
+        while True:
+            while left and len(self.pending) < AHEAD * max(self._worker_count(), 1):
+                task = next(tasks, None)
+                left = task is not None
+                if task:
+                    self._submit(*task)
+            if not self.pending:
+                return
+            try:
+                future = self.ended.get(timeout=0.2)
+            except queue.Empty:
+                self._look_after_workers()
+                continue
+            key, arguments, rounds = self.pending.pop(future)
+            result = self._result(future)
+            if not isinstance(result, KilledWorker):
+                yield key, result
+            elif rounds < ROUNDS:
+                self._submit(key, arguments, rounds + 1)
+            else:
+                yield key, Failed("each worker that had this task died")
+
+    def cancel(self) -> None:
+        """Take back what no worker has begun."""
+        if self.client.status == "running":
+            self.client.cancel([*self.pending, self.common], force=True)
+
+    def _submit(self, key: str, arguments: tuple, rounds: int = 1) -> None:
+        self.count += 1
+        task = f"{self.id}-{self.count}"
+        future = self.client.submit(
+            call_as, self.common, self.function.__module__, self.function.__name__, arguments, key=task, pure=False
+        )
+        self.pending[future] = key, arguments, rounds
+        future.add_done_callback(self.ended.put)
+
+    def _result(self, future: Future) -> Any:
+        """Return the result, or that the workers that had the task died."""
+        try:
+            error = future.exception()
+            if error is None:
+                return future.result()
+        except (CancelledError, OSError, TimeoutError):
+            raise ClusterError(_gone(self.client)) from None
+        if isinstance(error, KilledWorker):
+            return error
+        raise ClusterError(_gone(self.client) if isinstance(error, CancelledError) else _of_worker(error))
+
+    def _worker_count(self) -> int:
+        """Return the number of workers, asked for once a second."""
+        if time.monotonic() - self.asked > 1:
+            try:
+                self.workers = len(self.client.nthreads())
+            except (OSError, TimeoutError):
+                raise ClusterError(_gone(self.client)) from None
+            self.asked = time.monotonic()
+        return self.workers
+
+    def _look_after_workers(self) -> None:
+        if self.client.status != "running":
+            raise ClusterError(_gone(self.client))
+        if self.processes:
+            self.processes.start()
+            if self.processes.failures > 3 * len(self.processes.running):
+                raise ClusterError(f"The worker processes fail: {self.processes.last_words()}")
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    try:
+        client = Client(address, timeout=CONNECTING)
+    except OSError:
+        raise ClusterError(f"The scheduler at {address} does not answer.") from None
+    except ValueError:
+        raise ClusterError(f"{address} is not the address of a scheduler; write tcp://HOST:PORT.") from None
+    except Exception:  # whatever the bytes of another protocol are taken for
+        raise ClusterError(f"What answers at {address} is not a Dask scheduler of a similar version.") from None
+    with client:
+        yield client
+
+
+def _check_workers(client: Client, address: str, here: Setup) -> None:
+    try:
+        client.wait_for_workers(1, timeout=JOINING)
+    except TimeoutError:
+        raise ClusterError(
+            f"The scheduler at {address} has no workers; start some: dask worker {address} --nthreads 1"
+        ) from None
+    try:
+        found = client.run(versions)
+    except Exception as error:
+        raise ClusterError(_of_worker(error)) from None
+    for worker, nthreads in client.nthreads().items():
+        if worker in found and (text := problem(found[worker], here.versions, nthreads)):
+            raise ClusterError(f"The worker at {worker} {text}.")
+
+
+def _same(common: Any) -> Any:
+    return common
+
+
+def _gone(client: Client) -> str:
+    return f"The scheduler at {client._start_arg if isinstance(client._start_arg, str) else 'this machine'} has gone."
+
+
+def _of_worker(error: BaseException) -> str:
+    if isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == "mi_brdfs":
+        return "A worker cannot import mi_brdfs; install the version that is here on all machines."
+    return str(error)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Dask's log from the terminal: what matters is raised."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
+    audible = [logger for logger in map(logging.getLogger, names) if not logger.disabled]
+    for logger in audible:
+        logger.disabled = True
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="distributed")
+        try:
+            yield
+        finally:
+            for logger in audible:
+                logger.disabled = False

@@ -1,0 +1,105 @@
+"""A scene file, with all that decides what a sensor sees of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import mitsuba as mi
+
+RESERVED = ("config", "filename")
+"""Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene file and its parameters, or its copy for another machine."""
+
+    path: str
+    parameters: dict[str, str] = field(default_factory=dict)
+    """The values of its ``<default>`` parameters."""
+    box_filter: bool = False
+    """Whether films get box filters: a denoiser expects pixels that share no samples."""
+    contents: dict[str, bytes] | None = None
+    """In a copy, the files by their paths, without the root."""
+    names: dict[str, str] = field(default_factory=dict)
+    """In a copy, the path of each file by the name that the scene gives it."""
+    folder: str = "."
+    """In a copy, the folder relative to which names may be, besides the scene's."""
+
+    def load(self) -> Any:
+        """Return the scene. The files named in it are looked for as by ``mi.load_file``."""
+        if self.contents is None:
+            return self._load(Path(self.path), {})
+        # The scene has read its files when it is loaded.
+        with TemporaryDirectory(prefix="mi_brdfs-", ignore_cleanup_errors=True) as root:
+            for path, content in self.contents.items():
+                Path(root, path).parent.mkdir(parents=True, exist_ok=True)
+                Path(root, path).write_bytes(content)
+            folder = Path(root, self.folder)
+            folder.mkdir(parents=True, exist_ok=True)
+            names = {name: os.path.join(root, path) for name, path in self.names.items()}
+            return self._load(Path(root, self.path), names, folder)
+
+    def copied(self) -> SceneFile:
+        """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
+        with _looking_in(Path(self.path).parent):
+            state = mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), self.path, **self.parameters)
+            named = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in _file_names(state)}
+        names = {name: _rootless(path) for name, path in named.items() if os.path.isfile(path)}
+        paths = [self.path, *map(str, state.files), *(path for path in named.values() if os.path.isfile(path))]
+        contents = {_rootless(path): Path(path).read_bytes() for path in paths}
+        return SceneFile(_rootless(self.path), self.parameters, self.box_filter, contents, names, _rootless("."))
+
+    def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
+        config = mi.parser.ParserConfig(mi.variant())
+        with _looking_in(path.parent, *folders):
+            state = mi.parser.parse_file(config, str(path), **self.parameters)
+            for props, key in _file_names(state):
+                props[key] = names.get(props[key], props[key])
+            mi.parser.transform_all(config, state)
+            if self.box_filter:
+                _set_box_filters(state)
+            return mi.parser.instantiate(config, state)
+
+
+def _file_names(state: Any) -> list[tuple[mi.Properties, str]]:
+    """Return where a parsed scene names files: the strings of properties that are called so."""
+    properties = [(node.props, key) for node in state.nodes for key in node.props.keys() if "file" in key]
+    return [(props, key) for props, key in properties if isinstance(props[key], str)]
+
+
+def _rootless(path: str) -> str:
+    absolute = Path(os.path.abspath(path))
+    return absolute.relative_to(absolute.anchor).as_posix()
+
+
+@contextmanager
+def _looking_in(*folders: Path) -> Iterator[None]:
+    """Look for files in these folders first, and forget these and those that a scene adds."""
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    for folder in reversed(folders):
+        resolver.prepend(str(folder))
+    mi.set_file_resolver(resolver)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
+
+
+def _set_box_filters(state: Any) -> None:
+    for node in state.nodes:
+        if node.type == mi.ObjectType.ReconstructionFilter:
+            node.props = mi.Properties("box")
+    for node in state.nodes:
+        children = [node.props[name] for name in node.props.keys()]
+        places = [it.index() for it in children if isinstance(it, mi.Properties.ResolvedReference)]
+        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in places)
+        if node.type == mi.ObjectType.Film and not filtered:
+            node.props["rfilter"] = mi.load_dict({"type": "box"})

@@ -1,0 +1,91 @@
+"""Finished fits in Parquet files."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+try:
+    import pyarrow as pa
+    from pyarrow import parquet
+except ImportError:
+    raise ImportError("a sweep needs PyArrow: pip install 'mi_brdfs[cluster]'") from None
+
+from ..fit import METRICS
+
+PARTS = "fitted", "held_out"
+IDENTITY = {
+    "key": pa.string(),  # of all that follow up to the versions, but for the file's name
+    "file": pa.string(),
+    "content": pa.string(),  # SHA-256 of the file
+    "model": pa.string(),
+    "metric": pa.string(),
+    "seed": pa.int64(),
+    "starts": pa.int64(),
+    "cut": pa.float64(),
+    "variant": pa.string(),
+    "versions": pa.string(),
+}
+JSON = "bsdf", "sigma", "correlations", "undetermined", "bounds", "remarks"
+FINDINGS = {
+    **{f"{metric}_{part}": pa.float64() for metric in METRICS for part in PARTS},
+    "albedo": pa.float64(),
+    "bic": pa.float64(),
+    "tried": pa.int64(),  # starts, with the published material
+    "agree": pa.int64(),
+    "pairs": pa.int64(),
+    "resolved": pa.bool_(),
+    **dict.fromkeys(JSON, pa.string()),
+    "seconds": pa.float64(),
+}
+SCHEMA = pa.schema(IDENTITY | FINDINGS)
+"""A row is a fit, with the keys of :meth:`mi_brdfs.fit.Fit.to_dict`; nested values are JSON."""
+
+
+class StoreWarning(UserWarning):
+    """A file among the results that cannot be used."""
+
+
+class Store:
+    """A folder of Parquet files with rows of ``SCHEMA``, each file written at once."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+
+    def add(self, name: str, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Write a file: all of it or nothing."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"{name}.parquet"
+        partial = path.with_name(f".{name}-{os.getpid()}")
+        try:
+            parquet.write_table(pa.Table.from_pylist(list(rows), schema=SCHEMA), partial)
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+    def rows(self, columns: Iterable[str] | None = None) -> Iterator[dict[str, Any]]:
+        """Yield the rows of all files, one file at a time; warn of each that holds no such rows."""
+        for path in sorted(self.folder.glob("*.parquet")):
+            try:
+                with parquet.ParquetFile(path) as file:
+                    if missing := set(SCHEMA.names) - set(file.schema_arrow.names):
+                        raise ValueError(f"it has no column {min(missing)}")
+                    found = file.read(list(columns) if columns else SCHEMA.names).to_pylist()
+            except (OSError, ValueError) as error:  # pa.ArrowInvalid is a ValueError
+                text = f"{path} holds no fits, and is left out: {error}"
+                warnings.warn(" ".join(text.split()), StoreWarning, stacklevel=2)
+                continue
+            yield from found
+
+
+def row_of(identity: Mapping[str, Any], fit: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the row of a fit that was written by ``to_dict``."""
+    errors = {f"{metric}_{part}": fit["errors"][metric][part] for metric in METRICS for part in PARTS}
+    nested = {name: json.dumps(fit[name]) for name in JSON}
+    starts = {"tried": fit["starts"]["tried"], "agree": fit["starts"]["agree"]}
+    plain = {name: fit[name] for name in ("albedo", "bic", "pairs", "resolved", "seconds")}
+    return {**identity, **errors, **starts, **plain, **nested}

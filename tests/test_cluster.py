@@ -1,0 +1,314 @@
+"""Workers return what this process would have, also when some are killed; what cannot work is refused in a sentence."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import dask
+import mitsuba as mi
+import numpy as np
+import psutil
+import pytest
+from cluster_tasks import last_breath, powers, work
+from support import ROOT
+from typer.testing import CliRunner
+
+import mi_brdfs
+from mi_brdfs import render as rendering
+from mi_brdfs.cli import app
+from mi_brdfs.cluster import ClusterError, Failed, client, run
+from mi_brdfs.cluster.passes import passes_on
+from mi_brdfs.cluster.worker import _file
+from mi_brdfs.mitsuba import guests
+from mi_brdfs.mitsuba.registry import info
+from mi_brdfs.render import one_thread, pass_source, render
+from mi_brdfs.scene_file import SceneFile
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
+SCENE = """<scene version="3.0.0">
+    <default name="radius" value="1"/>
+    <include filename="parts/material.xml"/>
+    <integrator type="INTEGRATOR"/>
+    <emitter type="constant"/>
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film>
+        <sampler type="independent"><integer name="sample_count" value="32"/></sampler>
+    </sensor>
+    <shape type="sphere"><float name="radius" value="$radius"/><ref id="checked"/></shape>
+</scene>"""
+MATERIAL = """<scene version="3.0.0"><bsdf type="MODEL" id="checked">
+    <texture type="bitmap" name="reflectance"><string name="filename" value="textures/checks.png"/></texture>
+</bsdf></scene>"""
+
+
+def start(name, *options, folder, **environment):
+    """Start a command of Dask's, in a folder where no scene is."""
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    return subprocess.Popen(
+        [sys.executable, "-m", f"distributed.cli.dask_{name}", *options, "--no-dashboard"],
+        cwd=folder, env=os.environ | {"PYTHONPATH": path, **environment}, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+def scheduler_in(folder):
+    process = start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", "s.json", folder=folder)
+    while not (folder / "s.json").exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    return process, json.loads((folder / "s.json").read_text())["address"]
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """A scheduler and two workers, started by their commands as on other machines."""
+    folder = tmp_path_factory.mktemp("machine")
+    scheduler, address = scheduler_in(folder)
+    workers = start("worker", address, "--nthreads", "1", "--nworkers", "2", folder=folder)
+    yield address
+    workers.terminate()
+    workers.wait()
+    scheduler.kill()
+    scheduler.wait()
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene of several files."""
+    return scene_in(tmp_path)
+
+
+def scene_in(folder, integrator="path", model="diffuse"):
+    (folder / "parts").mkdir()
+    (folder / "textures").mkdir()
+    (folder / "scene.xml").write_text(SCENE.replace("INTEGRATOR", integrator))
+    (folder / "parts/material.xml").write_text(MATERIAL.replace("MODEL", model))
+    checks = np.indices((8, 8)).sum(axis=0)[..., None] % 2 * [0.2, 0.5, 0.7] + 0.1
+    mi.Bitmap(checks.astype(np.float32)).convert(component_format=mi.Struct.Type.UInt8).write(
+        str(folder / "textures/checks.png")
+    )
+    return folder / "scene.xml"
+
+
+def worker_processes():
+    """The workers that this process started."""
+    children = [it for it in psutil.Process().children() if it.status() != "zombie"]
+    return [it for it in children if "--no-nanny" in it.cmdline()]
+
+
+def test_workers_return_what_a_serial_run_does(address):
+    tasks = {str(number): (number,) for number in range(6)}
+    serial = dict(run(powers, tasks, shared=(2.5,)))
+    for where in ({"workers": 2}, {"scheduler": address}):
+        keys, results = zip(*run(powers, iter(tasks.items()), shared=(2.5,), **where), strict=True)
+        assert sorted(keys) == sorted(tasks)
+        assert all(np.array_equal(serial[key], result) for key, result in zip(keys, results, strict=True))
+
+
+def test_killed_workers_cost_no_task_and_a_failure_is_one_tasks(ctrl_c):
+    results = []
+    for key, result in run(work, {str(number): (number,) for number in range(10)}, workers=2):
+        results.append((key, result))
+        if len(results) in (1, 4):
+            worker_processes()[0].kill()
+    assert sorted(key for key, _ in results) == sorted(map(str, range(10)))
+    results = dict(results)
+    assert results.pop("3") == Failed("3 is not a number that I like")
+    assert all(result[:2] == (int(key), "llvm_ad_rgb") for key, result in results.items())
+    assert len({result[2] for result in results.values()} - {os.getpid()}) >= 2
+    assert not worker_processes()
+
+
+def test_a_task_of_which_workers_die_is_given_out_again(tmp_path):
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        assert list(run(last_breath, {"a": (str(tmp_path), 2)}, workers=1)) == [("a", "alive")]
+
+
+def test_a_closed_iterator_leaves_no_process():
+    results = run(work, ((str(number), (number,)) for number in range(10**9)), workers=2)
+    next(results)
+    assert len(worker_processes()) == 2
+    before = time.perf_counter()
+    results.close()
+    assert not worker_processes()
+    assert time.perf_counter() - before < 3
+
+
+@pytest.fixture
+def small_passes(monkeypatch):
+    monkeypatch.setattr(rendering, "_samples_per_pass", lambda threads: 4 * 32 * 24)
+
+
+@pytest.mark.usefixtures("small_passes")
+@pytest.mark.parametrize(
+    "integrator, variant",
+    [("path", "llvm_ad_rgb"), ("shading", "llvm_ad_rgb"), ("ptracer", "llvm_ad_rgb"), ("path", "scalar_rgb")],
+)
+def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, address, integrator, variant):
+    file = SceneFile(str(scene_in(tmp_path, integrator)), {"radius": "1.2"})
+    with mi.variant_context(variant):
+        loaded = file.load()
+        with one_thread():
+            expected = render(loaded, spp=32, seed=5)
+        picture = render(loaded, spp=32, seed=5, passes=passes_on(file, scheduler=address))
+        assert np.array_equal(np.array(expected.bitmap), np.array(picture.bitmap))
+        assert np.array(picture.image).std() > 0.05
+
+
+def test_a_scene_and_its_copy_are_found_from_any_folder(scene, tmp_path, monkeypatch):
+    """Also with box filters; the copy does without the files."""
+    monkeypatch.chdir(tmp_path.parent)
+    name = str(scene.relative_to(tmp_path.parent))
+    file = SceneFile(name, {"radius": "0.9"}, box_filter=True)
+    copy, expected = file.copied(), np.array(mi.render(mi.load_file(name, radius="0.9"), spp=4)).mean()
+    loaded = file.load()
+    assert loaded.sensors()[0].film().rfilter().is_box_filter()
+    for path in tmp_path.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    monkeypatch.chdir("/")
+    pictures = [np.array(mi.render(each, spp=4)) for each in (loaded, copy.load())]
+    assert np.array_equal(*pictures) and pictures[0].mean() == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.usefixtures("small_passes", "ctrl_c")
+def test_also_with_a_worker_killed_in_a_crop_with_aovs(scene):
+    scene.write_text(
+        scene.read_text().replace(
+            '<integrator type="path"/>',
+            '<integrator type="aov"><string name="aovs" value="z:depth"/><integrator type="path"/></integrator>',
+        )
+    )
+    file, window, passes = SceneFile(str(scene)), [3, 2, 20, 18], []
+    loaded = file.load()
+    rendering.crop(loaded.sensors()[0], *window)
+    with one_thread():
+        expected = render(loaded, spp=64)
+
+    def kill(done, total):
+        passes.append(done)
+        if len(passes) == 2:
+            worker_processes()[0].kill()
+
+    picture = render(loaded, spp=64, on_pass=kill, passes=passes_on(file, window=window, workers=2))
+    assert picture.spp == 64 and len(passes) >= 8
+    assert np.array_equal(np.array(expected.bitmap), np.array(picture.bitmap))
+    assert not worker_processes()
+
+
+@pytest.mark.usefixtures("small_passes", "ctrl_c")
+def test_ctrl_c_keeps_the_finished_passes(scene, address):
+    file = SceneFile(str(scene))
+    picture = render(
+        file.load(), spp=1 << 20, on_pass=lambda *_: os.kill(os.getpid(), signal.SIGINT),
+        passes=passes_on(file, scheduler=address),
+    )  # fmt: skip
+    assert picture.interrupted and picture.spp == 4
+
+
+GUEST = """from mi_brdfs.models.lambert import Lambert
+
+class Twin(Lambert):
+    \'\'\'Lambert's twin.\'\'\'
+    plugins = ("twin",)
+"""
+
+
+@pytest.mark.usefixtures("as_before")
+def test_models_of_a_file_go_along(tmp_path, address):
+    file = tmp_path / "twins.py"
+    file.write_text(GUEST)
+    guests.import_models(str(file))
+    assert dict(run(info, {"a": ("twin",)}, scheduler=address))["a"].startswith("Lambert's twin.")
+    # As on a machine that has another file there.
+    assert _file(str(file), GUEST) == str(file)
+    copy = Path(_file(str(file), GUEST + "# edited"))
+    assert copy.name == "twins.py" and copy.read_text().endswith("# edited") and file.read_text() == GUEST
+    shutil.rmtree(copy.parent)
+
+
+def test_the_command_renders_on_a_scheduler(scene, address, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path / "parts")
+    done = CliRunner().invoke(app, ["render", "../scene.xml", "--scheduler", address, "-D", "radius=.5", "--spp", "8"])
+    assert done.exit_code == 0, done.output
+    assert {"scene.exr", "scene.png"} <= {path.name for path in (tmp_path / "parts").iterdir()}
+
+
+@pytest.mark.parametrize(
+    "scheduler, sentence",
+    [
+        ("tcp://127.0.0.1:1", "The scheduler at tcp://127.0.0.1:1 does not answer."),
+        ("nonsense", "nonsense is not the address of a scheduler; write tcp://HOST:PORT."),
+        ("http://127.0.0.1:80", "http://127.0.0.1:80 is not the address of a scheduler; write tcp://HOST:PORT."),
+    ],
+)
+def test_a_wrong_address_is_one_sentence(scheduler, sentence, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(client, "CONNECTING", 1)
+    done = CliRunner().invoke(app, ["render", str(scene), "--scheduler", scheduler, "-o", str(tmp_path / "x.exr")])
+    assert done.exit_code == 1 and done.stderr == f"mi-brdfs: {sentence}\n"
+
+
+def test_other_versions_are_refused(address, monkeypatch):
+    monkeypatch.setattr(mi_brdfs.cluster.worker, "__version__", "9.9")
+    with pytest.raises(ClusterError, match=r"The worker at tcp://\S+ has mi_brdfs 0.1.0, this process has 9.9\.$"):
+        list(run(powers, {"a": (2, 1)}, scheduler=address))
+
+
+def test_a_scheduler_that_goes(tmp_path):
+    scheduler, address = scheduler_in(tmp_path)
+    worker = start("worker", address, "--nthreads", "1", "--no-nanny", folder=tmp_path)
+    try:
+        results = run(work, {str(number): (number,) for number in range(100)}, scheduler=address)
+        next(results)
+        scheduler.kill()
+        with pytest.raises(ClusterError, match=f"^The scheduler at {address} has gone.$"):
+            list(results)
+    finally:
+        worker.kill()
+        worker.wait()
+        scheduler.wait()
+
+
+@pytest.mark.usefixtures("small_passes")
+def test_what_is_finished_when_the_scheduler_goes_is_kept(scene):
+    """Unless nothing is."""
+    loaded, left = SceneFile(str(scene)).load(), 3
+    source = pass_source(loaded.integrator())
+
+    def passes(scene, sensor, jobs):
+        for _, (seed, spp) in zip(range(left), jobs, strict=False):
+            yield source.sums(scene, scene.sensors()[sensor], seed=seed, spp=spp)
+        raise ClusterError("The scheduler has gone.")
+
+    with pytest.warns(UserWarning, match=r"^The scheduler has gone\.$"):
+        picture = render(loaded, spp=32, passes=passes)
+    assert (picture.spp, picture.total, picture.interrupted) == (12, 32, True)
+    left = 0
+    with pytest.raises(ClusterError):
+        render(loaded, spp=32, passes=passes)
+
+
+def test_without_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert dict(run(powers, {"a": (2, 1)})).keys() == {"a"}
+    with pytest.raises(ImportError, match=r'^workers need the extra "cluster": pip install "mi_brdfs\[cluster\]"$'):
+        run(powers, {"a": (2, 1)}, workers=2)
+
+
+@pytest.mark.slow
+def test_two_workers_render_at_least_1_7_times_as_fast_as_one():
+    """On a machine with two idle cores; ``-s`` shows the times, which include the start of the processes."""
+    file = SceneFile(str(ROOT / "scenes/cornell_box.xml"), {"width": "256", "height": "256"})
+    loaded, seconds = file.load(), {1: [], 2: []}
+    for workers in (1, 2) * 3:
+        start = time.perf_counter()
+        render(loaded, spp=640, passes=passes_on(file, workers=workers))
+        seconds[workers].append(time.perf_counter() - start)
+    print({workers: [round(each, 2) for each in all_of] for workers, all_of in seconds.items()})
+    assert min(seconds[1]) >= 1.7 * min(seconds[2])
