@@ -67,8 +67,9 @@ def by_flip(fits: Sequence[Fit], shown: Appearance) -> tuple[list[Fit], Appearan
     """Return fits with their FLIP errors, the least first, and their pictures in the same order.
 
     It is the mean over the picture of LDR-FLIP (P. Andersson et al., FLIP: A difference evaluator for alternating
-    images, HPG 2020, doi:10.1145/3406183) at 67 pixels per degree, its authors' default. Pictures are compared as the report shows them: linear values, brightened alike,
-    clipped at 1, in sRGB, without any other tone mapping. What a display clips has no error.
+    images, HPG 2020, doi:10.1145/3406183) at 67 pixels per degree, its authors' default. Pictures are compared as the
+    report shows them: linear values, brightened alike, clipped at 1, in sRGB, without any other tone mapping. What a
+    display clips has no error.
 
     Another seed changes an error by less than .001, and the order of fits whose errors differ by more not at all.
     """

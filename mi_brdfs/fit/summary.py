@@ -12,11 +12,14 @@ from .result import Fit
 class Median(NamedTuple):
     """A model over several materials."""
 
+    error: float
+    """By which models are ranked: the FLIP error where pictures were compared, and else the held-out one."""
     held_out: float
     fitted: float
     model: str
     files: int
     best_in: int
+    flip: float | None
 
 
 def notes(fit: Fit) -> str:
@@ -38,19 +41,18 @@ def values(fit: Fit) -> list[tuple[str, float, float | None]]:
 
 def medians(ranked: Sequence[Sequence[Fit]]) -> list[Median]:
     """Return the medians of each model's errors over materials, whose fits are each in the order of their rank; the
-    least on held-out directions first."""
+    best first."""
     by_model: dict[str, list[Fit]] = {}
     for own in ranked:
         for it in own:
             by_model.setdefault(it.model, []).append(it)
     winners = [own[0].model for own in ranked]
-    return sorted(
-        Median(
-            median(it.held_out for it in own),
-            median(it.errors[it.metric]["fitted"] for it in own),
-            model,
-            len(own),
-            winners.count(model),
-        )
-        for model, own in by_model.items()
-    )
+    found = []
+    for model, own in by_model.items():
+        held_out = median(it.held_out for it in own)
+        fitted = median(it.errors[it.metric]["fitted"] for it in own)
+        seen = [it.flip for it in own if it.flip is not None]
+        flip = median(seen) if seen else None
+        error = held_out if flip is None else flip
+        found.append(Median(error, held_out, fitted, model, len(own), winners.count(model), flip))
+    return sorted(found, key=lambda it: it.error)

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from ...measure.directions import direction
 from ...measure.probe import BSDFProbe
@@ -21,7 +22,7 @@ from ...measured.summary import azimuths
 from ...plot.lit import LitTable
 from ...plot.lobes import GRAZING, Curve, in_plane, value
 from ...plot.planar import THIN
-from ...plot.style import FAINT, GRID, INK, STYLES, calm, incidence
+from ...plot.style import FAINT, GRID, INK, STYLES, calm
 from ..metrics import METRICS
 from ..observations import Observations
 from ..result import Fit
@@ -37,8 +38,6 @@ CELLS = 8, 32
 """The least and the most cells of a residual map, along each side."""
 PAIRS = 8
 """How many pairs of directions a cell has on average, unless it were too large or too small."""
-DARKER = 30
-"""By what factor the data's least values are drawn above the lower end of a scale, and its peak below the upper one."""
 
 
 def probe_of(fit: Fit) -> BSDFProbe:
@@ -56,14 +55,15 @@ def lobes(measurement: Measurement, fits: Sequence[BSDFProbe], cut: float) -> li
         tables.append(LitTable(measurement, float(across)))
     drawn = []
     for table in tables:
-        angles = [float(theta) for theta in table.angles if theta <= cut][-3 if len(tables) > 1 else -4 :]
+        angles = [float(theta) for theta in table.angles if theta <= cut][-2 if len(tables) > 1 else -4 :]
         for theta, nodes in zip(angles, table.nodes(angles), strict=True):
-            turned = f", φi = {np.degrees(table.phi):.0f}°" if table.grid.anisotropic else ""
-            drawn.append((f"θi = {theta:.3g}°{turned}", _lobe(table, theta, nodes, fits)))
+            turned = f", φi = {np.degrees(table.phi):.0f}°" if len(tables) > 1 else ""
+            caption = f"θi = {theta:.3g}°{turned}"
+            drawn.append((caption, _lobe(table, theta, caption, nodes, fits)))
     return drawn
 
 
-def _lobe(table: LitTable, theta_i: float, nodes: Curve, fits: Sequence[BSDFProbe]) -> str:
+def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Sequence[BSDFProbe]) -> str:
     azimuth = float(np.degrees(table.phi))
     curve = table.curve(theta_i)
     near = np.geomspace(0.02, 20, 30)
@@ -79,16 +79,16 @@ def _lobe(table: LitTable, theta_i: float, nodes: Curve, fits: Sequence[BSDFProb
     wi, wo = direction(theta_i, azimuth), in_plane(theta, azimuth)
     for probe, colour, style in zip(fits, SERIES, STYLES, strict=False):
         ax.plot(theta, value(probe, wi, wo) / wo[:, 2], color=colour, linestyle=style, linewidth=1.5)
-    seen = np.concatenate([curve.value[np.isfinite(curve.value)], nodes.value])
+    even = np.interp(np.linspace(-GRAZING, GRAZING, 181), *curve)
+    seen = nodes.value if len(nodes.value) else even[np.isfinite(even)]
     seen = seen[seen > 0]
     ax.set_yscale("log")
     if len(seen):
-        peak = seen.max()
-        ax.set_ylim(max(np.quantile(seen, 0.05) / 4, peak * 1e-6), peak * 3)
+        ax.set_ylim(max(np.quantile(seen, 0.02) / 4, seen.max() * 1e-6), seen.max() * 3)
     ax.axvline(theta_i, color=FAINT, linestyle=(0, (1, 2)), **THIN)
     ax.set_xlim(-90, 90)
     ax.set_xticks(range(-90, 91, 30), [f"{turn}°".replace("-", "−") for turn in range(-90, 91, 30)])
-    ax.set_title(incidence(float(f"{theta_i:.3g}")), fontsize=9, color=INK)
+    ax.set_title(caption, fontsize=9, color=INK)
     ax.set_xlabel(r"$\theta_o$", fontsize=9, color=INK)
     ax.set_ylabel("f [1/sr]", fontsize=9, color=INK)
     return svg(figure)
@@ -128,6 +128,7 @@ class Residuals:
         calm(ax)
         ax.grid(False)
         norm = Normalize(-limit, limit)
+        ax.add_patch(Rectangle((0, 0), 1, 1, fill=False, edgecolor=GRID, hatch="////", linewidth=0))
         ax.pcolormesh(self.edges, self.edges, np.ma.masked_invalid(self.cells.T), norm=norm, cmap=PALETTE,
                       rasterized=True)  # fmt: skip
         places = [0, 2, 10, 30, 60, 90]

@@ -86,10 +86,11 @@ class Section:
         told = f"{best.model} comes nearest to the data." if others else f"Only {best.model} was fitted."
         if others:
             ratio, name = _error(others[0]) / max(_error(best), 1e-30), others[0].model
+            kind = "held-out error" if best.flip is None else "FLIP error"
             if ratio <= ALIKE:
-                told += f" {name} is as good: its error is only {100 * (ratio - 1):.1f} % larger."
+                told += f" {name} is as good: its {kind} is only {100 * (ratio - 1):.1f} % larger."
             else:
-                told += f" The error of the next, {name}, is {ratio:.3g} times as large."
+                told += f" The {kind} of the next, {name}, is {ratio:.3g} times as large."
         return f"{told} {best.starts.agree} of {best.starts.tried} starts agree on it."
 
 
@@ -120,7 +121,7 @@ class Page:
         environment = Environment(
             loader=FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
         )
-        environment.filters |= {"number": _number, "error": _error, "name": lambda file: Path(file).name}
+        environment.filters |= {"number": _number, "error": _error, "breakable": _breakable, "name": _name}
         return environment.get_template("page.html").render(
             sections=self.sections,
             medians=table,
@@ -132,9 +133,6 @@ class Page:
             version=__version__,
             mitsuba=mi.__version__,
         )
-
-    def write(self, path: Path, unfinished: str = "") -> None:
-        path.write_text(self.text(unfinished), encoding="utf-8")
 
 
 def _draw(section: Section, shown: Appearance) -> None:
@@ -170,6 +168,15 @@ def _error(fit: Fit) -> float:
 def _number(value: float | None) -> str:
     """Return a number as the command prints it."""
     return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
+
+
+def _name(file: str) -> str:
+    return Path(file).name
+
+
+def _breakable(name: str) -> Markup:
+    """Return the name of a parameter, whose words may be on several lines."""
+    return Markup("_<wbr>").join(name.split("_"))
 
 
 def _told(measurement: Measurement) -> str:
