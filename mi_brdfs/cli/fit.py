@@ -33,7 +33,12 @@ TOGETHER = 10
 def fit_(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
     model: Annotated[str, typer.Option(metavar="TYPE,…|all", help="The models, as `list` shows them.")] = "all",
-    metric: Annotated[str, typer.Option(metavar="log|l2|ngan|cube-root", help="The error to make small.")] = "log",
+    metric: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="The error to make small: log, l2, ngan, cube-root, bieron-l2 or bieron-log."
+        ),
+    ] = "log",
     starts: Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")] = 10,
     parameters: Annotated[
         list[str] | None,

@@ -27,7 +27,7 @@ def print_ranking(fits: list[Fit]) -> None:
     lowest = min(it.bic for it in fits)
     for it in fits:
         table.add_row(
-            it.model, *([f"{it.flip:.4g}"] if seen else []), f"{it.held_out:.4g}",
+            it.model, *[_shown(it.flip)] * seen, f"{it.held_out:.4g}",
             f"{it.errors[it.metric]['fitted']:.4g}",
             f"{it.bic - lowest:.0f}", f"{it.albedo:.2f}", f"{it.starts.agree}/{it.starts.tried}", notes(it),
         )  # fmt: skip
@@ -52,13 +52,17 @@ def print_medians(ranked: list[list[Fit]]) -> None:
 
     out.print("Medians", style="bold")
     rows = medians(ranked)
-    seen = rows[0].flip is not None
+    seen = any(row.flip is not None for row in rows)
     table = Table("model", *["FLIP"] * seen, "held out", "fitted", "files", "best in", box=None, pad_edge=False)
     for column in table.columns[1:]:
         column.justify = "right"
     for row in rows:
         table.add_row(
-            row.model, *([f"{row.flip:.4g}"] if seen else []), f"{row.held_out:.4g}", f"{row.fitted:.4g}",
+            row.model, *[_shown(row.flip)] * seen, f"{row.held_out:.4g}", f"{row.fitted:.4g}",
             str(row.files), str(row.best_in),
         )  # fmt: skip
     print_table(table)
+
+
+def _shown(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

@@ -70,7 +70,7 @@ def fit(
             or what :func:`observe` made of one of these; or a list of them. Values of files weigh by the solid angles
             of their cells, and scattered ones alike.
         model: the name of a plugin of this package or of a guest, or several.
-        metric: "log", "l2", "ngan" or "cube-root".
+        metric: "log", "l2", "ngan", "cube-root", "bieron-l2" or "bieron-log".
         given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.
             They hold for the models that have them.
         tied: parameters that equal another one, as ``{"cy": "cx"}``.

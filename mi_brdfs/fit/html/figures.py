@@ -34,9 +34,9 @@ CURVES = len(SERIES)
 PALETTE = "RdBu_r"
 NODES = 60
 """The most nodes that are drawn of a lobe."""
-CELLS = 8, 32
+CELLS = 8, 28
 """The least and the most cells of a residual map, along each side."""
-PAIRS = 8
+PAIRS = 20
 """How many pairs of directions a cell has on average, unless it were too large or too small."""
 
 
