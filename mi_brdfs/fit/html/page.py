@@ -82,16 +82,20 @@ class Section:
     @property
     def verdict(self) -> str:
         """Which model fits best, and by how much, in sentences."""
-        best, *others = (card.fit for card in self.cards)
-        told = f"{best.model} comes nearest to the data." if others else f"Only {best.model} was fitted."
-        if others:
-            ratio, name = _error(others[0]) / max(_error(best), 1e-30), others[0].model
-            kind = "held-out error" if best.flip is None else "FLIP error"
-            if ratio <= ALIKE:
-                told += f" {name} is as good: its {kind} is only {100 * (ratio - 1):.1f} % larger."
-            else:
-                told += f" The {kind} of the next, {name}, is {ratio:.3g} times as large."
-        return f"{told} {best.starts.agree} of {best.starts.tried} starts agree on it."
+        fits = [card.fit for card in self.cards]
+        best, agreement = fits[0], f"{fits[0].starts.agree} of {fits[0].starts.tried} starts of {fits[0].model} agree."
+        if len(fits) == 1:
+            return f"Only {best.model} was fitted. {agreement}"
+        told = [f"{best.model} comes nearest to the data."]
+        ratio, name = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model
+        kind = "held-out error" if best.flip is None else "FLIP error"
+        if ratio <= ALIKE:
+            told.append(f"{name} is as good: its {kind} is only {100 * (ratio - 1):.1f} % larger.")
+        else:
+            told.append(f"The {kind} of the next, {name}, is {ratio:.3g} times as large.")
+        winners = {"held-out error": min(fits, key=lambda it: it.held_out), "BIC": min(fits, key=lambda it: it.bic)}
+        told += [f"By the {kind} it would be {it.model}." for kind, it in winners.items() if it is not best]
+        return " ".join([*told, agreement])
 
 
 class Page:
