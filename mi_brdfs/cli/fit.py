@@ -65,7 +65,7 @@ def fit_(
 ) -> None:
     """Fit models to measured BRDFs, and rank them by their error on directions that were not fitted. Ctrl-C keeps what
     is finished."""
-    from ..fit import FitError, find_metric
+    from ..fit import find_metric
 
     check_output("--json", json_file)
     check_output("-o", output)
@@ -75,8 +75,8 @@ def fit_(
         find_metric(metric)
         models = all_models() if model == "all" else find_models(model.split(","))
         given = _given(parameters, models)
-        page = _page(image) if image or output else None
-    except (ValueError, FitError) as error:
+        page = _page(image, output)
+    except ValueError as error:
         fail(one_line(error), Exit.USAGE)
     except ImportError as error:
         fail(str(error))
@@ -85,7 +85,7 @@ def fit_(
         fail(f"this needs an rgb variant with derivatives, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
     names = [it.plugins[0] for it in models]
     fits: list[Fit] = []
-    complete, failed = True, 0
+    complete, seen, failed = True, True, 0
     with stdout_to_stderr():
         try:
             materials, failed = _read(files, cut, seed)
@@ -94,7 +94,7 @@ def fit_(
             complete = False
         by_file = groupby(sorted(fits, key=lambda it: it.file), key=lambda it: it.file)
         ranked = [sorted(own, key=lambda it: it.held_out) for _, own in by_file]
-        if page:
+        if page or image:
             ranked, seen = _look(ranked, page, image, complete)
     for own in ranked:
         print_ranking(own)
@@ -103,7 +103,7 @@ def fit_(
     write_json(json_file, [it.to_dict() for own in ranked for it in own])
     finished = len({(it.file, it.bsdf["type"]) for it in fits})
     interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(names)} fits were finished."
-    if page and not interrupted and not seen:
+    if complete and not seen:
         interrupted = "Interrupted; not all pictures were made."
     if page and output and ranked:
         write_text(output, page.text(interrupted))
@@ -114,18 +114,20 @@ def fit_(
         raise typer.Exit(Exit.ERROR)
 
 
-def _page(image: bool) -> Page:
-    """Return an empty report.
+def _page(image: bool, output: Path | None) -> Page | None:
+    """Return an empty report if one is wanted.
 
     Raises:
-        ImportError: if what it needs is not installed.
+        ImportError: if what it or FLIP needs is not installed.
     """
-    from ..fit.html import Page
-
     if image:
         from ..fit.appearance import evaluator
 
         evaluator()
+    if not output:
+        return None
+    from ..fit.html import Page
+
     return Page()
 
 
@@ -208,29 +210,29 @@ def _fit_all(
     return len(failed)
 
 
-def _look(ranked: list[list[Fit]], page: Page, image: bool, complete: bool) -> tuple[list[list[Fit]], bool]:
-    """Add the fits to each material to the report, with pictures until Ctrl-C is pressed. Return them, in the order of
-    their FLIP errors if ``image``, and whether all have their pictures."""
-    from ..fit.appearance import Appearance, by_flip, render
-    from ..fit.html.page import CARDS
+def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: bool) -> tuple[list[list[Fit]], bool]:
+    """Render the fits to each material until Ctrl-C is pressed, and add them to the report if there is one. Return
+    them, in the order of their FLIP errors if ``image``, and whether all were rendered."""
+    from ..fit.appearance import MOST, Appearance, by_flip, render
 
     found = []
     with _progress("Rendering") as progress:
-        task = progress.add_task("", total=sum(1 + len(own if image else own[:CARDS]) for own in ranked))
+        task = progress.add_task("", total=sum(1 + len(own if image else own[:MOST]) for own in ranked))
         for own in ranked:
             shown: Appearance | None = None
             progress.update(task, description=Path(own[0].file).name)
             if complete:
                 try:
-                    shown = render(own if image else own[:CARDS], lambda: progress.advance(task))
+                    shown = render(own if image else own[:MOST], lambda: progress.advance(task))
                     own, shown = by_flip(own, shown) if image else (own, shown)
-                    page.add(own, shown)
+                    if page:
+                        page.add(own, shown)
                 except KeyboardInterrupt:
                     complete, shown = False, None
                 except (ValueError, RuntimeError) as error:
                     shown = None
                     progress.console.print(f"mi-brdfs: {own[0].file}: no pictures: {one_line(error)}")
-            if not shown:
+            if page and not shown:
                 page.add(own)
             found.append(own)
     return found, complete

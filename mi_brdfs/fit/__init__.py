@@ -149,7 +149,7 @@ def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[F
         FitError: if the data of a fit are no file.
         OSError: if the page cannot be written.
     """
-    from .appearance import by_flip, check_file, render
+    from .appearance import MOST, by_flip, check_file, render
     from .html import Page
 
     page, found = Page(), []
@@ -160,7 +160,7 @@ def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[F
         check_file(own)
     for own in by_file.values():
         ranked = sorted(own, key=lambda it: it.held_out)
-        shown = render(ranked)
+        shown = render(ranked if image else ranked[:MOST])
         if image:
             ranked, shown = by_flip(ranked, shown)
         page.add(ranked, shown)

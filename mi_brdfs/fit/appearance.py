@@ -21,6 +21,8 @@ from .result import Fit
 SIZE, SAMPLES, DEPTH, SEED = 256, 36, 3, 1
 """Of pictures: their width and height, the samples of a pixel, the length of paths, and the seed, which is the same for
 data and fits: their noise is then alike, and almost none of it is in their difference."""
+MOST = 8
+"""The most fits to a material that a report shows, and does not only list."""
 BRIGHT, STOPS = 0.9, 3
 """How bright the brightest twentieth of the data's ball may become, and by how many stops at most it is brightened."""
 

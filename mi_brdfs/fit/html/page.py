@@ -18,7 +18,7 @@ from PIL import Image
 from ... import __version__
 from ...measure.arrays import Array
 from ...measured import Measurement, read
-from ..appearance import Appearance, check_file, lightness
+from ..appearance import MOST, Appearance, check_file, lightness
 from ..lanes import rgb_variant
 from ..metrics import METRICS
 from ..observations import observe
@@ -26,8 +26,6 @@ from ..result import Fit
 from ..summary import Median, medians, notes, values
 from .figures import CURVES, PALETTE, Residuals, lobes, probe_of
 
-CARDS = 8
-"""The most fits to a material that are shown, and not only listed."""
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
 ALIKE = 1.05
@@ -141,11 +139,11 @@ class Page:
 
 def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
-    cards, measurement = section.cards[:CARDS], read(section.file)
+    cards, measurement = section.cards[:MOST], read(section.file)
     section.material, section.stops = _told(measurement), shown.stops
     section.data = _data_uri(shown.data)
     at = lightness(shown.data)
-    differences = [lightness(picture) - at for picture in shown.fits[:CARDS]]
+    differences = [lightness(picture) - at for picture in shown.fits[:MOST]]
     largest = np.quantile(abs(differences[0]), 0.99)
     section.lightness = next((end for end in SCALES if end >= largest), SCALES[-1])
     for card, picture, difference in zip(cards, shown.fits, differences, strict=False):
