@@ -51,8 +51,10 @@ def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
 
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
-    options = "--model", "lambert,burley", "--starts", 400, "--json", "fits.json"
+    options = "--model", "lambert,burley", "--starts", 400, "--json", "fits.json", "-o", "fits.html"
     status, out, err = interrupted(tmp_path, "fit", LOFT, *options, running="Fitting burley")
     assert status == 130 and "Interrupted; 1 of 2 fits were finished." in err and "Traceback" not in err
     assert "lambert" in out
     assert [row["model"] for row in json.loads((tmp_path / "fits.json").read_text())] == ["lambert"]
+    page = (tmp_path / "fits.html").read_text(encoding="utf-8")
+    assert "Only lambert was fitted." in page and "Interrupted; 1 of 2 fits were finished." in page

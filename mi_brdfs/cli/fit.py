@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from statistics import median
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
+from ..measure.sources import value_of
 from ..mitsuba.registry import all_models, find_models
+from ..model import Model
 from .app import command
 from .errors import one_line
-from .options import check_output, write_json
-from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
+from .fit_tables import print_medians, print_ranking
+from .options import check_output, parameters_of, write_json, write_text
+from .terminal import Exit, err, fail, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
     from ..fit import Fit, Observations
+    from ..fit.html import Page
 
 TOGETHER = 10
 """The most files that are fitted together: Ctrl-C keeps what was finished before."""
@@ -29,10 +33,31 @@ TOGETHER = 10
 def fit_(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
     model: Annotated[str, typer.Option(metavar="TYPE,…|all", help="The models, as `list` shows them.")] = "all",
-    metric: Annotated[str, typer.Option(metavar="log|l2|ngan|cube-root", help="The error to make small.")] = "log",
+    metric: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="The error to make small: log, l2, ngan, cube-root, bieron-l2 or bieron-log."
+        ),
+    ] = "log",
     starts: Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")] = 10,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "-D",
+            "--param",
+            metavar="name=value",
+            help="Fix a parameter of the models that have it to a number, a word, true, false, #rrggbb or 'r;g;b'; of "
+            "a choice, name=a,b fits each; may be repeated.",
+        ),
+    ] = None,
     cut: Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")] = 80,
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts, and of what is held out.")] = 0,
+    image: Annotated[
+        bool, typer.Option("--image", help="Rank by FLIP, the error of a rendered picture as an eye sees it.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="Also write a page with pictures.")
+    ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all fits to this file.")
     ] = None,
@@ -43,34 +68,85 @@ def fit_(
     from ..fit import find_metric
 
     check_output("--json", json_file)
+    check_output("-o", output)
+    if output and output.suffix.lower() not in (".html", ".htm"):
+        fail(f"-o {output}: the report is a page; give it a name that ends in .html", Exit.USAGE)
     try:
         find_metric(metric)
         models = all_models() if model == "all" else find_models(model.split(","))
+        given = _given(parameters, models)
+        page = _page(image, output)
     except ValueError as error:
         fail(one_line(error), Exit.USAGE)
+    except ImportError as error:
+        fail(str(error))
     chosen = set_tracing_variant(variant)
     if not chosen.endswith("_ad_rgb"):
         fail(f"this needs an rgb variant with derivatives, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
     names = [it.plugins[0] for it in models]
     fits: list[Fit] = []
-    complete, failed = True, 0
+    complete, seen, failed = True, True, 0
     with stdout_to_stderr():
         try:
             materials, failed = _read(files, cut, seed)
-            failed += _fit_all(materials, names, metric, starts, seed, fits)
+            failed += _fit_all(materials, names, metric, starts, seed, given, fits)
         except KeyboardInterrupt:
             complete = False
-    ranked = [list(own) for _, own in groupby(sorted(fits, key=lambda it: it.file), key=lambda it: it.file)]
+        by_file = groupby(sorted(fits, key=lambda it: it.file), key=lambda it: it.file)
+        ranked = [sorted(own, key=lambda it: it.held_out) for _, own in by_file]
+        if page or image:
+            ranked, seen = _look(ranked, page, image, complete)
     for own in ranked:
-        _print_ranking(sorted(own, key=lambda it: it.held_out), metric)
+        print_ranking(own)
     if len(ranked) > 1 and len(names) > 1:
-        _print_medians(ranked, metric)
-    write_json(json_file, [it.to_dict() for it in fits])
-    if not complete:
-        err.print(f"Interrupted; {len(fits)} of {len(files) * len(names)} fits were finished.")
+        print_medians(ranked)
+    write_json(json_file, [it.to_dict() for own in ranked for it in own])
+    finished = len({(it.file, it.bsdf["type"]) for it in fits})
+    interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(names)} fits were finished."
+    if complete and not seen:
+        interrupted = "Interrupted; not all pictures were made."
+    if page and output and ranked:
+        write_text(output, page.text(interrupted))
+    if interrupted:
+        err.print(interrupted)
         raise typer.Exit(Exit.INTERRUPTED)
     if failed:
         raise typer.Exit(Exit.ERROR)
+
+
+def _page(image: bool, output: Path | None) -> Page | None:
+    """Return an empty report if one is wanted.
+
+    Raises:
+        ImportError: if what it or FLIP needs is not installed.
+    """
+    if image:
+        from ..fit.appearance import evaluator
+
+        evaluator()
+    if not output:
+        return None
+    from ..fit.html import Page
+
+    return Page()
+
+
+def _given(definitions: list[str] | None, models: list[type[Model]]) -> dict[str, Any]:
+    """Return what -D options fix, a tuple where they give several words of a choice.
+
+    Raises:
+        ValueError: if no model has such a parameter, or several values are given for what is no choice.
+    """
+    from ..fit.unknowns import check_names, default_words
+
+    given: dict[str, Any] = {}
+    for name, text in parameters_of(definitions).items():
+        check_names(models, [name])
+        several = tuple(value_of(part) for part in text.split(","))
+        if len(several) > 1 and not any(name in default_words(it) for it in models):
+            raise ValueError(f"-D {name}={text}: only a choice can have several values, and {name} is a number")
+        given[name] = several if len(several) > 1 else several[0]
+    return given
 
 
 def _read(files: list[Path], cut: float, seed: int) -> tuple[list[Observations], int]:
@@ -86,17 +162,30 @@ def _read(files: list[Path], cut: float, seed: int) -> tuple[list[Observations],
     return materials, len(files) - len(materials)
 
 
+@contextmanager
+def _progress(doing: str) -> Iterator[Progress]:
+    columns = [TextColumn(f"{doing} {{task.description}}", markup=False), BarColumn(), TaskProgressColumn(),
+               TimeRemainingColumn()]  # fmt: skip
+    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+        yield progress
+
+
 def _fit_all(
-    materials: list[Observations], names: list[str], metric: str, starts: int, seed: int, fits: list[Fit]
+    materials: list[Observations],
+    names: list[str],
+    metric: str,
+    starts: int,
+    seed: int,
+    given: dict[str, Any],
+    fits: list[Fit],
 ) -> int:
     """Add the fits of all models to all materials, and return how many models cannot be fitted."""
     from ..fit import fit
+    from ..fit.unknowns import known_names
 
     batches = [materials[k : k + TOGETHER] for k in range(0, len(materials), TOGETHER)]
-    columns = [TextColumn("Fitting {task.description}", markup=False), BarColumn(), TaskProgressColumn(),
-               TimeRemainingColumn()]  # fmt: skip
     failed = set()
-    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+    with _progress("Fitting") as progress:
         task = progress.add_task("", total=len(materials) * len(names))
         for batch in batches:
             for name in names:
@@ -107,7 +196,9 @@ def _fit_all(
 
                 progress.update(task, description=name)
                 try:
-                    found = fit(batch, name, metric=metric, starts=starts, seed=seed, progress=advance)
+                    (each,) = find_models([name])
+                    own = {key: value for key, value in given.items() if key in known_names(each)}
+                    found = fit(batch, name, metric=metric, given=own, starts=starts, seed=seed, progress=advance)
                     for it in found:
                         _ = it.albedo  # a kernel, whose time belongs to the progress
                     fits += found
@@ -119,57 +210,29 @@ def _fit_all(
     return len(failed)
 
 
-def _print_ranking(fits: list[Fit], metric: str) -> None:
-    """Print the models by their error, and the best one to paste."""
-    from ..fit import METRICS
+def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: bool) -> tuple[list[list[Fit]], bool]:
+    """Render the fits to each material until Ctrl-C is pressed, and add them to the report if there is one. Return
+    them, in the order of their FLIP errors if ``image``, and whether all were rendered."""
+    from ..fit.appearance import MOST, Appearance, by_flip, render
 
-    best = fits[0]
-    out.print(best.file, style="bold")
-    table = Table("model", "held out", "fitted", "ΔBIC", "albedo", "agree", "notes", box=None, pad_edge=False)
-    for column in table.columns[1:6]:
-        column.justify = "right"
-    lowest = min(it.bic for it in fits)
-    for it in fits:
-        table.add_row(
-            it.model, f"{it.held_out:.4g}", f"{it.errors[metric]['fitted']:.4g}", f"{it.bic - lowest:.0f}",
-            f"{it.albedo:.2f}", f"{it.starts.agree}/{it.starts.tried}", _notes(it),
-        )  # fmt: skip
-    print_table(table)
-    out.print(f"Error of {METRICS[metric].text}, up to {best.cut:g}°; {best.pairs} pairs of directions fitted.")
-    out.print()
-    parameters = Table(best.model, "", "", box=None, pad_edge=False)
-    for name, sigma in best.sigma.items():
-        value = best.bsdf[name]
-        for k, number in enumerate(value["value"] if isinstance(value, dict) else [value]):
-            spread = sigma[k] if isinstance(sigma, list) else sigma
-            parameters.add_row("" if k else name, f"{number:.4g}", "" if spread is None else f"± {spread:.2g}")
-    print_table(parameters)
-    out.print(f"\n{best.to_xml()}\n")
-    for sentence in best.remarks():
-        out.print(sentence)
-    out.print()
-
-
-def _notes(it: Fit) -> str:
-    words = ["albedo above 1"] * (it.albedo > 1) + ["unresolved"] * (not it.resolved)
-    return ", ".join(words + ([f"at an end: {', '.join(it.bounds)}"] if it.bounds else []))
-
-
-def _print_medians(ranked: list[list[Fit]], metric: str) -> None:
-    """Print the medians over the files."""
-    by_model: dict[str, list[Fit]] = {}
-    for own in ranked:
-        for it in own:
-            by_model.setdefault(it.model, []).append(it)
-    out.print("Medians", style="bold")
-    table = Table("model", "held out", "fitted", "files", "best in", box=None, pad_edge=False)
-    for column in table.columns[1:]:
-        column.justify = "right"
-    winners = [min(own, key=lambda it: it.held_out).model for own in ranked]
-    rows = [
-        (median(it.held_out for it in own), median(it.errors[metric]["fitted"] for it in own), model, len(own))
-        for model, own in by_model.items()
-    ]
-    for held_out, fitted, model, count in sorted(rows):
-        table.add_row(model, f"{held_out:.4g}", f"{fitted:.4g}", str(count), str(winners.count(model)))
-    print_table(table)
+    found = []
+    with _progress("Rendering") as progress:
+        task = progress.add_task("", total=sum(1 + len(own if image else own[:MOST]) for own in ranked))
+        for own in ranked:
+            shown: Appearance | None = None
+            progress.update(task, description=Path(own[0].file).name)
+            if complete:
+                try:
+                    shown = render(own if image else own[:MOST], lambda: progress.advance(task))
+                    own, shown = by_flip(own, shown) if image else (own, shown)
+                    if page:
+                        page.add(own, shown)
+                except KeyboardInterrupt:
+                    complete, shown = False, None
+                except (ValueError, RuntimeError) as error:
+                    shown = None
+                    progress.console.print(f"mi-brdfs: {own[0].file}: no pictures: {one_line(error)}")
+            if page and not shown:
+                page.add(own)
+            found.append(own)
+    return found, complete

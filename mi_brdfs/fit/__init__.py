@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from ..measured import FileError
@@ -27,6 +28,7 @@ __all__ = [
     "find_metric",
     "fit",
     "observe",
+    "report",
 ]
 
 STARTS = 10
@@ -68,7 +70,7 @@ def fit(
             or what :func:`observe` made of one of these; or a list of them. Values of files weigh by the solid angles
             of their cells, and scattered ones alike.
         model: the name of a plugin of this package or of a guest, or several.
-        metric: "log", "l2", "ngan" or "cube-root".
+        metric: "log", "l2", "ngan", "cube-root", "bieron-l2" or "bieron-log".
         given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.
             They hold for the models that have them.
         tied: parameters that equal another one, as ``{"cy": "cx"}``.
@@ -127,3 +129,41 @@ def fit(
             fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, advance, fixed)
             found += list(zip(alike, fits, strict=True))
     return [it for _, it in sorted(found, key=lambda pair: (pair[0], pair[1].held_out))]
+
+
+def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[Fit]:
+    """Write a page about fits of files, as ``mi-brdfs fit -o report.html`` does: for each material the ranking of the
+    models, pictures of the data and the fits by ``mi_brdfs.preview``, lobes in the plane of incidence, the residuals
+    over θh and θd, and the parameters. It needs nothing but a browser.
+
+    Args:
+        fits: what :func:`fit` returned of files.
+        path: of the page, which is replaced if it exists.
+        image: rank the models by the FLIP errors of their pictures (:func:`mi_brdfs.fit.appearance.by_flip`).
+
+    Returns:
+        The fits in the order of the page, with ``flip`` if ``image``.
+
+    Raises:
+        ImportError: without the extra ``report``.
+        FitError: if the data of a fit are no file.
+        OSError: if the page cannot be written.
+    """
+    from .appearance import MOST, by_flip, check_file, render
+    from .html import Page
+
+    page, found = Page(), []
+    by_file: dict[str, list[Fit]] = {}
+    for it in fits:
+        by_file.setdefault(it.file, []).append(it)
+    for own in by_file.values():
+        check_file(own)
+    for own in by_file.values():
+        ranked = sorted(own, key=lambda it: it.held_out)
+        shown = render(ranked if image else ranked[:MOST])
+        if image:
+            ranked, shown = by_flip(ranked, shown)
+        page.add(ranked, shown)
+        found += ranked
+    Path(path).write_text(page.text(), encoding="utf-8")
+    return found

@@ -27,11 +27,13 @@ class Metric(NamedTuple):
     """Whether pairs weigh by the solid angles of both directions, or by that of wi and the polar angle of wo alone."""
     text: str
     """What it is, and whose."""
+    cosine: bool = False
+    """Whether pairs weigh by cosθo, too."""
 
     def weights(self, wo: np.ndarray, solid_angle: np.ndarray) -> np.ndarray:
         """Return the weights w of pairs, for the solid angles dωi dωo that each stands for."""
         if self.solid_angle:
-            return solid_angle
+            return solid_angle * wo[:, 2] if self.cosine else solid_angle
         return solid_angle / np.maximum(np.hypot(wo[:, 0], wo[:, 1]), POLE)
 
 
@@ -59,6 +61,13 @@ METRICS = {
     "ngan": Metric(_same, np.ones_like, True, "f cosθi, weighted by solid angle (Ngan et al. 2005)"),
     "cube-root": Metric(np.cbrt, _cube_root_slope, True,
                         "the cube root of f cosθi, weighted by solid angle (Fores et al. 2012)"),
+    # As BBM states them (github.com/bsdfbenchmark/bbm, cosine_weighted_l2.h and cosine_weighted_log.h; the paper's own
+    # text was not at hand): J. Bieron, P. Peers, An adaptive BRDF fitting metric, CGF 39(4), 2020,
+    # doi:10.1111/cgf.14054. The paper then chooses among fits by pictures, as `mi-brdfs fit --image` does.
+    "bieron-l2": Metric(_same, np.ones_like, True,
+                        "f cosθi, weighted by solid angle and cosθo (Bieron and Peers 2020)", cosine=True),
+    "bieron-log": Metric(_log, lambda x: 1 / (1 + np.abs(x)), True,
+                         "ln(1 + f cosθi), weighted by solid angle and cosθo (Bieron and Peers 2020)", cosine=True),
 }  # fmt: skip
 """By name. J. Löw, J. Kronander, A. Ynnerman, J. Unger, BRDF models for accurate and efficient rendering of glossy
 surfaces, ACM TOG 31(1), 2012, doi:10.1145/2077341.2077350. A. Ngan, F. Durand, W. Matusik, Experimental analysis of

@@ -77,6 +77,8 @@ class Fit:
     """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, where it states any."""
     fixed: list[str] = field(default_factory=list)
     """Parameters that isotropic data say nothing about, left at their defaults."""
+    flip: float | None = None
+    """The FLIP error of a picture of it, where it was looked at: :func:`mi_brdfs.fit.appearance.by_flip`."""
 
     @property
     def held_out(self) -> float:
@@ -142,6 +144,7 @@ class Fit:
             "metric": self.metric,
             "bsdf": self.bsdf,
             "errors": finite,
+            "flip": self.flip,
             "sigma": self.sigma,
             "starts": self.starts._asdict(),
             "bic": self.bic,

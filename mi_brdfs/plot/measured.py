@@ -13,16 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from ..measure.arrays import luminance
-from ..measured import Measurement, Samples, read
+from ..measured import Measurement, read
 from ..measured.albedo import albedos
-from ..measured.arrays import components, stacked
-from ..measured.coordinates import HalfDifference, polar_angle, spherical
-from ..measured.counts import batches, census
-from ..measured.measurement import usable
-from ..measured.observer import to_srgb
-from ..measured.summary import azimuths, ends, table
-from .lobes import Curve, largest, refined
+from ..measured.arrays import stacked
+from ..measured.coordinates import HalfDifference
+from .lit import LitTable
+from .lobes import largest
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
 from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title
@@ -30,11 +26,6 @@ from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, loo
 PIXELS = 256
 DECADES = 5
 """The most decades of brightness that a slice shows."""
-ANGLES = 10, 40, 70
-"""The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
-LOBES = 4
-NEAR = 0.5
-"""How far from the plane of incidence, and in θi from the curve, nodes are drawn, in degrees."""
 NODE = {"linestyle": "", "marker": "o", "markersize": 3, "fillstyle": "none", "markeredgewidth": 0.8}
 STATED = {"linestyle": "", "marker": "o", "markersize": 4, "color": INK}
 
@@ -63,7 +54,7 @@ def measured(*files: str | Path | Measurement) -> Figure:
     found = [file if isinstance(file, Measurement) else read(file) for file in files]
     figure = new_figure(9, 3.4 * len(found) + 0.2)
     for measurement, row in zip(found, figure.subplots(len(found), 3, squeeze=False), strict=True):
-        it = _Table(measurement)
+        it = LitTable(measurement)
         _draw_slice(row[0], it)
         _draw_lobes(row[1], it)
         _draw_albedo(row[2], it)
@@ -74,43 +65,7 @@ def measured(*files: str | Path | Measurement) -> Figure:
     return figure
 
 
-class _Table:
-    """A measurement as a table with a luminance."""
-
-    def __init__(self, measurement: Measurement) -> None:
-        self.measurement, self.grid = measurement, table(measurement.data)
-        path, material = measurement.path, measurement.material
-        self.name = path.name if material in ("", path.stem) else f"{material} ({path.name})"
-        self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
-        self.phi = float(azimuths(self.grid)[0])
-        self.coloured = self.grid.values.shape[-1] > 1
-        self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")
-
-    def colour(self, f: np.ndarray) -> np.ndarray:
-        """Return values as linear sRGB, limited to its gamut, or as they are if they have one channel."""
-        wavelengths = self.measurement.wavelengths
-        if wavelengths is not None and len(wavelengths) > 1:
-            f = f @ to_srgb(wavelengths)
-        return np.maximum(f, 0)
-
-    def luminance(self, f: np.ndarray) -> np.ndarray:
-        return luminance(self.colour(f))
-
-    @property
-    def angles(self) -> np.ndarray:
-        """The angles of incidence of lobes, in degrees."""
-        data, names = self.measurement.data, self.grid.coordinates.names
-        if isinstance(data, Samples):
-            nodes = np.unique(np.round(np.degrees(polar_angle(components(data.wi))), 1))
-        elif "theta_i" in names:
-            nodes = np.degrees(self.grid.axes[names.index("theta_i")].nodes)
-        else:
-            nodes = np.array(ANGLES)
-        nodes = nodes[nodes < max(85, nodes[0] + 1)]
-        return nodes[np.unique(np.linspace(0, len(nodes) - 1, LOBES).round().astype(int))]
-
-
-def _draw_slice(ax: Axes, it: _Table) -> None:
+def _draw_slice(ax: Axes, it: LitTable) -> None:
     middles = (np.arange(PIXELS) + 0.5) / PIXELS
     theta_h, theta_d = np.meshgrid(middles, middles)
     pair = HalfDifference().directions(np.sqrt(theta_h), theta_d * np.pi / 2, np.full_like(theta_h, np.pi / 2))
@@ -153,52 +108,18 @@ def _norm(luminance: np.ndarray) -> LogNorm:
     return LogNorm(low, np.clip(lit.max(), 10 * low, 10**DECADES * low), clip=True)
 
 
-def _draw_lobes(ax: Axes, it: _Table) -> None:
-    curves = [LabelledCurve(incidence(float(f"{t:.3g}")), t, _curve(it, t), look(k)) for k, t in enumerate(it.angles)]
+def _draw_lobes(ax: Axes, it: LitTable) -> None:
+    curves = [LabelledCurve(incidence(float(f"{t:.3g}")), t, it.curve(t), look(k)) for k, t in enumerate(it.angles)]
     calm(ax)
     draw_cartesian(ax, curves, True, False, it.quantity)
-    for line, nodes in zip(curves, _nodes(it), strict=True):
+    for line, nodes in zip(curves, it.nodes(it.angles), strict=True):
         ax.plot(*nodes, color=line.look["color"], **NODE)
         ax.set_ylim(top=max(ax.get_ylim()[1], 1.3 * largest([nodes.value])))
     marks = [Line2D([], [], linestyle="", color=FAINT, **MIRROR), Line2D([], [], color=FAINT, **NODE)]
     _legend(ax, [*ax.get_lines()[1 : 2 * len(curves) : 2], *marks], [*(c.label for c in curves), "mirror", "nodes"])
 
 
-def _curve(it: _Table, theta_i: float) -> Curve:
-    """Return the luminance of f in the plane of incidence, and NaN where nothing was measured."""
-    wi, near = stacked(spherical(np.radians(theta_i), it.phi)), np.geomspace(0.01, 20, 40)
-
-    def toward(theta: np.ndarray) -> np.ndarray:
-        return stacked(spherical(np.radians(-theta), it.phi))
-
-    peaks = [end + near * side for end in (-theta_i, theta_i) for side in (-1, 1)]
-    theta = np.unique(np.concatenate([np.linspace(-90, 90, 361), *peaks]))
-    curve = refined(lambda t: it.luminance(it.grid.evaluate(wi, toward(t))), theta[abs(theta) < 90])
-    return curve._replace(value=np.where(it.grid.measured(wi, toward(curve.theta)), curve.value, np.nan))
-
-
-def _nodes(it: _Table) -> list[Curve]:
-    """Return what the table has near the plane of incidence, for each angle of incidence."""
-    found: list[list[np.ndarray]] = [[] for _ in it.angles]
-    for wi, wo, f in batches(it.measurement.data):
-        sin = np.hypot(wi[:, 0], wi[:, 1])
-        x, y = np.where(sin > 1e-6, wi[:, :2].T / np.maximum(sin, 1e-6), [[np.cos(it.phi)], [np.sin(it.phi)]])
-        along, across = wo[:, 0] * x + wo[:, 1] * y, wo[:, 1] * x - wo[:, 0] * y
-        theta_i, theta_o = np.degrees(np.arctan2(sin, wi[:, 2])), np.degrees(np.arctan2(-along, wo[:, 2]))
-        # Far from the mirror direction, values change more slowly.
-        near = abs(across) < np.radians(NEAR + 0.05 * abs(theta_o - theta_i))
-        near &= (wi[:, 2] > 0) & (wo[:, 2] > 0)
-        if it.grid.anisotropic:
-            near &= x * np.cos(it.phi) + y * np.sin(it.phi) > np.cos(np.radians(NEAR))
-        for k, wanted in enumerate(it.angles):
-            mine = near & (abs(theta_i - wanted) < NEAR)
-            # By as much as the mirror direction: a highlight stays in place.
-            shifted = theta_o[mine] + wanted - theta_i[mine]
-            found[k].append(np.stack([shifted, it.luminance(usable(f[mine]))]))
-    return [Curve(*np.concatenate(parts, axis=1)) for parts in found]
-
-
-def _draw_albedo(ax: Axes, it: _Table) -> None:
+def _draw_albedo(ax: Axes, it: LitTable) -> None:
     low, high = it.incidence
     angles = np.unique(np.append(np.arange(0, 90, 3), [low, min(high, 89)]))
     angles = angles[(angles >= low) & (angles <= high)]

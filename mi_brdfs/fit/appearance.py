@@ -1,0 +1,124 @@
+"""How fits look beside their data: pictures of the preview scene, and their FLIP errors."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import mitsuba as mi
+import numpy as np
+
+from ..measure.arrays import Array, luminance
+from ..model import EnergyWarning
+from ..preview import preview_scene
+from .lanes import rgb_variant
+from .observations import FitError
+from .result import Fit
+
+SIZE, SAMPLES, DEPTH, SEED = 256, 36, 3, 1
+"""Of pictures: their width and height, the samples of a pixel, the length of paths, and the seed, which is the same for
+data and fits: their noise is then alike, and almost none of it is in their difference."""
+MOST = 8
+"""The most fits to a material that a report shows, and does not only list."""
+BRIGHT, STOPS = 0.9, 3
+"""How bright the brightest twentieth of the data's ball may become, and by how many stops at most it is brightened."""
+
+
+class Appearance(NamedTuple):
+    """A material and fits to it, in the same scene: pictures of shape (SIZE, SIZE, 3) in sRGB, from 0 to 1."""
+
+    data: Array
+    fits: list[Array]
+    stops: int
+    """By how many stops all are brighter than rendered: a dark material would show nothing."""
+
+
+def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> Appearance:
+    """Render the data of fits to one material by ``tabulated``, and each fit, calling ``advance`` after each picture.
+
+    Raises:
+        FitError: if the data are arrays.
+    """
+    file = check_file(fits)
+    with rgb_variant(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
+        pictures = []
+        for bsdf in ({"type": "tabulated", "filename": os.path.abspath(file)}, *(it.bsdf for it in fits)):
+            pictures.append(_picture(bsdf))
+            advance()
+        stops = _stops(pictures[0])
+        data, *others = (_encoded(2.0**stops * picture) for picture in pictures)
+    return Appearance(data, others, stops)
+
+
+def check_file(fits: Sequence[Fit]) -> str:
+    """Return the file that fits are of.
+
+    Raises:
+        FitError: if there is none.
+    """
+    if not os.path.exists(fits[0].file):
+        raise FitError(f"Pictures need the file that was fitted; there is none of {fits[0].file}.")
+    return fits[0].file
+
+
+def by_flip(fits: Sequence[Fit], shown: Appearance) -> tuple[list[Fit], Appearance]:
+    """Return fits with their FLIP errors, the least first, and their pictures in the same order.
+
+    It is the mean over the picture of LDR-FLIP (P. Andersson et al., FLIP: A difference evaluator for alternating
+    images, HPG 2020, doi:10.1145/3406183) at 67 pixels per degree, its authors' default. Pictures are compared as the
+    report shows them: linear values, brightened alike, clipped at 1, in sRGB, without any other tone mapping. What a
+    display clips has no error.
+
+    Another seed changes an error by less than .001, and the order of fits whose errors differ by more not at all.
+    """
+    evaluate = evaluator()
+    errors = [float(evaluate(shown.data, it, "LDR", True, False, True, {"ppd": 67.0})[1]) for it in shown.fits]
+    order = np.argsort(errors, kind="stable")
+    return [replace(fits[k], flip=errors[k]) for k in order], shown._replace(fits=[shown.fits[k] for k in order])
+
+
+def evaluator() -> Callable[..., Any]:
+    """Return the function that computes FLIP.
+
+    Raises:
+        ImportError: if it is not installed.
+    """
+    try:
+        from flip_evaluator import evaluate
+    except ImportError:
+        raise ImportError("FLIP needs the package flip-evaluator: pip install 'mi_brdfs[report]'") from None
+    return evaluate
+
+
+def lightness(picture: Array) -> Array:
+    """Return CIE L* of a picture in sRGB, from 0 to 100."""
+    linear = np.where(picture <= 0.04045, picture / 12.92, ((picture + 0.055) / 1.055) ** 2.4)
+    y = luminance(linear)
+    return np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, 24389 / 27 * y)
+
+
+def _picture(bsdf: dict) -> Array:
+    """Return a picture of a material, linear."""
+    scene = preview_scene(bsdf)
+    scene["integrator"]["max_depth"] = DEPTH
+    scene["sensor"]["film"] |= {"width": SIZE, "height": SIZE}
+    scene["sensor"]["sampler"] = {"type": "multijitter", "sample_count": SAMPLES}
+    loaded = mi.load_dict(scene)  # alive until the picture is
+    return np.array(mi.render(loaded, seed=SEED))[..., :3]
+
+
+def _stops(picture: Array) -> int:
+    """Return by how many stops a picture can be brightened without the ball in its middle being clipped."""
+    at = np.linspace(-1, 1, SIZE)
+    ball = np.hypot(at, at[:, None]) < 0.55
+    return int(np.clip(np.floor(np.log2(BRIGHT / max(np.quantile(luminance(picture)[ball], 0.95), 1e-6))), 0, STOPS))
+
+
+def _encoded(picture: Array) -> Array:
+    """Return linear values in sRGB, clipped."""
+    x = np.clip(np.nan_to_num(picture), 0, 1)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)

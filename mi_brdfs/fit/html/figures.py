@@ -1,0 +1,169 @@
+"""The drawings of a report as SVG, whose ink is that of the page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from io import StringIO
+from itertools import count
+
+import matplotlib as mpl
+import mitsuba as mi
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from ...measure.directions import direction
+from ...measure.probe import BSDFProbe
+from ...measured.measurement import Measurement
+from ...measured.summary import azimuths
+from ...plot.lit import LitTable
+from ...plot.lobes import GRAZING, Curve, in_plane, value
+from ...plot.planar import THIN
+from ...plot.style import FAINT, GRID, INK, STYLES, calm
+from ..metrics import METRICS
+from ..observations import Observations
+from ..result import Fit
+
+SERIES = "#010101", "#020202", "#030303"
+"""In place of the page's colours of the best fits."""
+CURVES = len(SERIES)
+"""How many fits are drawn over the data."""
+PALETTE = "RdBu_r"
+NODES = 60
+"""The most nodes that are drawn of a lobe."""
+CELLS = 8, 28
+"""The least and the most cells of a residual map, along each side."""
+PAIRS = 20
+"""How many pairs of directions a cell has on average, unless it were too large or too small."""
+
+
+def probe_of(fit: Fit) -> BSDFProbe:
+    return BSDFProbe(mi.load_dict(fit.bsdf))
+
+
+def lobes(measurement: Measurement, fits: Sequence[BSDFProbe], cut: float) -> list[tuple[str, str]]:
+    """Return ``(caption, SVG)`` of f in the plane of incidence, of the data and of fits, for some angles of incidence;
+    of anisotropic data for two azimuths."""
+    first = LitTable(measurement)
+    tables = [first]
+    if first.grid.anisotropic:
+        every = np.asarray(azimuths(first.grid))
+        across = every[np.argmin(abs(np.cos(every - first.phi)))]
+        tables.append(LitTable(measurement, float(across)))
+    drawn = []
+    for table in tables:
+        angles = [float(theta) for theta in table.angles if theta <= cut][-2 if len(tables) > 1 else -4 :]
+        for theta, nodes in zip(angles, table.nodes(angles), strict=True):
+            turned = f", φi = {np.degrees(table.phi):.0f}°" if len(tables) > 1 else ""
+            caption = f"θi = {theta:.3g}°{turned}"
+            drawn.append((caption, _lobe(table, theta, caption, nodes, fits)))
+    return drawn
+
+
+def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Sequence[BSDFProbe]) -> str:
+    azimuth = float(np.degrees(table.phi))
+    curve = table.curve(theta_i)
+    near = np.geomspace(0.02, 20, 30)
+    theta = np.unique(np.concatenate([np.linspace(-GRAZING, GRAZING, 241), theta_i + near, theta_i - near, [theta_i]]))
+    theta = theta[abs(theta) < 88]
+    figure = _figure(3.5, 2.5)
+    ax = figure.subplots()
+    calm(ax)
+    ax.plot(*curve, color=FAINT, linewidth=3, alpha=0.45, solid_capstyle="round")
+    step = max(1, len(nodes.theta) // NODES)
+    order = np.argsort(nodes.theta)[::step]
+    ax.plot(nodes.theta[order], nodes.value[order], linestyle="", marker="o", markersize=2.6, color=INK, alpha=0.7)
+    wi, wo = direction(theta_i, azimuth), in_plane(theta, azimuth)
+    for probe, colour, style in zip(fits, SERIES, STYLES, strict=False):
+        ax.plot(theta, value(probe, wi, wo) / wo[:, 2], color=colour, linestyle=style, linewidth=1.5)
+    even = np.interp(np.linspace(-GRAZING, GRAZING, 181), *curve)
+    seen = nodes.value if len(nodes.value) else even[np.isfinite(even)]
+    seen = seen[seen > 0]
+    ax.set_yscale("log")
+    if len(seen):
+        ax.set_ylim(max(np.quantile(seen, 0.02) / 4, seen.max() * 1e-6), seen.max() * 3)
+    ax.axvline(theta_i, color=FAINT, linestyle=(0, (1, 2)), **THIN)
+    ax.set_xlim(-90, 90)
+    ax.set_xticks(range(-90, 91, 30), [f"{turn}°".replace("-", "−") for turn in range(-90, 91, 30)])
+    ax.set_title(caption, fontsize=9, color=INK)
+    ax.set_xlabel(r"$\theta_o$", fontsize=9, color=INK)
+    ax.set_ylabel("f [1/sr]", fontsize=9, color=INK)
+    return svg(figure)
+
+
+class Residuals:
+    """How a fit differs from the data in its metric, in cells of √θh × θd: their means, NaN where there are none."""
+
+    def __init__(self, material: Observations, fit: Fit, probe: BSDFProbe) -> None:
+        metric = METRICS[fit.metric]
+        cosine = material.wi[:, 2:].astype(np.float64)
+        model = probe.eval(probe.whole, material.wi, material.wo)[:, : material.channels] / material.wo[:, 2:]
+        difference = metric.transform(model * cosine) - metric.transform(material.f * cosine)
+        usable = material.usable.sum(axis=1)
+        mean = np.where(material.usable, difference, 0).sum(axis=1) / np.maximum(usable, 1)
+        half = material.wi + material.wo.astype(np.float64)
+        half /= np.linalg.norm(half, axis=1, keepdims=True)
+        theta_h = np.degrees(np.arccos(np.clip(half[:, 2], -1, 1)))
+        theta_d = np.degrees(np.arccos(np.clip((half * material.wi).sum(axis=1), -1, 1)))
+        self.quantity = metric.text.partition(",")[0]
+        self.edges = np.linspace(0, 1, 1 + int(np.clip(np.sqrt(len(mean) / PAIRS), *CELLS)))
+        places = np.sqrt(theta_h / 90), theta_d / 90
+        total, *_ = np.histogram2d(*places, self.edges, weights=mean * (usable > 0))
+        number, *_ = np.histogram2d(*places, self.edges, weights=1.0 * (usable > 0))
+        with np.errstate(invalid="ignore"):
+            self.cells = total / np.where(number, number, np.nan)
+
+    @property
+    def extent(self) -> float:
+        """The residual that all but a few cells stay below."""
+        return float(np.nanquantile(abs(self.cells), 0.97))
+
+    def draw(self, limit: float) -> str:
+        """Return them as SVG, with a scale from ``-limit`` to ``limit``."""
+        figure = _figure(3.5, 2.7)
+        ax = figure.subplots()
+        calm(ax)
+        ax.grid(False)
+        norm = Normalize(-limit, limit)
+        ax.add_patch(Rectangle((0, 0), 1, 1, fill=False, edgecolor=GRID, hatch="////", linewidth=0))
+        ax.pcolormesh(self.edges, self.edges, np.ma.masked_invalid(self.cells.T), norm=norm, cmap=PALETTE,
+                      rasterized=True)  # fmt: skip
+        places = [0, 2, 10, 30, 60, 90]
+        ax.set_xticks(np.sqrt(np.array(places) / 90), [f"{angle}°" for angle in places])
+        ax.set_yticks(np.array([0, 30, 60, 90]) / 90, [f"{angle}°" for angle in (0, 30, 60, 90)])
+        ax.set(xlim=(0, 1), ylim=(0, 1))
+        ax.set_xlabel(r"$\theta_h$", fontsize=9, color=INK)
+        ax.set_ylabel(r"$\theta_d$", fontsize=9, color=INK)
+        bar = figure.colorbar(ScalarMappable(norm, PALETTE), ax=ax, aspect=18, pad=0.03, extend="both")
+        bar.ax.tick_params(labelsize=8, labelcolor=INK)
+        bar.outline.set_visible(False)
+        return svg(figure)
+
+
+_numbers = count()
+
+
+def _figure(width: float, height: float) -> Figure:
+    return Figure(figsize=(width, height), dpi=110, layout="constrained")
+
+
+def svg(figure: Figure) -> str:
+    """Return a figure as an element of a page: transparent, its inks the page's variables, its text text."""
+    text = StringIO()
+    # Names of definitions are hashes, and must be different in other figures of the page.
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"figure {next(_numbers)}"}):
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    found = text.getvalue()
+    found = found[found.index("<svg") :]
+    found = re.sub(r"<metadata>.*?</metadata>", "", found, flags=re.DOTALL)
+    found = re.sub(r'<g id="[^"]*"', "<g", found)
+    found = re.sub(r"<!--.*?-->\n?", "", found, flags=re.DOTALL)
+    found = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*"', r"\1", found)
+    found = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*"', r"\1", found)
+    inks = {INK: "--ink", FAINT: "--faint", GRID: "--line"} | {s: f"--series-{k}" for k, s in enumerate(SERIES, 1)}
+    for ink, name in inks.items():
+        found = found.replace(ink, f"var({name})")
+    return found

@@ -1,0 +1,201 @@
+"""The report as one page of HTML that needs nothing else."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+from jinja2 import Environment, FileSystemLoader
+from markupsafe import Markup
+from matplotlib import colormaps
+from PIL import Image
+
+from ... import __version__
+from ...measure.arrays import Array
+from ...measured import Measurement, read
+from ..appearance import MOST, Appearance, check_file, lightness
+from ..lanes import rgb_variant
+from ..metrics import METRICS
+from ..observations import observe
+from ..result import Fit
+from ..summary import Median, medians, notes, values
+from .figures import CURVES, PALETTE, Residuals, lobes, probe_of
+
+PAIRS = 16384
+"""The most pairs of directions of a residual map."""
+ALIKE = 1.05
+"""The ratio of errors up to which two models fit alike."""
+QUALITY = 88
+SCALES = 1, 2, 5, 10, 20, 50, 100
+"""The ends of the scale of differences of lightness."""
+
+
+@dataclass
+class Card:
+    """A fit, as it is shown. What is not shown is empty."""
+
+    fit: Fit
+    rank: int
+    picture: str = ""
+    difference: str = ""
+    residuals: str = ""
+
+    @property
+    def notes(self) -> str:
+        return notes(self.fit)
+
+    @property
+    def values(self) -> list[tuple[str, float, float | None]]:
+        return values(self.fit)
+
+
+@dataclass
+class Section:
+    """A material. What is not shown is empty."""
+
+    anchor: str
+    file: str
+    cards: list[Card]
+    material: str = ""
+    """What a file calls it, and its format."""
+    data: str = ""
+    """The picture of the data."""
+    lightness: int = 0
+    """The end of the scale of differences."""
+    stops: int = 0
+    """By how many stops pictures are brightened."""
+    quantity: str = ""
+    """What residuals are of."""
+    lobes: Sequence[tuple[str, Markup]] = ()
+
+    @property
+    def best(self) -> Fit:
+        return self.cards[0].fit
+
+    @property
+    def verdict(self) -> str:
+        """Which model fits best, and by how much, in sentences."""
+        fits = [card.fit for card in self.cards]
+        best, agreement = fits[0], f"{fits[0].starts.agree} of {fits[0].starts.tried} starts of {fits[0].model} agree."
+        if len(fits) == 1:
+            return f"Only {best.model} was fitted. {agreement}"
+        told = [f"{best.model} comes nearest to the data."]
+        ratio, name = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model
+        kind = "held-out error" if best.flip is None else "FLIP error"
+        if ratio <= ALIKE:
+            told.append(f"{name} is as good: its {kind} is only {100 * (ratio - 1):.1f} % larger.")
+        else:
+            told.append(f"The {kind} of the next, {name}, is {ratio:.3g} times as large.")
+        winners = {"held-out error": min(fits, key=lambda it: it.held_out), "BIC": min(fits, key=lambda it: it.bic)}
+        told += [f"By the {kind} it would be {it.model}." for kind, it in winners.items() if it is not best]
+        return " ".join([*told, agreement])
+
+
+class Page:
+    """A report, to which materials are added one after the other."""
+
+    def __init__(self) -> None:
+        self.sections: list[Section] = []
+
+    def add(self, fits: Sequence[Fit], shown: Appearance | None = None) -> None:
+        """Add the fits to a material, the best first. With pictures of them, in the same order, it also gets drawings.
+
+        Raises:
+            FitError: if the data are arrays.
+            FileError: if they cannot be read any more.
+        """
+        file = check_file(fits)
+        cards = [Card(it, rank) for rank, it in enumerate(fits, 1)]
+        section = Section(f"material-{len(self.sections) + 1}", file, cards)
+        if shown:
+            _draw(section, shown)
+        self.sections.append(section)
+
+    def text(self, unfinished: str = "") -> str:
+        """Return the page; ``unfinished`` says what it lacks."""
+        everything = [[card.fit for card in section.cards] for section in self.sections]
+        table: list[Median] = medians(everything) if len(everything) > 1 else []
+        environment = Environment(
+            loader=FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
+        )
+        environment.filters |= {"number": _number, "error": _error, "breakable": _breakable, "name": _name}
+        return environment.get_template("page.html").render(
+            sections=self.sections,
+            medians=table,
+            metrics=METRICS,
+            flip=any(it.flip is not None for own in everything for it in own),
+            unfinished=unfinished,
+            palette=_gradient(),
+            curves=CURVES,
+            version=__version__,
+            mitsuba=mi.__version__,
+        )
+
+
+def _draw(section: Section, shown: Appearance) -> None:
+    """Draw a material, and its best fits."""
+    cards, measurement = section.cards[:MOST], read(section.file)
+    section.material, section.stops = _told(measurement), shown.stops
+    section.data = _data_uri(shown.data)
+    at = lightness(shown.data)
+    differences = [lightness(picture) - at for picture in shown.fits[:MOST]]
+    largest = np.quantile(abs(differences[0]), 0.99)
+    section.lightness = next((end for end in SCALES if end >= largest), SCALES[-1])
+    for card, picture, difference in zip(cards, shown.fits, differences, strict=False):
+        card.picture = _data_uri(picture)
+        card.difference = _data_uri(colormaps[PALETTE](0.5 + 0.5 * difference / section.lightness)[..., :3])
+    with rgb_variant():
+        probes = [probe_of(card.fit) for card in cards]
+        cut = section.best.cut
+        pairs = observe(measurement, cut, PAIRS)
+        residuals = [Residuals(pairs, card.fit, probe) for card, probe in zip(cards, probes, strict=True)]
+        drawn = lobes(measurement, probes[:CURVES], cut)
+    section.lobes = [(caption, Markup(drawing)) for caption, drawing in drawn]
+    section.quantity = residuals[0].quantity
+    limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
+    for card, each in zip(cards, residuals, strict=True):
+        card.residuals = Markup(each.draw(limit))
+
+
+def _error(fit: Fit) -> float:
+    """Return the error by which fits are ranked."""
+    return fit.held_out if fit.flip is None else fit.flip
+
+
+def _number(value: float | None) -> str:
+    """Return a number as the command prints it."""
+    return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
+
+
+def _name(file: str) -> str:
+    return Path(file).name
+
+
+def _breakable(name: str) -> Markup:
+    """Return the name of a parameter, whose words may be on several lines."""
+    return Markup("_<wbr>").join(name.split("_"))
+
+
+def _told(measurement: Measurement) -> str:
+    channels = measurement.data.values.shape[-1]
+    kind = "anisotropic" if measurement.data.anisotropic else "isotropic"
+    words = [measurement.material, measurement.format, kind, f"{channels} channel{'s' * (channels > 1)}"]
+    return ", ".join(word for word in words if word)
+
+
+def _data_uri(picture: Array) -> str:
+    """Return a picture from 0 to 1 as a link that contains it."""
+    stream = BytesIO()
+    Image.fromarray(np.round(255 * picture).astype(np.uint8)).save(stream, "WEBP", quality=QUALITY)
+    return "data:image/webp;base64," + b64encode(stream.getvalue()).decode()
+
+
+def _gradient() -> str:
+    """Return the scale of differences for a style sheet."""
+    colours = colormaps[PALETTE](np.linspace(0, 1, 9), bytes=True)[:, :3]
+    return ", ".join(f"rgb({', '.join(map(str, colour))})" for colour in colours)

@@ -1,0 +1,167 @@
+"""The page of ``mi-brdfs fit``: complete, by itself, and with the numbers of the JSON; and the ranking by pictures."""
+
+import base64
+import json
+import os
+import re
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+from support import ROOT
+from test_cli import run
+from test_validation_html import Page
+
+from mi_brdfs.fit import FitError, appearance, fit, report
+
+MEASURED = ROOT / "scenes" / "measured"
+LOFT = MEASURED / "AnoBlackEC1onAlum.bsdf"
+HOSTILE = "<b>&'\"{{1}}.bsdf"
+
+
+class Report(Page):
+    def handle_starttag(self, tag, attributes):
+        super().handle_starttag(tag, attributes)
+        if tag in ("img", "wbr"):
+            self.open.pop()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """``(stdout, rows of the JSON, page)`` of a file whose name would break a careless page."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / HOSTILE).write_bytes(LOFT.read_bytes())
+    options = "--model", "lambert,ward", "-D", "variant=balanced,ward-duer", "-D", "alpha=0.4", "--starts", 2
+    done = run("fit", HOSTILE, *options, "--image", "-o", "r.html", "--json", "r.json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = json.loads((folder / "r.json").read_text(encoding="utf-8"))
+    return done.stdout, rows, (folder / "r.html").read_text(encoding="utf-8")
+
+
+def test_the_page_needs_nothing_else(written):
+    page = Report(re.sub(r"<script>.*?</script>", "", written[2], flags=re.DOTALL))
+    links = [link for name in ("src", "href", "xlink:href") for link in page.attributes(name)]
+    assert len(links) > 8 and all(link.startswith(("#", "data:image/")) for link in links)
+    assert not re.search(r"@import|url\((?!#)|<link|<script src", written[2])
+    assert "b" not in {tag for tag, _ in page.elements} and HOSTILE in page.text
+    identifiers = page.attributes("id")
+    assert len(set(identifiers)) == len(identifiers)
+    assert {link[1:] for link in links if link.startswith("#")} <= set(identifiers)
+    assert len(written[2]) < 700_000
+
+
+def test_its_pictures_show_something(written):
+    pictures = [link for link in Report(written[2]).attributes("src") if link.startswith("data:")]
+    assert len(pictures) == 1 + 2 * 3  # the data, and each fit with its difference
+    for link in pictures:
+        shown = np.array(Image.open(BytesIO(base64.b64decode(link.partition("base64,")[2])))) / 255.0
+        assert shown.shape == (256, 256, 3) and 0.1 < shown.mean() < 0.97 and shown.std() > 0.01
+    drawings = Report(written[2]).pictures()
+    assert sum(it.startswith("f over θo, θi = ") for it in drawings) == 4
+    assert sum(it.startswith("Residuals of ") for it in drawings) == 3
+
+
+def test_its_numbers_are_those_of_the_rows(written):
+    stdout, rows, page = written
+    table = page.partition('class="ranking"')[2].partition("</table>")[0]
+    shown = [re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", row)).split() for row in table.split("<tr")[2:]]
+    assert len(shown) == len(rows) == 3
+    assert [row["flip"] for row in rows] == sorted(row["flip"] for row in rows)
+    for cells, row in zip(shown, rows, strict=True):
+        numbers = row["flip"], row["errors"]["log"]["held_out"], row["errors"]["log"]["fitted"]
+        at = len(row["model"].split()) + cells.index(row["model"].split()[0])
+        assert cells[at : at + 3] == [f"{number:.4g}" for number in numbers]
+        assert cells[at + 4] == f"{row['albedo']:.2f}"
+        assert f"{row['flip']:.4g}" in stdout
+
+
+def test_parameters_are_fixed_and_choices_enumerated(written):
+    rows = {row["model"]: row for row in written[1]}
+    assert set(rows) == {"lambert", "ward", "ward variant=ward-duer"}
+    for name in set(rows) - {"lambert"}:
+        assert rows[name]["bsdf"]["alpha"] == 0.4 and "alpha" not in rows[name]["sigma"]
+    assert "alpha" not in rows["lambert"]["bsdf"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("-o", "nowhere/r.html"), "-o nowhere/r.html: there is no folder nowhere"),
+        (("-o", "r.pdf"), "-o r.pdf: the report is a page; give it a name that ends in .html"),
+        (("-D", "alpah=0.2"), "ward, lambert: there is no parameter alpah; did you mean alpha?"),
+        (("-D", "alpha=0.2,0.3"), "-D alpha=0.2,0.3: only a choice can have several values"),
+        (("-D", "alpha"), "-D alpha: write -D name=value"),
+    ],
+)
+def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
+    done = run("fit", LOFT, "--model", "ward,lambert", *arguments, cwd=tmp_path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("package", "option"), [("jinja2", "-ofit.html"), ("flip_evaluator", "--image")])
+def test_a_missing_package_is_told_before_anything_is_fitted(package, option, tmp_path, monkeypatch):
+    (tmp_path / f"{package}.py").write_text(f"raise ModuleNotFoundError('No module named {package}')")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    done = run("fit", LOFT, "--model", "ward", option, cwd=tmp_path)
+    assert done.returncode == 1 and done.stdout == ""
+    assert "pip install 'mi_brdfs[report]'" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.fixture
+def small(monkeypatch):
+    monkeypatch.setattr(appearance, "SIZE", 48)
+    monkeypatch.setattr(appearance, "SAMPLES", 4)
+
+
+@pytest.fixture
+def fits(llvm_rgb):
+    return fit(str(LOFT), ["ward", "lambert"], starts=2)
+
+
+@pytest.mark.usefixtures("small")
+def test_pictures_choose_where_the_metric_misleads(fits, tmp_path):
+    """A white material to which a metric gave the least error is not what the black paint looks like; and FLIP is what
+    its authors' program says of the same pictures, up to their rounding to 8 bits."""
+    from flip_evaluator import evaluate
+
+    good = fits[0]
+    white = {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.8, 0.8, 0.8]}}
+    misled = replace(fits[1], bsdf=white, errors={"log": {"fitted": 0.0, "held_out": 0.0}})
+    shown = appearance.render([misled, good])
+    ranked, sorted_pictures = appearance.by_flip([misled, good], shown)
+    assert [it.model for it in ranked] == [good.model, misled.model]
+    assert ranked[1].flip > 2 * ranked[0].flip
+    assert np.array_equal(sorted_pictures.fits[0], shown.fits[1])
+    for name, picture in (("data", shown.data), ("fit", sorted_pictures.fits[0])):
+        Image.fromarray(np.round(255 * picture).astype(np.uint8)).save(tmp_path / f"{name}.png")
+    _, flip, _ = evaluate(str(tmp_path / "data.png"), str(tmp_path / "fit.png"), "LDR")
+    assert ranked[0].flip == pytest.approx(flip, rel=0.02)
+
+
+@pytest.mark.usefixtures("small")
+def test_noise_does_not_decide(fits):
+    """The data themselves, with the same seed, have no error."""
+    data = replace(fits[0], bsdf={"type": "tabulated", "filename": str(LOFT)})
+    ((own,), _) = appearance.by_flip([data], appearance.render([data]))
+    assert own.flip < 1e-4
+
+
+@pytest.mark.usefixtures("small")
+def test_report_from_python(llvm_rgb, tmp_path):
+    """Of several materials it has a list and medians; what is no file is refused."""
+    files = [str(LOFT), str(MEASURED / "aeroglaze_z307.bsdf")]
+    found = fit(files, ["ward", "lambert"], starts=1)
+    ranked = report(found, tmp_path / "r.html")
+    assert ranked == found and all(it.flip is None for it in ranked)
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    page = Report(text)
+    assert "Medians over all materials" in page.text and "FLIP" not in page.text
+    assert page.attributes("href").count("#material-2") == 1 and text.count('class="ranking"') == 2
+    middle = np.mean([it.held_out for it in found if it.model == "ward"])
+    assert f"{middle:.4g}" in text.partition('class="medians"')[2].partition("</table>")[0]
+    with pytest.raises(FitError, match="there is none of arrays"):
+        report([replace(found[0], file="arrays")], tmp_path / "no.html")
+    assert not (tmp_path / "no.html").exists()
