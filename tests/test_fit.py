@@ -71,4 +71,4 @@ def test_the_uncertainty_counts_what_is_at_an_end():
     assert ended
     for it, truth in ended:
         assert it.sigma["wrap"] is None and "wrap" not in it.correlations
-        assert abs(it.bsdf["exponent"] - truth["exponent"]) < 3 * it.sigma["exponent"]
+        assert abs(it.bsdf["exponent"] - truth["exponent"]) < 3 * it.sigma["exponent"] < 1.5

@@ -104,14 +104,14 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     lengths, axes = np.linalg.eigh(normal)
     blind = lengths <= BLIND * lengths.max()
     lost = (np.abs(axes[:, blind]) > 0.1).any(axis=1)
-    ranges = np.array([u.high - u.low for u in unknowns])
-    before = np.diag(np.where(ended, 12 / (ranges * scale) ** 2, 0)) * (residuals @ residuals) / len(residuals)
+    ranges, variance = np.array([u.high - u.low for u in unknowns]), residuals @ residuals / len(residuals)
+    before = np.diag(np.where(ended, 12 * variance / (ranges * scale) ** 2, 0))
     lengths, axes = np.linalg.eigh(normal + before)
     bread = (axes / np.where(lengths <= BLIND * lengths.max(), np.inf, lengths)) @ axes.T
     leverage = ((scaled @ bread) * scaled).sum(axis=1).reshape(-1, channels).sum(axis=1)
     scores = (scaled * residuals[:, None]).reshape(len(leverage), channels, -1).sum(axis=1)
     scores = scores / np.maximum(1 - leverage, 0.1)[:, None]  # a pair with weight pulls the model to itself
-    covariance = bread @ (scores.T @ scores + before) @ bread / np.outer(scale, scale)
+    covariance = bread @ (scores.T @ scores + variance * before) @ bread / np.outer(scale, scale)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
     ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
     known = [k for k in range(len(unknowns)) if not ended[k] and not lost[k]]
