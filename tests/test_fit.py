@@ -1,30 +1,74 @@
 """Fits of known materials: what was put in comes out, within the stated uncertainty."""
 
+import numpy as np
 import pytest
 from fits import MODELS, measured
 
-from mi_brdfs.fit import fit
+from mi_brdfs.fit import Fit, fit
 from mi_brdfs.mitsuba.registry import own_models
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
+DRAWS = 4
+"""Noisy materials of each model, 308 parameters in all."""
+NEVER = 4.2
+"""Standard deviations beyond which a normal distribution has one of 308 in one of a hundred runs."""
 
 
 def test_every_model_is_tried():
     assert set(MODELS) == {model.plugins[0] for model in own_models()}
 
 
+def deviations(truth: dict[str, float], found: Fit) -> list[float]:
+    """Return how many of the stated standard deviations each parameter is off."""
+    return [(found.bsdf[name] - value) / found.sigma[name] for name, value in truth.items()]
+
+
+def noisy(name: str, draws: int) -> list[list[float]]:
+    """Return the deviations of fits to materials at random, with noise, gaps and negatives that are of one model."""
+    own = 1000 * (1 + list(MODELS).index(name))
+    truths = [MODELS[name].drawn(own + k) for k in range(draws)]
+    data = [measured(name, truth, seed=own + k, noise=0.01) for k, truth in enumerate(truths)]
+    fits = fit(data, name, given=MODELS[name].given, starts=2)
+    assert np.mean([it.negative for it in fits]) > 50 and np.mean([it.missing for it in fits]) > 200
+    assert np.median([it.held_out / it.errors["log"]["fitted"] for it in fits]) < 1.2
+    return [deviations(truth, it) for truth, it in zip(truths, fits, strict=True)]
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_recovers_parameters(name):
-    """Exactly from exact data, and within 3σ from noisy ones with gaps and negatives."""
+    """Exactly from exact data, and from noisy ones with gaps and negatives within 3σ. Of a normal distribution one of
+    370 is beyond, so of the materials of a model, whose parameters go together, one may have some, but not far."""
     model = MODELS[name]
     truth = model.drawn(seed=1)
-    exact, noisy = fit(
-        [measured(name, truth), measured(name, truth, seed=2, noise=0.01)], name, given=model.given, starts=4
-    )
-    assert exact.file == noisy.file == "arrays"
+    (exact,) = fit(measured(name, truth), name, given=model.given, starts=4)
+    assert exact.file == "arrays" and exact.errors["log"]["fitted"] < 1e-5
     for parameter, value in truth.items():
         assert exact.bsdf[parameter] == pytest.approx(value, rel=1e-3), parameter
-        assert abs(noisy.bsdf[parameter] - value) < 3 * noisy.sigma[parameter], parameter
-    assert noisy.negative > 50 and noisy.missing > 200
-    assert exact.errors["log"]["fitted"] < 1e-5
-    assert noisy.errors["log"]["held_out"] < 1.2 * noisy.errors["log"]["fitted"]
+    off = np.abs(noisy(name, DRAWS)).max(axis=1)
+    assert (off > 3).sum() <= 1 and off.max() < NEVER
+
+
+@pytest.mark.parametrize(
+    ("names", "draws", "tolerance"),
+    [(["ward"], 60, 0.16), pytest.param(list(MODELS), 24, 0.08, marks=pytest.mark.slow)],
+    ids=["ward", "all"],
+)
+def test_the_uncertainty_is_neither_too_small_nor_too_large(names, draws, tolerance):
+    """Deviations have a root mean square of 1, up to about three of its own standard deviations."""
+    off = np.concatenate([np.ravel(noisy(name, draws)) for name in names])
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(1, abs=tolerance)
+
+
+def test_the_uncertainty_counts_what_is_at_an_end():
+    """With noise of a tenth, wrap and exponent can hardly be told apart: where wrap ends at 1, the exponent is no
+    surer for that."""
+    model = MODELS["wrap"]
+    truths = [model.drawn(seed) | {"wrap": 0.78} for seed in range(12)]
+    data = [measured("wrap", truth, seed=seed, noise=0.1) for seed, truth in enumerate(truths)]
+    fits = fit(data, "wrap", starts=2)
+    ended = [(it, truth) for it, truth in zip(fits, truths, strict=True) if "wrap" in it.bounds]
+    assert ended
+    for it, truth in ended:
+        assert it.sigma["wrap"] is None and "wrap" not in it.correlations
+        assert abs(it.bsdf["exponent"] - truth["exponent"]) < 3 * it.sigma["exponent"] < 1.5

@@ -100,6 +100,32 @@ def test_metrics_are_what_they_say():
     assert set(it.errors) == set(METRICS)
 
 
+def test_metrics_of_a_table():
+    """Sums over a small one with cells of equal steps: Löw's weight is sinθi, the others' sinθi sinθo."""
+    theta, phi = (np.arange(6) + 0.5) / 6 * np.radians(78), (np.arange(5) + 0.5) / 5 * np.pi
+    axes = (*[Axis(theta, low=0, high=np.radians(78))] * 2, Axis(phi, low=0, high=np.pi))
+    values = np.random.default_rng(1).uniform(0.05, 2, (6, 6, 5, 3))
+    values[2, 3, 1, 0] = -1
+    grid = Grid(Spherical(mirrored=True), axes, values)
+    material = observe(Measurement(Path("table"), "made", grid, None))
+    (it,) = fit(material, "orennayar", given={"sigma": 0.0}, starts=1)
+    rho = it.bsdf["reflectance"]["value"]
+    transforms = {"log": lambda x: np.log(1 + x), "l2": lambda x: x, "ngan": lambda x: x, "cube-root": np.cbrt}
+    for name, transform in transforms.items():
+        total = weights = 0.0
+        for k in range(material.fitted):
+            theta_i, theta_o = (np.arccos(float(w[k, 2])) for w in (material.wi, material.wo))
+            weight = np.sin(theta_i) * (np.sin(theta_o) if name in ("ngan", "cube-root") else 1)
+            for channel in range(3):
+                if not material.usable[k, channel]:
+                    continue
+                difference = transform(material.f[k, channel] * np.cos(theta_i)) - transform(
+                    rho[channel] / np.pi * np.cos(theta_i)
+                )
+                total, weights = total + weight * difference**2, weights + weight
+        assert it.errors[name]["fitted"] == pytest.approx(np.sqrt(total / weights), rel=1e-3), name
+
+
 def test_each_metric_is_made_small():
     data = measured("walter", MODELS["walter"].drawn(3), 800, noise=0.1)
     fits = {name: fit(data, "ward", metric=name, starts=4)[0] for name in METRICS}

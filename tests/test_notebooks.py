@@ -115,6 +115,26 @@ def from_a_goniometer_to_a_picture(names):
     assert np.sqrt(names["at_30"] * names["at_70"]) > 2 * names["at_50"]
 
 
+def which_model_fits(names):
+    held_out = {model: it.held_out for model, it in names["own"].items()}
+    assert min(held_out, key=held_out.get) == "walter"
+    assert 1.3 * held_out["walter"] < held_out["cooktorrance"] < 0.6 * held_out["ward"] < held_out["lambert"]
+    metrics = names["by_metric"]
+    for found in metrics.values():
+        assert min(found, key=lambda model: found[model].held_out) == "walter"
+    alpha = {metric: found["ward"].bsdf["alpha"] for metric, found in metrics.items()}
+    assert 1.2 * alpha["ngan"] < alpha["log"] < alpha["cube-root"]
+    spread = {cut: ranked[-1].held_out / ranked[0].held_out for cut, ranked in names["cuts"].items()}
+    assert spread[40] < 1.15 < spread[60] < spread[80]
+    assert len({ranked[0].model for ranked in names["cuts"].values()}) == 3
+    splits = np.reshape(names["splits"], (4, 4))
+    assert len({ranked[0].model for ranked in splits}) > 1
+    assert all(min(ranked, key=lambda it: it.bic).model == "low" for ranked in splits)
+    assert names["fixed"].bic - names["free"].bic == pytest.approx(-np.log(359), abs=0.5)
+    assert names["fixed"].sigma["alpha"] < 0.5 * names["free"].sigma["alpha"]
+    assert names["it"].undetermined == [] and -1.6 < names["it"].bsdf["cx"] < -1.2
+
+
 def coming_from_mitsuba_06(names):
     assert names["difference"] < 1e-4  # of the same scene with the names of Mitsuba 3
 
@@ -134,6 +154,7 @@ SAYS = {
         recover_a_material,
         write_your_own_brdf,
         from_a_goniometer_to_a_picture,
+        which_model_fits,
         coming_from_mitsuba_06,
         anatomy_of_a_microfacet_brdf,
     )

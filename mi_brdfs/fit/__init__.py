@@ -61,8 +61,9 @@ def fit(
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are
     nearest to the data among many, from random ones, and from the nearest published material; the best end counts.
-    Negative and missing values have no weight. It runs in the active variant if that is an rgb one with derivatives,
-    and else in the fastest that works here.
+    Negative and missing values have no weight: where noise about 0 makes them negative, what is left is too bright, by
+    up to 0.8 of its standard deviation. It runs in the active variant if that is an rgb one with derivatives, and else
+    in the fastest that works here.
 
     Args:
         data: a file, a :class:`mi_brdfs.measured.Measurement` or a tuple of arrays ``(wi, wo, f)``, of shapes (N, 3),

@@ -88,33 +88,35 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     """Return the uncertainty from the Jacobian and from how far the data are from the model at each pair of directions,
     so that noise may differ from pair to pair and be common to the channels.
 
+    Unknowns at the end of their range are anywhere in it as far as the data allow: where the others stand depends on
+    that. They are given the variance of a uniform distribution beforehand.
+
     J. G. MacKinnon, H. White, Some heteroskedasticity-consistent covariance matrix estimators with improved finite
     sample properties, Journal of Econometrics 29(3), 1985, doi:10.1016/0304-4076(85)90158-7.
     """
     unknowns, channels = problem.configuration.unknowns, problem.lanes.channels
     residuals, jacobian = np.nan_to_num(residuals), np.nan_to_num(jacobian)
-    free = [k for k, u in enumerate(unknowns) if not u.at_end(float(values[k]))]
-    sigma: list[float | None] = [None] * len(unknowns)
-    labels = [unknowns[k].label for k in free]
-    if not free:
-        return Uncertainty(sigma, {}, [])
-    scale = np.sqrt((jacobian[:, free] ** 2).sum(axis=0))
+    labels, ended = [u.label for u in unknowns], [u.at_end(float(x)) for u, x in zip(unknowns, values, strict=True)]
+    scale = np.sqrt((jacobian**2).sum(axis=0))
     scale = np.where(scale > 0, scale, 1)
-    scaled = jacobian[:, free] / scale
-    lengths, axes = np.linalg.eigh(scaled.T @ scaled)
+    scaled = jacobian / scale
+    normal = scaled.T @ scaled
+    lengths, axes = np.linalg.eigh(normal)
     blind = lengths <= BLIND * lengths.max()
     lost = (np.abs(axes[:, blind]) > 0.1).any(axis=1)
-    bread = (axes / np.where(blind, np.inf, lengths)) @ axes.T
+    ranges, variance = np.array([u.high - u.low for u in unknowns]), residuals @ residuals / len(residuals)
+    before = np.diag(np.where(ended, 12 * variance / (ranges * scale) ** 2, 0))
+    lengths, axes = np.linalg.eigh(normal + before)
+    bread = (axes / np.where(lengths <= BLIND * lengths.max(), np.inf, lengths)) @ axes.T
     leverage = ((scaled @ bread) * scaled).sum(axis=1).reshape(-1, channels).sum(axis=1)
     scores = (scaled * residuals[:, None]).reshape(len(leverage), channels, -1).sum(axis=1)
     scores = scores / np.maximum(1 - leverage, 0.1)[:, None]  # a pair with weight pulls the model to itself
-    covariance = bread @ (scores.T @ scores) @ bread / np.outer(scale, scale)
+    covariance = bread @ (scores.T @ scores + variance * before) @ bread / np.outer(scale, scale)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
     ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
-    known = [i for i in range(len(free)) if not lost[i]]
-    for i in known:
-        sigma[free[i]] = float(deviations[i])
-    rows = {labels[i]: {labels[j]: float(np.clip(ratio[i, j], -1, 1)) for j in known} for i in known}
+    known = [k for k in range(len(unknowns)) if not ended[k] and not lost[k]]
+    rows = {labels[k]: {labels[j]: float(np.clip(ratio[k, j], -1, 1)) for j in known} for k in known}
+    sigma = [float(deviations[k]) if k in known else None for k in range(len(unknowns))]
     return Uncertainty(sigma, rows, [label for label, gone in zip(labels, lost, strict=True) if gone])
 
 

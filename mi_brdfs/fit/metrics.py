@@ -1,6 +1,24 @@
 """The metrics of fits: how far a model's values are from measured ones.
 
-An error is √(Σ w (T(f cosθi) - T(f' cosθi))² / Σ w), over pairs of directions and channels, where f' is the model.
+An error is √(Σ w (T(f cosθi) - T(f' cosθi))² / Σ w), over pairs of directions and channels, f measured and f' of the
+model, up to the cut of the angles θi and θo. Papers leave the root, the sum of weights or both out; the setting with
+the least error is the same. With dωi = sinθi dθi dφi, and dωo alike:
+
+    log         T(x) = ln(1 + x)   w = dωi dθo dφo    E2 of Löw et al. 2012
+    l2          T(x) = x           w = dωi dθo dφo    E1 of Löw et al. 2012
+    ngan        T(x) = x           w = dωi dωo        Ngan et al. 2005
+    cube-root   T(x) = ∛x          w = dωi dωo        Fores et al. 2012
+
+So Löw's weight is sinθi on a grid of equal steps, which gives θo near the normal more weight than a solid angle does.
+The first three agree with the loss functions of BBM (github.com/bsdfbenchmark/bbm, ``include/loss``), which sum over
+channels and samples and take no root; the papers' own text was not at hand. For Fores et al. only the abstract was:
+"cube root" and that it is compared with root mean squares. Others read it as the mean of |f cosθi - f' cosθi|^⅔ (code
+of Sztrajman et al. 2021). The cut of 80° is that of Ngan et al. as it is commonly told; it is not part of a metric.
+
+J. Löw, J. Kronander, A. Ynnerman, J. Unger, BRDF models for accurate and efficient rendering of glossy surfaces, ACM
+TOG 31(1), 2012, doi:10.1145/2077341.2077350. A. Ngan, F. Durand, W. Matusik, Experimental analysis of BRDF models,
+EGSR 2005, doi:10.2312/EGWR/EGSR05/117-126. A. Fores, J. Ferwerda, J. Gu, Toward a perceptually based metric for BRDF
+modeling, CIC 20, 2012, doi:10.2352/CIC.2012.20.1.art00025.
 """
 
 from __future__ import annotations
@@ -69,10 +87,7 @@ METRICS = {
     "bieron-log": Metric(_log, lambda x: 1 / (1 + np.abs(x)), True,
                          "ln(1 + f cosθi), weighted by solid angle and cosθo (Bieron and Peers 2020)", cosine=True),
 }  # fmt: skip
-"""By name. J. Löw, J. Kronander, A. Ynnerman, J. Unger, BRDF models for accurate and efficient rendering of glossy
-surfaces, ACM TOG 31(1), 2012, doi:10.1145/2077341.2077350. A. Ngan, F. Durand, W. Matusik, Experimental analysis of
-BRDF models, EGSR 2005, doi:10.2312/EGWR/EGSR05/117-126. A. Fores, J. Ferwerda, J. Gu, Toward a perceptually based
-metric for BRDF modeling, CIC 20, 2012, doi:10.2352/CIC.2012.20.1.art00025."""
+"""By name."""
 
 
 def find_metric(name: str) -> Metric:

@@ -102,7 +102,7 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
     some = np.flatnonzero(usable.any(axis=1))
     if len(some) < 2:
         raise FitError(f"{name}: only one pair of directions has a value within the cut at {cut:g}°.")
-    some, fitted = _halves(some, wi[some] + wo[some], rng)
+    some, fitted = _halves(some, np.where(usable, f, 0).sum(axis=1)[some] * wi[some, 2], rng)
     return Observations(
         name=name,
         wi=wi[some].astype(np.float32),
@@ -130,10 +130,10 @@ def _scatter(measurement: Measurement) -> tuple[tuple[float, float, float], ...]
     return tuple(found)
 
 
-def _halves(rows: np.ndarray, half: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, int]:
-    """Return rows in random order, a half of them first, and how many that are: of each two whose half vectors are at
-    about the same angle to the normal, one is in either half, so that highlights are in both."""
-    sorted_rows = rows[np.argsort(np.hypot(half[:, 0], half[:, 1]) / half[:, 2], kind="stable")]
+def _halves(rows: np.ndarray, values: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, int]:
+    """Return rows in random order, a half of them first, and how many that are: of each two whose values are next to
+    each other by size, one is in either half, so that narrow highlights are in both."""
+    sorted_rows = rows[np.argsort(values, kind="stable")]
     first = np.zeros(len(rows), bool)
     first[::2] = rng.random(len(first[::2])) < 0.5
     first[1::2] = ~first[: len(first[1::2]) * 2 : 2]

@@ -41,9 +41,9 @@ class Problem:
         values = self.values_of(points)
         slopes = np.stack([u.slope(values[:, k]) for k, u in enumerate(self.configuration.unknowns)], axis=-1)
         for p, residuals, jacobian in self.residuals(which, values, pairs):
-            jacobian = jacobian * slopes[p]
             found.cost[p] = residuals @ residuals
-            found.gradient[p], found.matrix[p] = jacobian.T @ residuals, jacobian.T @ jacobian
+            found.gradient[p] = jacobian.T @ residuals * slopes[p]
+            found.matrix[p] = jacobian.T @ jacobian * np.outer(slopes[p], slopes[p])
         return found
 
     def residuals(

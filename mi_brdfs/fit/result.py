@@ -52,7 +52,8 @@ class Fit:
     errors: dict[str, dict[str, float]]
     """In every metric, by name, on the pairs that were ``fitted`` and on those ``held_out``; NaN if none was."""
     sigma: dict[str, float | list[float | None] | None]
-    """The standard deviation of each parameter; None at the end of a range, and where the data do not tell."""
+    """The standard deviation of each parameter by the noise of the data; None at the end of a range, and where the data
+    do not tell. It knows nothing of what all data have in common, as that negative ones have no weight."""
     correlations: dict[str, dict[str, float]]
     """Of the fitted numbers: "alpha", "diffuse_reflectance.r" …"""
     undetermined: list[str]

@@ -1,0 +1,176 @@
+"""What fits cost: CPU time by directions and materials, memory over repeated fits, and the time of many materials.
+
+python tests/fit_cost.py steps | fits | memory | files [--models NAME,…] [--starts N] FILE…
+
+``steps`` measures one evaluation with its Jacobian and normal equations, which is what fits consist of, and ``fits``
+whole fits, both over more than a decade of directions and of materials, kernels warm, in alternating rounds: each
+figure is the median of the CPU time on one thread, which other processes hardly change. ``memory`` repeats fits of
+several models; ``files`` fits measured files as a user would, and tells the time on the wall.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads that wait for work take CPU time
+
+import argparse
+import gc
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from fits import MODELS, measured
+
+from mi_brdfs.fit import METRICS, Observations, fit, observe
+from mi_brdfs.fit.isotropy import isotropic
+from mi_brdfs.fit.problem import Problem
+from mi_brdfs.fit.unknowns import configurations
+from mi_brdfs.mitsuba.registry import find_model
+
+import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
+import mitsuba as mi  # isort: skip
+
+DIRECTIONS = 1000, 3000, 10_000, 30_000
+MATERIALS = 1, 3, 10, 30, 100
+ROUNDS = 25
+SEVEN = "ward,phong,blinnphong,ashikhminshirley,walter,cooktorrance,low"
+REPEATS = 20
+REPEATED = "lambert", "ward", "walter", "low"
+
+
+def material(model: str, directions: int, seed: int = 1) -> Observations:
+    """Three channels of noisy values, of which half the pairs are fitted: as many as there are ``directions``."""
+    wi, wo, f = measured(model, MODELS[model].drawn(seed), 2 * directions, seed)
+    noise = 1 + 0.05 * np.random.default_rng(seed).standard_normal((len(f), 3))
+    return observe((wi, wo, f[:, None] * [1, 0.7, 0.4] * noise), pairs=2 * directions)
+
+
+def problem(model: str, directions: int, materials: int) -> Problem:
+    (configuration,) = configurations(find_model(model), MODELS[model].given, {}, 1, 3, False)
+    alike = [material(model, directions, seed) for seed in range(min(materials, 3))]
+    own = [alike[k % len(alike)] for k in range(materials)]
+    return Problem(isotropic(configuration), own, METRICS["log"])
+
+
+def medians(calls: dict[str, Callable[[], object]], rounds: int = ROUNDS) -> dict[str, float]:
+    """Return the median CPU time of each call in seconds; each is made once before, and then once a round."""
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for call in calls.values():
+        call()
+    for _ in range(rounds):
+        for name, call in calls.items():
+            start = time.process_time()
+            call()
+            times[name].append(time.process_time() - start)
+    return {name: median(own) for name, own in times.items()}
+
+
+def line(sizes: Iterable[float], seconds: Iterable[float]) -> tuple[float, float, float]:
+    """Return ``(fixed, slope, deviation)`` of the line with the least relative deviations, and the largest of these."""
+    x, y = np.array(list(sizes), float), np.array(list(seconds))
+    fixed, slope = np.linalg.lstsq(np.stack([1 / y, x / y], axis=-1), np.ones(len(x)), rcond=None)[0]
+    return float(fixed), float(slope), float(np.abs((fixed + slope * x) / y - 1).max())
+
+
+def report(what: str, found: dict[int, float]) -> float:
+    """Print times by size with the line through them, and return the largest deviation from it."""
+    fixed, slope, deviation = line(found, found.values())
+    cells = ", ".join(f"{size}: {seconds * 1e3:.1f}" for size, seconds in found.items())
+    formula = f"{fixed * 1e3:.1f} ms + {slope * 1e6:.3g} µs each, within {deviation:.0%}"
+    print(f"{what}  {cells} ms; about {formula}", flush=True)
+    return deviation
+
+
+def steps(model: str = "walter") -> float:
+    """One step of fits of a model; return the largest deviation from a line."""
+    calls, point = {}, None
+    for directions, materials in [*((n, 3) for n in DIRECTIONS), *((1000, m) for m in MATERIALS)]:
+        it = problem(model, directions, materials)
+        low, high = it.box
+        point = (np.clip(low, -3, 3) + np.clip(high, -3, 3)) / 2
+        points = np.tile(point, (materials, 1))
+        calls[f"{directions} {materials}"] = lambda it=it, points=points: it.sums(range(len(points)), points)
+    found = medians(calls)
+    print(f"One step of {model}, three channels, {len(point)} unknowns:")
+    return max(
+        report("  by directions, of 3 materials: ", {n: found[f"{n} 3"] for n in DIRECTIONS}),
+        report("  by materials, of 1000 directions:", {m: found[f"1000 {m}"] for m in MATERIALS}),
+    )
+
+
+def fits(model: str = "ward", starts: int = 4, rounds: int = 3) -> float:
+    """Whole fits: the choice of starts is a fixed part for each material, as it looks at the same number of pairs."""
+    by_directions = {n: [material(model, n, seed) for seed in range(3)] for n in DIRECTIONS}
+    by_materials = {m: [material(model, 1000, seed) for seed in range(m)] for m in MATERIALS}
+    calls = {f"n {n}": lambda it=it: fit(it, model, starts=starts) for n, it in by_directions.items()}
+    calls |= {f"m {m}": lambda own=own: fit(own, model, starts=starts) for m, own in by_materials.items()}
+    found = medians(calls, rounds)
+    print(f"Whole fits of {model}, three channels, {starts} starts:")
+    return max(
+        report("  by directions, of 3 materials:   ", {n: found[f"n {n}"] for n in DIRECTIONS}),
+        report("  by materials, of 1000 directions:", {m: found[f"m {m}"] for m in MATERIALS}),
+    )
+
+
+def resident() -> float:
+    """Return the memory that the process holds, in MiB. Linux only."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def memory(models: Iterable[str] = REPEATED, repeats: int = REPEATS) -> list[tuple[float, float]]:
+    """Fit several models again and again; print and return ``(resident, the most that Dr.Jit held)`` in MiB after each
+    round."""
+    own = {name: material(name, 2000) for name in models}
+    found = []
+    for k in range(repeats):
+        dr.detail.malloc_clear_statistics()
+        for name, it in own.items():
+            fit(it, name, given=MODELS[name].given, starts=2)
+        gc.collect()
+        found.append((resident(), dr.detail.malloc_watermark(dr.JitBackend.LLVM) / 2**20))
+        print(f"round {k + 1:2}: {found[-1][0]:.1f} MiB resident, Dr.Jit {found[-1][1]:.1f} MiB at most", flush=True)
+    return found
+
+
+def files(paths: list[Path], models: str, starts: int) -> None:
+    """Read files and fit models to them, in batches as the command does; print the time on the wall."""
+    start, cpu = time.perf_counter(), time.process_time()
+    materials = [observe(path) for path in paths]
+    read, rows = time.perf_counter() - start, []
+    print(f"{len(paths)} files read in {read:.1f} s", flush=True)
+    for name in models.split(","):
+        begun = time.perf_counter()
+        own = [it for k in range(0, len(materials), 10) for it in fit(materials[k : k + 10], name, starts=starts)]
+        rows += own
+        error, agree = median(it.held_out for it in own), median(it.starts.agree / it.starts.tried for it in own)
+        print(f"{name:18} {time.perf_counter() - begun:6.1f} s, median held out {error:.4f}, {agree:.0%} of the starts "
+              "agree", flush=True)  # fmt: skip
+    print(f"{len(rows)} fits, {starts} starts each, {os.cpu_count()} cores: {time.perf_counter() - start:.0f} s, of "
+          f"CPU {time.process_time() - cpu:.0f} s")  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["steps", "fits", "memory", "files"])
+    parser.add_argument("paths", nargs="*", type=Path, metavar="FILE")
+    parser.add_argument("--models", default=SEVEN, metavar="NAME,…")
+    parser.add_argument("--starts", default=4, type=int, metavar="N")
+    arguments = parser.parse_args()
+    mi.set_variant("llvm_ad_rgb")
+    if arguments.what in ("steps", "fits"):
+        dr.set_thread_count(1)  # threads that wait for work take CPU time
+    if arguments.what == "files":
+        if not arguments.paths:
+            sys.exit("files: which?")
+        files(arguments.paths, arguments.models, arguments.starts)
+    else:
+        {"steps": steps, "fits": fits, "memory": memory}[arguments.what]()
+
+
+if __name__ == "__main__":
+    main()
