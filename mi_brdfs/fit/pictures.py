@@ -51,11 +51,10 @@ def images(
     also as 0.
 
     What is minimised is the mean over pixels of ((I − P) / (P̄ + m/10))², for a rendering I and a picture P with the
-    local mean P̄ over 5 x 5 pixels and the mean m of all: bright highlights count no more than what is around. Numbers and
-    colours are found
-    by Levenberg–Marquardt steps, whose derivatives are images: radiative backpropagation (``prb``) in forward mode. The
-    products of residuals, and of derivatives, are those of renderings with different random numbers, so that noise does
-    not bias them. Bitmaps follow first as a whole, and then texel by texel with Adam.
+    local mean P̄ over 5 x 5 pixels and the mean m of all: highlights count no more than what is around. Numbers and
+    colours are found by Levenberg–Marquardt steps, whose derivatives are images: radiative backpropagation (``prb``) in
+    forward mode. The products of residuals, and of derivatives, are those of renderings with different random numbers,
+    so that noise does not bias them. Bitmaps follow first as a whole, and then texel by texel with Adam.
 
     Args:
         scene: a loaded scene, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by its integrator

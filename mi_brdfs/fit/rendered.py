@@ -166,25 +166,28 @@ class Rendered:
             self._sweeps = self._together(self.jacobian(point, seed))
         columns = np.zeros((sum(view.picture.size for view in self.views), len(point)))
         spp = max(factor * self.spp // 2, 1)
-        with self._differentiable(point):
-            for sweep in self._sweeps:
-                tangent = self._tangent(point, sweep, seed, spp)
-                if len(sweep) == 1:
-                    columns[:, sweep[0]] = tangent
-                else:
-                    for channel, k in enumerate(sweep):
-                        columns[channel::3, k] = tangent[channel::3]
+        for sweep in self._sweeps:
+            tangent = self._tangent(point, sweep, seed, spp)
+            if len(sweep) == 1:
+                columns[:, sweep[0]] = tangent
+            else:
+                for channel, k in enumerate(sweep):
+                    columns[channel::3, k] = tangent[channel::3]
         return columns
 
     def _tangent(self, point: Array, sweep: list[int], seed: int, spp: int) -> Array:
         """Return the derivative of the residuals by some shifts together."""
         direction = np.isin(np.arange(len(point)), sweep).astype(float)
         found = []
-        for k, (view, root) in enumerate(zip(self.views, self._roots, strict=True)):
+        with self._differentiable(point):
             for slot, place in zip(self.slots, self.places, strict=True):
                 dr.set_grad(self.params[slot.key], slot.typed(slot.slopes(point[place]) * direction[place]))
-            image = self.integrator.render_forward(self.scene, self.params, view.sensor, seed=seed + k, spp=spp)
-            found.append((root * view.cut(image)).ravel())
+                dr.enqueue(dr.ADMode.Forward, self.params[slot.key])
+            # Bitmaps hold copies of their values: integrators need the derivatives of these.
+            dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearEdges)
+            for k, (view, root) in enumerate(zip(self.views, self._roots, strict=True)):
+                image = self.integrator.render_forward(self.scene, self.params, view.sensor, seed=seed + k, spp=spp)
+                found.append((root * view.cut(image)).ravel())
         return np.concatenate(found)
 
     def gradients(self, point: Array) -> list[Array]:
@@ -208,7 +211,7 @@ class Rendered:
 
     @contextmanager
     def _differentiable(self, point: Array) -> Iterator[None]:
-        """Put a point, with derivatives of all of its values: then one kernel serves all sweeps."""
+        """Put a point, with derivatives of all of its values, so that one kernel serves all sweeps."""
         self.put(point)
         for slot in self.slots:
             dr.enable_grad(self.params[slot.key])
