@@ -190,10 +190,11 @@ def _views(
     indices = range(len(given)) if sensors is None else list(sensors)
     if not given:
         raise FitError("There is no picture to fit to.")
-    if len(indices) != len(given) or not all(0 <= index < count for index in indices):
-        raise FitError(
-            f"There are {len(given)} pictures, of sensors {[*indices]}; the scene has {count} sensors, from 0."
-        )
+    if len(indices) != len(given):
+        raise FitError(f"Each picture has its sensor: there are {len(given)} pictures and {len(indices)} sensors.")
+    for index in indices:
+        if not 0 <= index < count:
+            raise FitError(f"The scene has no sensor {index} for a picture: it has {count}, counted from 0.")
     views = []
     for index, pixels in zip(indices, given, strict=True):
         sensor = scene.sensors()[index]
