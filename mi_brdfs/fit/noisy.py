@@ -78,19 +78,22 @@ def descend(
 
 def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
-    are on the scales of the unknowns, NaN for those at an end of their range. Noise may be common to near pixels."""
+    are on the scales of the unknowns, NaN for those at an end of their range; noise may be common to
+    near pixels (MacKinnon and White 1985, HC2)."""
     look = _look(rendered, point, MORE)
     step = look.step(point, 0, rendered.box)
     end, (low, high) = point + step, rendered.box
     free = np.flatnonzero((end > low) & (end < high))
     sigma = np.full(len(point), np.nan)
     if len(free):
-        mean = (look.residuals[0] + look.residuals[1]) / 2 + look.jacobian @ step
-        blocks = rendered.blocks
-        scores = np.stack([np.bincount(blocks, look.jacobian[:, k] * mean) for k in free], axis=-1)
+        mean, jacobian = sum(look.residuals) / 2 + look.jacobian @ step, look.jacobian[:, free]
         bread = np.linalg.pinv(look.matrix[np.ix_(free, free)])
-        covariance = bread @ (scores.T @ scores) @ bread
-        sigma[free] = np.sqrt(np.maximum(np.diag(covariance), 0) * len(scores) / max(len(scores) - len(free), 1))
+        columns = [*(jacobian * mean[:, None]).T, ((jacobian @ bread) * jacobian).sum(axis=1)]
+        *scores, leverage = (np.bincount(rendered.blocks, column) for column in columns)
+        scores = np.stack(scores) / np.sqrt(
+            np.maximum(1 - leverage, 0.1)
+        )  # a block with weight pulls the step to itself
+        sigma[free] = np.sqrt(np.diag(bread @ (scores @ scores.T) @ bread))
     return end, sigma, look.cost
 
 

@@ -21,7 +21,7 @@ REACH = 2
 FLOOR = 0.1
 """What is added to it, as a part of the mean of the picture: dark pixels are noisy."""
 
-BLOCK = 8
+BLOCK = 4
 """The side of a square of pixels that may have noise in common."""
 
 
