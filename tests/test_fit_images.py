@@ -203,7 +203,7 @@ def test_scenes_without_an_answer():
         "A fit needs a loaded scene, not dict": {},
         "The scene has no light.": scene_of({"type": "ward"}, lights={}),
         "no BSDF of mi_brdfs whose parameters can be fitted": scene_of({"type": "diffuse"}),
-        "ball.bsdf.diffuse_reflectance.value changes nothing": scene_of({"type": "ward"}, plane, lights=behind),
+        "ball.bsdf changes nothing in the pictures": scene_of({"type": "ward"}, plane, lights=behind),
         "diffuse_reflectance.data has no derivatives": scene_of(
             {"type": "ward", "diffuse_reflectance": bitmap(np.full((2, 2, 3), 99, np.uint8))}, lights=lamp
         ),

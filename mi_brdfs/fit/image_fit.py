@@ -25,7 +25,7 @@ class ImageFit:
     shape (height, width, channels)."""
     sigma: dict[str, Any]
     """The standard deviations of numbers and channels, as far as noise of the pictures and of the last renderings goes;
-    None at the end of a range, and for bitmaps."""
+    None at the end of a range, where the pictures tell nothing, and for bitmaps."""
     bsdfs: dict[str, dict[str, Any]]
     """The materials they belong to, as plugin dicts for ``mi.load_dict``, by their paths. Textures are those of the
     scene."""

@@ -78,12 +78,12 @@ def descend(
 
 def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
-    are on the scales of the unknowns, NaN for those at an end of their range; noise may be common to
-    near pixels (MacKinnon and White 1985, HC2)."""
+    are on the scales of the unknowns, NaN for those at an end of their range, or without
+    influence; noise may be common to near pixels (MacKinnon and White 1985, HC2)."""
     look = _look(rendered, point, MORE)
     step = look.step(point, 0, rendered.box)
     end, (low, high) = point + step, rendered.box
-    free = np.flatnonzero((end > low) & (end < high))
+    free = np.flatnonzero((end > low) & (end < high) & look.jacobian.any(axis=0))
     sigma = np.full(len(point), np.nan)
     if len(free):
         mean, jacobian = sum(look.residuals) / 2 + look.jacobian @ step, look.jacobian[:, free]

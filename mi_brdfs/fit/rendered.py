@@ -224,10 +224,11 @@ class Rendered:
     def _together(self, jacobian: Array) -> list[list[int]]:
         """Return the shifts of each sweep: the channels of a colour together, unless some channel of the pictures
         depends on another one of a colour."""
-        if not jacobian.any(axis=0).all():
-            blind = int(np.flatnonzero(~jacobian.any(axis=0))[0])
-            key = next(s.key for s, place in zip(self.slots, self.places, strict=True) if place.stop > blind)
-            raise FitError(f"{key} changes nothing in the pictures: its surface is not seen, or not lit.")
+        seen = [jacobian[:, place].any() for place in self.places]
+        paths = [slot.key.rsplit(".", 2)[0] for slot in self.slots]
+        for path in paths:
+            if not any(own for own, of in zip(seen, paths, strict=True) if of == path):
+                raise FitError(f"{path} changes nothing in the pictures: its surface is not seen, or not lit.")
         alone = [[k] for k in range(jacobian.shape[1])]
         if any(view.picture.shape[-1] != 3 for view in self.views):
             return alone
