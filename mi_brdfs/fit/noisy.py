@@ -61,14 +61,7 @@ def descend(
         look = _look(rendered, point)
         on_step(look.cost)
         costs.append(look.cost)
-        step = np.zeros_like(point)
-        for _ in range(TRIES):
-            tried = look.step(point, damping, rendered.box)
-            first, second = (rendered.residuals(point + tried, seed) for seed in look.seeds)
-            if first @ second < look.cost:
-                step, damping = tried, max(damping * WEAKER, LEAST_DAMPING)
-                break
-            damping *= STRONGER
+        step, damping = _gaining(rendered, look, point, damping)
         point = point + step
         stalled = len(costs) > PATIENCE and min(costs[-PATIENCE:]) > GAIN * min(costs[:-PATIENCE])
         if stalled or (step.any() and np.abs(step).max() < SHORT):
@@ -78,10 +71,10 @@ def descend(
 
 def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
-    are on the scales of the unknowns, NaN for those at an end of their range, or without
-    influence; noise may be common to near pixels (MacKinnon and White 1985, HC2)."""
+    are on the scales of the unknowns, NaN for those at an end of their range or without influence; noise may be common
+    to near pixels (MacKinnon and White 1985, HC2)."""
     look = _look(rendered, point, MORE)
-    step = look.step(point, 0, rendered.box)
+    step, _ = _gaining(rendered, look, point, LEAST_DAMPING, MORE)
     end, (low, high) = point + step, rendered.box
     free = np.flatnonzero((end > low) & (end < high) & look.jacobian.any(axis=0))
     sigma = np.full(len(point), np.nan)
@@ -90,11 +83,21 @@ def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
         bread = np.linalg.pinv(look.matrix[np.ix_(free, free)])
         columns = [*(jacobian * mean[:, None]).T, ((jacobian @ bread) * jacobian).sum(axis=1)]
         *scores, leverage = (np.bincount(rendered.blocks, column) for column in columns)
-        scores = np.stack(scores) / np.sqrt(
-            np.maximum(1 - leverage, 0.1)
-        )  # a block with weight pulls the step to itself
-        sigma[free] = np.sqrt(np.diag(bread @ (scores @ scores.T) @ bread))
+        left = np.maximum(1 - leverage, 0.1)  # a block with weight pulls the step to itself
+        weighed = np.stack(scores) / np.sqrt(left)
+        sigma[free] = np.sqrt(np.diag(bread @ (weighed @ weighed.T) @ bread))
     return end, sigma, look.cost
+
+
+def _gaining(rendered: Rendered, look: Look, point: Array, damping: float, factor: int = 1) -> tuple[Array, float]:
+    """Return a step that lowers the cost, or none, and the damping of the next one."""
+    for _ in range(TRIES):
+        step = look.step(point, damping, rendered.box)
+        first, second = (rendered.residuals(point + step, seed, factor) for seed in look.seeds)
+        if first @ second < look.cost:
+            return step, max(damping * WEAKER, LEAST_DAMPING)
+        damping *= STRONGER
+    return np.zeros_like(point), damping
 
 
 def _look(rendered: Rendered, point: Array, factor: int = 1) -> Look:

@@ -23,7 +23,7 @@ from .observations import FitError
 from .rendered import Rendered, Slot, View
 from .unknowns import Unknown, unknown_in
 
-Picture = str | os.PathLike | mi.Bitmap | Any
+Picture = Any
 """A file, a bitmap, or an array of linear values, shape (height, width, channels)."""
 SAMPLES = 1 << 18
 """Samples of a rendering of all pictures, unless there are to be more."""
