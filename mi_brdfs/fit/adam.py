@@ -13,7 +13,7 @@ import numpy as np
 from ..measure.arrays import Array
 from .rendered import Rendered
 
-STEPS = 4
+STEPS = 10
 """Steps for each that is told of."""
 FIRST, LAST = 0.2, 0.01
 """The longest steps along an unknown, on its scale, in the beginning and at the end."""

@@ -151,12 +151,12 @@ class Rendered:
         """Return the residuals at a point, with ``factor`` times the samples."""
         self.put(point)
         return np.concatenate([
-            (root * (view.cut(self._render(view, seed + k, factor)) - view.picture)).ravel()
+            (root * (view.cut(self._render(view, seed + k, factor * self.spp)) - view.picture)).ravel()
             for k, (view, root) in enumerate(zip(self.views, self._roots, strict=True))
         ])  # fmt: skip
 
-    def _render(self, view: View, seed: int, factor: int = 1) -> mi.TensorXf:
-        return self.integrator.render(self.scene, view.sensor, seed=seed, spp=factor * self.spp)
+    def _render(self, view: View, seed: int, spp: int) -> mi.TensorXf:
+        return self.integrator.render(self.scene, view.sensor, seed=seed, spp=spp)
 
     def jacobian(self, point: Array, seed: int, factor: int = 1) -> Array:
         """Return the derivatives of the residuals by the shifts, shape (residuals, shifts), by forward
@@ -191,17 +191,18 @@ class Rendered:
         return np.concatenate(found)
 
     def gradients(self, point: Array) -> list[Array]:
-        """Return half the derivatives of the sum of squares by the base of each slot, by backward differentiation."""
+        """Return half the derivatives of the sum of squares by the base of each slot, by backward differentiation;
+        with a quarter of the samples, as there are many steps."""
         self.put(point)
-        seed, other = self.fresh(), self.fresh()
+        seed, other, spp = self.fresh(), self.fresh(), max(self.spp // 4, 1)
         with dr.suspend_grad():
-            images = [self._render(view, seed + k) for k, view in enumerate(self.views)]
+            images = [self._render(view, seed + k, spp) for k, view in enumerate(self.views)]
         with self._differentiable(point):
             for k, (view, root, image) in enumerate(zip(self.views, self._roots, images, strict=True)):
                 given = np.zeros(image.shape, np.float32)
                 given[..., : view.picture.shape[-1]] = root**2 * (view.cut(image) - view.picture)
                 self.integrator.render_backward(
-                    self.scene, self.params, mi.TensorXf(given), view.sensor, seed=other + k, spp=self.spp
+                    self.scene, self.params, mi.TensorXf(given), view.sensor, seed=other + k, spp=spp
                 )
             found = [np.array(dr.grad(self.params[slot.key]), np.float64) for slot in self.slots]
         return [
