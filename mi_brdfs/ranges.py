@@ -52,6 +52,14 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
 
 def _ranges(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
     """Yield ``(key, range)`` of the traversed parameters of our BSDFs."""
+    for key, bsdf, _, name in declared(params):
+        if name in bsdf.model.ranges:
+            yield key, bsdf.model.ranges[name]
+
+
+def declared(params: mi.SceneParameters) -> Iterator[tuple[str, Any, str, str]]:
+    """Yield ``(key, bsdf, path, name)`` of the traversed values of parameters of our BSDFs: ``path`` is that of the
+    BSDF, and empty if it was traversed by itself, and ``name`` the property's."""
     for key in params.keys():
         node = params.properties[key][2]
         *path, word = key.split(".")
@@ -61,8 +69,8 @@ def _ranges(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
         levels = 0
         while node is not None and not _is_ours(node):
             node, levels = params.hierarchy[node][0], levels + 1
-        if node is not None and levels and path[-levels] in node.model.ranges:
-            yield key, node.model.ranges[path[-levels]]
+        if node is not None and levels:
+            yield key, node, ".".join(path[:-levels]), path[-levels]
 
 
 def _is_ours(node: Any) -> bool:

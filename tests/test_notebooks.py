@@ -51,10 +51,14 @@ def recover_a_material(names):
     excess = {model: error / names["noise"] for model, error in names["errors"].items()}
     assert excess["walter"] < 1.1
     assert min(excess[model] for model in ("phong", "ward", "burley")) > 2
-    # The last steps are 0.04 · 0.97^59 = 0.007 long.
-    found = {model: {name: trace[-1] for name, trace in fit[2].items()} for model, fit in names["fits"].items()}
+    found = {
+        model: {key.split(".")[2]: value for key, value in fit.values.items()}
+        for model, (_, fit) in names["fits"].items()
+    }
     for name, hidden in names["hidden"].items():
         assert found["walter"][name] == pytest.approx(hidden, abs=0.02), name
+        sigma = np.array(names["fits"]["walter"][1].sigma[f"ball.bsdf.{name}.value"])
+        assert (abs(np.array(found["walter"][name]) - hidden) < 4 * sigma).all(), name
     for model in ("phong", "ward"):
         assert found[model]["diffuse_reflectance"][0] > 0.15
     difference = {model: np.array(fit[0] - names["target"]) for model, fit in names["fits"].items()}

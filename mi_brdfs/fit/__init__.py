@@ -1,4 +1,4 @@
-"""From measured BRDFs to parameters of models: :func:`fit`."""
+"""From measured BRDFs to parameters of models, :func:`fit`, and from pictures: :func:`images`."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import Any
 from ..measured import FileError
 from ..mitsuba.registry import find_model
 from .engine import fit_configuration
+from .image_fit import ImageFit
 from .isotropy import isotropic
 from .lanes import rgb_variant
 from .metrics import METRICS, Metric, find_metric
 from .observations import CUT, PAIRS, FitError, Observations, Source, observe
+from .pictures import images
 from .result import Fit, Starts
 from .starts import warm
 from .unknowns import check_names, configurations
@@ -22,11 +24,13 @@ __all__ = [
     "FileError",
     "Fit",
     "FitError",
+    "ImageFit",
     "Metric",
     "Observations",
     "Starts",
     "find_metric",
     "fit",
+    "images",
     "observe",
     "report",
 ]

@@ -54,7 +54,8 @@ def solve(
     costs, gradient, matrix = (np.array(array) for array in sums(active, points))
     costs = np.where(np.isfinite(costs), costs, np.inf)
     for _ in range(steps):
-        tried = np.clip(points[active] + _steps(points, gradient, matrix, damping, active, low, high), low, high)
+        moves = damped_steps(points[active], gradient[active], matrix[active], damping[active], low, high)
+        tried = np.clip(points[active] + moves, low, high)
         cost, new_gradient, new_matrix = sums(active, tried)
         cost = np.where(np.isfinite(cost), cost, np.inf)
         better = cost < costs[active]
@@ -74,16 +75,14 @@ def solve(
     return points, costs
 
 
-def _steps(
-    points: Array, gradient: Array, matrix: Array, damping: Array, active: Array, low: Array, high: Array
-) -> Array:
-    """Return the damped steps of some problems, at most ``LONGEST`` along each unknown."""
-    x, g, a = points[active], np.nan_to_num(gradient[active]), np.nan_to_num(matrix[active])
+def damped_steps(x: Array, gradient: Array, matrix: Array, damping: Array, low: Array, high: Array) -> Array:
+    """Return the damped steps of some problems from points x, at most ``LONGEST`` along each unknown."""
+    g, a = np.nan_to_num(gradient), np.nan_to_num(matrix)
     held = ((x <= low) & (g > 0)) | ((x >= high) & (g < 0))
     free = ~held
     g, a = np.where(free, g, 0), a * (free[:, :, None] & free[:, None, :])
     diagonal = np.einsum("pkk->pk", a)
     floor = 1e-12 * diagonal.max(axis=1, keepdims=True) + 1e-300
     eye = np.eye(x.shape[1])
-    scaled = a + eye * (damping[active][:, None] * np.maximum(diagonal, floor) + np.where(held, 1, floor))[:, None, :]
+    scaled = a + eye * (damping[:, None] * np.maximum(diagonal, floor) + np.where(held, 1, floor))[:, None, :]
     return np.clip(-np.linalg.solve(scaled, g[..., None])[..., 0], -LONGEST, LONGEST)

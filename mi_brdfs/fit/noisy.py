@@ -1,0 +1,122 @@
+"""Levenberg–Marquardt steps where residuals and derivatives are noisy, as those of renderings are.
+
+Expectations are without bias: the residuals and their derivatives come of different random numbers, and of each there
+are two, so that no product has the square of a noise in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..measure.arrays import Array
+from .rendered import Rendered
+from .solver import DAMPING, STRONGER, WEAKER, damped_steps
+
+TRIES = 4
+"""How often a step is shortened that gains nothing, before its place is looked at anew."""
+LEAST_DAMPING = 1e-4
+LEAST = 0.02
+"""The part of JᵀJ that is at least kept where all of it may be noise, in any direction."""
+SHORT = 0.02
+"""The longest step along an unknown, on its scale, after which nothing more is to be gained from a few samples."""
+PATIENCE, GAIN = 3, 0.9
+"""Nor is there after so many steps that did not lower the cost by this factor."""
+MORE = 4
+"""How many times the samples the last step takes."""
+
+
+class Look(NamedTuple):
+    """What is seen at a point: a pair of independent residuals, and JᵀJ and J."""
+
+    seeds: tuple[int, int]
+    residuals: tuple[Array, Array]
+    jacobian: Array
+    matrix: Array
+
+    @property
+    def cost(self) -> float:
+        first, second = self.residuals
+        return float(first @ second)
+
+    @property
+    def gradient(self) -> Array:
+        first, second = self.residuals
+        return np.asarray(self.jacobian.T @ (first + second) / 2)
+
+    def step(self, point: Array, damping: float, box: tuple[Array, Array]) -> Array:
+        batch = damped_steps(point[None], self.gradient[None], self.matrix[None], np.array([damping]), *box)
+        return np.asarray(np.clip(point + batch[0], *box) - point)
+
+
+def descend(
+    rendered: Rendered, point: Array, steps: int, on_step: Callable[[float], None] = lambda cost: None
+) -> tuple[Array, bool]:
+    """Return ``(point, converged)`` after at most ``steps`` steps; ``on_step`` is called with the cost before each."""
+    damping, costs = DAMPING, list[float]()
+    point = np.clip(point, *rendered.box)
+    for _ in range(steps):
+        look = _look(rendered, point)
+        on_step(look.cost)
+        costs.append(look.cost)
+        step, damping = _gaining(rendered, look, point, damping)
+        point = point + step
+        stalled = len(costs) > PATIENCE and min(costs[-PATIENCE:]) > GAIN * min(costs[:-PATIENCE])
+        if stalled or (step.any() and np.abs(step).max() < SHORT):
+            return point, True
+    return point, False
+
+
+def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
+    """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
+    are on the scales of the unknowns, NaN for those at an end of their range or without influence; noise may be common
+    to near pixels (MacKinnon and White 1985, HC2)."""
+    look = _look(rendered, point, MORE)
+    step, _ = _gaining(rendered, look, point, LEAST_DAMPING, MORE)
+    end, (low, high) = point + step, rendered.box
+    free = np.flatnonzero((end > low) & (end < high) & look.jacobian.any(axis=0))
+    sigma = np.full(len(point), np.nan)
+    if len(free):
+        mean, jacobian = sum(look.residuals) / 2 + look.jacobian @ step, look.jacobian[:, free]
+        bread = np.linalg.pinv(look.matrix[np.ix_(free, free)])
+        columns = [*(jacobian * mean[:, None]).T, ((jacobian @ bread) * jacobian).sum(axis=1)]
+        *scores, leverage = (np.bincount(rendered.blocks, column) for column in columns)
+        left = np.maximum(1 - leverage, 0.1)  # a block with weight pulls the step to itself
+        weighed = np.stack(scores) / np.sqrt(left)
+        sigma[free] = np.sqrt(np.diag(bread @ (weighed @ weighed.T) @ bread))
+    return end, sigma, look.cost
+
+
+def _gaining(rendered: Rendered, look: Look, point: Array, damping: float, factor: int = 1) -> tuple[Array, float]:
+    """Return a step that lowers the cost, or none, and the damping of the next one."""
+    for _ in range(TRIES):
+        step = look.step(point, damping, rendered.box)
+        first, second = (rendered.residuals(point + step, seed, factor) for seed in look.seeds)
+        if first @ second < look.cost:
+            return step, max(damping * WEAKER, LEAST_DAMPING)
+        damping *= STRONGER
+    return np.zeros_like(point), damping
+
+
+def _look(rendered: Rendered, point: Array, factor: int = 1) -> Look:
+    seeds = rendered.fresh(), rendered.fresh()
+    first, second = (rendered.residuals(point, seed, factor) for seed in seeds)
+    one, other = (rendered.jacobian(point, rendered.fresh(), factor) for _ in range(2))
+    return Look(seeds, (first, second), (one + other) / 2, _matrix(one, other))
+
+
+def _matrix(one: Array, other: Array) -> Array:
+    """Return JᵀJ of two noisy J, whose products have the square of no noise. Where it is much less than that of their
+    mean, or negative, it is a small part of this."""
+    cross = one.T @ other
+    cross = (cross + cross.T) / 2
+    mean = (one + other) / 2
+    whole = mean.T @ mean
+    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    lengths, axes = np.linalg.eigh(whole / np.outer(scale, scale))
+    roots = np.sqrt(np.maximum(lengths, 1e-12 * lengths.max()))
+    parts, directions = np.linalg.eigh((axes / roots).T @ (cross / np.outer(scale, scale)) @ (axes / roots))
+    kept = (axes * roots) @ directions
+    return np.asarray((kept * np.clip(parts, LEAST, 1)) @ kept.T * np.outer(scale, scale))

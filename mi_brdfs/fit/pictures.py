@@ -1,0 +1,228 @@
+"""From pictures of a scene to the parameters of its materials: :func:`images`."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..measure.arrays import Array
+from ..parameters import Rotation
+from ..parameters.messages import listed, meant
+from ..ranges import declared
+from .adam import refine_textures
+from .image_fit import ImageFit, found
+from .noisy import descend, finish
+from .observations import FitError
+from .rendered import Rendered, Slot, View
+from .unknowns import Unknown, unknown_in
+
+Picture = Any
+"""A file, a bitmap, or an array of linear values, shape (height, width, channels)."""
+SAMPLES = 1 << 18
+"""Samples of a rendering of all pictures, unless there are to be more."""
+COEFFICIENT = 1e9
+"""Above it, a depth stands for none."""
+
+
+def images(
+    scene: mi.Scene,
+    pictures: Picture | Sequence[Picture],
+    parameters: str | Sequence[str] | None = None,
+    *,
+    sensors: Sequence[int] | None = None,
+    iterations: int = 20,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> ImageFit:
+    """Fit parameters of materials to pictures of a scene whose shapes, lights and sensors are known.
+
+    The scene's own values are the start, and those found are in the scene in the end; it is as before if the fit fails
+    or is interrupted. Numbers, colours and bitmaps are sought within the ranges that the models declare, on the scales
+    that suit these: roughnesses and exponents on a logarithmic one, shares and reflectances on a logit one. A colour
+    that is given as a number stays grey, and a parameter that a model leaves out by default is fitted if it is given,
+    also as 0.
+
+    What is minimised is the mean over pixels of ((I − P) / (P̄ + m/10))², for a rendering I and a picture P with the
+    local mean P̄ over 5 x 5 pixels and the mean m of all: highlights count no more than what is around. Numbers and
+    colours are found by Levenberg–Marquardt steps, whose derivatives are images: radiative backpropagation (``prb``) in
+    forward mode. The products of residuals, and of derivatives, are those of renderings with different random numbers,
+    so that noise does not bias them. Bitmaps follow first as a whole, and then texel by texel with Adam.
+
+    Args:
+        scene: a loaded scene, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by its integrator
+            if that is a ``prb``, and else by ``prb`` of the same depth.
+        pictures: a picture, or a list of them: files, bitmaps, or arrays of linear values and shape
+            (height, width, channels) as ``mi.render`` returns them, of the size of the film. Pixels that are NaN do not
+            count. Files with 8 bits are taken as sRGB.
+        parameters: keys of ``mi.traverse(scene)``, or the beginnings of some up to a dot, as ``"ball.bsdf"`` for all
+            parameters of a BSDF, or ``"ball.bsdf.alpha"``. By default, all of the BSDFs of this package.
+        sensors: for each picture, the index of the sensor that took it; by default the first ones, in order.
+        iterations: the most steps. They end when they gain no more.
+        spp: the samples of a pixel in each rendering; by default as many as make 2^18 for all pictures.
+        seed: of the renderings' random numbers.
+        progress: called with how many of how many steps are done.
+
+    Returns:
+        The values by traverse key, their uncertainty, and the materials as plugin dicts.
+
+    Raises:
+        FitError: if nothing can be fitted, and why, in a sentence.
+    """
+    if not isinstance(scene, mi.Scene):
+        raise FitError(
+            f"A fit needs a loaded scene, not {type(scene).__name__}: mi.load_file or mi.load_dict return it."
+        )
+    if not dr.is_diff_v(mi.Float):
+        raise FitError(f"A fit needs a variant with derivatives, such as llvm_ad_rgb, not {mi.variant()}.")
+    if iterations < 1 or (spp is not None and spp < 1):
+        raise FitError("A fit needs iterations >= 1 and spp >= 1.")
+    if not scene.emitters():
+        raise FitError("The scene has no light.")
+    slots, point = _slots(mi.traverse(scene), parameters)
+    integrator = _integrator(scene.integrator())
+    views = _views(scene, integrator, pictures, sensors)
+    pixels = sum(view.picture.shape[0] * view.picture.shape[1] for view in views)
+    rendered = Rendered(scene, integrator, views, slots, spp or max(SAMPLES // pixels, 2), seed)
+    before = {slot.key: type(rendered.params[slot.key])(rendered.params[slot.key]) for slot in slots}
+    counts = [(view.sensor.sampler(), view.sensor.sampler().sample_count()) for view in views]
+    losses, done = list[float](), 0
+    textures = any(slot.is_texture for slot in slots)
+    total = iterations * (3 if textures else 1) + 1
+
+    def on_step(loss: float | None = None) -> None:
+        nonlocal done
+        done += 1
+        if loss is not None:
+            losses.append(loss)
+        if progress:
+            progress(done, total)
+
+    try:
+        point, converged = descend(rendered, point, iterations, on_step)
+        if textures:
+            point = refine_textures(rendered, point, iterations, on_step)
+            point, converged = descend(rendered, point, iterations, on_step)
+        point, sigma, loss = finish(rendered, point)
+        rendered.put(point)
+    except BaseException:
+        for key, value in before.items():
+            rendered.params[key] = value
+        rendered.params.update()
+        raise
+    finally:
+        for sampler, count in counts:
+            sampler.set_sample_count(count)
+    done = total - 1
+    on_step(loss)
+    return found(rendered, point, sigma, losses, converged)
+
+
+def _slots(params: mi.SceneParameters, wanted: str | Sequence[str] | None) -> tuple[list[Slot], Array]:
+    """Return the parameters that are sought, and the point where they are now."""
+    ours = {key: (bsdf.model, name) for key, bsdf, _, name in declared(params)
+            if name in bsdf.model.ranges or isinstance(bsdf.model.parameters.get(name), Rotation)}  # fmt: skip
+    if not ours:
+        raise FitError("The scene has no BSDF of mi_brdfs whose parameters can be fitted.")
+    words = list(ours) if wanted is None else [wanted] if isinstance(wanted, str) else list(wanted)
+    chosen: dict[str, None] = {}
+    for word in words:
+        matching = [key for key in ours if key == word or key.startswith(f"{word}.")]
+        if not matching:
+            if any(key == word or key.startswith(f"{word}.") for key in params.keys()):
+                raise FitError(f"{word} is no parameter of a BSDF of mi_brdfs; there are {listed(ours, 'and')}.")
+            near = meant(word, ours)
+            hint = f"did you mean {near}?" if near else f"there are {listed(ours, 'and')}."
+            raise FitError(f"The scene has no parameter {word}; {hint}")
+        chosen |= dict.fromkeys(matching)
+    if not chosen:
+        raise FitError("There are no parameters to fit: the list is empty.")
+    slots, starts = [], []
+    for key in chosen:
+        slot, start = _slot(key, *ours[key], params[key])
+        slots.append(slot)
+        starts.append(start)
+    return slots, np.concatenate(starts)
+
+
+def _slot(key: str, model: Any, name: str, value: Any) -> tuple[Slot, Array]:
+    if not isinstance(value, (mi.TensorXf, mi.Float, mi.Color3f)):
+        raise FitError(f"{key} has no derivatives: load the bitmap with the parameter format = variant.")
+    numbers = np.array(value, np.float64)
+    if numbers.ndim < 3:
+        numbers = numbers.ravel()
+    if name in model.ranges:
+        unknown = unknown_in(name, None, numbers.shape[-1] == 3, model.ranges[name])
+    else:
+        unknown = Unknown(name, None, False, -0.5, 0.5, "turns")
+    on_scale = unknown.to_scale(numbers)
+    if numbers.ndim == 3:
+        return Slot(key, unknown, type(value), on_scale), np.zeros(numbers.shape[-1])
+    return Slot(key, unknown, type(value), np.zeros(len(numbers))), on_scale
+
+
+def _integrator(own: mi.Integrator) -> mi.Integrator:
+    """Return a scene's own integrator if it propagates derivatives, or else one that does, of the same depth."""
+    if isinstance(own, mi.ad.integrators.common.RBIntegrator):
+        return own
+    given = {name: int(number) for name, number in re.findall(r"(max_depth|rr_depth) = (-?\d+)", str(own))}
+    if own.class_name() == "DirectIntegrator":
+        given["max_depth"] = 2
+    if given.get("max_depth", 0) > COEFFICIENT:
+        given["max_depth"] = -1
+    kind = "prbvolpath" if "Vol" in own.class_name() else "prb"
+    return mi.load_dict({"type": kind, "hide_emitters": bool(getattr(own, "hide_emitters", False)), **given})
+
+
+def _views(
+    scene: mi.Scene, integrator: mi.Integrator, pictures: Picture | Sequence[Picture], sensors: Sequence[int] | None
+) -> list[View]:
+    """Return the pictures with their sensors."""
+    given = [_pixels(it) for it in (pictures if isinstance(pictures, (list, tuple)) else [pictures])]
+    count = len(scene.sensors())
+    indices = range(len(given)) if sensors is None else list(sensors)
+    if not given:
+        raise FitError("There is no picture to fit to.")
+    if len(indices) != len(given):
+        raise FitError(f"Each picture has its sensor: there are {len(given)} pictures and {len(indices)} sensors.")
+    for index in indices:
+        if not 0 <= index < count:
+            raise FitError(f"The scene has no sensor {index} for a picture: it has {count}, counted from 0.")
+    views = []
+    for index, pixels in zip(indices, given, strict=True):
+        sensor = scene.sensors()[index]
+        own = sensor.sampler().sample_count()
+        height, width, channels = integrator.render(scene, sensor, seed=0, spp=1).shape
+        sensor.sampler().set_sample_count(own)
+        if pixels.shape[:2] != (height, width):
+            shape = f"{pixels.shape[1]} x {pixels.shape[0]}"
+            raise FitError(f"A picture has {shape} pixels, and the film of its sensor {width} x {height}.")
+        if pixels.shape[2] not in {channels, min(channels, 3)}:
+            raise FitError(f"A picture has {pixels.shape[2]} channels, and the film of its sensor {channels}.")
+        if not np.nan_to_num(pixels, posinf=0).any():
+            raise FitError("A picture is black, or has no numbers.")
+        views.append(View(sensor, pixels))
+    return views
+
+
+def _pixels(picture: Picture) -> Array:
+    """Return a picture as an array of linear values, shape (height, width, channels)."""
+    if isinstance(picture, (str, os.PathLike)):
+        if not Path(picture).is_file():
+            raise FitError(f"There is no file {picture}.")
+        picture = mi.Bitmap(str(picture))
+    if isinstance(picture, mi.Bitmap):
+        formats = mi.Bitmap.PixelFormat
+        colour = formats.Y if picture.pixel_format() in (formats.Y, formats.YA) else formats.RGB
+        picture = picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)
+    pixels = np.array(picture, np.float64)
+    if pixels.ndim not in (2, 3):
+        raise FitError(f"A picture has the shape (height, width, channels), not {pixels.shape}.")
+    return pixels if pixels.ndim == 3 else pixels[..., None]

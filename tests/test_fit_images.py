@@ -1,0 +1,236 @@
+"""Parameters from pictures: what was put in comes out, whatever the start."""
+
+import json
+import re
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mi_brdfs.fit import FitError, images
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
+SIZE = 32
+
+
+def rgb(*value):
+    return {"type": "rgb", "value": [*value]}
+
+
+def scene_of(bsdf, shape=None, size=SIZE, integrator="prb", origins=((0, 0, 5.2),), lights=None, pixel_format="rgb"):
+    """A surface under an even sky and two lamps, from some places."""
+    T = mi.ScalarTransform4f
+    sensors = {
+        f"sensor_{k}": {
+            "type": "perspective",
+            "fov": 24,
+            "to_world": T().look_at(origin=[*origin], target=[0, 0, 0], up=[0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": size, "height": size, "pixel_format": pixel_format,
+                     "rfilter": {"type": "box"}},
+        }
+        for k, origin in enumerate(origins)
+    }  # fmt: skip
+    if lights is None:
+        lights = {
+            "sky": {"type": "constant", "radiance": 0.3},
+            "key": {"type": "point", "position": [-3, 3, 4], "intensity": 30.0},
+            "rim": {"type": "point", "position": [4, 1, -1], "intensity": 20.0},
+        }
+    surface = shape or {"type": "sphere", "to_world": T().rotate([1, 0, 0], -70)}
+    return mi.load_dict(
+        {"type": "scene", "integrator": {"type": integrator, "max_depth": 2}, **sensors, **lights,
+         "ball": {**surface, "bsdf": bsdf}}
+    )  # fmt: skip
+
+
+def picture_of(scene, sensor=0, spp=1024):
+    return np.array(mi.render(scene, sensor=sensor, spp=spp, seed=1000))
+
+
+def values(found, of="ball.bsdf"):
+    """The values of a BSDF by the names of its parameters."""
+    return {key[len(of) + 1 :].rpartition(".")[0]: value for key, value in found.values.items()}
+
+
+START = {"diffuse_reflectance": rgb(0.5, 0.5, 0.5), "specular_reflectance": rgb(0.2, 0.2, 0.2)}
+HIDDEN = {"diffuse_reflectance": rgb(0.1, 0.2, 0.3), "specular_reflectance": rgb(0.5, 0.4, 0.3)}
+
+
+@pytest.mark.parametrize("start", [(0.01, 0.01), (0.3, 0.05)])
+def test_an_anisotropic_highlight(start):
+    """Adam on the parameters themselves ends at 0.01 instead of 0.05."""
+    picture = picture_of(scene_of({"type": "ward", "alpha_u": 0.05, "alpha_v": 0.3, **HIDDEN}))
+    found = images(scene_of({"type": "ward", "alpha_u": start[0], "alpha_v": start[1], **START}), picture)
+    assert found.converged and not found.bounds
+    for name, hidden in {"alpha_u": 0.05, "alpha_v": 0.3, **HIDDEN}.items():
+        value = np.array(hidden["value"] if isinstance(hidden, dict) else hidden)
+        sigma = np.array(found.sigma[f"ball.bsdf.{name}.value"])
+        assert (abs(values(found)[name] - value) < 3 * sigma).all() and (sigma < 0.12 * value + 0.01).all(), name
+    assert values(found)["alpha_u"] == pytest.approx(0.05, rel=0.05)
+    assert values(found)["alpha_v"] == pytest.approx(0.3, rel=0.05)
+
+
+MODELS = {
+    "burley": (
+        {"base_color": rgb(0.6, 0.3, 0.1), "metallic": 0.3, "specular": 0.6, "roughness": 0.3},
+        {"base_color": rgb(0.3, 0.3, 0.3), "metallic": 0.7, "specular": 0.3, "roughness": 0.8},
+    ),
+    "orennayar": ({"reflectance": rgb(0.7, 0.4, 0.2), "sigma": 0.5}, {"reflectance": rgb(0.2, 0.2, 0.2), "sigma": 0.1}),
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_models(model):
+    hidden, start = MODELS[model]
+    picture = picture_of(scene_of({"type": model, **hidden}))
+    found = images(scene_of({"type": model, **start}), picture, [f"ball.bsdf.{name}" for name in start])
+    assert {*values(found)} == {*hidden}
+    for name, value in hidden.items():
+        assert values(found)[name] == pytest.approx(value["value"] if isinstance(value, dict) else value, rel=0.06)
+
+
+def test_a_scene_and_a_material_to_go_on_with():
+    """The scene has the values, another one gets them, and so has the plugin dict with words and what was not sought;
+    the same seed gives the same result; progress ends."""
+    bsdf = {"type": "walter", "shadowing": "correlated", "f0": 0.3, "alpha": 0.2, "diffuse_reflectance": 0.3}
+    picture = picture_of(scene_of(bsdf))
+    steps = []
+
+    def once():
+        scene = scene_of(bsdf | {"alpha": 0.6, "diffuse_reflectance": 0.8}, integrator="path")
+        sought = ["ball.bsdf.alpha", "ball.bsdf.diffuse_reflectance.value"]
+        return scene, images(scene, picture, sought, seed=3, progress=lambda *done: steps.append(done))
+
+    scene, found = once()
+    assert steps[-1][0] == steps[-1][1] and sorted(steps) == steps
+    assert found.bsdfs == {
+        "ball.bsdf": {
+            "type": "walter", "shadowing": "correlated", "specular_reflectance": 1.0, "f0": pytest.approx(0.3),
+            "alpha": pytest.approx(0.2, rel=0.02), "diffuse_reflectance": pytest.approx(0.3, rel=0.02),
+        }
+    }  # fmt: skip
+    other = scene_of(bsdf)
+    found.update(other)
+    expected = np.array(mi.render(scene_of(found.bsdfs["ball.bsdf"]), spp=16))
+    for same in (scene, other):
+        np.testing.assert_allclose(mi.render(same, integrator=other.integrator(), spp=16), expected, rtol=1e-5)
+    assert json.loads(json.dumps(found.to_dict()))["values"] == found.values
+    assert once()[1].values == pytest.approx(found.values, rel=1e-3)  # but for the order of sums
+
+
+def test_the_end_of_a_range():
+    """A metal without a diffuse lobe."""
+    bsdf = {"type": "walter", "alpha": 0.2, "diffuse_reflectance": 0.0}
+    start = {"type": "walter", "alpha": 0.4, "specular_reflectance": 0.5, "diffuse_reflectance": 0.5}
+    found = images(scene_of(start), picture_of(scene_of(bsdf)))
+    assert 0 <= values(found)["diffuse_reflectance"] < 0.003
+    assert values(found)["specular_reflectance"] == pytest.approx(1, abs=0.02)
+    assert values(found)["alpha"] == pytest.approx(0.2, rel=0.02)
+
+
+def test_several_pictures():
+    """Taken from two sides, by sensors in another order; pixels without a number do not count."""
+    origins = ((0, 0, 5.2), (5.2, 0, 0))
+    hidden = scene_of({"type": "ward", "alpha": 0.15, **HIDDEN}, origins=origins)
+    pictures = [picture_of(hidden, sensor=k) for k in (1, 0)]
+    pictures[0][:, ::2] = np.nan
+    found = images(scene_of({"type": "ward", "alpha": 0.5, **START}, origins=origins), pictures, sensors=[1, 0])
+    assert values(found)["alpha"] == pytest.approx(0.15, rel=0.04)
+    assert values(found)["diffuse_reflectance"] == pytest.approx([0.1, 0.2, 0.3], abs=0.015)
+
+
+def bitmap(texels, **members):
+    return {"type": "bitmap", "bitmap": mi.Bitmap(texels), "raw": True, **members}
+
+
+def test_a_bitmap():
+    """The texels of a colour beneath a gloss, and the number of the latter."""
+    lights = {
+        "sky": {"type": "constant", "radiance": 0.5},
+        "key": {"type": "point", "position": [0, 1, 2.5], "intensity": 6.0},
+    }
+
+    def scene(**given):
+        return scene_of({"type": "walter", **given}, {"type": "rectangle"}, lights=lights, origins=[(0, -2, 4)])
+
+    texels = np.float32(np.random.default_rng(0).uniform(0.1, 0.8, (4, 4, 3)))
+    picture = picture_of(scene(alpha=0.2, specular_reflectance=0.2, diffuse_reflectance=bitmap(texels)))
+    start = bitmap(np.full((4, 4, 3), 0.3, np.float32))
+    fitted = scene(alpha=0.5, specular_reflectance=0.2, diffuse_reflectance=start)
+    found = images(fitted, picture, ["ball.bsdf.alpha", "ball.bsdf.diffuse_reflectance"], iterations=12)
+    data = values(found)["diffuse_reflectance"]
+    assert found.sigma["ball.bsdf.diffuse_reflectance.data"] is None and data.shape == (4, 4, 3)
+    assert np.sqrt(np.mean((data - texels) ** 2)) < 0.015
+    assert values(found)["alpha"] == pytest.approx(0.2, rel=0.06)
+    mi.load_dict(found.bsdfs["ball.bsdf"])
+    assert np.shape(found.to_dict()["values"]["ball.bsdf.diffuse_reflectance.data"]) == (4, 4, 3)
+
+
+# --- Wrong input ----------------------------------------------------------------------------------------------------
+
+GREY = np.full((SIZE, SIZE, 3), 0.5)
+WRONG = {
+    "nothing": ({"pictures": []}, "There is no picture to fit to."),
+    "size": ({"pictures": GREY[:20]}, "A picture has 32 x 20 pixels, and the film of its sensor 32 x 32."),
+    "channels": ({"pictures": GREY[..., :1]}, "A picture has 1 channels, and the film of its sensor 3."),
+    "shape": ({"pictures": np.ones(3)}, "A picture has the shape (height, width, channels), not (3,)."),
+    "black": ({"pictures": 0 * GREY}, "A picture is black, or has no numbers."),
+    "gaps": ({"pictures": np.nan * GREY}, "A picture is black, or has no numbers."),
+    "file": ({"pictures": "missing.exr"}, "There is no file missing.exr."),
+    "sensor": ({"sensors": [1]}, "The scene has no sensor 1 for a picture: it has 1, counted from 0."),
+    "sensors": ({"sensors": [0, 0]}, "Each picture has its sensor: there are 1 pictures and 2 sensors."),
+    "number": ({"pictures": [GREY, GREY]}, "The scene has no sensor 1 for a picture"),
+    "misspelt": ({"parameters": "ball.bsdf.alhpa"}, "no parameter ball.bsdf.alhpa; did you mean ball.bsdf.alpha"),
+    "another": ({"parameters": ["key.intensity.value"]}, "key.intensity.value is no parameter of a BSDF of mi_brdfs"),
+    "none": ({"parameters": []}, "There are no parameters to fit: the list is empty."),
+    "iterations": ({"iterations": 0}, "A fit needs iterations >= 1 and spp >= 1."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input(case):
+    given, message = WRONG[case]
+    with pytest.raises(FitError, match=re.escape(message)):
+        images(scene_of({"type": "ward"}), **({"pictures": GREY} | given))
+
+
+def test_scenes_without_an_answer():
+    lamp = {"key": {"type": "point", "position": [-3, 3, 4], "intensity": 30.0}}
+    behind = {"key": {"type": "directional", "direction": [0, 0, 1]}}
+    plane = {"type": "rectangle"}
+    for message, scene in {
+        "A fit needs a loaded scene, not dict": {},
+        "The scene has no light.": scene_of({"type": "ward"}, lights={}),
+        "no BSDF of mi_brdfs whose parameters can be fitted": scene_of({"type": "diffuse"}),
+        "ball.bsdf changes nothing in the pictures": scene_of({"type": "ward"}, plane, lights=behind),
+        "diffuse_reflectance.data has no derivatives": scene_of(
+            {"type": "ward", "diffuse_reflectance": bitmap(np.full((2, 2, 3), 99, np.uint8))}, lights=lamp
+        ),
+    }.items():
+        with pytest.raises(FitError, match=message):
+            images(scene, GREY)
+    with mi.variant_context("scalar_rgb"), pytest.raises(FitError, match="such as llvm_ad_rgb, not scalar_rgb"):
+        images(scene_of({"type": "ward"}, integrator="path"), GREY)
+
+
+def test_an_interrupt_leaves_the_scene_as_it_was():
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    scene = scene_of({"type": "ward", "alpha": 0.3})
+    with pytest.raises(KeyboardInterrupt):
+        images(scene, GREY, progress=stop)
+    assert mi.traverse(scene)["ball.bsdf.alpha.value"][0] == pytest.approx(0.3)
+    assert scene.sensors()[0].sampler().sample_count() == 4
+
+
+def test_files(tmp_path):
+    """Linear values from an EXR, and those behind sRGB from a PNG."""
+    bsdf = {"type": "lambert", "reflectance": rgb(0.6, 0.3, 0.1)}
+    bitmap = mi.Bitmap(picture_of(scene_of(bsdf)).astype(np.float32))
+    bitmap.write(str(tmp_path / "picture.exr"))
+    mi.util.write_bitmap(str(tmp_path / "picture.png"), bitmap)
+    for name, precision in {"picture.exr": 0.01, "picture.png": 0.02}.items():
+        found = images(scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}), tmp_path / name)
+        assert values(found)["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=precision)
