@@ -88,7 +88,8 @@ class SmoothLobe(Lobe):
 
     On the unit disc of projected directions x, f cosθ_o dω = f dx: the cosine cancels, and S depends on d² only. Draw
     the azimuth of a chord through -wi_xy, d² from the power law up to the disc's edge, at the same fraction of the mass
-    on both sides, and one of the two points with probability ∝ mass times F.
+    on both sides, and one of the two points with probability ∝ mass times F. A dielectric of nearly the same index on
+    both sides has a share of forward directions besides (:mod:`mi_brdfs.microfacet.forward`).
     """
 
     def __init__(self, reflectance, law, fresnel):
