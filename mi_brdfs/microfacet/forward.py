@@ -124,15 +124,15 @@ class WithForwardShare(Sampler):
             u2, v2 = dr.square(distribution.alpha_u), dr.square(distribution.alpha_v)
             along = u2 * x * x + v2 * y * y
             slope2 = distribution.inverse_cdf(0.75, 0.25, 1 / along)
-            slopes2 = u2 * (slope2 / along), v2 * (slope2 / along)
+            directions = ForwardDirections(fresnel, wi, u2 * (slope2 / along), v2 * (slope2 / along))
         else:
             slope2 = distribution.inverse_cdf(0.75, 0.25, 1 / dr.square(distribution.alpha_u))
-            slopes2 = (slope2,)
+            directions = ForwardDirections(fresnel, wi, slope2)
         z2 = dr.square(lowest_cosine(wi))
         cos2 = z2 + slope2 / (1 + slope2)
         low = z2 / cos2
         share = ForwardShare.of(fresnel, wi, dr.sqrt(low) * (1 - low), cos2)
-        return share, ForwardDirections(fresnel, wi, *slopes2)
+        return share, directions
 
     def forward_reflectance(self, lobe: FacetLobe, wi: mi.Vector3f) -> Any:
         return self._forward(lobe, wi)[0].reflectance
