@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import context, interaction, numbers
+from support import context, direction, interaction, numbers
 from test_fuzz import CASES, FuzzedPlugin, directions, magnitudes
 
 from mi_brdfs.math import luminance
@@ -75,6 +75,48 @@ def test_weights(model, options):
             at = {name: value[..., k].tolist() for name, value in settings.items()}
             assert not wrong[k], f"{figure[k]:.3g} of part {part} at {np.degrees(theta[k]):.1f}°, wi {wi[k]}: {at}"
         assert (eta < SELDOM_BELOW).mean() <= SELDOM, f"part {part}: {np.sort(eta)[:5]}"
+
+
+def rgb(*value):
+    return {"type": "rgb", "value": value}
+
+
+def kit(distribution, shadowing, **given):
+    return {"type": "microfacet", "distribution": distribution, "shadowing": shadowing, **given}
+
+
+HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
+    (88.2, 150.9, None, kit("ggx", "smith", alpha_u=1.353, alpha_v=0.01734, int_ior=0.01245, ext_ior=0.01246)),
+    (86.3, 102.2, None, kit("beckmann", "vcavity", alpha_u=0.00273, alpha_v=1.101, int_ior=69.47, ext_ior=69.54)),
+    (87.0, 55.9, None, kit("epd", "ashikhmin-shirley", alpha=0.4619, gamma=0.1922, int_ior=3.6, ext_ior=3.785)),
+    (85.6, 19.6, None, {"type": "walter", "alpha_u": 0.00585, "alpha_v": 0.177, "int_ior": 1.333, "ext_ior": 1.3364,
+                        "shadowing": "correlated", "diffuse_reflectance": 0.3, "specular_reflectance": 0.6}),
+    (85.1, 105.6, None, {"type": "cooktorrance", "distribution": "blinn", "normalization": "tog82", "alpha": 0.9286,
+                         "int_ior": 1.333, "ext_ior": 1.3476, "diffuse_reflectance": 0.5,
+                         "specular_reflectance": 0.8}),
+    (85.6, 84.2, 1, {"type": "low", "variant": "smooth", "diffuse_reflectance": 0.7, "b": 2.197, "c": 0.2993,
+                     "int_ior": 1.045}),
+    (84.6, -169.5, None, kit("ggx", "smith-correlated", alpha=1.132, eta=rgb(2.26, 0.04876, 7.943),
+                             k=rgb(0.08227, 0.07313, 0.0485))),
+    (84.0, 17.7, None, kit("ggx", "schlick", alpha_u=0.1657, alpha_v=0.002473, eta=rgb(0.01801, 1.335, 0.01596),
+                           k=rgb(0.003775, 0.01671, 0.002307))),
+    (88.5, 147.0, None, kit("gtr", "ashikhmin-premoze", alpha=0.0885, gamma=2.194, eta=rgb(0.08868, 0.2391, 10.9),
+                            k=rgb(0.00279, 0.002173, 0.005052))),
+    (87.6, 177.5, None, kit("ggx", "ashikhmin-premoze", alpha=0.02423, eta=rgb(0.01313, 0.01666, 23.02),
+                            k=rgb(0.1534, 0.001129, 0.5858))),
+    (88.9, 90.0, 1, {"type": "blinnphong", "normalization": "original", "exponent": 0.00319,
+                     "diffuse_reflectance": 0.5}),
+]  # fmt: skip
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("theta, phi, part, given", HEAVY)
+def test_heaviest_weights(theta, phi, part, given):
+    u, x, y = lattice(10, 1).T
+    si = interaction(np.tile(direction(theta, phi), (len(u), 1)))
+    sampled = mi.load_dict(given).sample(context(part), si, mi.Float(u), mi.Point2f(x, y), True)
+    weights = numbers(luminance(sampled[1]))
+    assert weights.max() <= LARGEST_WEIGHT * weights.mean()
 
 
 @pytest.fixture(autouse=True)

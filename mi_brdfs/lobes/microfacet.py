@@ -72,7 +72,9 @@ class MicrofacetLobe(Lobe):
             nearer = self.NEARER
         nearer = nearer * versine * safe_sqrt(versine * slope2)
         # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
-        return self.reflectance * (self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9)) * seen)
+        fresnel = self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9))
+        fresnel += self.sampler.forward_reflectance(self, wi)
+        return self.reflectance * (fresnel * seen)
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         facet = Facet.between(wi, wo)

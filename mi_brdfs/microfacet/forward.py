@@ -2,50 +2,140 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, choose, normalize_or, safe_sqrt, select
+from ..math import EPSILON, SMALL, choose, normalize_or, safe_sqrt, select, sin_theta
 from .facet import Facet
+from .fresnel import Dielectric
 from .sampling import FacetLobe, Sampler
 
 
-class WithForwardShare(Sampler):
-    """Another sampler for a dielectric, with a share of directions about the horizon opposite to ``wi``: there a
-    dielectric of nearly the same index on both sides reflects by far the most.
+class ForwardDirections:
+    """Directions about the horizon opposite to ``wi``, where a dielectric of nearly the same index on both sides
+    reflects by far the most.
 
-    Where both directions are low, cosθ_d² is about ((z + z')² + δ²)/4, with their cosines z and z' and the azimuth δ
-    from the plane of incidence. z' has the density ∝ z'/(z + z')³, and t = tan(δ/2) ∝ (w² + t²)^(-3/2), with w =
-    (z + z')/2.
+    Where both directions are low, with the cosines z and z' and the azimuth δ from the plane of incidence, cosθ_d² is
+    about ((z + z')² + δ²)/4. z' has the density ∝ z'/(z + z')³. tan(δ/2) has one ∝ (σ² + (tan(δ/2) - m)²)^(-3/2): m is
+    where the half vector lies on the ridge of anisotropic facets, and σ is (z + z')/2, limited by how far the facets
+    reach across. Where the indices differ more, up to total reflection at cosθ_d = √|η² - 1|, z is larger in σ.
     """
 
-    INDISTINCT = 0.008
-    """The reflectance at normal incidence, that of η = 1.2, below which dielectrics need it."""
-    LARGEST = 0.8
-    """The share where it needs it most. tests/calibration/forward.py fits both."""
+    BROADER = 2
+    """How much |η² - 1| adds to z²."""
+
+    def __init__(
+        self, fresnel: Dielectric, wi: mi.Vector3f, slope2: mi.Float = 1e6, slope2_v: mi.Float | None = None
+    ) -> None:
+        """For facets of some mean square slope, along u if another one along v is given."""
+        self.z, self.sin = lowest_cosine(wi), sin_theta(wi)
+        self.broader = dr.sqrt(self.z * self.z + self.BROADER * abs(dr.square(fresnel.eta) - 1))
+        self.x, self.y = x, y = normalize_or(wi.x, wi.y, (1, 0))
+        self.across, self.ridge = dr.rcp(slope2), None
+        if slope2_v is not None:
+            u, v = self.across, dr.rcp(slope2_v)
+            self.across = x * x * v + y * y * u
+            self.ridge = x * y * (u - v) / (1 + self.across)
+
+    def _azimuth(self, z: mi.Float, sin: mi.Float) -> tuple[Any, mi.Float]:
+        """Return ``(m, σ)`` of a z' = cosθ_o."""
+        narrow, broad = 0.5 * (self.z + z), 0.5 * (self.broader + z)
+        sigma = dr.rsqrt(self.across / dr.square(narrow) + 1 / dr.square(broad))
+        if self.ridge is None:
+            return 0, sigma
+        difference = z * z - self.z * self.z
+        root = safe_sqrt(sin * sin - dr.square(self.ridge) * difference)
+        return self.ridge * difference / ((self.sin + sin) * dr.maximum(sin + root, SMALL)), sigma
+
+    def draw(self, v: mi.Point2f) -> mi.Vector3f:
+        ratio = dr.sqrt(v.x) / (1 + self.z)  # z'/(z + z')
+        z = self.z * ratio / (1 - ratio)
+        sin = safe_sqrt(1 - z * z)
+        m, sigma = self._azimuth(z, sin)
+        uniform = 2 * v.y - 1
+        tan = m + sigma * uniform / dr.maximum(safe_sqrt(1 - uniform * uniform), SMALL)
+        scale = dr.rcp(1 + tan * tan)
+        sin_delta, cos_delta = 2 * tan * scale, (1 - tan * tan) * scale
+        x, y = -cos_delta * self.x - sin_delta * self.y, sin_delta * self.x - cos_delta * self.y
+        return mi.Vector3f(sin * x, sin * y, z)
+
+    def pdf(self, wo: mi.Vector3f) -> mi.Float:
+        """Return the density per solid angle."""
+        z = dr.maximum(wo.z, 0)
+        x, y = normalize_or(wo.x, wo.y, (1, 0))
+        m, sigma = self._azimuth(z, safe_sqrt(1 - z * z))
+        tan = (self.x * y - self.y * x) / dr.maximum(1 - (self.x * x + self.y * y), SMALL)
+        inverse = dr.rsqrt(1 + dr.square((tan - m) / sigma))
+        scale = dr.rcp(self.z + z)
+        return (
+            0.5 * dr.square((1 + self.z) * scale) * (self.z * scale) * z
+            * (1 + tan * tan) / sigma * inverse * dr.square(inverse)
+        )  # fmt: skip
+
+
+class ForwardShare(NamedTuple):
+    """How much of a lobe lies about the horizon opposite to ``wi``."""
+
+    reflectance: Any
+    """What that adds to the mean reflectance of other directions."""
+    probability: mi.Float
+    """Of samples drawn there."""
+
+    @classmethod
+    def of(cls, fresnel: Dielectric, wi: mi.Vector3f, fraction: mi.Float, typical: mi.Float) -> ForwardShare:
+        """For what ``fraction`` the lobe would have there if it reflected everything, and the square of the cosθ_d that
+        is typical of the rest."""
+        step2 = dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) * dr.select(fresnel.eta < 1, TOTAL, 1)
+        distinct = dr.square(dr.square(dr.square(step2 / INDISTINCT)))
+        forward = fraction * fresnel(LOWEST * lowest_cosine(wi)) / (1 + distinct)
+        rest = dr.maximum(fresnel(dr.minimum(dr.sqrt(typical), 1)), EPSILON)
+        return cls(forward, LARGEST * forward / (forward + rest))
+
+
+INDISTINCT = 0.016
+"""The reflectance at normal incidence below which dielectrics need a share of forward directions,"""
+TOTAL = 0.33
+"""to which it counts by this factor if they reflect totally."""
+LARGEST = 0.8
+"""The share where they need it most."""
+LOWEST = 0.8
+"""The cosθ_d of these directions, relative to cosθ_i."""
+
+
+def lowest_cosine(wi: mi.Vector3f) -> mi.Float:
+    """Return the z of above, not too small for what divides by it."""
+    return dr.maximum(wi.z, 1e-3)
+
+
+class WithForwardShare(Sampler):
+    """Another sampler for a dielectric, with a share of :class:`ForwardDirections`."""
 
     def __init__(self, sampler: Sampler) -> None:
         self.sampler = sampler
 
-    def _share(self, lobe: FacetLobe, wi: mi.Vector3f) -> mi.Float:
-        distribution, z = lobe.distribution, self._cosine(wi)
+    def _forward(self, lobe: FacetLobe, wi: mi.Vector3f) -> tuple[ForwardShare, ForwardDirections]:
+        distribution = lobe.distribution
         fresnel: Any = lobe.fresnel  # a Dielectric
-        # From a facet in the plane of incidence that is steeper than three of four.
-        x, y = normalize_or(wi.x, wi.y, (1, 0))
-        g = dr.square(x / distribution.alpha_u) + dr.square(y / distribution.alpha_v)
-        slope2 = distribution.inverse_cdf(0.75, 0.25, g)
-        cos2 = z * z + slope2 / (1 + slope2)
-        low = z * z / cos2
-        brighter = low * (1 - low) * fresnel(z) / dr.maximum(fresnel(dr.minimum(dr.sqrt(cos2), 1)), EPSILON)
-        distinct = dr.square(dr.square(dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) / self.INDISTINCT))
-        return self.LARGEST * brighter / ((1 + brighter) * (1 + distinct))
+        # Three of four facets are less steep than that along wi.
+        if distribution.anisotropic:
+            x, y = normalize_or(wi.x, wi.y, (1, 0))
+            u2, v2 = dr.square(distribution.alpha_u), dr.square(distribution.alpha_v)
+            along = u2 * x * x + v2 * y * y
+            slope2 = distribution.inverse_cdf(0.75, 0.25, 1 / along)
+            directions = ForwardDirections(fresnel, wi, u2 * (slope2 / along), v2 * (slope2 / along))
+        else:
+            slope2 = distribution.inverse_cdf(0.75, 0.25, 1 / dr.square(distribution.alpha_u))
+            directions = ForwardDirections(fresnel, wi, slope2)
+        z2 = dr.square(lowest_cosine(wi))
+        cos2 = z2 + slope2 / (1 + slope2)
+        low = z2 / cos2
+        share = ForwardShare.of(fresnel, wi, dr.sqrt(low) * (1 - low), cos2)
+        return share, directions
 
-    @staticmethod
-    def _cosine(wi: mi.Vector3f) -> mi.Float:
-        """The z of above, not too small for what divides by it."""
-        return dr.maximum(wi.z, 1e-3)
+    def forward_reflectance(self, lobe: FacetLobe, wi: mi.Vector3f) -> Any:
+        return self._forward(lobe, wi)[0].reflectance
 
     def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.complete(lobe, wi, u, v, True, None)[0].wo
@@ -53,36 +143,14 @@ class WithForwardShare(Sampler):
     def complete(
         self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, given: Facet | None
     ) -> tuple[Facet, mi.Float]:
-        share = self._share(lobe, wi)
-        forward, u = choose(u, share)
-        wo = self._draw(wi, v)
+        share, directions = self._forward(lobe, wi)
+        forward, u = choose(u, share.probability)
+        wo = directions.draw(v)
         if given is not None:
             wo = select(drawn, wo, given.wo)
         facet, pdf = self.sampler.complete(lobe, wi, u, v, select(forward, False, drawn), Facet.between(wi, wo))
-        return facet, self._mixed(facet, pdf, share)
-
-    def _draw(self, wi: mi.Vector3f, v: mi.Point2f) -> mi.Vector3f:
-        z = self._cosine(wi)
-        ratio = dr.sqrt(v.x) / (1 + z)  # z'/(z + z')
-        cos = z * ratio / (1 - ratio)
-        uniform = 2 * v.y - 1
-        sin_half, cos_half = normalize_or(0.5 * (z + cos) * uniform, safe_sqrt(1 - uniform * uniform), (0, 1))  # of δ/2
-        sin_delta, cos_delta = 2 * sin_half * cos_half, (cos_half - sin_half) * (cos_half + sin_half)
-        x, y = normalize_or(-wi.x, -wi.y, (1, 0))
-        sin = safe_sqrt(1 - cos * cos)
-        return mi.Vector3f(sin * (x * cos_delta - y * sin_delta), sin * (y * cos_delta + x * sin_delta), cos)
+        return facet, dr.lerp(pdf, directions.pdf(facet.wo), share.probability)
 
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
-        return self._mixed(facet, self.sampler.pdf(lobe, facet), self._share(lobe, facet.wi))
-
-    def _mixed(self, facet: Facet, pdf: mi.Float, share: mi.Float) -> mi.Float:
-        """The density, where ``pdf`` is that of the other sampler."""
-        wi, wo, z, cos = facet.wi, facet.wo, self._cosine(facet.wi), dr.maximum(facet.cos_o, 0)
-        x_i, y_i = normalize_or(-wi.x, -wi.y, (1, 0))
-        x_o, y_o = normalize_or(wo.x, wo.y, (1, 0))
-        sin2_half = 0.25 * (dr.square(x_o - x_i) + dr.square(y_o - y_i))
-        width2, scale = 0.25 * dr.square(z + cos), 1 / (z + cos)
-        inverse = dr.rsqrt(dr.lerp(width2, 1, sin2_half))
-        azimuth = 0.25 * width2 * safe_sqrt(1 - sin2_half) * inverse * dr.square(inverse)
-        forward = 2 * (z * scale) * (cos * scale) * dr.square(1 + z) * scale * azimuth
-        return dr.lerp(pdf, forward, share)
+        share, directions = self._forward(lobe, facet.wi)
+        return dr.lerp(self.sampler.pdf(lobe, facet), directions.pdf(facet.wo), share.probability)

@@ -88,4 +88,7 @@ class Conductor(Fresnel):
         return 0.5 * s * (1 + p)
 
     def brightness(self, cos: mi.Float) -> mi.Float:
-        return Conductor(luminance(self.eta), luminance(self.k))(cos)
+        # Of channels that differ much the mean index may reflect next to nothing where they do.
+        k2 = dr.square(self.k)
+        normal = (dr.square(self.eta - 1) + k2) / (dr.square(self.eta + 1) + k2)
+        return dr.maximum(Conductor(luminance(self.eta), luminance(self.k))(cos), 0.5 * luminance(normal))

@@ -39,6 +39,10 @@ class Sampler:
         """The density per solid angle with which it draws ``facet.wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define pdf.")
 
+    def forward_reflectance(self, lobe: FacetLobe, wi: mi.Vector3f) -> Any:
+        """What a share of forward directions adds to the mean reflectance of the lobe's other ones."""
+        return 0
+
     def complete(
         self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, given: Facet | None
     ) -> tuple[Facet, mi.Float]:
@@ -219,7 +223,10 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
     STEEP = 0.65
-    """How many of the steep facets δ counts: those whose slope is at least a half."""
+    """How many of the steep facets δ counts: those whose slope is at least a half. Twice as many where both the
+    distribution and the shadowing term favour them: some would weigh too much."""
+    LARGEST = 0.5
+    """The largest δ, for the reason of :attr:`AntitheticSteepNormals.LARGEST`."""
     STEEP_IMPLICIT = 0.7
     """The largest δ under the implicit term."""
 
@@ -238,12 +245,12 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         if not self.steep:
             return x, y, leaning, 0
         steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
-        steep *= self.STEEP
+        steep *= self.STEEP * (2 if distribution.long_tailed and lobe.shadowing.favours_steep else 1)
         if isinstance(lobe.shadowing, Implicit):
             # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
             steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), EPSILON))
         else:
-            steep = steep / (steep + dr.sqrt(seen + cos2))
+            steep = dr.minimum(steep / (steep + dr.sqrt(seen + cos2)), self.LARGEST)
         return x, y, leaning + (1 - leaning) * steep, steep
 
     def _azimuth(

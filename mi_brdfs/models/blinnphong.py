@@ -85,6 +85,7 @@ class ResponseShadowing(Shadowing):
     """The shadowing term for which f cosθ_o is D/4."""
 
     lean = 0.7
+    favours_steep = True
     reciprocal = False
 
     def __call__(self, facet):

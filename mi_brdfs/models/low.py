@@ -2,7 +2,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
-from ..math import EPSILON, SMALL, clamp, luminance, normalize_or, safe_sqrt
+from ..math import EPSILON, SMALL, choose, clamp, luminance, normalize_or, safe_sqrt
+from ..microfacet.forward import ForwardDirections, ForwardShare, lowest_cosine
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
@@ -87,14 +88,23 @@ class SmoothLobe(Lobe):
 
     On the unit disc of projected directions x, f cosθ_o dω = f dx: the cosine cancels, and S depends on d² only. Draw
     the azimuth of a chord through -wi_xy, d² from the power law up to the disc's edge, at the same fraction of the mass
-    on both sides, and one of the two points with probability ∝ mass times F.
+    on both sides, and one of the two points with probability ∝ mass times F. A dielectric of nearly the same index on
+    both sides has a share of forward directions besides (:mod:`mi_brdfs.microfacet.forward`).
     """
 
     def __init__(self, reflectance, law, fresnel):
         self.reflectance, self.law, self.fresnel = reflectance, law, fresnel
 
     def estimated_albedo(self, wi):
-        return self.reflectance * (self.fresnel(wi.z) * self.law.norm * dr.pi)
+        return self.reflectance * ((self.fresnel(wi.z) + self._forward(wi).reflectance) * self.law.norm * dr.pi)
+
+    def _forward(self, wi):
+        """Return how much lies about the horizon opposite to ``wi``."""
+        d = dr.sqrt(self.law.inverse(0.75 * self.law.norm))
+        z2 = dr.square(lowest_cosine(wi)) + 0.3 * abs(dr.square(self.fresnel.eta) - 1)
+        cos2 = z2 + d * (1 - 0.25 * d)
+        low = z2 / cos2
+        return ForwardShare.of(self.fresnel, wi, low * dr.sqrt(low) * (1 - low), cos2)
 
     def mirror_reflectance(self, wi):
         return self.reflectance * self.fresnel(wi.z)
@@ -130,11 +140,15 @@ class SmoothLobe(Lobe):
         mass = self._mass(wi, x, y)
         _, other = self._end(wi, -x, -y, clamp(self.law.mass(d2) / mass, 0, 1))
         own = self._brightness(wi, wo.x, wo.y)
-        return self.reflectance * value, 2 * dr.inv_pi * own * shape / (mass * own + other)
+        pdf = 2 * dr.inv_pi * own * shape / (mass * own + other)
+        forward = ForwardDirections(self.fresnel, wi).pdf(wo)
+        return self.reflectance * value, dr.lerp(pdf, forward, self._forward(wi).probability)
 
     def sample(self, wi, u, v):
+        is_forward, u = choose(u, self._forward(wi).probability)
         y, x = dr.sincos(dr.two_pi * v.x)
         (first, weight), (second, other) = self._end(wi, x, y, v.y), self._end(wi, -x, -y, v.y)
         take_first = u * (weight + other) < weight
         px, py = (dr.select(take_first, a, b) for a, b in zip(first, second, strict=True))
-        return mi.Vector3f(px, py, safe_sqrt(1 - px * px - py * py))
+        wo = mi.Vector3f(px, py, safe_sqrt(1 - px * px - py * py))
+        return dr.select(is_forward, ForwardDirections(self.fresnel, wi).draw(v), wo)

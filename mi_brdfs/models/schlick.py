@@ -107,6 +107,7 @@ class Unshadowed(Shadowing):
     """G = 1."""
 
     lean = 0.7
+    favours_steep = True
 
     def __call__(self, facet):
         return 1.0

@@ -11,8 +11,8 @@ from itertools import product
 from harness import Fit, attributes, main, number, variance_loss
 
 from mi_brdfs.lobes import MicrofacetLobe
+from mi_brdfs.microfacet import forward
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
-from mi_brdfs.microfacet.forward import WithForwardShare
 from mi_brdfs.microfacet.fresnel import Dielectric
 from mi_brdfs.microfacet.shadowing import VCavity
 
@@ -33,8 +33,8 @@ def fits() -> Iterator[Fit]:
             ANGLES,
         )
 
-    yield attributes(WithForwardShare, "INDISTINCT", of_indices(1.1, 1.2, 1.3, 1.5))
-    yield attributes(WithForwardShare, "LARGEST", of_indices(1.01, 1.05, 1.1, 1.2))
+    yield attributes(forward, "INDISTINCT", of_indices(1.1, 1.2, 1.3, 1.5))
+    yield attributes(forward, "LARGEST", of_indices(1.01, 1.05, 1.1, 1.2))
 
 
 if __name__ == "__main__":
