@@ -213,11 +213,11 @@ class EPD(Isotropic):
 
     long_tailed = True
     # tests/calibration/epd.py fits these.
-    FAR, GROWTH = 1.65, 1.96
-    """How far the law reaches, in medians, and the ratio of neighbouring slopes at which D is evaluated."""
-    STEPS = (-7, 0, 1, 2, 3, 4, 10)
-    """By which powers of that ratio those differ from how far the law reaches. The last is for the end of the last
-    ramp: D is nothing at infinity."""
+    FAR, GROWTH = 1.7, 1.38
+    """How far the law reaches, in medians, and by which ratio, to the power of each of"""
+    STEPS = (-14, 0, 2, 5, 6, 8, 20)
+    """these, the slopes at which D is evaluated differ from that. The last is for the end of the last ramp: D is
+    nothing at infinity."""
 
     def __init__(self, alpha: mi.Float, gamma: mi.Float) -> None:
         super().__init__()

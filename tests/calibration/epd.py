@@ -1,5 +1,5 @@
-"""The exponential power distribution: how far the law that it is drawn from reaches, and at which slopes D is evaluated,
-for the least mean relative variance of half vectors.
+"""The exponential power distribution: how far the law that it is drawn from reaches, and at which slopes D is
+evaluated, for the least mean relative variance of half vectors.
 
     python tests/calibration/epd.py [--check]
 """
