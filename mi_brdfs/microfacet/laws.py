@@ -65,7 +65,7 @@ class BentLaw:
 
     def cdf(self, m: mi.Float, s: mi.Float) -> tuple[mi.Float, mi.Float]:
         """``(c, 1 - c)``, where c is the mass above s."""
-        mass = self._at(dr.select(self.rises, m, s))[-1] / self.norm
+        mass = dr.minimum(self._at(dr.select(self.rises, m, s))[-1] / self.norm, 1)  # rounded, it may be more
         return dr.select(self.rises, mass, 1 - mass), dr.select(self.rises, 1 - mass, mass)
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float) -> mi.Float:
