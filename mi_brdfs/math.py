@@ -9,6 +9,7 @@ no divisor falls below one of three values, chosen so that a power of it is stil
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any
 
 import drjit as dr
@@ -77,40 +78,51 @@ def log1p(x: Any) -> Any:
     """Return log(1 + x), accurate to a few ulp for x > -1, and -inf at x = -1."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
-    return dr.select(small, near * _log1p_series(near), dr.log(1 + far))
+    return dr.select(small, near * log1p_series(near), dr.log(1 + far))
 
 
 def expm1(x: Any) -> Any:
     """Return exp(x) - 1, accurate to a few ulp."""
     small = abs(x) < 0.5
     near = dr.select(small, x, 0)
-    return dr.select(small, near * _expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
+    return dr.select(small, near * expm1_series(near), dr.exp(dr.select(small, 0, x)) - 1)
 
 
 def log1p_ratio(x: Any) -> Any:
     """Return log(1 + x)/x, and its limit 1 at x = 0."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
-    return dr.select(small, _log1p_series(near), dr.log(1 + far) / far)
+    return dr.select(small, log1p_series(near), dr.log(1 + far) / far)
 
 
 def expm1_ratio(x: Any, shift: Any = 0, scale: Any = 1) -> Any:
     """Return (exp(x) - 1)/x, and its limit 1 at x = 0, times ``scale`` = exp(-``shift``)."""
     small = abs(x) < 0.5
     near, far = dr.select(small, x, 0), dr.select(small, 1, x)
-    return dr.select(small, _expm1_series(near) * scale, (dr.exp(far - shift) - scale) / far)
+    return dr.select(small, expm1_series(near) * scale, (dr.exp(far - shift) - scale) / far)
 
 
-def _log1p_series(x: Any) -> Any:
+def log1p_series(x: Any) -> Any:
     """Return log(1 + x)/x for |x| <= 0.5: log(1 + x) = 2 atanh(y) with |y| <= 1/3, so the next term is below 1e-8."""
     half = 1 / (2 + x)
     y2 = dr.square(x * half)
     return 2 * half * (1 + y2 * (1 / 3 + y2 * (1 / 5 + y2 * (1 / 7 + y2 * (1 / 9 + y2 * (1 / 11 + y2 / 13))))))
 
 
-def _expm1_series(x: Any) -> Any:
+def expm1_series(x: Any) -> Any:
     """Return (exp(x) - 1)/x for |x| <= 0.5; the next term is below 1e-8."""
     return 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8))))))
+
+
+def reciprocal_gamma(x: Any) -> Any:
+    """Return 1/Γ(x) for x >= 1, accurate to a few ulp of log Γ(x): Γ(x + 3)/(x (x + 1)(x + 2)), and of that Stirling's
+    series, whose next term is below 1e-7."""
+    y = x + 3
+    inverse = 1 / y
+    inverse2 = dr.square(inverse)
+    series = inverse * (1 / 12 - inverse2 * (1 / 360 - inverse2 / 1260))
+    log_gamma = (y - 0.5) * dr.log(y) - y + 0.5 * math.log(2 * math.pi) + series
+    return x * (x + 1) * (x + 2) * dr.exp(-log_gamma)
 
 
 def safe_sqrt(x: Any) -> Any:

@@ -59,3 +59,10 @@ def mostly_slow(names):
     names = list(names)
     first = first_of_each(names).values()
     return [pytest.param(name, id=str(name), marks=[] if name in first else pytest.mark.slow) for name in names]
+
+
+OTHER_VARIANTS = [
+    pytest.param(name, marks=pytest.mark.slow)
+    for name in ("llvm_ad_spectral", "llvm_ad_mono_polarized", "scalar_rgb", "scalar_spectral")
+]
+"""One of each kind, except the one that users have most."""

@@ -1,12 +1,16 @@
 import signal
 
 import pytest
+from catalogue import OTHER_VARIANTS
 
 from mi_brdfs.mitsuba.registry import MODELS
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
-mi.set_variant("scalar_rgb")  # variant_context needs one to return to
+ELSE = "scalar_rgb"
+"""The variant of tests that ask for none."""
+
+mi.set_variant(ELSE)
 
 
 def pytest_addoption(parser):
@@ -23,8 +27,7 @@ def derivative_lanes(request):
 @pytest.fixture
 def llvm_rgb():
     """The variant that most tests run in."""
-    with mi.variant_context("llvm_ad_rgb"):
-        yield
+    mi.set_variant("llvm_ad_rgb")
 
 
 @pytest.fixture
@@ -36,14 +39,27 @@ def as_before():
     MODELS.update(models)
 
 
-OTHERS = ("llvm_ad_spectral", "llvm_ad_mono_polarized", "scalar_rgb", "scalar_spectral")
+@pytest.fixture(scope="module", params=["llvm_ad_rgb", *OTHER_VARIANTS])
+def variant_name(request):
+    """Of a module, so that its tests run variant by variant."""
+    return request.param
 
 
-@pytest.fixture(params=["llvm_ad_rgb", *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)])
-def variant(request):
+@pytest.fixture
+def variant(variant_name):
     """Each kind of variant in turn; the one that users have most by default."""
-    with mi.variant_context(request.param):
-        yield request.param
+    mi.set_variant(variant_name)
+    return variant_name
+
+
+IN_VARIANTS = {"llvm_rgb", "variant_name"}
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item, nextitem):
+    """Stay in a variant while the next test asks for one, too: changing to one of LLVM's takes as long as a test."""
+    if IN_VARIANTS & set(item.fixturenames) and not IN_VARIANTS & set(getattr(nextitem, "fixturenames", ())):
+        mi.set_variant(ELSE)
 
 
 @pytest.fixture

@@ -33,13 +33,6 @@ CASES = [
 ]
 
 
-@pytest.fixture(scope="module")
-def llvm_rgb():
-    """One for all tests, as it takes a tenth of a second to enter a variant."""
-    with mi.variant_context("llvm_ad_rgb"):
-        yield
-
-
 @pytest.fixture(autouse=True)
 def no_lanes_left():
     """Every BSDF that lives is part of the kernels of its variant, and arrays of many lanes can be in none."""

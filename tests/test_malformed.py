@@ -27,13 +27,6 @@ from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
 MODELS = pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 
 
-@pytest.fixture(scope="module")
-def llvm_rgb():
-    """One for all tests: it takes longer to enter a variant than to load a plugin."""
-    with mi.variant_context("llvm_ad_rgb"):
-        yield
-
-
 def refusal(load, *arguments):
     """The error of loading something, as a user sees it: in one line that a terminal shows as it is."""
     with pytest.raises(RuntimeError) as caught:

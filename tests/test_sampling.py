@@ -6,10 +6,14 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import ROWS, mostly_slow
+from catalogue import OTHER_VARIANTS, ROWS, mostly_slow
 from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 from support import call, direction, hemisphere, interaction, is_scalar
 
+from mi_brdfs.validation import check
+
+EXACT = "finite", "horizon", "support", "eval_pdf", "reciprocity", "weight", "components", "flags", "active", "mode"
+"""Checks of the public checker."""
 ANGLES = [(0, 0), (30, 0), (60, 0), (80, 0), (60, 127)]
 
 
@@ -56,32 +60,40 @@ def test_chi2(row):
             assert test.histogram_sum[0] > 0.2
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("row", ROWS, ids=str)
+def test_passes_the_checker(row):
+    """Of the public checker, what needs no statistics. One angle of incidence does: it looks at directions all over,
+    too."""
+    report = check(row.bsdf, angles=(60,), only=EXACT)
+    assert report.passed, report
+
+
+@pytest.mark.parametrize("variant_name", OTHER_VARIANTS, scope="module")
 @pytest.mark.parametrize("row", ROWS, ids=str)
 def test_weight_is_value_over_density(row, variant):
-    """In every variant, with eval_pdf = (eval, pdf), and eval_pdf_sample both at once; each lobe alone in rgb, as the
-    others would only repeat that."""
-    bsdf = mi.load_dict(row.bsdf)
+    """In variants other than the checker's, with eval_pdf = (eval, pdf), and eval_pdf_sample both at once."""
+    bsdf, context = mi.load_dict(row.bsdf), mi.BSDFContext()
     count = 40 if is_scalar() else 20_000
     rng = np.random.default_rng(3)
     wi, other = hemisphere(count, 1), hemisphere(count, 2)
     u, v = rng.random((count, 1)).astype(np.float32), rng.random((count, 2)).astype(np.float32)
-    for _, context in contexts(bsdf) if variant == "llvm_ad_rgb" else [next(contexts(bsdf))]:
-        wo, pdf, weight = call(bsdf.sample, context, wi, u, v)
-        wo = wo.astype(np.float32)
-        value, density = call(bsdf.eval_pdf, context, wi, wo)
-        np.testing.assert_allclose(density, pdf, rtol=1e-4, atol=1e-6)
-        drawn = (density > 0).ravel()
-        assert drawn.mean() > 0.3
-        np.testing.assert_allclose(weight[drawn], value[drawn] / density[drawn], rtol=1e-4, atol=1e-7)
-        assert not weight[~drawn].any()
-        np.testing.assert_array_equal(call(bsdf.eval, context, wi, wo)[0], value)
-        np.testing.assert_array_equal(call(bsdf.pdf, context, wi, wo)[0], density)
+    wo, pdf, weight = call(bsdf.sample, context, wi, u, v)
+    wo = wo.astype(np.float32)
+    value, density = call(bsdf.eval_pdf, context, wi, wo)
+    np.testing.assert_allclose(density, pdf, rtol=1e-4, atol=1e-6)
+    drawn = (density > 0).ravel()
+    assert drawn.mean() > 0.3
+    np.testing.assert_allclose(weight[drawn], value[drawn] / density[drawn], rtol=1e-4, atol=1e-7)
+    assert not weight[~drawn].any()
+    np.testing.assert_array_equal(call(bsdf.eval, context, wi, wo)[0], value)
+    np.testing.assert_array_equal(call(bsdf.pdf, context, wi, wo)[0], density)
 
-        both = call(bsdf.eval_pdf_sample, context, wi, other, u, v)
-        np.testing.assert_allclose(both[0], call(bsdf.eval, context, wi, other)[0], rtol=1e-5)
-        np.testing.assert_allclose(both[1], call(bsdf.pdf, context, wi, other)[0], rtol=1e-5)
-        np.testing.assert_allclose(both[2], wo, atol=1e-6)
-        np.testing.assert_allclose(both[4], weight, rtol=1e-4, atol=1e-7)
+    both = call(bsdf.eval_pdf_sample, context, wi, other, u, v)
+    np.testing.assert_allclose(both[0], call(bsdf.eval, context, wi, other)[0], rtol=1e-5)
+    np.testing.assert_allclose(both[1], call(bsdf.pdf, context, wi, other)[0], rtol=1e-5)
+    np.testing.assert_allclose(both[2], wo, atol=1e-6)
+    np.testing.assert_allclose(both[4], weight, rtol=1e-4, atol=1e-7)
 
 
 @functools.cache
@@ -113,6 +125,7 @@ def test_density_integrates_to_one_at_most(row):
             assert 0.2 < (pdf[:, 0] * solid_angle).sum() < 1 + 1e-3
 
 
+@pytest.mark.parametrize("variant_name", OTHER_VARIANTS, scope="module")
 @pytest.mark.parametrize("row", [row for row in ROWS if row.reciprocal], ids=str)
 def test_reciprocity(row, variant):
     bsdf, context = mi.load_dict(row.bsdf), mi.BSDFContext()

@@ -26,7 +26,7 @@ def first(run: BenchRun) -> Iterator[Figure]:
     built-in: the median of pairs of fresh processes, alternating, without cached kernels. The scenes are one sphere
     with the default parameters of a model, and one sphere for each model, compared with as many built-ins.
 
-    Targets: 1.15 for one model, 1.5 for all of them.
+    Targets: 1.15 for one model, 1.3 for all of them.
     """
     singles = [(case.name, [case.bsdf], [case.other], case.other["type"]) for case in pairs(run.cases)]
     models = defaults(run.cases)
@@ -35,7 +35,7 @@ def first(run: BenchRun) -> Iterator[Figure]:
         count = sizes.FIRST_ALL_PAIRS if name == ALL else sizes.FIRST_PAIRS
         seconds = np.array([_pair(ours, theirs, k % 2 == 1) for k in range(count)]).T
         median, interval = median_interval(seconds[0] / seconds[1])
-        target = Target("≤", 1.5 if name == ALL else 1.15, beside)
+        target = Target("≤", 1.3 if name == ALL else 1.15, beside)
         yield Figure("first", name, "first picture", median, 2, "×", interval, (target,))
         yield Figure("first", name, "ours", float(np.median(seconds[0])), 2, " s")
         yield Figure("first", name, "built-in", float(np.median(seconds[1])), 2, " s")

@@ -13,7 +13,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import TINY, log1p_ratio
+from ..math import TINY
 from .facet import Facet
 from .laws import LARGEST_TAN2, cosine_power, cosine_power_cdf, inverse_cosine_power_cdf, log_complement
 from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
@@ -174,16 +174,16 @@ class AshikhminShirleyNormals(Distribution):
         return 2 * super().mean_square_slope_along(v)
 
     def eval(self, facet: Facet) -> mi.Float:
-        # e log(cosθ), where steepness is (e + 1) sin²θ
-        tan2 = dr.minimum(facet.tan2_h, LARGEST_TAN2)
-        exponent = -0.5 * (self.steepness(facet) - facet.sin2_h) * (1 + tan2) * log1p_ratio(tan2)
-        return dr.inv_two_pi / (self.alpha_u * self.alpha_v) * dr.exp(exponent)
+        x, y = facet.azimuth
+        g = dr.square(x / self.alpha_u) + dr.square(y / self.alpha_v)  # e + 1, as for the lines of the sampler
+        return dr.inv_two_pi / (self.alpha_u * self.alpha_v) * cosine_power(facet.tan2_h, g - 1)
 
     def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         return self.eval(facet)
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
-        complement = cosine_power(tan2, g)
+        # Dr.Jit computes the power that D has, too, once.
+        complement = cosine_power(tan2, g - 1) * dr.rsqrt(1 + dr.minimum(tan2, LARGEST_TAN2))
         return 1 - complement, complement
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:

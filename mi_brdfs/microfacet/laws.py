@@ -39,77 +39,81 @@ class PowerLaw:
 
 
 class BentLaw:
-    """A density on [0, 1] that can be inverted: ∝ exp(κ s) for κ >= 0, and ∝ 1/(1 - κ s) for κ < 0. Its cumulative
-    distribution begins at s = 1, and s comes with its complement m = 1 - s. Of a number and its complement the smaller
-    one is computed, by the formula that keeps its digits."""
+    """A density on [0, 1] that square roots can invert: nearly ∝ exp(κ s) for κ >= 0, and nearly ∝ 1/(1 - κ s) for
+    κ < 0. With powers in place of the exponential and the logarithm, it is (1 + k m)^-33 with k = κ/33, of the
+    complement m = 1 - s, and (1 + k s)^(-33/32) with k = -κ. Its cumulative distribution begins at s = 1.
+
+    Differences of powers are products (:func:`power_32`), which keep their digits and have their limit at k = 0."""
 
     def __init__(self, kappa: mi.Float) -> None:
         self.rises = kappa >= 0
-        self.kappa, self.k = dr.select(self.rises, kappa, 0), dr.select(self.rises, 0, -kappa)
-        # Of exp(-κ m): exp(κ s) leaves the range of float32, or its derivative does.
-        self.norm = dr.select(self.rises, expm1_ratio(-self.kappa), log1p_ratio(self.k))
+        self.k = dr.select(self.rises, kappa / 33, -kappa)
+        _, _, power, self.norm = self._at(1)
+        self.lowest = 1 / power
+
+    def _at(self, x: Any) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
+        """``(b, r, b³², mass)`` of an m or s: b = 1 + k x, the base r is b or its root, and the mass from 0 to x is not
+        normalised."""
+        b = 1 + self.k * x
+        base = dr.select(self.rises, b, root_32(b))
+        power, quotient = power_32(base)
+        return b, base, power, x * dr.select(self.rises, quotient / power, 1 / (base * quotient))
 
     def eval(self, m: mi.Float, s: mi.Float) -> mi.Float:
-        return dr.select(self.rises, dr.exp(-self.kappa * m), 1 / (1 + self.k * s)) / self.norm
+        b, base, power, _ = self._at(dr.select(self.rises, m, s))
+        return dr.select(self.rises, 32 / power, 1 / (32 * base)) / (b * self.norm)
 
     def cdf(self, m: mi.Float, s: mi.Float) -> tuple[mi.Float, mi.Float]:
         """``(c, 1 - c)``, where c is the mass above s."""
-        above = (m < 0.5) & (self.kappa * m < 0.7)
-        up, down = m / (1 + self.k), s
-        weight = dr.select(above, m, s * dr.exp(-self.kappa * m))
-        exponential = expm1_ratio(-self.kappa * dr.select(above, m, s)) * weight
-        rational = log1p_ratio(dr.select(above, -up, down) * self.k) * dr.select(above, up, down)
-        mass = dr.select(self.rises, exponential, rational) / self.norm
-        return dr.select(above, mass, 1 - mass), dr.select(above, 1 - mass, mass)
+        mass = dr.minimum(self._at(dr.select(self.rises, m, s))[-1] / self.norm, 1)  # rounded, it may be more
+        return dr.select(self.rises, mass, 1 - mass), dr.select(self.rises, 1 - mass, mass)
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float) -> mi.Float:
         """The s of a ``cdf`` value."""
-        above = c < 0.5
-        mass = dr.select(above, c, complement)
-        y = mass * self.norm * dr.select(above, 1, dr.exp(self.kappa))
-        sign = dr.select(above, -1, 1)
-        # log(1 + κ y)/κ, but a large exp(κ) out of the logarithm: a derivative divides by its square.
-        large = (c >= 0.5) & (self.kappa * y > 1e8)
-        exponential = log1p_ratio(dr.select(large, 0, sign * self.kappa * y))
-        rational = expm1_ratio(sign * self.k * y) * dr.select(above, 1 + self.k, 1)
-        value = y * dr.select(self.rises, exponential, rational)
-        kappa = dr.select(large, self.kappa, 1)
-        value = dr.select(large, 1 + dr.log(dr.select(large, kappa * mass * self.norm, 1)) / kappa, value)
-        return dr.select(above, 1 - value, value)
+        rest = complement * self.k * self.norm
+        # Of 1/b where it rises, and of b.
+        root = dr.select(self.rises, root_32(self.lowest + rest), 1 / (1 - dr.select(self.rises, 0, rest)))
+        _, quotient = power_32(root)
+        return dr.select(self.rises, 1 - c * self.norm / (root * quotient), complement * self.norm * root * quotient)
 
 
 class Ramps:
-    """A density on [0, 1], linear between equally spaced points, at which the ``heights`` are given up to a factor."""
+    """A density on [0, 1], linear between its ends and some ``points``, at all of which the ``heights`` are given up to
+    a factor."""
 
-    def __init__(self, heights: list[Any]) -> None:
+    def __init__(self, points: list[Any], heights: list[Any]) -> None:
         highest = functools.reduce(dr.maximum, heights)
         heights = [dr.maximum(height, SMALL * highest) for height in heights]  # it must not vanish
-        self.ramps = list(itertools.pairwise(heights))
-        self.masses = [0.5 * (left + right) for left, right in self.ramps]
-        self.sum = sum(self.masses)
-        self.total = self.sum / len(self.ramps)
+        self.ramps: list[tuple[Any, ...]] = []
+        """Of each ramp its left end, the mass up to there, and its height there and slope."""
+        self.total = 0
+        for (start, end), (left, right) in zip(
+            itertools.pairwise([0, *points, 1]), itertools.pairwise(heights), strict=True
+        ):
+            self.ramps.append((start, self.total, left, (right - left) / (end - start)))
+            self.total = self.total + 0.5 * (left + right) * (end - start)  # anew, as the last one is kept
+
+    def _ramp(self, x: mi.Float, coordinate: int) -> tuple[Any, ...]:
+        """The ramp of an x, which is compared with its left end, 0, or the mass up to there, 1."""
+        found, *others = self.ramps
+        for ramp in others:
+            here = x >= ramp[coordinate]
+            found = tuple(dr.select(here, *it) for it in zip(ramp, found, strict=True))
+        return found
 
     def eval(self, c: mi.Float) -> mi.Float:
-        c = c * len(self.ramps)
-        left, right = self.ramps[0]
-        for k, (next_left, next_right) in enumerate(self.ramps[1:], start=1):
-            left, right = dr.select(c < k, left, next_left), dr.select(c < k, right, next_right)
-        share = c - dr.clip(dr.floor(c), 0, len(self.ramps) - 1)
-        return dr.lerp(left, right, share) / self.total
+        start, _, height, slope = self._ramp(c, 0)
+        return (height + (c - start) * slope) / self.total
 
     def cdf(self, c: mi.Float) -> mi.Float:
-        shares = (dr.clip(c * len(self.ramps) - k, 0, 1) for k in range(len(self.ramps)))
-        ramps = zip(self.ramps, self.masses, shares, strict=True)
-        return sum(share * dr.lerp(left, mass, share) for (left, _), mass, share in ramps) / self.sum
+        start, mass, height, slope = self._ramp(c, 0)
+        return (mass + (c - start) * (height + 0.5 * (c - start) * slope)) / self.total
 
     def inverse_cdf(self, mass: mi.Float) -> mi.Float:
-        remaining, c = mass * self.sum, 0
-        for (left, right), mass in zip(self.ramps, self.masses, strict=True):
-            here = dr.clip(remaining, 0, mass)
-            # Rounded, the square of the height there may be less than 0.
-            c += 2 * here / (left + safe_sqrt(left * left + 2 * (right - left) * here))
-            remaining -= mass
-        return c / len(self.ramps)
+        start, before, height, slope = self._ramp(mass * self.total, 1)
+        rest = mass * self.total - before
+        # Rounded, the square of the height there may be less than 0.
+        return start + 2 * rest / (height + safe_sqrt(height * height + 2 * slope * rest))
 
 
 class RootLaw:
@@ -134,6 +138,21 @@ class RootLaw:
         return dr.minimum(
             self.far * (c * (root + self.lowest) / dr.maximum((1 - c) * (1 + root), EPSILON)), LARGEST_TAN2
         )
+
+
+def root_32(x: mi.Float) -> mi.Float:
+    """The 32nd root."""
+    for _ in range(5):
+        x = dr.sqrt(x)
+    return x
+
+
+def power_32(x: mi.Float) -> tuple[mi.Float, mi.Float]:
+    """``(x³², (x³² - 1)/(x - 1))``."""
+    power, quotient = x, 1
+    for _ in range(5):
+        quotient, power = quotient * (1 + power), power * power
+    return power, quotient
 
 
 def versine(cos: mi.Float, sin2: mi.Float) -> mi.Float:

@@ -8,7 +8,15 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import ONE_MINUS_EPSILON, clamp, expm1_ratio, gauss_legendre
+from ..math import (
+    ONE_MINUS_EPSILON,
+    clamp,
+    expm1_ratio,
+    expm1_series,
+    gauss_legendre,
+    log1p_series,
+    reciprocal_gamma,
+)
 from .distributions import Isotropic
 from .facet import Facet
 from .laws import (
@@ -96,11 +104,15 @@ class ABC(Isotropic):
 
     def _cosine_mass(self) -> mi.Float:
         """∫ (1 - y)(1 + B y)^-C over 0 <= y <= 1."""
-        b = self.law.k
-        broad = b < 0.5
+        b, c = self.law.k, self.law.gamma
+        broad = b * dr.maximum(c, 1) < 0.5
         # Gauss-Legendre where the closed form, (∫ (1 + B y)^(1-C) - ∫ (1 + B y)^-C)/B, would cancel.
-        quadrature = sum(w * y * self.law.eval(y) for y, w in gauss_legendre(4))
-        closed = (PowerLaw(b, self.law.gamma - 1).norm - self.law.norm) / dr.select(broad, 1, b)
+        near = dr.select(broad, b, 0)
+        quadrature = 0
+        for y, w in gauss_legendre(3):
+            log = -c * (near * y) * log1p_series(near * y)
+            quadrature += w * y * (1 + log * expm1_series(log))
+        closed = (PowerLaw(b, c - 1).norm - self.law.norm) / dr.select(broad, 1, b)
         return self.law.norm - dr.select(broad, quadrature, closed)
 
     def mean_square_slope(self) -> mi.Float:
@@ -200,13 +212,12 @@ class EPD(Isotropic):
     """
 
     long_tailed = True
-    RAMPS = 9
-    """For which it is sampled nearly as well as Beckmann's distribution where it is that."""
     # tests/calibration/epd.py fits these.
-    FAR = 1.35
-    """How far the law reaches, in medians."""
-    END = 0.05
-    """How far from its end the last ramp's height there is that of D, in units of a ramp: D is nothing at infinity."""
+    FAR, GROWTH = 1.7, 1.38
+    """How far the law reaches, in medians, and by which ratio, to the power of each of"""
+    STEPS = (-14, 0, 2, 5, 6, 8, 20)
+    """these, the slopes at which D is evaluated differ from that. The last is for the end of the last ramp: D is
+    nothing at infinity."""
 
     def __init__(self, alpha: mi.Float, gamma: mi.Float) -> None:
         super().__init__()
@@ -215,13 +226,15 @@ class EPD(Isotropic):
         # (Chen and Rubin 1986, doi:10.1016/0167-7152(86)90044-1), nearly.
         median = self.alpha2 * dr.exp(dr.log(dr.maximum(1 / gamma - 1 / 3, 0.1)) / gamma)
         self.median, far = self._limited(median), self._limited(self.FAR * median)
-        self.scale = dr.inv_pi / self.alpha2 * dr.exp(-dr.lgamma(1 + 1 / gamma))
+        self.scale = dr.inv_pi / self.alpha2 * reciprocal_gamma(1 + 1 / gamma)
 
-        self.law = RootLaw(dr.minimum(self.alpha2, 0.5 * far), far)
-        points = [k / self.RAMPS for k in (*range(1, self.RAMPS), self.RAMPS - self.END)]
-        slopes = [0, *(self.law.inverse_cdf(c) for c in points)]
-        falls = [1, *(dr.exp(-dr.exp(gamma * dr.log(t / self.alpha2))) for t in slopes[1:])]
-        self.ramps = Ramps([fall * self._rest(t) / self.law.eval(t) for fall, t in zip(falls, slopes, strict=True)])
+        self.law = law = RootLaw(dr.minimum(self.alpha2, 0.5 * far), far)
+        # (tan²θ/α²)ᵞ at slopes in a geometric series is in another one.
+        first, growth = dr.exp(gamma * dr.log(far / self.alpha2)), dr.exp(dr.log(self.GROWTH) * gamma)
+        powers = [first * growth**step for step in self.STEPS]
+        slopes = [far * self.GROWTH**step for step in self.STEPS]
+        heights = [fall(x) * self._rest(t) / law.eval(t) for x, t in zip([0, *powers], [0, *slopes], strict=True)]
+        self.ramps = Ramps([law.cdf(t) for t in slopes[:-1]], heights)
 
     def _limited(self, tan2: mi.Float) -> mi.Float:
         return dr.minimum(tan2, 1e16)  # of which derivatives take the square
@@ -258,3 +271,9 @@ class EPD(Isotropic):
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return self.law.inverse_cdf(self.ramps.inverse_cdf(c))
+
+
+def fall(x: mi.Float) -> mi.Float:
+    """About exp(-x), to a few percent where that is no small number."""
+    y = dr.minimum(x, 60) / 8
+    return 1 / dr.square(dr.square(dr.square(1 + y * (1 + 0.5 * y))))

@@ -3,7 +3,7 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, PowerLobe
 from ..lobes.mirror import AxisFrame
-from ..math import EPSILON, SMALL, TINY, clamp, log1p, safe_sqrt
+from ..math import EPSILON, SMALL, TINY, clamp, log1p_series, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
@@ -99,7 +99,8 @@ class LafortuneLobe(PowerLobe):
         taken = sum((self.unit - c) * (self.unit + c) * w * w for c, w in zip(self.c, wi, strict=True))
         taken = taken / (self.unit * self.unit * dr.squared_norm(wi))
         near = abs(taken) < 0.5
-        log = dr.select(near, 0.5 * log1p(-dr.select(near, taken, 0)), dr.log(length / self.unit))
+        little = dr.select(near, -taken, 0)
+        log = dr.select(near, 0.5 * little * log1p_series(little), dr.log(length / self.unit))
         # A C above 1 with a large exponent overflows float32: limit so bright a lobe.
         return self.scale * dr.exp(clamp(self.exponent * log, -dr.inf, 40))
 

@@ -1,5 +1,5 @@
-"""The exponential power distribution: how far the law that it is drawn from reaches, and where it ends, for the least
-mean relative variance of half vectors.
+"""The exponential power distribution: how far the law that it is drawn from reaches, and at which slopes D is
+evaluated, for the least mean relative variance of half vectors.
 
     python tests/calibration/epd.py [--check]
 """
@@ -29,7 +29,7 @@ def fits() -> Iterator[Fit]:
         ]
         return variance_loss(lobes, ANGLES)()
 
-    yield attributes(EPD, "FAR END", loss)
+    yield attributes(EPD, "FAR GROWTH", loss)
 
 
 if __name__ == "__main__":
