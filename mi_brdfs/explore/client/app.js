@@ -219,8 +219,7 @@ function start() {
     drawLobe();
     cards.lobe.figure.querySelector("canvas")?.toBlob(done);
   };
-  cards.picture.figure.before(byId("picture-bar"));
-  cards.lobe.figure.before(byId("lobe-bar"));
+  for (const view of ["picture", "lobe"]) cards[view].tools.before(byId(`${view}-bar`));
   startPicture();
   startLobe();
   startSubjects();
@@ -237,8 +236,14 @@ function start() {
     sendState();
   });
   on("selected", () => redraw("bars", "subjects"));
-  on("subject", () => redraw("bars", "subjects", ...VIEWS));
-  on("view", (view) => redraw(view));
+  on("subject", () => {
+    say("");
+    redraw("bars", "subjects", ...VIEWS);
+  });
+  on("view", (view) => {
+    say("");
+    redraw(view);
+  });
   on("exported", (state) => {
     session.state = clean(state);
     redrawAll();
@@ -251,10 +256,13 @@ function start() {
   addEventListener("hashchange", openAddress);
   addEventListener("popstate", openAddress);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
-  new ResizeObserver(() => {
+  const observer = new ResizeObserver(() => {
     if (session.hello && wantedSize() !== session.state.size) sendState();
+    // Where the picture stays in sight on a phone, the bar above it does not.
+    document.documentElement.style.setProperty("--above", `${byId("picture-bar").parentElement.offsetHeight + 12}px`);
     redraw(...VIEWS);
-  }).observe(byId("grid"));
+  });
+  for (const node of [document.body, byId("picture-bar")]) observer.observe(node);
   redrawAll();
   connect();
 }

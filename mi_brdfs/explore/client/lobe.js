@@ -15,7 +15,7 @@ void main() {
   seen = vec4(colour.rgb * light * colour.a, colour.a);
 }`;
 const ARROW = 1.18;
-const camera = { yaw: 1.87, pitch: 0.42, distance: 4.6 };
+const camera = { yaw: 1.87, pitch: 0.42, distance: 4.1 };
 let gl, program, canvas, labels, places;
 const bodies = new Map();
 
@@ -166,7 +166,7 @@ function furniture(wi) {
 function look(aspect) {
   const { yaw, pitch, distance } = camera;
   const back = [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
-  const target = [0, 0, places.whole ? 0 : 0.38];
+  const target = [0, 0, places.whole ? 0 : 0.42];
   const right = [-Math.sin(yaw), Math.cos(yaw), 0];
   const up = cross(back, right);
   const far = distance * Math.max(1, 1.15 / aspect) * (places.whole ? 1.25 : 1);

@@ -74,6 +74,7 @@ export function drawPicture() {
 
 function build(mode, shown, layout) {
   stack.dataset.layout = layout;
+  cards.picture.node.classList.toggle("wide", mode === "side" && shown.length > 1);
   stack.className = `pictures ${mode} of-${mode === "side" ? shown.length : 1}`;
   for (const k of shown) if (!canvases.has(k)) canvases.set(k, element("canvas", { role: "img" }));
   const caption = (k) => element("figcaption", { "data-subject": k, class: "marked" }, element("b"), element("small"));
