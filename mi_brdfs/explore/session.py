@@ -219,7 +219,8 @@ class Session:
 
         with self.materials.loaded(self.materials.expanded(state.subjects[k])) as bsdf:
             report = check(bsdf, only=["chi2"], angles=[max(state.theta, 1.0)])
-        self.send(text(type="chi2", subject=k, passed=report.passed, text=" ".join(report.sentences())))
+        told = " ".join(dict.fromkeys(f"{it.subject}: {it.sentence}" for it in report.findings))
+        self.send(text(type="chi2", subject=k, passed=report.passed, text=told))
 
     def _fit(self, k: int, request: dict[str, Any], state: State) -> None:
         from ..fit import fit
