@@ -1,0 +1,335 @@
+// Curves: the plane of incidence as polar and cartesian plots, albedo, and the small plots of the sampler.
+import { CHANNELS, DASHES, PALETTE, clamp, degrees, format, interpolate, largest, radians, shape, ticks, valueScale } from "./util.js";
+import { session, visible } from "./session.js";
+import { cards, tell } from "./card.js";
+
+export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k];
+
+/** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
+function curvesOf(view) {
+  return visible().flatMap((k) => (session.shown[view][k]?.curves ?? []).map((curve) => ({
+    ...curve, subject: k, dimmed: Boolean(session.info[k]?.error), dash: DASHES[session.state.subjects[k].colour],
+    colour: CHANNELS[curve.channel] ?? colourOf(k),
+    name: session.state.subjects[k].name + (CHANNELS[curve.channel] ? `, ${curve.channel}` : ""),
+  })));
+}
+
+/** Return curves of f cosθ, each over its subject's maximum if they are to be normalised. */
+function lobesOf(view) {
+  const curves = curvesOf(view);
+  if (!session.state.normalise) return curves;
+  const peak = {};
+  for (const curve of curves) peak[curve.subject] = Math.max(peak[curve.subject] ?? 0, largest([curve.y]));
+  return curves.map((curve) => ({ ...curve, y: curve.y.map((value) => value / peak[curve.subject]) }));
+}
+
+/** Return the path through points, without those that cannot be told from the one before. */
+function path(points) {
+  let text = "";
+  let last = null;
+  points.forEach(([x, y], k) => {
+    if (!Number.isFinite(x + y)) return;
+    if (last && k < points.length - 1 && Math.abs(x - last[0]) + Math.abs(y - last[1]) < 0.25) return;
+    text += `${last ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`;
+    last = [x, y];
+  });
+  return text;
+}
+
+const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
+const label = (x, y, text, anchor = "middle", kind = "tick") => shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
+const drawing = (width, height, summary) => shape("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img",
+  tabindex: 0, "aria-label": summary });
+
+function stroke(curve, points) {
+  return shape("path", { d: path(points), class: curve.dimmed ? "curve dimmed" : "curve", stroke: curve.colour,
+    "stroke-dasharray": curve.dash });
+}
+
+function summary(curves, what, unit) {
+  const parts = curves.map(({ name, x, y }) => {
+    const peak = largest([y]);
+    return `${name}: at most ${format(peak)}${unit} at ${format(x[y.findIndex((value) => value === peak)] ?? 0)}°`;
+  });
+  return `${what}. ${parts.join("; ") || "No data yet"}.`;
+}
+
+/** A crosshair that pointer and arrow keys move: `angleAt` maps a place to an angle, `cross` draws it. */
+function attach(card, svg, angleAt, range, cross) {
+  let angle = null;
+  const move = (to) => {
+    angle = to;
+    cross(to);
+  };
+  const follow = (event) => {
+    const box = svg.getBoundingClientRect();
+    const scale = svg.viewBox.baseVal.width / box.width;
+    move(angleAt((event.clientX - box.left) * scale, (event.clientY - box.top) * scale));
+  };
+  svg.addEventListener("pointermove", follow);
+  svg.addEventListener("pointerdown", follow);
+  svg.addEventListener("pointerleave", () => move(null));
+  svg.addEventListener("blur", () => move(null));
+  svg.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -10, ArrowUp: 10 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    move(clamp((angle ?? session.state.theta) + step * (event.shiftKey ? 0.1 : 1), ...range));
+  });
+}
+
+/** Where the plane of incidence is looked at, in both of its plots. */
+let cursor = null;
+const crosses = {};
+
+function pointAt(angle) {
+  cursor = angle;
+  for (const cross of Object.values(crosses)) cross();
+}
+
+const widthOf = (card, most = 620) => Math.max(Math.min(card.figure.clientWidth, most), 240);
+
+function replaceFigure(card, ...nodes) {
+  const focused = card.figure.contains(document.activeElement) && document.activeElement.tagName === "svg";
+  card.figure.replaceChildren(...nodes);
+  if (focused) nodes[0].focus();
+}
+
+const unitOf = () => (session.state.normalise ? "f cosθo / maximum" : "f cosθo, 1/sr");
+
+// --- Polar ----------------------------------------------------------------------------------------------------------
+
+export function drawPolar() {
+  const card = cards.polar;
+  const curves = lobesOf("polar");
+  const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
+  const scale = valueScale(curves.map(({ y }) => y), session.state.scale === "log");
+  const width = widthOf(card);
+  const margin = 26;
+  const radius = (width - 2 * margin) / 2;
+  const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
+  const middle = [width / 2, margin + radius];
+  const place = (angle, reach) => [middle[0] + radius * reach * Math.sin(radians(angle)),
+    middle[1] - radius * reach * Math.cos(radians(angle))];
+  const svg = drawing(width, height, summary(curves, `Polar plot of ${unitOf()} in the plane of incidence`, ""));
+
+  const ring = (reach, kind) => {
+    const [x, y] = place(-90, reach);
+    const r = radius * reach;
+    const around = `M${x} ${y}a${r} ${r} 0 0 1 ${2 * r} 0` + (whole ? `a${r} ${r} 0 0 1 ${-2 * r} 0` : "");
+    return shape("path", { d: around, class: kind });
+  };
+  for (const [value, text] of scale.marks) {
+    const reach = scale.of(value);
+    if (reach <= 0.02) continue;
+    svg.append(ring(reach, "grid"));
+    if (reach > 0.14) svg.append(label(middle[0] + radius * reach, middle[1] + 14, text));
+  }
+  svg.append(ring(1, "rim"));
+  for (let angle = whole ? -180 : -90; angle < (whole ? 180 : 91); angle += 30) {
+    const [x, y] = place(angle, 1);
+    const [tx, ty] = place(angle, 1 + 15 / radius);
+    svg.append(line(...middle, x, y, "grid"));
+    if (Math.abs(angle) !== 90) svg.append(label(tx, ty + 4, `${Math.abs(angle)}°`));
+  }
+  svg.append(line(middle[0] - radius, middle[1], middle[0] + radius, middle[1], "axis"));
+  const { theta } = session.state;
+  svg.append(shape("path", { d: path([middle, place(theta, 1)]), class: "mirror" }));
+  for (const curve of curves) svg.append(stroke(curve, curve.x.map((angle, k) => place(angle, scale.of(curve.y[k])))));
+  const tip = place(-theta, 1);
+  svg.append(line(...tip, ...place(-theta, 0.06), "incident"));
+  svg.append(shape("path", { d: path([place(-theta + 2.5, 0.13), place(-theta, 0.03), place(-theta - 2.5, 0.13)]), class: "incident" }));
+  svg.append(label(...place(-theta - 4, 0.97), "ωi", "middle", "direction"));
+  const overlay = shape("g");
+  svg.append(overlay);
+
+  crosses.polar = () => {
+    overlay.replaceChildren();
+    if (cursor === null) return tell(card, []);
+    overlay.append(shape("path", { d: path([middle, place(cursor, 1)]), class: "cross" }));
+    dots(overlay, curves, (value) => place(cursor, scale.of(value)));
+    tell(card, [[null, `θo ${format(cursor)}°`], ...valuesAt(curves)]);
+  };
+  attach(card, svg, (x, y) => {
+    const angle = degrees(Math.atan2(x - middle[0], middle[1] - y));
+    return whole ? angle : clamp(angle, -89.9, 89.9);
+  }, whole ? [-180, 180] : [-89.9, 89.9], pointAt);
+  replaceFigure(card, svg);
+  crosses.polar();
+}
+
+function dots(overlay, curves, place) {
+  for (const curve of curves) {
+    const value = interpolate(curve.x, curve.y, cursor);
+    if (value === null) continue;
+    const [cx, cy] = place(value);
+    overlay.append(shape("circle", { cx, cy, r: 4, fill: curve.colour, class: "dot" }));
+  }
+}
+
+const valuesAt = (curves) => curves.map((curve) => [curve.colour, `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`]);
+
+// --- Cartesian ------------------------------------------------------------------------------------------------------
+
+/** Draw axes; return the drawing and where values are in it. */
+function axes(width, height, across, scale, what, unit = "°") {
+  const [left, right, top, bottom] = [46, 14, 14, 26];
+  const svg = drawing(width, height, what);
+  const x = (value) => left + ((value - across.low) / (across.high - across.low)) * (width - left - right);
+  const y = (value) => height - bottom - clamp(scale.of(value), 0, 1.05) * (height - top - bottom);
+  for (const [value, text] of scale.marks) {
+    svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
+  }
+  for (const value of across.marks) {
+    svg.append(line(x(value), top, x(value), height - bottom, "grid"), label(x(value), height - bottom + 17, `${format(value)}${unit}`));
+  }
+  svg.append(line(left, height - bottom, width - right, height - bottom, "axis"));
+  const at = (place) => clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
+  return { svg, x, y, at, top, bottom: height - bottom };
+}
+
+/** Draw curves over an angle; `mark` adds to the drawing before them, `moved` tells of the crosshair. */
+function graph(card, curves, across, scale, what, mark, crossing) {
+  const width = widthOf(card, 760);
+  const it = axes(width, Math.round(clamp(0.62 * width, 200, 380)), across, scale, what);
+  mark?.(it);
+  for (const curve of curves) it.svg.append(stroke(curve, curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])])));
+  const overlay = shape("g");
+  it.svg.append(overlay);
+  const cross = (angle, symbol) => {
+    overlay.replaceChildren();
+    if (angle === null) return tell(card, []);
+    overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
+    cursorAt(angle, () => dots(overlay, curves, (value) => [it.x(angle), it.y(value)]));
+    tell(card, [[null, `${symbol} ${format(angle)}°`], ...cursorAt(angle, () => valuesAt(curves))]);
+  };
+  attach(card, it.svg, (x) => it.at(x), [across.low, across.high], (angle) => crossing(angle, cross));
+  replaceFigure(card, it.svg);
+  return cross;
+}
+
+function cursorAt(angle, act) {
+  const before = cursor;
+  cursor = angle;
+  const result = act();
+  cursor = before;
+  return result;
+}
+
+export function drawCartesian() {
+  const curves = lobesOf("cartesian");
+  const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
+  const across = whole ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] } : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
+  const scale = valueScale(curves.map(({ y }) => y), session.state.scale === "log");
+  const { theta } = session.state;
+  const mark = ({ svg, x, top, bottom }) => {
+    svg.append(line(x(-theta), top, x(-theta), bottom, "incident"), label(x(-theta) + 5, top + 10, "ωi", "start", "direction"));
+    svg.append(line(x(theta), top, x(theta), bottom, "mirror"));
+  };
+  const cross = graph(cards.cartesian, curves, across, scale,
+    summary(curves, `Plot of ${unitOf()} over the angle in the plane of incidence`, ""), mark, pointAt);
+  crosses.cartesian = () => cross(cursor, "θo");
+  crosses.cartesian();
+}
+
+export function drawAlbedo() {
+  const curves = curvesOf("albedo");
+  const scale = valueScale(curves.map(({ y }) => y), false, 1.02);
+  const mark = ({ svg, x, y, top, bottom }) => {
+    svg.append(line(x(0), y(1), x(90), y(1), "unity"), line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"));
+  };
+  graph(cards.albedo, curves, { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] }, scale,
+    summary(curves, "Albedo over the angle of incidence, with a line at 1", ""), mark, (angle, cross) => cross(angle, "θi"));
+  tell(cards.albedo, []);
+}
+
+/** Return the curves of a view as rows of a table. */
+export function table(view) {
+  return [["subject", "channel", view === "albedo" ? "theta_i_degrees" : "theta_o_degrees", view === "albedo" ? "albedo" : "f_cos_theta_o"],
+    ...visible().flatMap((k) => (session.shown[view][k]?.curves ?? []).flatMap((curve) =>
+      curve.x.map((angle, at) => [session.state.subjects[k].name, curve.channel, angle, curve.y[at]])))];
+}
+
+// --- Sampler --------------------------------------------------------------------------------------------------------
+
+export function drawSampler(chi2) {
+  const card = cards.sampler;
+  const found = visible().filter((k) => session.shown.sampler[k]).map((k) => [k, session.shown.sampler[k]]);
+  const full = widthOf(card, 1400);
+  const columns = full > 900 ? 3 : full > 560 ? 2 : 1;
+  const width = Math.floor((full - 16 * (columns - 1)) / columns);
+  const height = Math.round(clamp(0.7 * width, 190, 300));
+  const titled = (title, svg) => {
+    const box = document.createElement("figure");
+    const caption = document.createElement("figcaption");
+    caption.textContent = title;
+    box.append(caption, svg);
+    return box;
+  };
+  const figures = [titled("Directions drawn", drawDots(found, width, Math.max(height, Math.min(width, 300)))),
+    titled("Weight ÷ mean weight", drawHistogram(found, width, height)), titled("Efficiency η over θi", drawEfficiency(found, width, height))];
+  card.figure.replaceChildren(...figures, chi2);
+}
+
+function drawDots(found, width, height) {
+  const svg = drawing(width, height, `Directions drawn by the samplers of ${found.length} subjects, seen from above, ωi on the left`);
+  const radius = height / 2 - 14;
+  const [x, y] = [width / 2, height / 2];
+  for (const angle of [30, 60, 90]) {
+    svg.append(shape("circle", { cx: x, cy: y, r: (radius * angle) / 90, class: angle === 90 ? "rim" : "grid" }));
+    svg.append(label(x, y - (radius * angle) / 90 + 11, `${angle}°`));
+  }
+  const [cos, sin] = [Math.cos(radians(session.state.phi)), Math.sin(radians(session.state.phi))];
+  for (const [k, { dots: drawn }] of found) {
+    const group = shape("g", { fill: colourOf(k), class: "drawn" });
+    for (const [wx, wy, wz] of drawn) {
+      const [along, across] = [cos * wx + sin * wy, cos * wy - sin * wx];
+      const length = Math.hypot(along, across) || 1;
+      const reach = ((radius * degrees(Math.atan2(length, Math.abs(wz)))) / 90) / length;
+      const place = { cx: (x - along * reach).toFixed(1), cy: (y + across * reach).toFixed(1), r: 1.4 };
+      group.append(shape("circle", wz < 0 ? { ...place, class: "below", stroke: colourOf(k) } : place));
+    }
+    svg.append(group);
+  }
+  const at = x - (radius * session.state.theta) / 90;
+  svg.append(shape("circle", { cx: at, cy: y, r: 4, class: "source" }), label(at, y - 8, "ωi", "middle", "direction"));
+  return svg;
+}
+
+function drawHistogram(found, width, height) {
+  const shares = found.map(([k, { histogram }]) => {
+    const total = histogram.count.reduce((sum, count) => sum + count, 0) || 1;
+    return [k, histogram.edges, histogram.count.map((count) => count / total)];
+  });
+  const high = Math.max(2, ...shares.map(([, edges]) => edges[edges.length - 1]));
+  const scale = valueScale(shares.map(([, , share]) => share), false);
+  const it = axes(width, height, { low: 0, high, marks: ticks(0, high, 5) }, scale, "Histogram of the weight over its mean: a narrow one is good", "");
+  it.svg.append(line(it.x(1), it.top, it.x(1), it.bottom, "unity"));
+  for (const [k, edges, share] of shares) {
+    const points = share.flatMap((value, bin) => [[it.x(edges[bin]), it.y(value)], [it.x(edges[bin + 1]), it.y(value)]]);
+    const closed = [[it.x(edges[0]), it.bottom], ...points, [it.x(edges[edges.length - 1]), it.bottom]];
+    it.svg.append(shape("path", { d: path(closed), fill: colourOf(k), class: "area", stroke: colourOf(k) }));
+  }
+  return it.svg;
+}
+
+function drawEfficiency(found, width, height) {
+  const scale = { of: (value) => value / 1.04, marks: [0, 0.25, 0.5, 0.75, 1].map((value) => [value, format(value)]) };
+  const it = axes(width, height, { low: 0, high: 90, marks: [0, 30, 60, 90] }, scale, summary(
+    found.map(([k, { eta }]) => ({ name: session.state.subjects[k].name, ...eta })), "Efficiency of the samplers, 1 is perfect", ""));
+  it.svg.append(line(it.x(session.state.theta), it.top, it.x(session.state.theta), it.bottom, "incident"));
+  for (const [k, { eta }] of found) {
+    const curve = { colour: colourOf(k), dash: DASHES[session.state.subjects[k].colour] };
+    it.svg.append(stroke(curve, eta.x.map((angle, at) => [it.x(angle), it.y(eta.y[at])])));
+  }
+  const overlay = shape("g");
+  it.svg.append(overlay);
+  attach(cards.sampler, it.svg, (x) => it.at(x), [0, 90], (angle) => {
+    overlay.replaceChildren();
+    if (angle === null) return tell(cards.sampler, []);
+    overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
+    tell(cards.sampler, [[null, `θi ${format(angle)}°`], ...found.map(([k, { eta }]) =>
+      [colourOf(k), `${session.state.subjects[k].name} η ${format(interpolate(eta.x, eta.y, angle))}`])]);
+  });
+  return it.svg;
+}
