@@ -17,7 +17,7 @@ from .session import Session
 from .state import Bsdf
 from .views import text
 
-KEPT = 2
+KEPT = 4
 """Scenes that stay loaded."""
 
 

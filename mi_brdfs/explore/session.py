@@ -152,7 +152,7 @@ class Session:
         if view == "picture":
             key = key_of(given), stages.Setting.of(state)
             if self._pictures.get(k, (None,))[0] != key:
-                progress = stages.Progress(engine.stage(stages.Setting.of(state)))
+                progress = stages.Progress(engine.stage(key[1].quick()))
                 with self.materials.loaded(bsdf) as loaded:
                     progress.advance(loaded)
                 self._pictures[k] = key, progress
@@ -175,6 +175,9 @@ class Session:
         if not rough:
             return False
         _, k, given = min(rough, key=lambda it: it[:2])
+        stage = engine.stage(setting)
+        if self._pictures[k][1].stage is not stage:  # so far it was a quick one
+            self._pictures[k] = self._pictures[k][0], stages.Progress(stage)
         progress, before = self._pictures[k][1], self._pictures[k][1].spp
         with self.materials.loaded(self.materials.expanded(given)) as loaded:
             progress.advance(loaded)
@@ -219,7 +222,8 @@ class Session:
 
         with self.materials.loaded(self.materials.expanded(state.subjects[k])) as bsdf:
             report = check(bsdf, only=["chi2"], angles=[max(state.theta, 1.0)])
-        self.send(text(type="chi2", subject=k, passed=report.passed, text=" ".join(report.sentences())))
+        told = " ".join(dict.fromkeys(f"{it.subject}: {it.sentence}" for it in report.findings))
+        self.send(text(type="chi2", subject=k, passed=report.passed, text=told))
 
     def _fit(self, k: int, request: dict[str, Any], state: State) -> None:
         from ..fit import fit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,10 @@ MOST = 256
 """Samples per pixel, after which a picture is finished."""
 LONGEST = 0.08
 """The longest that a pass should take, in seconds: edits wait for its end."""
+QUICK = 256
+"""The most pixels of a side of the first pass, which shows an edit at once."""
+STEP = 128
+"""Larger sides are multiples of it: scenes of a few sizes stay loaded."""
 PEAK = 8.0
 """The radiance that is shown as white, the same in all pictures."""
 ENVIRONMENT = "environment"
@@ -40,7 +44,12 @@ class Setting:
     @classmethod
     def of(cls, state: State) -> Setting:
         """Return the setting of a state; the user's scene has its own light."""
-        return cls("" if state.shape == "scene" else state.stage, state.shape, state.size)
+        size = -(-state.size // STEP) * STEP if state.size > QUICK else state.size
+        return cls("" if state.shape == "scene" else state.stage, state.shape, size)
+
+    def quick(self) -> Setting:
+        """Return it for the first pass after an edit, of few pixels."""
+        return replace(self, size=min(self.size, QUICK))
 
 
 @dataclass
