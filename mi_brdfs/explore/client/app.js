@@ -127,16 +127,6 @@ function drawBars() {
   else document.documentElement.dataset.dark = state.dark;
   byId("theme").textContent = isDark() ? "Light" : "Dark";
   document.title = `${state.subjects.map(({ name }) => name).join(", ") || "Explorer"} · mi_brdfs`;
-  drawList();
-}
-
-/** In an exported page, list the parameters where the controls would be. */
-function drawList() {
-  if (!session.exported) return;
-  byId("controls").replaceChildren(...Object.entries(session.state.subjects[session.selected]?.bsdf ?? {}).map(([name, value]) =>
-    element("div", { class: "fixed" }, element("span", {}, name), element("b", {}, Array.isArray(value) ? value.map((v) => format(v)).join(", ")
-      : typeof value === "number" ? format(value, 4) : String(value)))));
-  byId("incidence").textContent = `θi = ${format(session.state.theta)}°, φi = ${format(session.state.phi)}°`;
 }
 
 // --- The sampler's test ---------------------------------------------------------------------------------------------
@@ -251,16 +241,21 @@ function start() {
   on("hello", () => {
     if (!session.state.subjects.length) session.state = readFragment(location.hash) ?? clean(session.hello.state);
     if (!session.exported) emit("state", false);
+    for (const id of ["tours", "share", "add"]) byId(id).disabled = false;
+    byId("tours").hidden = !session.hello.tours?.length;
     byId("version").textContent = `${session.hello.version} · ${session.hello.variant}`;
   });
   addEventListener("hashchange", openAddress);
   addEventListener("popstate", openAddress);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
+  let width = innerWidth;
   const observer = new ResizeObserver(() => {
     if (session.hello && wantedSize() !== session.state.size) sendState();
     // Where the picture stays in sight on a phone, the bar above it does not.
     document.documentElement.style.setProperty("--above", `${byId("picture-bar").parentElement.offsetHeight + 12}px`);
-    redraw(...VIEWS);
+    redraw("lobe");
+    if (innerWidth !== width) redraw(...VIEWS);
+    width = innerWidth;
   });
   for (const node of [document.body, byId("picture-bar")]) observer.observe(node);
   redrawAll();

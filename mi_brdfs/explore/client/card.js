@@ -22,7 +22,7 @@ export function makeCard(view, title, note, files = []) {
 }
 
 function saveAs(card, kind) {
-  const name = `${session.state.subjects.map((subject) => subject.name).join("-").replace(/[^\w.-]+/g, "_")}-${card.view}`;
+  const name = `${session.state.subjects.map((subject) => subject.name).join("-").replace(/[^\p{L}\p{N}.-]+/gu, "_")}-${card.view}`;
   if (kind === "SVG") {
     const figures = [...card.figure.querySelectorAll("svg")];
     figures.forEach((figure, k) => save(`${name}${figures.length > 1 ? `-${k + 1}` : ""}.svg`, standalone(figure), "image/svg+xml"));

@@ -17,6 +17,7 @@ export function drawControls() {
     told.textContent = built = "";
     return;
   }
+  if (session.exported) return drawList(host, session.state.subjects[k].bsdf);
   const controls = info?.controls ?? [];
   const form = JSON.stringify([k, session.state.subjects[k].bsdf.type, controls.map(({ name, kind, words, low, high, optional }) =>
     [name, kind, words, low, high, optional, valueOf({ name, value: null }, k) === null && optional])]);
@@ -33,6 +34,14 @@ export function drawControls() {
     row.error.textContent = row === own ? info.error : "";
   }
   byId("notes").textContent = (info?.notes ?? []).join(" · ");
+}
+
+/** In an exported page nothing can be changed: list the parameters. */
+function drawList(host, bsdf) {
+  const told = (value) => (typeof value === "number" ? format(value, 4) : String(value));
+  host.replaceChildren(...Object.entries(bsdf).filter(([name]) => name !== "type").map(([name, value]) => element("div", { class: "fixed" },
+    element("span", {}, name.replaceAll("_", " ")), element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)))));
+  byId("incidence").textContent = `θi = ${format(session.state.theta)}°, φi = ${format(session.state.phi)}°`;
 }
 
 /** Return the rows under the headings of their groups; those left out follow as buttons. */

@@ -11,7 +11,7 @@ export function startDialogs() {
     byId("share-dialog").showModal();
   };
   for (const what of ["xml", "dict", "command"]) byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
-  byId("copy-link").onclick = () => copy(location.href.replace(/#.*/, "") + "#" + encodeURIComponent(decodeURIComponent(fragment().slice(1))), "link");
+  byId("copy-link").onclick = () => copy(location.href.replace(/#.*/, "") + "#" + encodeURIComponent(decodeURIComponent(fragment().slice(1))).replaceAll("'", "%27"), "link");
   byId("save-png").onclick = () => cards.picture.tools.querySelector("button")?.click();
   byId("save-exr").onclick = () => ask({ type: "save", what: "exr", subject: session.selected });
   byId("save-page").onclick = () => ask({ type: "save", what: "page", state: session.state });

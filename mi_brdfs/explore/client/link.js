@@ -30,8 +30,7 @@ export function post(message) {
 }
 
 export function connect() {
-  const carried = document.getElementById("exported");
-  if (carried) return replay(JSON.parse(carried.textContent));
+  if (session.exported) return replay(JSON.parse(document.getElementById("exported").textContent));
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
@@ -52,7 +51,6 @@ export function connect() {
 }
 
 function replay({ state, frames }) {
-  session.exported = true;
   document.documentElement.classList.add("exported");
   emit("exported", state);
   for (const frame of frames) {

@@ -171,12 +171,16 @@ const valuesAt = (curves) => curves.map((curve) => [curve.colour, `${curve.name}
 
 // --- Cartesian ------------------------------------------------------------------------------------------------------
 
+let drawings = 0;
+
 /** Draw axes; return the drawing and where values are in it. */
 function axes(width, height, across, scale, what, unit = "°") {
   const [left, right, top, bottom] = [46, 14, 14, 26];
   const svg = drawing(width, height, what);
+  const clip = `inside-${++drawings}`;
+  svg.append(shape("clipPath", { id: clip }, shape("rect", { x: left, y: top - 4, width: width - left - right, height: height - top - bottom + 6 })));
   const x = (value) => left + ((value - across.low) / (across.high - across.low)) * (width - left - right);
-  const y = (value) => height - bottom - clamp(scale.of(value), 0, 1.05) * (height - top - bottom);
+  const y = (value) => height - bottom - clamp(scale.of(value), 0, 9) * (height - top - bottom);
   for (const [value, text] of scale.marks) {
     svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
   }
@@ -185,7 +189,7 @@ function axes(width, height, across, scale, what, unit = "°") {
   }
   svg.append(line(left, height - bottom, width - right, height - bottom, "axis"));
   const at = (place) => clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
-  return { svg, x, y, at, top, bottom: height - bottom };
+  return { svg, x, y, at, clip, top, bottom: height - bottom };
 }
 
 /** Draw curves over an angle; `mark` adds to the drawing before them, `moved` tells of the crosshair. */
@@ -193,7 +197,9 @@ function graph(card, curves, across, scale, what, mark, crossing) {
   const width = widthOf(card, 760);
   const it = axes(width, Math.round(clamp(0.62 * width, 200, 380)), across, scale, what);
   mark?.(it);
-  for (const curve of curves) it.svg.append(stroke(curve, curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])])));
+  const inside = shape("g", { "clip-path": `url(#${it.clip})` });
+  for (const curve of curves) inside.append(stroke(curve, curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])])));
+  it.svg.append(inside);
   const overlay = shape("g");
   it.svg.append(overlay);
   const cross = (angle, symbol) => {
@@ -234,7 +240,10 @@ export function drawCartesian() {
 
 export function drawAlbedo() {
   const curves = curvesOf("albedo");
-  const scale = valueScale(curves.map(({ y }) => y), false, 1.02);
+  // Where energy is gained without end, the scale is that of angles up to 85°.
+  const scale = valueScale(curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)), false, 1.02);
+  const gained = largest(curves.map(({ y }) => y));
+  cards.albedo.note.textContent = "over the angle of incidence" + (gained > 1.005 ? `, up to ${format(gained)}` : "");
   const mark = ({ svg, x, y, top, bottom }) => {
     svg.append(line(x(0), y(1), x(90), y(1), "unity"), line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"));
   };

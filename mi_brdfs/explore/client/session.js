@@ -21,7 +21,7 @@ export const session = {
   /** The subjects as they were sent. */
   sent: [],
   selected: 0,
-  exported: false,
+  exported: document.getElementById("exported") !== null,
   connected: false,
   hello: null,
   /** The server's account of each subject: error, controls, xml … */

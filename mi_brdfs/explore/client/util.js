@@ -135,7 +135,7 @@ export function save(name, data, mime) {
 /** Return a figure as a file of its own, with the colours that it has on the page. */
 export function standalone(figure) {
   const copy = figure.cloneNode(true);
-  const wanted = ["fill", "stroke", "stroke-width", "stroke-dasharray", "opacity", "font-size", "text-anchor"];
+  const wanted = ["fill", "stroke", "stroke-width", "stroke-dasharray", "opacity", "fill-opacity", "font-size", "text-anchor"];
   const originals = [figure, ...figure.querySelectorAll("*")];
   [copy, ...copy.querySelectorAll("*")].forEach((node, k) => {
     const style = getComputedStyle(originals[k]);
