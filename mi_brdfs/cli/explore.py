@@ -109,7 +109,7 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
                 kind = MEASURED if is_measured(target) else GIVEN
                 subject = {"type": kind, "file": found[0].word, **(values if kind == MEASURED else {})}
             else:
-                subject = {**Materials().expanded({"type": target}), **values} if values else {"type": target}
+                subject = {"type": target, **values}
                 Materials().expanded(subject)
             subjects.append({"bsdf": checked(subject), "name": Path(target).name if sources else target})
         except (StateError, ValueError, RuntimeError) as error:

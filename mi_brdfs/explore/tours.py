@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Any
 
 STEP = re.compile(
-    r"^## (?P<title>.+)\n+```json\n(?P<state>.*?)\n```\n+(?P<text>.*?)\s*(?=^## |\Z)", re.MULTILINE | re.DOTALL
+    r"^## (?P<title>[^\n]+)\n+```json\n(?P<state>.*?)\n```\n+(?P<text>.*?)\s*(?=^## |\Z)", re.MULTILINE | re.DOTALL
 )
 
 
