@@ -1,6 +1,6 @@
 // The page: its cards, its bars, and what is drawn when.
 import { byId, element, format } from "./util.js";
-import { VIEWS, change, clean, emit, fragment, on, readFragment, session, visible } from "./session.js";
+import { VIEWS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
 import { connect, post, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
 import { colourOf, drawAlbedo, drawCartesian, drawPolar, drawSampler, table } from "./plots.js";
@@ -189,11 +189,8 @@ function openAddress() {
   if (location.hash === address) return;
   const found = readFragment(location.hash);
   if (!found) return;
-  session.shown = Object.fromEntries(Object.keys(session.shown).map((view) => [view, []]));
-  session.info = [];
-  session.oldest = session.serial + 1;
   address = location.hash;
-  change(found);
+  goTo(found, false);
 }
 
 function start() {

@@ -1,5 +1,5 @@
 // A card of the page: a heading, buttons, a figure, and a line for the values under the pointer.
-import { element, save, standalone } from "./util.js";
+import { element, save, shape, standalone } from "./util.js";
 import { session } from "./session.js";
 
 export const cards = {};
@@ -9,7 +9,7 @@ export function makeCard(view, title, note, files = []) {
   const tools = element("div", { class: "tools" });
   const figure = element("div", { class: `figure ${view}` });
   const readout = element("output", { class: "readout" });
-  const card = { view, title, figure, readout, tools, hint: "" };
+  const card = { view, title, figure, readout, tools, legend: [] };
   for (const kind of files) {
     tools.append(element("button", { class: "quiet", "aria-label": `${title}: save as ${kind}`, onclick: () => saveAs(card, kind) },
       kind));
@@ -35,8 +35,11 @@ function saveAs(card, kind) {
 
 const quoted = (cell) => (/[",\n]/.test(String(cell)) ? `"${String(cell).replace(/"/g, '""')}"` : String(cell ?? ""));
 
-/** Show values in the line below the figure: pairs of a colour and a text. */
+/** Show values in the line below the figure, or else its legend: texts with a colour, and the dashes of a curve. */
 export function tell(card, items) {
-  card.readout.replaceChildren(...(items.length ? items : [[null, card.hint]]).map(([colour, text]) =>
-    element("span", { style: colour ? `--mark:${colour}` : null, class: colour ? "marked" : null }, text)));
+  card.readout.replaceChildren(...(items.length ? items : card.legend).map(([colour, text, dash]) => {
+    if (dash === undefined) return element("span", { style: colour ? `--mark:${colour}` : null, class: colour ? "marked" : null }, text);
+    return element("span", {}, shape("svg", { width: 24, height: 8, class: "sample", "aria-hidden": "true" },
+      shape("line", { x1: 0, y1: 4, x2: 24, y2: 4, stroke: colour, "stroke-width": 2, "stroke-dasharray": dash })), text);
+  }));
 }

@@ -68,7 +68,8 @@ function replay({ state, frames }) {
 function keep(view, subject, answer) {
   const list = session.shown[view];
   const before = list?.[subject];
-  if (!list || answer.serial < session.oldest || answer.serial < before?.serial) return;
+  if (!list || subject >= session.state.subjects.length) return;
+  if (answer.serial < session.oldest[subject] || answer.serial < before?.serial) return;
   // A part below the surface belongs to the part above it, or to the one before, until the next one has come.
   answer.former = before?.serial ?? 0;
   list[subject] = answer;
@@ -80,7 +81,7 @@ function receive(message) {
     session.hello = message;
     emit("hello");
   } else if (message.type === "subject") {
-    if (message.serial < session.oldest || message.serial < session.info[message.subject]?.serial) return;
+    if (message.serial < session.oldest[message.subject] || message.serial < session.info[message.subject]?.serial) return;
     session.info[message.subject] = message;
     emit("subject", message.subject);
     adopt(message.subject, message.bsdf);

@@ -28,7 +28,8 @@ export function startLobe() {
     card.figure.append(element("p", {}, "This browser has no WebGL 2, which the lobe needs; the polar plot shows its cut."));
     return false;
   }
-  card.hint = session.exported ? "Drag to turn, or arrow keys" : "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi";
+  card.legend = [[null, session.exported ? "Drag to turn, or arrow keys" : "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi"]];
+  tell(card, []);
   labels = element("div", { class: "labels" });
   card.figure.append(canvas, labels);
   setUp();

@@ -123,7 +123,7 @@ function drawDifference([a, b]) {
   const [first, second] = [session.shown.picture[a], session.shown.picture[b]];
   const told = stack.querySelector(".scale");
   if (!first || !second || first.width !== second.width || first.height !== second.height) {
-    told.textContent = "Waiting for both pictures …";
+    if (!canvas.first) told.textContent = "Waiting for both pictures …";
     return;
   }
   if (canvas.first === first && canvas.second === second) return;

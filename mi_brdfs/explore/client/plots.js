@@ -95,6 +95,12 @@ function replaceFigure(card, ...nodes) {
   if (focused) nodes[0].focus();
 }
 
+/** Put the legend and the unit of curves of f cosθ into their card. */
+function describe(card, curves) {
+  card.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
+  card.note.textContent = `${unitOf()}, at θi = ${format(session.state.theta)}°`;
+}
+
 const unitOf = () => (session.state.normalise ? "f cosθo / maximum" : "f cosθo, 1/sr");
 
 // --- Polar ----------------------------------------------------------------------------------------------------------
@@ -102,6 +108,7 @@ const unitOf = () => (session.state.normalise ? "f cosθo / maximum" : "f cosθo
 export function drawPolar() {
   const card = cards.polar;
   const curves = lobesOf("polar");
+  describe(card, curves);
   const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
   const scale = valueScale(curves.map(({ y }) => y), session.state.scale === "log");
   const width = widthOf(card);
@@ -167,7 +174,8 @@ function dots(overlay, curves, place) {
   }
 }
 
-const valuesAt = (curves) => curves.map((curve) => [curve.colour, `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`]);
+const valuesAt = (curves) => curves.map((curve) =>
+  [curve.colour, `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`, curve.dash]);
 
 // --- Cartesian ------------------------------------------------------------------------------------------------------
 
@@ -224,6 +232,7 @@ function cursorAt(angle, act) {
 
 export function drawCartesian() {
   const curves = lobesOf("cartesian");
+  describe(cards.cartesian, curves);
   const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
   const across = whole ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] } : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
   const scale = valueScale(curves.map(({ y }) => y), session.state.scale === "log");
@@ -249,6 +258,7 @@ export function drawAlbedo() {
   };
   graph(cards.albedo, curves, { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] }, scale,
     summary(curves, "Albedo over the angle of incidence, with a line at 1", ""), mark, (angle, cross) => cross(angle, "θi"));
+  cards.albedo.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
   tell(cards.albedo, []);
 }
 

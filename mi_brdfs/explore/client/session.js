@@ -28,8 +28,8 @@ export const session = {
   info: [],
   /** The latest answer of each view, by subject. */
   shown: Object.fromEntries([...VIEWS, "lobeBelow", "hemisphereBelow"].map((view) => [view, []])),
-  /** Answers to older states are about other subjects. */
-  oldest: 0,
+  /** For each subject the first state that it is in: answers to older ones are about another. */
+  oldest: [],
 };
 
 const listeners = {};
@@ -69,15 +69,30 @@ export function adopt(index, bsdf) {
   if (bsdf && now && JSON.stringify(now) === JSON.stringify(session.sent[index]?.bsdf)) changeSubject(index, { bsdf });
 }
 
-/** Replace the subjects, each given with the number that it had, or -1. */
-export function arrange(subjects, former) {
+/** Replace the subjects, each given with the number that it had, or -1; what the server has shown of them stays. */
+function arrange(subjects, former, patch = {}, push = true) {
   const moved = (list) => former.map((k) => (k < 0 ? undefined : list[k]));
   session.info = moved(session.info);
   for (const view of Object.keys(session.shown)) session.shown[view] = moved(session.shown[view]);
-  session.oldest = session.serial + 1;
+  session.oldest = former.map((k, at) => (k === at ? session.oldest[k] : session.serial + 1));
   const place = session.state.pair.map((k) => former.indexOf(k));
   const pair = place.map((k, at) => (k >= 0 ? k : place[1 - at] === at ? 1 - at : at));
-  change({ subjects, pair }, true);
+  change({ pair, ...patch, subjects }, push);
+}
+
+/** Go to another state, of a tour or an address. */
+export function goTo(patch, push) {
+  const told = ({ bsdf }) => JSON.stringify(bsdf);
+  const now = session.state.subjects.map(told);
+  const subjects = patch.subjects ?? session.state.subjects;
+  if (patch.subjects) session.selected = 0;
+  const free = new Set(now.keys());
+  const former = subjects.map((subject, k) => {
+    const found = now[k] === told(subject) && free.has(k) ? k : [...free].find((at) => now[at] === told(subject)) ?? -1;
+    free.delete(found);
+    return found;
+  });
+  arrange(subjects, former, patch, push);
 }
 
 export function addSubject(bsdf, name) {

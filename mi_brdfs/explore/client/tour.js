@@ -1,6 +1,6 @@
 // Guided tours: a text for each step, whose state is merged into the page's.
 import { byId, element } from "./util.js";
-import { change, session } from "./session.js";
+import { change, clean, goTo, session } from "./session.js";
 
 export function startTours() {
   byId("tours").onclick = () => {
@@ -23,13 +23,8 @@ function go(name, step) {
   const tour = session.hello.tours.find((each) => each.name === name);
   if (step >= tour.steps.length) return change({ tour: null }, true);
   const patch = Object.assign({}, ...tour.steps.slice(0, step + 1).map(({ state }) => state));
-  if (tour.steps[step].state.subjects) {
-    session.selected = 0;
-    session.info = [];
-    for (const list of Object.values(session.shown)) list.length = 0;
-    session.oldest = session.serial + 1;
-  }
-  change({ ...patch, tour: { name, step } }, true);
+  if (patch.subjects) patch.subjects = clean(patch).subjects;
+  goTo({ ...patch, tour: { name, step } }, true);
   byId("tour").scrollIntoView({ block: "nearest" });
   byId("tour-title").focus();
 }
