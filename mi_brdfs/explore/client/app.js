@@ -24,6 +24,9 @@ const TITLES = {
 const DRAW = { picture: drawPicture, lobe: drawLobe, polar: drawPolar, cartesian: drawCartesian, albedo: drawAlbedo,
   slice: () => drawMaps("slice"), hemisphere: () => drawMaps("hemisphere"), sampler: () => drawSampler(chi2Box()) };
 
+/** What changes how the page shows what it has. */
+const LOOKS = ["scale", "normalise", "dark", "lobes", "wire"];
+
 // --- Drawing, once in a frame of the animation -----------------------------------------------------------------------
 
 const stale = new Set();
@@ -216,10 +219,12 @@ function start() {
   startMessages();
 
   on("sending", () => (session.state.size = wantedSize()));
-  on("state", (push) => {
-    verdicts.length = 0;
+  on("state", (push, names) => {
     keepAddress(push);
+    if (names?.every((name) => name === "wipe")) return redraw("picture");
     redrawAll();
+    if (names?.every((name) => LOOKS.includes(name))) return;
+    verdicts.length = 0;
     sendState();
   });
   on("selected", () => redraw("bars", "subjects"));

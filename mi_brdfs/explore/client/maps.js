@@ -17,7 +17,9 @@ export function drawMaps(view) {
   const peak = largest(arrays);
   const [low, high] = decades(arrays, peak);
   LIMITS[view] = [low, high];
-  const boxes = [...card.figure.querySelectorAll(".map")];
+  card.maps ??= card.figure.appendChild(element("div", { class: "maps" }));
+  card.node.classList.toggle("wide", found.length > 3);
+  const boxes = [...card.maps.children];
   found.forEach((map, k) => paint((boxes[k] ?? addBox(card, view)), view, map, low, high));
   boxes.slice(found.length).forEach((box) => box.remove());
   bar(card, low, high, view === "slice" ? "f, 1/sr" : "f cosθo, 1/sr");
@@ -30,8 +32,7 @@ function addBox(card, view) {
     ? [element("span", { class: "across" }, "θh 0…90°"), element("span", { class: "up" }, "θd 0…90°")]
     : [element("span", { class: "across" }, "ωi on the left, rim at 90°")];
   const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
-  let bar = card.figure.querySelector(".bar");
-  card.figure.insertBefore(box, bar);
+  card.maps.append(box);
   let spot = [0.5, 0.5];
   const show = (x, y) => {
     spot = [clamp(x, 0, 0.9999), clamp(y, 0, 0.9999)];

@@ -18,15 +18,20 @@ export function startPicture() {
   handle.addEventListener("pointermove", (event) => {
     if (!handle.hasPointerCapture(event.pointerId)) return;
     const box = handle.parentElement.getBoundingClientRect();
-    change({ wipe: clamp((event.clientX - box.left) / box.width, 0, 1) });
+    slideTo((event.clientX - box.left) / box.width);
   });
   handle.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -0.02, ArrowRight: 0.02, ArrowDown: -0.02, ArrowUp: 0.02, Home: -1, End: 1 }[event.key];
     if (!step) return;
     event.preventDefault();
-    change({ wipe: clamp(session.state.wipe + step, 0, 1) });
+    slideTo(session.state.wipe + step);
   });
   card.image = (done) => stack.querySelector("canvas") && flat().toBlob(done);
+}
+
+function slideTo(share) {
+  change({ wipe: clamp(share, 0, 1) });
+  drawPicture();
 }
 
 /** Return the size in pixels to ask for: what the layout shows, at most 512 unless the window is very large. */

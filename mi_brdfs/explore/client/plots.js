@@ -116,8 +116,8 @@ export function drawPolar() {
   const radius = (width - 2 * margin) / 2;
   const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
   const middle = [width / 2, margin + radius];
-  const place = (angle, reach) => [middle[0] + radius * reach * Math.sin(radians(angle)),
-    middle[1] - radius * reach * Math.cos(radians(angle))];
+  const place = (angle, reach) => [middle[0] + radius * Math.max(reach, 0) * Math.sin(radians(angle)),
+    middle[1] - radius * Math.max(reach, 0) * Math.cos(radians(angle))];
   const svg = drawing(width, height, summary(curves, `Polar plot of ${unitOf()} in the plane of incidence`, ""));
 
   const ring = (reach, kind) => {
@@ -188,7 +188,7 @@ function axes(width, height, across, scale, what, unit = "°") {
   const clip = `inside-${++drawings}`;
   svg.append(shape("clipPath", { id: clip }, shape("rect", { x: left, y: top - 4, width: width - left - right, height: height - top - bottom + 6 })));
   const x = (value) => left + ((value - across.low) / (across.high - across.low)) * (width - left - right);
-  const y = (value) => height - bottom - clamp(scale.of(value), 0, 9) * (height - top - bottom);
+  const y = (value) => height - bottom - clamp(scale.of(value), -0.1, 9) * (height - top - bottom);
   for (const [value, text] of scale.marks) {
     svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
   }

@@ -46,7 +46,7 @@ export function emit(event, ...details) {
 export function change(patch, push = false) {
   session.state = clean({ ...session.state, ...patch });
   session.selected = clamp(session.selected, 0, Math.max(session.state.subjects.length - 1, 0));
-  emit("state", push);
+  emit("state", push, Object.keys(patch));
 }
 
 /** Change a subject. */

@@ -89,7 +89,7 @@ export function valueScale(arrays, log, least = 0) {
   const reach = high - low + 0.08;
   const marks = [];
   for (let k = low; k <= high; k++) marks.push([10 ** k, power(k)]);
-  return { of: (value) => Math.max((Math.log10(Math.max(value, 1e-300)) - low) / reach, 0), marks, log, peak, low, high };
+  return { of: (value) => Math.max((Math.log10(Math.max(value, 1e-300)) - low) / reach, -0.1), marks, log, peak, low, high };
 }
 
 /** Return the value of a curve at x, straight between its points, or null outside it. */
