@@ -3,8 +3,9 @@ import { byId, element, format } from "./util.js";
 import { VIEWS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
 import { connect, post, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
-import { colourOf, drawAlbedo, drawCartesian, drawPolar, drawSampler, table } from "./plots.js";
-import { drawMaps } from "./maps.js";
+import { colourOf, drawAlbedo, drawCartesian, drawPolar, table } from "./plots.js";
+import { drawSampler } from "./sampler.js";
+import { drawMaps, mapsImage } from "./maps.js";
 import { drawLobe, startLobe } from "./lobe.js";
 import { drawPicture, pairOf, startPicture, wantedSize } from "./picture.js";
 import { drawSubjects, startSubjects } from "./subjects.js";
@@ -21,8 +22,16 @@ const TITLES = {
   hemisphere: ["Hemisphere", "f cosθo from above", ["PNG"]],
   sampler: ["Sampler", "", ["SVG", "CSV"]],
 };
-const DRAW = { picture: drawPicture, lobe: drawLobe, polar: drawPolar, cartesian: drawCartesian, albedo: drawAlbedo,
-  slice: () => drawMaps("slice"), hemisphere: () => drawMaps("hemisphere"), sampler: () => drawSampler(chi2Box()) };
+const DRAW = {
+  picture: drawPicture,
+  lobe: drawLobe,
+  polar: drawPolar,
+  cartesian: drawCartesian,
+  albedo: drawAlbedo,
+  slice: () => drawMaps("slice"),
+  hemisphere: () => drawMaps("hemisphere"),
+  sampler: () => drawSampler(chi2Box()),
+};
 
 /** What changes how the page shows what it has. */
 const LOOKS = ["scale", "normalise", "dark", "lobes", "wire"];
@@ -74,9 +83,19 @@ function startBars() {
     tie(`${name}-field`, name, asNumber);
   }
   for (const name of ["channel", "stage", "shape", "scale", "compare"]) tie(name, name);
-  tie("component", "component", ({ value }) => (value === "" ? null : Number(value)), (field, value) => (field.value = value ?? ""));
+  tie(
+    "component",
+    "component",
+    ({ value }) => (value === "" ? null : Number(value)),
+    (field, value) => (field.value = value ?? ""),
+  );
   tie("normalise", "normalise", asFlag, showFlag);
-  tie("side", "lobes", ({ checked }) => (checked ? "side" : "over"), (field, value) => (field.checked = value === "side"));
+  tie(
+    "side",
+    "lobes",
+    ({ checked }) => (checked ? "side" : "over"),
+    (field, value) => (field.checked = value === "side"),
+  );
   tie("wire", "wire", asFlag, showFlag);
   for (const [at, id] of ["first", "second"].entries()) {
     byId(id).onchange = ({ target }) => {
@@ -89,10 +108,22 @@ function startBars() {
   byId("swap").onclick = () => change({ pair: [...pairOf()].reverse() });
   byId("theme").onclick = () => change({ dark: !isDark() });
   byId("dismiss").onclick = () => (byId("alert").hidden = true);
-  byId("views").replaceChildren(...VIEWS.map((view) => element("button", { class: "toggle", "data-view": view, onclick: () => {
-    const { views } = session.state;
-    change({ views: views.includes(view) ? views.filter((each) => each !== view) : [...views, view] });
-  } }, view)));
+  byId("views").replaceChildren(
+    ...VIEWS.map((view) =>
+      element(
+        "button",
+        {
+          class: "toggle",
+          "data-view": view,
+          onclick: () => {
+            const { views } = session.state;
+            change({ views: views.includes(view) ? views.filter((each) => each !== view) : [...views, view] });
+          },
+        },
+        view,
+      ),
+    ),
+  );
 }
 
 const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
@@ -106,9 +137,19 @@ const setOptions = (field, pairs) => {
 
 function drawBars() {
   const { state, hello, info } = session;
-  setOptions(byId("stage"), (hello?.stages ?? [state.stage]).map((name) => [name, name]));
-  setOptions(byId("shape"), [["body", "body"], ["sphere", "sphere"], ...(hello?.scene ? [["scene", hello.scene]] : [])]);
-  setOptions(byId("component"), [["", "all components"], ...(info[session.selected]?.components ?? []).map((name, k) => [k, name])]);
+  setOptions(
+    byId("stage"),
+    (hello?.stages ?? [state.stage]).map((name) => [name, name]),
+  );
+  setOptions(byId("shape"), [
+    ["body", "body"],
+    ["sphere", "sphere"],
+    ...(hello?.scene ? [["scene", hello.scene]] : []),
+  ]);
+  setOptions(byId("component"), [
+    ["", "all components"],
+    ...(info[session.selected]?.components ?? []).map((name, k) => [k, name]),
+  ]);
   byId("component-row").hidden = (info[session.selected]?.components ?? []).length < 2;
   emit("draw-bars");
   for (const button of byId("views").children) {
@@ -137,14 +178,20 @@ function drawBars() {
 const verdicts = [];
 
 function chi2Box() {
-  return element("div", { class: "verdicts" }, ...visible().map((k) => element("p", { class: "marked", style: `--mark:${colourOf(k)}` },
-    session.exported ? null : element("button", { onclick: () => {
-      verdicts[k] = { text: "testing …" };
+  const row = (k) => {
+    const test = () => {
+      verdicts[k] = "testing …";
       post({ type: "chi2", subject: k });
       redraw("sampler");
-    } }, "χ² test"), ` ${session.state.subjects[k].name}`,
-    session.shown.sampler[k] ? `: efficiency η ${format(session.shown.sampler[k].efficiency)}` : "",
-    verdicts[k] ? `. ${verdicts[k].passed === undefined ? "" : verdicts[k].passed ? "Passed: " : "Failed: "}${verdicts[k].text}` : "")));
+    };
+    const button = session.exported ? null : element("button", { onclick: test }, "χ² test");
+    const { efficiency } = session.shown.sampler[k] ?? {};
+    const told = [session.state.subjects[k].name];
+    if (efficiency !== undefined) told.push(`efficiency η ${format(efficiency)}`);
+    if (verdicts[k]) told.push(verdicts[k]);
+    return element("p", { class: "marked", style: `--mark:${colourOf(k)}` }, button, ` ${told.join(": ")}`);
+  };
+  return element("div", { class: "verdicts" }, ...visible().map(row));
 }
 
 // --- Messages -------------------------------------------------------------------------------------------------------
@@ -162,7 +209,7 @@ function startMessages() {
     byId("alert").hidden = false;
   });
   on("chi2", ({ subject, passed, text }) => {
-    verdicts[subject] = { passed, text };
+    verdicts[subject] = `${passed === undefined ? "" : passed ? "passed: " : "failed: "}${text}`;
     redraw("sampler");
   });
   on("connection", () => {
@@ -176,7 +223,7 @@ function startMessages() {
 let address = "";
 let timer = null;
 
-/** Keep the state in the address: a step of the history for what is added or removed, else at most four times a second. */
+/** Keep the state in the address: a step of the history for what is added or removed, else when it has settled. */
 function keepAddress(push) {
   if (session.exported) return;
   clearTimeout(timer);
@@ -200,11 +247,19 @@ function start() {
   for (const view of VIEWS) {
     const card = makeCard(view, ...TITLES[view]);
     byId(view === "picture" ? "picture-place" : "grid").append(card.node);
-    if (view === "slice" || view === "hemisphere") card.image = (done) => card.figure.querySelector("canvas")?.toBlob(done);
+    if (view === "slice" || view === "hemisphere") card.image = (done) => mapsImage(view).toBlob(done);
   }
   for (const view of ["polar", "cartesian", "albedo"]) cards[view].table = () => table(view);
-  cards.sampler.table = () => [["subject", "theta_i_degrees", "efficiency"], ...visible().flatMap((k) =>
-    (session.shown.sampler[k]?.eta.x ?? []).map((angle, at) => [session.state.subjects[k].name, angle, session.shown.sampler[k].eta.y[at]]))];
+  cards.sampler.table = () => [
+    ["subject", "theta_i_degrees", "efficiency"],
+    ...visible().flatMap((k) =>
+      (session.shown.sampler[k]?.eta.x ?? []).map((angle, at) => [
+        session.state.subjects[k].name,
+        angle,
+        session.shown.sampler[k].eta.y[at],
+      ]),
+    ),
+  ];
   cards.lobe.image = (done) => {
     drawLobe();
     cards.lobe.figure.querySelector("canvas")?.toBlob(done);

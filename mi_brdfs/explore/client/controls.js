@@ -19,14 +19,27 @@ export function drawControls() {
   }
   if (session.exported) return drawList(host, session.state.subjects[k].bsdf);
   const controls = info?.controls ?? [];
-  const form = JSON.stringify([k, session.state.subjects[k].bsdf.type, controls.map(({ name, kind, words, low, high, optional }) =>
-    [name, kind, words, low, high, optional, valueOf({ name, value: null }, k) === null && optional])]);
+  const form = JSON.stringify([
+    k,
+    session.state.subjects[k].bsdf.type,
+    controls.map(({ name, kind, words, low, high, optional }) => [
+      name,
+      kind,
+      words,
+      low,
+      high,
+      optional,
+      valueOf({ name, value: null }, k) === null && optional,
+    ]),
+  ]);
   if (info && form !== built) {
     built = form;
     rows = controls.map((control) => makeRow(control, k));
     host.replaceChildren(...grouped(rows));
   }
-  const own = rows.find(({ control }) => info?.error && new RegExp(`(^|[^\\w])${control.name}([^\\w]|$)`).test(info.error));
+  const own = rows.find(
+    ({ control }) => info?.error && new RegExp(`(^|[^\\w])${control.name}([^\\w]|$)`).test(info.error),
+  );
   told.textContent = info?.error && !own ? info.error : "";
   for (const row of rows) {
     const control = controls.find(({ name }) => name === row.control.name) ?? row.control;
@@ -39,8 +52,18 @@ export function drawControls() {
 /** In an exported page nothing can be changed: list the parameters. */
 function drawList(host, bsdf) {
   const told = (value) => (typeof value === "number" ? format(value, 4) : String(value));
-  host.replaceChildren(...Object.entries(bsdf).filter(([name]) => name !== "type").map(([name, value]) => element("div", { class: "fixed" },
-    element("span", {}, name.replaceAll("_", " ")), element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)))));
+  host.replaceChildren(
+    ...Object.entries(bsdf)
+      .filter(([name]) => name !== "type")
+      .map(([name, value]) =>
+        element(
+          "div",
+          { class: "fixed" },
+          element("span", {}, name.replaceAll("_", " ")),
+          element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
+        ),
+      ),
+  );
   byId("incidence").textContent = `θi = ${format(session.state.theta)}°, φi = ${format(session.state.phi)}°`;
 }
 
@@ -50,8 +73,11 @@ function grouped(all) {
   for (const row of all) groups.set(row.control.group ?? "", [...(groups.get(row.control.group ?? "") ?? []), row]);
   return [...groups].flatMap(([name, members]) => {
     const absent = members.filter((row) => row.absent).map(({ node }) => node);
-    return [name ? element("h3", {}, name) : null, ...members.filter((row) => !row.absent).map(({ node }) => node),
-      absent.length ? element("div", { class: "row absent" }, ...absent) : null].filter(Boolean);
+    return [
+      name ? element("h3", {}, name) : null,
+      ...members.filter((row) => !row.absent).map(({ node }) => node),
+      absent.length ? element("div", { class: "row absent" }, ...absent) : null,
+    ].filter(Boolean);
   });
 }
 
@@ -66,24 +92,46 @@ function makeRow(control, k) {
   const absent = control.optional && valueOf({ name: control.name, value: null }, k) === null && control.value == null;
   const error = element("p", { class: "error", id: `${id}-error`, role: "alert" });
   const described = { "aria-describedby": `${id}-error` };
-  const usual = control.default ?? { number: middle(control), colour: 0.5, choice: control.words?.[0], flag: true, text: "" }[control.kind];
+  const usual =
+    control.default ??
+    { number: middle(control), colour: 0.5, choice: control.words?.[0], flag: true, text: "" }[control.kind];
   const named = control.name.replaceAll("_", " ");
   if (absent) {
-    const node = element("button", { class: "small", title: control.text ?? "", onclick: () => set(usual) }, `+ ${named}`);
+    const node = element(
+      "button",
+      { class: "small", title: control.text ?? "", onclick: () => set(usual) },
+      `+ ${named}`,
+    );
     return { control, node, absent, error, show: () => {} };
   }
-  const make = { number: makeNumber, colour: makeColour, choice: makeChoice, flag: makeFlag, text: makeText }[control.kind];
+  const make = { number: makeNumber, colour: makeColour, choice: makeChoice, flag: makeFlag, text: makeText }[
+    control.kind
+  ];
   const { body, show } = make(control, id, set, described);
   const [act, sign] = control.optional ? ["leave out", "×"] : ["reset", "↺"];
-  const head = element("div", { class: "name" }, element("label", { for: id, title: control.text ?? "" }, named),
-    element("button", { class: "quiet small reset", "aria-label": `${act} ${control.name}`, title: act, onclick: () => set(null) }, sign));
+  const head = element(
+    "div",
+    { class: "name" },
+    element("label", { for: id, title: control.text ?? "" }, named),
+    element(
+      "button",
+      { class: "quiet small reset", "aria-label": `${act} ${control.name}`, title: act, onclick: () => set(null) },
+      sign,
+    ),
+  );
   const meaning = control.text ? element("p", { class: "meaning" }, control.text) : null;
-  return { control, node: element("div", { class: `control ${control.kind}` }, head, body, error, meaning), show, error };
+  return {
+    control,
+    node: element("div", { class: `control ${control.kind}` }, head, body, error, meaning),
+    show,
+    error,
+  };
 }
 
 // --- Numbers --------------------------------------------------------------------------------------------------------
 
-const highOf = ({ low, high, value, default: usual }) => high ?? Math.max(10 * Math.abs(usual ?? 0), 4 * Math.abs(Number(value) || 0), (low ?? 0) + 1);
+const highOf = ({ low, high, value, default: usual }) =>
+  high ?? Math.max(10 * Math.abs(usual ?? 0), 4 * Math.abs(Number(value) || 0), (low ?? 0) + 1);
 const lowOf = ({ low, default: usual }) => low ?? -Math.max(1, 10 * Math.abs(usual ?? 0));
 
 /** Return maps between a number and a slider's place in 0…1. */
@@ -92,8 +140,10 @@ function slide(control) {
   if (control.scale !== "log") return [(value) => (value - low) / (high - low), (place) => low + place * (high - low)];
   const first = low > 0 ? low : high * 1e-6;
   const reach = Math.log(high / first);
-  return [(value) => Math.log(Math.max(value, first) / first) / reach,
-    (place) => (place <= 0 ? low : first * Math.exp(place * reach))];
+  return [
+    (value) => Math.log(Math.max(value, first) / first) / reach,
+    (place) => (place <= 0 ? low : first * Math.exp(place * reach)),
+  ];
 }
 
 function middle(control) {
@@ -108,7 +158,12 @@ const settled = (input, text) => {
 function makeNumber(control, id, set, described) {
   const [place, value] = slide(control);
   const slider = element("input", { type: "range", id, min: 0, max: STEPS, step: 1, ...described });
-  const field = element("input", { type: "number", step: "any", "aria-label": `${control.name}, as a number`, ...described });
+  const field = element("input", {
+    type: "number",
+    step: "any",
+    "aria-label": `${control.name}, as a number`,
+    ...described,
+  });
   slider.oninput = () => {
     const chosen = rounded(value(slider.value / STEPS));
     field.value = chosen;
@@ -137,16 +192,33 @@ const coarse = (slider) => (event) => {
 // --- Colours --------------------------------------------------------------------------------------------------------
 
 const asColour = (value) => (Array.isArray(value) ? value : [value ?? 0, value ?? 0, value ?? 0]);
-const hex = (colour) => "#" + colour.map((v) => Math.round(255 * toDisplay(clamp(v, 0, 1))).toString(16).padStart(2, "0")).join("");
+const hex = (colour) =>
+  "#" +
+  colour
+    .map((v) =>
+      Math.round(255 * toDisplay(clamp(v, 0, 1)))
+        .toString(16)
+        .padStart(2, "0"),
+    )
+    .join("");
 
 /** A colour in linear rgb: a level for all three channels, a number for each, and a picker where they are in 0…1. */
 function makeColour(control, id, set, described) {
   let current = asColour(control.value);
-  const [place, value] = slide({ ...control, value: Math.max(...current), default: Math.max(...asColour(control.default ?? 0)) });
+  const [place, value] = slide({
+    ...control,
+    value: Math.max(...current),
+    default: Math.max(...asColour(control.default ?? 0)),
+  });
   const level = element("input", { type: "range", id, min: 0, max: STEPS, step: 1, ...described });
   const picker = element("input", { type: "color", "aria-label": `${control.name}, as a colour` });
   const fields = ["red", "green", "blue"].map((channel, c) => {
-    const field = element("input", { type: "number", step: "any", "aria-label": `${control.name}, ${channel}`, class: channel });
+    const field = element("input", {
+      type: "number",
+      step: "any",
+      "aria-label": `${control.name}, ${channel}`,
+      class: channel,
+    });
     field.onchange = () => field.value !== "" && put(current.map((v, at) => (at === c ? Number(field.value) : v)));
     return field;
   });
@@ -167,14 +239,25 @@ function makeColour(control, id, set, described) {
     fields.forEach((field, c) => settled(field, rounded(Number(current[c]))));
   };
   const bounded = (control.high ?? Infinity) <= 1;
-  return { body: element("div", { class: "colours" }, element("div", { class: "pair" }, level, bounded ? picker : null),
-    element("div", { class: "three" }, ...fields)), show };
+  return {
+    body: element(
+      "div",
+      { class: "colours" },
+      element("div", { class: "pair" }, level, bounded ? picker : null),
+      element("div", { class: "three" }, ...fields),
+    ),
+    show,
+  };
 }
 
 // --- Words ----------------------------------------------------------------------------------------------------------
 
 function makeChoice(control, id, set, described) {
-  const select = element("select", { id, ...described }, ...control.words.map((word) => element("option", { value: word }, word)));
+  const select = element(
+    "select",
+    { id, ...described },
+    ...control.words.map((word) => element("option", { value: word }, word)),
+  );
   select.onchange = () => set(select.value);
   return { body: select, show: (value) => (select.value = value ?? control.default ?? "") };
 }

@@ -6,18 +6,27 @@ import { cards } from "./card.js";
 
 export function startDialogs() {
   byId("share").onclick = () => {
-    for (const what of ["xml", "dict", "command"]) byId(`copy-${what}`).disabled = !session.info[session.selected]?.[what];
+    for (const what of ["xml", "dict", "command"])
+      byId(`copy-${what}`).disabled = !session.info[session.selected]?.[what];
     byId("share-of").textContent = session.state.subjects[session.selected]?.name ?? "";
     byId("share-dialog").showModal();
   };
-  for (const what of ["xml", "dict", "command"]) byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
-  byId("copy-link").onclick = () => copy(location.href.replace(/#.*/, "") + "#" + encodeURIComponent(decodeURIComponent(fragment().slice(1))).replaceAll("'", "%27"), "link");
+  for (const what of ["xml", "dict", "command"])
+    byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
+  byId("copy-link").onclick = () =>
+    copy(
+      location.href.replace(/#.*/, "") +
+        "#" +
+        encodeURIComponent(decodeURIComponent(fragment().slice(1))).replaceAll("'", "%27"),
+      "link",
+    );
   byId("save-png").onclick = () => cards.picture.tools.querySelector("button")?.click();
   byId("save-exr").onclick = () => ask({ type: "save", what: "exr", subject: session.selected });
   byId("save-page").onclick = () => ask({ type: "save", what: "page", state: session.state });
   on("saved", () => (byId("shared").textContent = "Saved."));
   startFit();
-  for (const button of document.querySelectorAll("dialog .close")) button.onclick = () => button.closest("dialog").close();
+  for (const button of document.querySelectorAll("dialog .close"))
+    button.onclick = () => button.closest("dialog").close();
   for (const dialog of document.querySelectorAll("dialog")) {
     dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
     dialog.addEventListener("close", () => (byId("shared").textContent = ""));
@@ -36,7 +45,9 @@ async function copy(text, what) {
     // Without the permission, or from a file: an old way that needs none.
     const area = byId("share-dialog").appendChild(element("textarea", {}, text));
     area.select();
-    byId("shared").textContent = document.execCommand("copy") ? `Copied the ${what}.` : "The browser does not let the page copy.";
+    byId("shared").textContent = document.execCommand("copy")
+      ? `Copied the ${what}.`
+      : "The browser does not let the page copy.";
     area.remove();
   }
 }
@@ -80,7 +91,8 @@ function startFit() {
     running(false);
     byId("fit-told").textContent = error ?? text ?? "";
     if (!bsdf) return;
-    if (session.state.subjects.length >= 4) emit("error", "There is room for four subjects: remove one, then fit again.");
+    if (session.state.subjects.length >= 4)
+      emit("error", "There is room for four subjects: remove one, then fit again.");
     else addSubject(bsdf, `${bsdf.type}, fitted`);
   });
 }

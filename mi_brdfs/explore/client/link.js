@@ -81,7 +81,8 @@ function receive(message) {
     session.hello = message;
     emit("hello");
   } else if (message.type === "subject") {
-    if (message.serial < session.oldest[message.subject] || message.serial < session.info[message.subject]?.serial) return;
+    if (message.serial < session.oldest[message.subject] || message.serial < session.info[message.subject]?.serial)
+      return;
     session.info[message.subject] = message;
     emit("subject", message.subject);
     adopt(message.subject, message.bsdf);

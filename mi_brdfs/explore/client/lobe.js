@@ -1,5 +1,6 @@
 // The lobe as a body to turn, drawn by WebGL; the arrow of wi can be dragged.
 import { clamp, decades, degrees, element, format, largest, radians } from "./util.js";
+import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geometry.js";
 import { change, session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { belowOf } from "./link.js";
@@ -14,7 +15,6 @@ void main() {
   float light = mix(1.0, 0.45 + 0.6 * abs(dot(normalize(facing + vec3(1e-6)), eye)), lit);
   seen = vec4(colour.rgb * light * colour.a, colour.a);
 }`;
-const ARROW = 1.18;
 const camera = { yaw: 1.87, pitch: 0.42, distance: 4.1 };
 let gl, program, canvas, labels, places;
 const bodies = new Map();
@@ -25,10 +25,19 @@ export function startLobe() {
   canvas = element("canvas", { tabindex: 0, role: "img" });
   gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
   if (!gl) {
-    card.figure.append(element("p", {}, "This browser has no WebGL 2, which the lobe needs; the polar plot shows its cut."));
+    card.figure.append(
+      element("p", {}, "This browser has no WebGL 2, which the lobe needs; the polar plot shows its cut."),
+    );
     return false;
   }
-  card.legend = [[null, session.exported ? "Drag to turn, or arrow keys" : "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi"]];
+  card.legend = [
+    [
+      null,
+      session.exported
+        ? "Drag to turn, or arrow keys"
+        : "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi",
+    ],
+  ];
   tell(card, []);
   labels = element("div", { class: "labels" });
   card.figure.append(canvas, labels);
@@ -45,7 +54,10 @@ export function startLobe() {
 
 function setUp() {
   program = gl.createProgram();
-  for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+  for (const [kind, source] of [
+    [gl.VERTEX_SHADER, VERTEX],
+    [gl.FRAGMENT_SHADER, FRAGMENT],
+  ]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
@@ -59,54 +71,7 @@ function setUp() {
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
 }
 
-const unit = (theta, phi) => [Math.sin(radians(theta)) * Math.cos(radians(phi)), Math.sin(radians(theta)) * Math.sin(radians(phi)),
-  Math.cos(radians(theta))];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const scaled = (a, factor) => a.map((value) => value * factor);
-const sum = (a, b) => a.map((value, k) => value + b[k]);
-
-/** Return buffers for a grid of values, with radii as `radius` maps them. */
-function makeBody({ theta, phi, values, below }, radius) {
-  const [rows, columns] = [theta.length, phi.length];
-  const closed = phi[columns - 1] - phi[0] > 359.9;
-  const across = closed ? columns : columns + 1;
-  const position = new Float32Array(rows * across * 3);
-  const normal = new Float32Array(rows * across * 3);
-  for (let i = 0; i < rows; i++) {
-    for (let j = 0; j < across; j++) {
-      const r = radius(values[i * columns + (j % columns)]);
-      const [x, y, z] = unit(theta[i], phi[j % columns]);
-      position.set([r * x, r * y, below ? -r * z : r * z], 3 * (i * across + j));
-    }
-  }
-  const point = (i, j) => position.subarray(3 * (i * across + j), 3 * (i * across + j) + 3);
-  const apart = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  for (let i = 0; i < rows; i++) {
-    for (let j = 0; j < across; j++) {
-      const down = apart(point(Math.min(i + 1, rows - 1), j), point(Math.max(i - 1, 0), j));
-      const [left, right] = [j > 0 ? j - 1 : across - 2, j < across - 1 ? j + 1 : 1];
-      let n = cross(down, apart(point(i, right), point(i, left)));
-      const length = Math.hypot(...n);
-      n = length > 1e-12 ? scaled(n, 1 / length) : unit(theta[i], phi[j % columns]);
-      normal.set(n, 3 * (i * across + j));
-    }
-  }
-  const faces = [];
-  const lines = [];
-  for (let i = 0; i < rows - 1; i++) {
-    for (let j = 0; j < across - 1; j++) {
-      const a = i * across + j;
-      faces.push(a, a + across, a + 1, a + 1, a + across, a + across + 1);
-    }
-  }
-  const every = (count, wanted) => Math.max(1, Math.round(count / wanted));
-  for (let i = 0; i < rows; i += every(rows, 22)) for (let j = 0; j < across - 1; j++) lines.push(i * across + j, i * across + j + 1);
-  for (let j = 0; j < across; j += every(across, 40)) for (let i = 0; i < rows - 1; i++) lines.push(i * across + j, (i + 1) * across + j);
-  return upload(position, normal, new Uint32Array(faces), new Uint32Array(lines));
-}
-
-function upload(position, normal, faces, lines) {
+function upload({ position, normal, faces, lines }) {
   const made = { array: gl.createVertexArray(), faces: faces.length, lines: lines.length, buffers: [] };
   gl.bindVertexArray(made.array);
   const buffer = (target, data) => {
@@ -131,38 +96,6 @@ function discard(body) {
   body.buffers.forEach((buffer) => gl.deleteBuffer(buffer));
 }
 
-/** Return a tube along a direction from one distance to another, a cone if its end has no width. */
-function tube(way, from, to, wide, end, position, faces) {
-  const side = cross(way, Math.abs(way[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]);
-  const a = scaled(side, 1 / Math.hypot(...side));
-  const b = cross(way, a);
-  const first = position.length / 3;
-  for (let k = 0; k <= 12; k++) {
-    const around = sum(scaled(a, Math.cos((k * Math.PI) / 6)), scaled(b, Math.sin((k * Math.PI) / 6)));
-    position.push(...sum(scaled(way, from), scaled(around, wide)), ...sum(scaled(way, to), scaled(around, end)));
-    if (k) faces.push(first + 2 * k - 2, first + 2 * k - 1, first + 2 * k, first + 2 * k, first + 2 * k - 1, first + 2 * k + 1);
-  }
-}
-
-function furniture(wi) {
-  const position = [];
-  const faces = [];
-  tube(wi, 0.12, ARROW, 0.009, 0.009, position, faces);
-  tube(wi, 0.12, 0.02, 0.034, 0, position, faces);
-  tube(wi, ARROW - 0.03, ARROW + 0.03, 0.034, 0.034, position, faces);
-  const mirror = [-wi[0], -wi[1], wi[2]];
-  for (let k = 0; k < 12; k++) tube(mirror, 0.1 * k, 0.1 * k + 0.05, 0.006, 0.006, position, faces);
-  tube([0, 0, 1], 0, 1.08, 0.003, 0.003, position, faces);
-  tube([1, 0, 0], 0, 1, 0.003, 0.003, position, faces);
-  const lines = [];
-  const ring = position.length / 3;
-  for (let k = 0; k < 96; k++) {
-    position.push(Math.cos((k * Math.PI) / 48), Math.sin((k * Math.PI) / 48), 0);
-    lines.push(ring + k, ring + ((k + 1) % 96));
-  }
-  return upload(new Float32Array(position), new Float32Array(position.length), new Uint32Array(faces), new Uint32Array(lines));
-}
-
 /** Return the camera: its place, its axes, and its matrix by columns. */
 function look(aspect) {
   const { yaw, pitch, distance } = camera;
@@ -175,8 +108,12 @@ function look(aspect) {
   const zoom = 1 / Math.tan(radians(16));
   const [near, end] = [0.1, 40];
   const depth = (end + near) / (near - end);
-  const rows = [[...scaled(right, zoom / aspect), -dot(right, eye) * (zoom / aspect)], [...scaled(up, zoom), -dot(up, eye) * zoom],
-    [...scaled(back, depth), -dot(back, eye) * depth + (2 * end * near) / (near - end)], [...scaled(back, -1), dot(back, eye)]];
+  const rows = [
+    [...scaled(right, zoom / aspect), -dot(right, eye) * (zoom / aspect)],
+    [...scaled(up, zoom), -dot(up, eye) * zoom],
+    [...scaled(back, depth), -dot(back, eye) * depth + (2 * end * near) / (near - end)],
+    [...scaled(back, -1), dot(back, eye)],
+  ];
   const matrix = new Float32Array(16);
   rows.forEach((row, i) => row.forEach((value, j) => (matrix[4 * j + i] = value)));
   return { eye, back, right, up, zoom, aspect, matrix };
@@ -191,14 +128,20 @@ export function drawLobe() {
   if (!gl || gl.isContextLost()) return;
   const card = cards.lobe;
   const { state } = session;
-  const found = visible().filter((k) => session.shown.lobe[k]).map((k) => ({ subject: k,
-    parts: [session.shown.lobe[k], belowOf("lobe", k)].filter(Boolean) }));
+  const found = visible()
+    .filter((k) => session.shown.lobe[k])
+    .map((k) => ({ subject: k, parts: [session.shown.lobe[k], belowOf("lobe", k)].filter(Boolean) }));
   const arrays = found.map(({ parts }) => parts.map(({ values }) => values));
   const peaks = arrays.map((values) => largest(values));
   const common = Math.max(...peaks, 0) || 1;
   const log = state.scale === "log";
   const over = arrays.map((values, k) => (state.normalise ? peaks[k] : common));
-  const [low, high] = log ? decades(arrays.flatMap((values, k) => values.map((part) => part.map((value) => value / over[k]))), 1) : [0, 1];
+  const [low, high] = log
+    ? decades(
+        arrays.flatMap((values, k) => values.map((part) => part.map((value) => value / over[k]))),
+        1,
+      )
+    : [0, 1];
   const used = new Set();
   found.forEach(({ subject, parts }, k) => {
     const radius = (value) => {
@@ -212,7 +155,7 @@ export function drawLobe() {
       const before = bodies.get(slot);
       if (before?.stamp === stamp && before.of === part.values) continue;
       if (before) discard(before);
-      bodies.set(slot, Object.assign(makeBody(part, radius), { stamp, of: part.values }));
+      bodies.set(slot, Object.assign(upload(makeBody(part, radius)), { stamp, of: part.values }));
     }
   });
   for (const [slot, body] of bodies) {
@@ -221,9 +164,15 @@ export function drawLobe() {
     bodies.delete(slot);
   }
   render(found);
-  canvas.setAttribute("aria-label", `Lobes of f cosθo at θi ${format(state.theta)}°: ${found.map(({ subject }, k) =>
-    `${state.subjects[subject].name}, at most ${format(peaks[k])} per steradian`).join("; ")}. Arrow keys turn it.`);
-  card.note.textContent = "f cosθo as radius" + (log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "") +
+  canvas.setAttribute(
+    "aria-label",
+    `Lobes of f cosθo at θi ${format(state.theta)}°: ${found
+      .map(({ subject }, k) => `${state.subjects[subject].name}, at most ${format(peaks[k])} per steradian`)
+      .join("; ")}. Arrow keys turn it.`,
+  );
+  card.note.textContent =
+    "f cosθo as radius" +
+    (log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "") +
     (state.normalise ? ", over the maximum" : `, at most ${format(common)}`);
 }
 
@@ -237,12 +186,19 @@ function render(found) {
   const side = state.lobes === "side" && found.length > 1;
   const columns = side ? (found.length > 2 || width > height ? 2 : 1) : 1;
   const rows = side ? Math.ceil(found.length / columns) : 1;
-  const areas = (side ? found : [found]).map((_, k) => [((k % columns) * width) / columns, (Math.floor(k / columns) * height) / rows,
-    width / columns, height / rows]);
+  const areas = (side ? found : [found]).map((_, k) => [
+    ((k % columns) * width) / columns,
+    (Math.floor(k / columns) * height) / rows,
+    width / columns,
+    height / rows,
+  ]);
   places = { areas, whole: found.some(({ parts }) => parts.length > 1) };
   const wi = unit(state.theta, state.phi);
-  const things = furniture(wi);
-  const ink = getComputedStyle(canvas).color.match(/[\d.]+/g).slice(0, 3).map((value) => value / 255);
+  const things = upload(furniture(wi));
+  const ink = getComputedStyle(canvas)
+    .color.match(/[\d.]+/g)
+    .slice(0, 3)
+    .map((value) => value / 255);
   gl.viewport(0, 0, canvas.width, canvas.height);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   labels.replaceChildren();
@@ -297,7 +253,8 @@ function listen() {
     const box = canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   };
-  const areaAt = ([x, y]) => places?.areas.find(([left, top, width, height]) => x >= left && y >= top && x < left + width && y < top + height);
+  const areaAt = ([x, y]) =>
+    places?.areas.find(([left, top, width, height]) => x >= left && y >= top && x < left + width && y < top + height);
   const nearTip = (point, reach) => {
     const area = areaAt(point);
     if (session.exported || !area) return null;
@@ -331,11 +288,15 @@ function listen() {
       dragged = null;
     });
   }
-  canvas.addEventListener("wheel", (event) => {
-    if (!event.ctrlKey && document.activeElement !== canvas) return;
-    event.preventDefault();
-    zoomBy(Math.exp(event.deltaY / 600));
-  }, { passive: false });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      if (!event.ctrlKey && document.activeElement !== canvas) return;
+      event.preventDefault();
+      zoomBy(Math.exp(event.deltaY / 600));
+    },
+    { passive: false },
+  );
   canvas.addEventListener("keydown", (event) => {
     if (event.key === "+" || event.key === "-") return zoomBy(event.key === "+" ? 0.9 : 1.1);
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
@@ -372,10 +333,15 @@ function aim([x, y], [left, top, width, height]) {
   const inside = ARROW * ARROW - dot(nearest, nearest);
   const half = Math.sqrt(Math.max(inside, 0));
   const tip = unit(session.state.theta, session.state.phi);
-  const candidates = [along - half, along + half].map((t) => sum(eye, scaled(ray, t))).filter((point) => point[2] > 0 || inside <= 0);
+  const candidates = [along - half, along + half]
+    .map((t) => sum(eye, scaled(ray, t)))
+    .filter((point) => point[2] > 0 || inside <= 0);
   const way = candidates.sort((a, b) => dot(b, tip) / Math.hypot(...b) - dot(a, tip) / Math.hypot(...a))[0];
   if (!way) return;
   const theta = degrees(Math.atan2(Math.hypot(way[0], way[1]), Math.max(way[2], 0.001)));
   const phi = degrees(Math.atan2(way[1], way[0]));
-  change({ theta: Math.round(clamp(theta, 0, 89) * 10) / 10, phi: theta < 1 ? session.state.phi : Math.round(phi * 10) / 10 });
+  change({
+    theta: Math.round(clamp(theta, 0, 89) * 10) / 10,
+    phi: theta < 1 ? session.state.phi : Math.round(phi * 10) / 10,
+  });
 }

@@ -4,8 +4,6 @@ import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { belowOf } from "./link.js";
 
-const LIMITS = {};
-
 /** Draw the maps of a view beside each other, on one logarithmic scale of colours. */
 export function drawMaps(view) {
   const card = cards[view];
@@ -16,11 +14,11 @@ export function drawMaps(view) {
   const arrays = found.map(({ values }) => values);
   const peak = largest(arrays);
   const [low, high] = decades(arrays, peak);
-  LIMITS[view] = [low, high];
   card.maps ??= card.figure.appendChild(element("div", { class: "maps" }));
   card.node.classList.toggle("wide", found.length > 3);
+  card.maps.className = `maps of-${Math.min(found.length, 4)}`;
   const boxes = [...card.maps.children];
-  found.forEach((map, k) => paint((boxes[k] ?? addBox(card, view)), view, map, low, high));
+  found.forEach((map, k) => paint(boxes[k] ?? addBox(card, view), view, map, low, high));
   boxes.slice(found.length).forEach((box) => box.remove());
   bar(card, low, high, view === "slice" ? "f, 1/sr" : "f cosθo, 1/sr");
 }
@@ -28,9 +26,10 @@ export function drawMaps(view) {
 function addBox(card, view) {
   const canvas = element("canvas", { role: "img", tabindex: 0 });
   const frame = element("div", { class: "plate" }, canvas, element("i", { class: "spot", hidden: true }));
-  const axes = view === "slice"
-    ? [element("span", { class: "across" }, "θh 0…90°"), element("span", { class: "up" }, "θd 0…90°")]
-    : [element("span", { class: "across" }, "ωi on the left, rim at 90°")];
+  const axes =
+    view === "slice"
+      ? [element("span", { class: "across" }, "θh 0…90°"), element("span", { class: "up" }, "θd 0…90°")]
+      : [element("span", { class: "across" }, "ωi on the left, rim at 90°")];
   const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
   card.maps.append(box);
   let spot = [0.5, 0.5];
@@ -74,7 +73,7 @@ function where(view, map, x, y) {
   const [along, across] = [2 * x - 1, 2 * y - 1];
   const theta = 90 * Math.hypot(along, across);
   if (theta > 90) return `${name}: outside the hemisphere`;
-  const azimuth = (degrees(Math.atan2(-across, -along)) + session.state.phi + 540) % 360 - 180;
+  const azimuth = ((degrees(Math.atan2(-across, -along)) + session.state.phi + 540) % 360) - 180;
   return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: f cosθo ${format(value, 4)}`;
 }
 
@@ -85,13 +84,17 @@ function paint(box, view, map, low, high) {
   const name = session.state.subjects[map.subject].name + (map.below ? ", below" : "");
   box.querySelector("figcaption").textContent = name;
   box.classList.toggle("dimmed", Boolean(session.info[map.subject]?.error));
-  canvas.setAttribute("aria-label", `${view === "slice" ? "Slice over θh and θd" : "Hemisphere"} of ${name}: at most ${format(largest([values]))}`);
+  canvas.setAttribute(
+    "aria-label",
+    `${view === "slice" ? "Slice over θh and θd" : "Hemisphere"} of ${name}: at most ${format(largest([values]))}`,
+  );
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const image = new ImageData(width, height);
   for (let row = 0; row < height; row++) {
     for (let column = 0; column < width; column++) {
       const value = values[(height - 1 - row) * width + column];
-      const outside = view === "hemisphere" && Math.hypot(2 * (column + 0.5) / width - 1, 2 * (row + 0.5) / height - 1) > 1;
+      const outside =
+        view === "hemisphere" && Math.hypot((2 * (column + 0.5)) / width - 1, (2 * (row + 0.5)) / height - 1) > 1;
       if (Number.isNaN(value) || outside) continue;
       const share = value > 0 ? (Math.log10(value) - low) / (high - low) : 0;
       const colour = 4 * Math.round(255 * clamp(share, 0, 1));
@@ -103,9 +106,35 @@ function paint(box, view, map, low, high) {
 
 function bar(card, low, high, unit) {
   const box = card.figure.querySelector(".bar") ?? card.figure.appendChild(element("div", { class: "bar" }));
-  const stops = Array.from({ length: 17 }, (_, k) => `rgb(${[...COLOUR_MAP.subarray(4 * Math.round(k * 15.9375), 4 * Math.round(k * 15.9375) + 3)]})`);
+  const stops = Array.from(
+    { length: 17 },
+    (_, k) => `rgb(${[...COLOUR_MAP.subarray(4 * Math.round(k * 15.9375), 4 * Math.round(k * 15.9375) + 3)]})`,
+  );
   const labels = [];
-  for (let k = low; k <= high; k++) labels.push(element("span", { style: `left:${(100 * (k - low)) / (high - low)}%` }, power(k)));
-  box.replaceChildren(element("div", { class: "ramp", style: `background:linear-gradient(90deg,${stops})` }),
-    element("div", { class: "labels" }, ...labels), element("div", { class: "unit" }, `${unit}, logarithmic`));
+  for (let k = low; k <= high; k++)
+    labels.push(element("span", { style: `left:${(100 * (k - low)) / (high - low)}%` }, power(k)));
+  box.replaceChildren(
+    element("div", { class: "ramp", style: `background:linear-gradient(90deg,${stops})` }),
+    element("div", { class: "labels" }, ...labels),
+    element("div", { class: "unit" }, `${unit}, logarithmic`),
+  );
+}
+
+/** Return the maps of a view on one canvas, four times as large, with their names. */
+export function mapsImage(view) {
+  const boxes = [...cards[view].maps.children];
+  const canvases = boxes.map((box) => box.querySelector("canvas"));
+  const size = 4 * Math.max(...canvases.map(({ width }) => width));
+  const result = element("canvas", { width: boxes.length * (size + 16), height: size + 32 });
+  const context = result.getContext("2d");
+  Object.assign(context, {
+    imageSmoothingEnabled: false,
+    font: "18px system-ui, sans-serif",
+    fillStyle: getComputedStyle(boxes[0]).color,
+  });
+  canvases.forEach((canvas, k) => {
+    context.fillText(boxes[k].querySelector("figcaption").textContent, k * (size + 16), 20);
+    context.drawImage(canvas, k * (size + 16), 32, size, size);
+  });
+  return result;
 }

@@ -11,8 +11,14 @@ let stack, handle;
 export function startPicture() {
   const card = cards.picture;
   stack = element("div", { class: "pictures" });
-  handle = element("div", { class: "divider", role: "slider", tabindex: 0, "aria-label": "Divider between the two pictures",
-    "aria-valuemin": 0, "aria-valuemax": 100 });
+  handle = element("div", {
+    class: "divider",
+    role: "slider",
+    tabindex: 0,
+    "aria-label": "Divider between the two pictures",
+    "aria-valuemin": 0,
+    "aria-valuemax": 100,
+  });
   card.figure.append(stack);
   handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
   handle.addEventListener("pointermove", (event) => {
@@ -61,18 +67,26 @@ export function drawPicture() {
     if (answer && canvas.answer !== answer) put(canvas, answer);
     else if (!answer) canvas.width = canvas.width;
     canvas.closest(".frame").classList.toggle("dimmed", Boolean(session.info[k]?.error));
-    canvas.setAttribute("aria-label", `${session.state.subjects[k].name}, rendered in the stage ${session.state.stage}`);
+    canvas.setAttribute(
+      "aria-label",
+      `${session.state.subjects[k].name}, rendered in the stage ${session.state.stage}`,
+    );
     const caption = stack.querySelector(`[data-subject="${k}"]`);
     caption.querySelector("b").textContent = session.state.subjects[k].name;
     caption.style.setProperty("--mark", colourOf(k));
-    caption.querySelector("small").textContent = answer ? `${answer.spp} spp${answer.denoised ? ", denoised" : ""}` : "";
+    caption.querySelector("small").textContent = answer
+      ? `${answer.spp} spp${answer.denoised ? ", denoised" : ""}`
+      : "";
   }
   if (mode === "wipe") {
     const share = session.state.wipe;
     canvases.get(shown[0]).style.clipPath = `inset(0 ${100 * (1 - share)}% 0 0)`;
     handle.style.left = `${100 * share}%`;
     handle.setAttribute("aria-valuenow", Math.round(100 * share));
-    handle.setAttribute("aria-valuetext", `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * share)} %`);
+    handle.setAttribute(
+      "aria-valuetext",
+      `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * share)} %`,
+    );
   }
   if (mode === "difference") drawDifference(shown);
 }
@@ -85,13 +99,22 @@ function build(mode, shown, layout) {
   const caption = (k) => element("figcaption", { "data-subject": k, class: "marked" }, element("b"), element("small"));
   for (const k of shown) canvases.get(k).style.clipPath = "";
   if (mode === "side") {
-    stack.replaceChildren(...shown.map((k) => element("figure", {}, element("div", { class: "frame" }, watched(k)), caption(k))));
+    stack.replaceChildren(
+      ...shown.map((k) => element("figure", {}, element("div", { class: "frame" }, watched(k)), caption(k))),
+    );
   } else {
     const frame = element("div", { class: "frame" }, watched(shown[1]), watched(shown[0]));
     if (mode === "wipe") frame.append(handle);
     else frame.append(element("canvas", { class: "difference", role: "img" }));
-    stack.replaceChildren(element("figure", {}, frame, element("div", { class: "captions" }, ...shown.map(caption)),
-      mode === "difference" ? element("p", { class: "scale" }) : null));
+    stack.replaceChildren(
+      element(
+        "figure",
+        {},
+        frame,
+        element("div", { class: "captions" }, ...shown.map(caption)),
+        mode === "difference" ? element("p", { class: "scale" }) : null,
+      ),
+    );
   }
 }
 
@@ -106,19 +129,28 @@ function point(canvas, k, event) {
   const box = canvas.getBoundingClientRect();
   const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
   const shown = modeOf() === "side" ? [k] : pairOf();
-  tell(cards.picture, shown.flatMap((each) => {
-    const answer = session.shown.picture[each];
-    if (!answer) return [];
-    const at = 4 * (Math.floor(clamp(y, 0, 0.999) * answer.height) * answer.width + Math.floor(clamp(x, 0, 0.999) * answer.width));
-    const scale = 2 ** -session.state.exposure;
-    const values = [0, 1, 2].map((c) => (answer.pixels[at + c] === 255 ? "≥ " : "") + format(fromDisplay(answer.pixels[at + c] / 255) * scale, 2));
-    return [[colourOf(each), `radiance ${values.join(", ")}`]];
-  }));
+  tell(
+    cards.picture,
+    shown.flatMap((each) => {
+      const answer = session.shown.picture[each];
+      if (!answer) return [];
+      const at =
+        4 *
+        (Math.floor(clamp(y, 0, 0.999) * answer.height) * answer.width + Math.floor(clamp(x, 0, 0.999) * answer.width));
+      const scale = 2 ** -session.state.exposure;
+      const values = [0, 1, 2].map(
+        (c) =>
+          (answer.pixels[at + c] === 255 ? "≥ " : "") + format(fromDisplay(answer.pixels[at + c] / 255) * scale, 2),
+      );
+      return [[colourOf(each), `radiance ${values.join(", ")}`]];
+    }),
+  );
 }
 
 function put(canvas, answer) {
   canvas.answer = answer;
-  if (canvas.width !== answer.width || canvas.height !== answer.height) Object.assign(canvas, { width: answer.width, height: answer.height });
+  if (canvas.width !== answer.width || canvas.height !== answer.height)
+    Object.assign(canvas, { width: answer.width, height: answer.height });
   canvas.getContext("2d").putImageData(new ImageData(answer.pixels, answer.width, answer.height), 0, 0);
 }
 
@@ -150,7 +182,8 @@ function drawDifference([a, b]) {
   for (let k = 0; k < 4 * count; k++) image.data[k] = k % 4 === 3 ? 255 : image.data[k] * gain;
   Object.assign(canvas, { width: first.width, height: first.height });
   canvas.getContext("2d").putImageData(image, 0, 0);
-  told.textContent = `|a − b| of the values shown (sRGB, 0…1), ${gain === 1 ? "as it is" : `${gain} times`}: white is ` +
+  told.textContent =
+    `|a − b| of the values shown (sRGB, 0…1), ${gain === 1 ? "as it is" : `${gain} times`}: white is ` +
     `${format(1 / gain)}; mean ${format(total / count / 3 / 255, 2)}`;
   canvas.setAttribute("aria-label", told.textContent);
 }

@@ -1,5 +1,17 @@
-// Curves: the plane of incidence as polar and cartesian plots, albedo, and the small plots of the sampler.
-import { CHANNELS, DASHES, PALETTE, clamp, degrees, format, interpolate, largest, radians, shape, ticks, valueScale } from "./util.js";
+// Curves: the plane of incidence as polar and cartesian plots; and albedo.
+import {
+  CHANNELS,
+  DASHES,
+  PALETTE,
+  clamp,
+  degrees,
+  format,
+  interpolate,
+  largest,
+  radians,
+  shape,
+  valueScale,
+} from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 
@@ -7,11 +19,16 @@ export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k];
 
 /** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
 function curvesOf(view) {
-  return visible().flatMap((k) => (session.shown[view][k]?.curves ?? []).map((curve) => ({
-    ...curve, subject: k, dimmed: Boolean(session.info[k]?.error), dash: DASHES[session.state.subjects[k].colour],
-    colour: CHANNELS[curve.channel] ?? colourOf(k),
-    name: session.state.subjects[k].name + (CHANNELS[curve.channel] ? `, ${curve.channel}` : ""),
-  })));
+  return visible().flatMap((k) =>
+    (session.shown[view][k]?.curves ?? []).map((curve) => ({
+      ...curve,
+      subject: k,
+      dimmed: Boolean(session.info[k]?.error),
+      dash: DASHES[session.state.subjects[k].colour],
+      colour: CHANNELS[curve.channel] ?? colourOf(k),
+      name: session.state.subjects[k].name + (CHANNELS[curve.channel] ? `, ${curve.channel}` : ""),
+    })),
+  );
 }
 
 /** Return curves of f cosθ, each over its subject's maximum if they are to be normalised. */
@@ -24,7 +41,7 @@ function lobesOf(view) {
 }
 
 /** Return the path through points, without those that cannot be told from the one before. */
-function path(points) {
+export function path(points) {
   let text = "";
   let last = null;
   points.forEach(([x, y], k) => {
@@ -36,17 +53,22 @@ function path(points) {
   return text;
 }
 
-const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
-const label = (x, y, text, anchor = "middle", kind = "tick") => shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
-const drawing = (width, height, summary) => shape("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img",
-  tabindex: 0, "aria-label": summary });
+export const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
+export const label = (x, y, text, anchor = "middle", kind = "tick") =>
+  shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
+export const drawing = (width, height, summary) =>
+  shape("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", tabindex: 0, "aria-label": summary });
 
-function stroke(curve, points) {
-  return shape("path", { d: path(points), class: curve.dimmed ? "curve dimmed" : "curve", stroke: curve.colour,
-    "stroke-dasharray": curve.dash });
+export function stroke(curve, points) {
+  return shape("path", {
+    d: path(points),
+    class: curve.dimmed ? "curve dimmed" : "curve",
+    stroke: curve.colour,
+    "stroke-dasharray": curve.dash,
+  });
 }
 
-function summary(curves, what, unit) {
+export function summary(curves, what, unit) {
   const parts = curves.map(({ name, x, y }) => {
     const peak = largest([y]);
     return `${name}: at most ${format(peak)}${unit} at ${format(x[y.findIndex((value) => value === peak)] ?? 0)}°`;
@@ -55,7 +77,7 @@ function summary(curves, what, unit) {
 }
 
 /** A crosshair that pointer and arrow keys move: `angleAt` maps a place to an angle, `cross` draws it. */
-function attach(card, svg, angleAt, range, cross) {
+export function attach(card, svg, angleAt, range, cross) {
   let angle = null;
   const move = (to) => {
     angle = to;
@@ -87,7 +109,7 @@ function pointAt(angle) {
   for (const cross of Object.values(crosses)) cross();
 }
 
-const widthOf = (card, most = 620) => Math.max(Math.min(card.figure.clientWidth, most), 240);
+export const widthOf = (card, most = 620) => Math.max(Math.min(card.figure.clientWidth, most), 240);
 
 function replaceFigure(card, ...nodes) {
   const focused = card.figure.contains(document.activeElement) && document.activeElement.tagName === "svg";
@@ -110,14 +132,19 @@ export function drawPolar() {
   const curves = lobesOf("polar");
   describe(card, curves);
   const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
-  const scale = valueScale(curves.map(({ y }) => y), session.state.scale === "log");
+  const scale = valueScale(
+    curves.map(({ y }) => y),
+    session.state.scale === "log",
+  );
   const width = widthOf(card);
   const margin = 26;
   const radius = (width - 2 * margin) / 2;
   const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
   const middle = [width / 2, margin + radius];
-  const place = (angle, reach) => [middle[0] + radius * Math.max(reach, 0) * Math.sin(radians(angle)),
-    middle[1] - radius * Math.max(reach, 0) * Math.cos(radians(angle))];
+  const place = (angle, reach) => [
+    middle[0] + radius * Math.max(reach, 0) * Math.sin(radians(angle)),
+    middle[1] - radius * Math.max(reach, 0) * Math.cos(radians(angle)),
+  ];
   const svg = drawing(width, height, summary(curves, `Polar plot of ${unitOf()} in the plane of incidence`, ""));
 
   const ring = (reach, kind) => {
@@ -142,10 +169,21 @@ export function drawPolar() {
   svg.append(line(middle[0] - radius, middle[1], middle[0] + radius, middle[1], "axis"));
   const { theta } = session.state;
   svg.append(shape("path", { d: path([middle, place(theta, 1)]), class: "mirror" }));
-  for (const curve of curves) svg.append(stroke(curve, curve.x.map((angle, k) => place(angle, scale.of(curve.y[k])))));
+  for (const curve of curves)
+    svg.append(
+      stroke(
+        curve,
+        curve.x.map((angle, k) => place(angle, scale.of(curve.y[k]))),
+      ),
+    );
   const tip = place(-theta, 1);
   svg.append(line(...tip, ...place(-theta, 0.06), "incident"));
-  svg.append(shape("path", { d: path([place(-theta + 2.5, 0.13), place(-theta, 0.03), place(-theta - 2.5, 0.13)]), class: "incident" }));
+  svg.append(
+    shape("path", {
+      d: path([place(-theta + 2.5, 0.13), place(-theta, 0.03), place(-theta - 2.5, 0.13)]),
+      class: "incident",
+    }),
+  );
   svg.append(label(...place(-theta - 4, 0.97), "ωi", "middle", "direction"));
   const overlay = shape("g");
   svg.append(overlay);
@@ -157,10 +195,16 @@ export function drawPolar() {
     dots(overlay, curves, (value) => place(cursor, scale.of(value)));
     tell(card, [[null, `θo ${format(cursor)}°`], ...valuesAt(curves)]);
   };
-  attach(card, svg, (x, y) => {
-    const angle = degrees(Math.atan2(x - middle[0], middle[1] - y));
-    return whole ? angle : clamp(angle, -89.9, 89.9);
-  }, whole ? [-180, 180] : [-89.9, 89.9], pointAt);
+  attach(
+    card,
+    svg,
+    (x, y) => {
+      const angle = degrees(Math.atan2(x - middle[0], middle[1] - y));
+      return whole ? angle : clamp(angle, -89.9, 89.9);
+    },
+    whole ? [-180, 180] : [-89.9, 89.9],
+    pointAt,
+  );
   replaceFigure(card, svg);
   crosses.polar();
 }
@@ -174,29 +218,43 @@ function dots(overlay, curves, place) {
   }
 }
 
-const valuesAt = (curves) => curves.map((curve) =>
-  [curve.colour, `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`, curve.dash]);
+const valuesAt = (curves) =>
+  curves.map((curve) => [
+    curve.colour,
+    `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`,
+    curve.dash,
+  ]);
 
 // --- Cartesian ------------------------------------------------------------------------------------------------------
 
 let drawings = 0;
 
 /** Draw axes; return the drawing and where values are in it. */
-function axes(width, height, across, scale, what, unit = "°") {
+export function axes(width, height, across, scale, what, unit = "°") {
   const [left, right, top, bottom] = [46, 14, 14, 26];
   const svg = drawing(width, height, what);
   const clip = `inside-${++drawings}`;
-  svg.append(shape("clipPath", { id: clip }, shape("rect", { x: left, y: top - 4, width: width - left - right, height: height - top - bottom + 6 })));
+  svg.append(
+    shape(
+      "clipPath",
+      { id: clip },
+      shape("rect", { x: left, y: top - 4, width: width - left - right, height: height - top - bottom + 6 }),
+    ),
+  );
   const x = (value) => left + ((value - across.low) / (across.high - across.low)) * (width - left - right);
   const y = (value) => height - bottom - clamp(scale.of(value), -0.1, 9) * (height - top - bottom);
   for (const [value, text] of scale.marks) {
     svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
   }
   for (const value of across.marks) {
-    svg.append(line(x(value), top, x(value), height - bottom, "grid"), label(x(value), height - bottom + 17, `${format(value)}${unit}`));
+    svg.append(
+      line(x(value), top, x(value), height - bottom, "grid"),
+      label(x(value), height - bottom + 17, `${format(value)}${unit}`),
+    );
   }
   svg.append(line(left, height - bottom, width - right, height - bottom, "axis"));
-  const at = (place) => clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
+  const at = (place) =>
+    clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
   return { svg, x, y, at, clip, top, bottom: height - bottom };
 }
 
@@ -206,7 +264,13 @@ function graph(card, curves, across, scale, what, mark, crossing) {
   const it = axes(width, Math.round(clamp(0.62 * width, 200, 380)), across, scale, what);
   mark?.(it);
   const inside = shape("g", { "clip-path": `url(#${it.clip})` });
-  for (const curve of curves) inside.append(stroke(curve, curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])])));
+  for (const curve of curves)
+    inside.append(
+      stroke(
+        curve,
+        curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])]),
+      ),
+    );
   it.svg.append(inside);
   const overlay = shape("g");
   it.svg.append(overlay);
@@ -217,7 +281,13 @@ function graph(card, curves, across, scale, what, mark, crossing) {
     cursorAt(angle, () => dots(overlay, curves, (value) => [it.x(angle), it.y(value)]));
     tell(card, [[null, `${symbol} ${format(angle)}°`], ...cursorAt(angle, () => valuesAt(curves))]);
   };
-  attach(card, it.svg, (x) => it.at(x), [across.low, across.high], (angle) => crossing(angle, cross));
+  attach(
+    card,
+    it.svg,
+    (x) => it.at(x),
+    [across.low, across.high],
+    (angle) => crossing(angle, cross),
+  );
   replaceFigure(card, it.svg);
   return cross;
 }
@@ -234,15 +304,30 @@ export function drawCartesian() {
   const curves = lobesOf("cartesian");
   describe(cards.cartesian, curves);
   const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
-  const across = whole ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] } : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
-  const scale = valueScale(curves.map(({ y }) => y), session.state.scale === "log");
+  const across = whole
+    ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] }
+    : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
+  const scale = valueScale(
+    curves.map(({ y }) => y),
+    session.state.scale === "log",
+  );
   const { theta } = session.state;
   const mark = ({ svg, x, top, bottom }) => {
-    svg.append(line(x(-theta), top, x(-theta), bottom, "incident"), label(x(-theta) + 5, top + 10, "ωi", "start", "direction"));
+    svg.append(
+      line(x(-theta), top, x(-theta), bottom, "incident"),
+      label(x(-theta) + 5, top + 10, "ωi", "start", "direction"),
+    );
     svg.append(line(x(theta), top, x(theta), bottom, "mirror"));
   };
-  const cross = graph(cards.cartesian, curves, across, scale,
-    summary(curves, `Plot of ${unitOf()} over the angle in the plane of incidence`, ""), mark, pointAt);
+  const cross = graph(
+    cards.cartesian,
+    curves,
+    across,
+    scale,
+    summary(curves, `Plot of ${unitOf()} over the angle in the plane of incidence`, ""),
+    mark,
+    pointAt,
+  );
   crosses.cartesian = () => cross(cursor, "θo");
   crosses.cartesian();
 }
@@ -250,105 +335,45 @@ export function drawCartesian() {
 export function drawAlbedo() {
   const curves = curvesOf("albedo");
   // Where energy is gained without end, the scale is that of angles up to 85°.
-  const scale = valueScale(curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)), false, 1.02);
+  const scale = valueScale(
+    curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)),
+    false,
+    1.02,
+  );
   const gained = largest(curves.map(({ y }) => y));
   cards.albedo.note.textContent = "over the angle of incidence" + (gained > 1.005 ? `, up to ${format(gained)}` : "");
   const mark = ({ svg, x, y, top, bottom }) => {
-    svg.append(line(x(0), y(1), x(90), y(1), "unity"), line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"));
+    svg.append(
+      line(x(0), y(1), x(90), y(1), "unity"),
+      line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"),
+    );
   };
-  graph(cards.albedo, curves, { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] }, scale,
-    summary(curves, "Albedo over the angle of incidence, with a line at 1", ""), mark, (angle, cross) => cross(angle, "θi"));
+  graph(
+    cards.albedo,
+    curves,
+    { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] },
+    scale,
+    summary(curves, "Albedo over the angle of incidence, with a line at 1", ""),
+    mark,
+    (angle, cross) => cross(angle, "θi"),
+  );
   cards.albedo.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
   tell(cards.albedo, []);
 }
 
 /** Return the curves of a view as rows of a table. */
 export function table(view) {
-  return [["subject", "channel", view === "albedo" ? "theta_i_degrees" : "theta_o_degrees", view === "albedo" ? "albedo" : "f_cos_theta_o"],
-    ...visible().flatMap((k) => (session.shown[view][k]?.curves ?? []).flatMap((curve) =>
-      curve.x.map((angle, at) => [session.state.subjects[k].name, curve.channel, angle, curve.y[at]])))];
-}
-
-// --- Sampler --------------------------------------------------------------------------------------------------------
-
-export function drawSampler(chi2) {
-  const card = cards.sampler;
-  const found = visible().filter((k) => session.shown.sampler[k]).map((k) => [k, session.shown.sampler[k]]);
-  const full = widthOf(card, 1400);
-  const columns = full > 900 ? 3 : full > 560 ? 2 : 1;
-  const width = Math.floor((full - 16 * (columns - 1)) / columns);
-  const height = Math.round(clamp(0.7 * width, 190, 300));
-  const titled = (title, svg) => {
-    const box = document.createElement("figure");
-    const caption = document.createElement("figcaption");
-    caption.textContent = title;
-    box.append(caption, svg);
-    return box;
-  };
-  const figures = [titled("Directions drawn", drawDots(found, width, Math.max(height, Math.min(width, 300)))),
-    titled("Weight ÷ mean weight", drawHistogram(found, width, height)), titled("Efficiency η over θi", drawEfficiency(found, width, height))];
-  card.figure.replaceChildren(...figures, chi2);
-}
-
-function drawDots(found, width, height) {
-  const svg = drawing(width, height, `Directions drawn by the samplers of ${found.length} subjects, seen from above, ωi on the left`);
-  const radius = height / 2 - 14;
-  const [x, y] = [width / 2, height / 2];
-  for (const angle of [30, 60, 90]) {
-    svg.append(shape("circle", { cx: x, cy: y, r: (radius * angle) / 90, class: angle === 90 ? "rim" : "grid" }));
-    svg.append(label(x, y - (radius * angle) / 90 + 11, `${angle}°`));
-  }
-  const [cos, sin] = [Math.cos(radians(session.state.phi)), Math.sin(radians(session.state.phi))];
-  for (const [k, { dots: drawn }] of found) {
-    const group = shape("g", { fill: colourOf(k), class: "drawn" });
-    for (const [wx, wy, wz] of drawn) {
-      const [along, across] = [cos * wx + sin * wy, cos * wy - sin * wx];
-      const length = Math.hypot(along, across) || 1;
-      const reach = ((radius * degrees(Math.atan2(length, Math.abs(wz)))) / 90) / length;
-      const place = { cx: (x - along * reach).toFixed(1), cy: (y + across * reach).toFixed(1), r: 1.4 };
-      group.append(shape("circle", wz < 0 ? { ...place, class: "below", stroke: colourOf(k) } : place));
-    }
-    svg.append(group);
-  }
-  const at = x - (radius * session.state.theta) / 90;
-  svg.append(shape("circle", { cx: at, cy: y, r: 4, class: "source" }), label(at, y - 8, "ωi", "middle", "direction"));
-  return svg;
-}
-
-function drawHistogram(found, width, height) {
-  const shares = found.map(([k, { histogram }]) => {
-    const total = histogram.count.reduce((sum, count) => sum + count, 0) || 1;
-    return [k, histogram.edges, histogram.count.map((count) => count / total)];
-  });
-  const high = Math.max(2, ...shares.map(([, edges]) => edges[edges.length - 1]));
-  const scale = valueScale(shares.map(([, , share]) => share), false);
-  const it = axes(width, height, { low: 0, high, marks: ticks(0, high, 5) }, scale, "Histogram of the weight over its mean: a narrow one is good", "");
-  it.svg.append(line(it.x(1), it.top, it.x(1), it.bottom, "unity"));
-  for (const [k, edges, share] of shares) {
-    const points = share.flatMap((value, bin) => [[it.x(edges[bin]), it.y(value)], [it.x(edges[bin + 1]), it.y(value)]]);
-    const closed = [[it.x(edges[0]), it.bottom], ...points, [it.x(edges[edges.length - 1]), it.bottom]];
-    it.svg.append(shape("path", { d: path(closed), fill: colourOf(k), class: "area", stroke: colourOf(k) }));
-  }
-  return it.svg;
-}
-
-function drawEfficiency(found, width, height) {
-  const scale = { of: (value) => value / 1.04, marks: [0, 0.25, 0.5, 0.75, 1].map((value) => [value, format(value)]) };
-  const it = axes(width, height, { low: 0, high: 90, marks: [0, 30, 60, 90] }, scale, summary(
-    found.map(([k, { eta }]) => ({ name: session.state.subjects[k].name, ...eta })), "Efficiency of the samplers, 1 is perfect", ""));
-  it.svg.append(line(it.x(session.state.theta), it.top, it.x(session.state.theta), it.bottom, "incident"));
-  for (const [k, { eta }] of found) {
-    const curve = { colour: colourOf(k), dash: DASHES[session.state.subjects[k].colour] };
-    it.svg.append(stroke(curve, eta.x.map((angle, at) => [it.x(angle), it.y(eta.y[at])])));
-  }
-  const overlay = shape("g");
-  it.svg.append(overlay);
-  attach(cards.sampler, it.svg, (x) => it.at(x), [0, 90], (angle) => {
-    overlay.replaceChildren();
-    if (angle === null) return tell(cards.sampler, []);
-    overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
-    tell(cards.sampler, [[null, `θi ${format(angle)}°`], ...found.map(([k, { eta }]) =>
-      [colourOf(k), `${session.state.subjects[k].name} η ${format(interpolate(eta.x, eta.y, angle))}`])]);
-  });
-  return it.svg;
+  return [
+    [
+      "subject",
+      "channel",
+      view === "albedo" ? "theta_i_degrees" : "theta_o_degrees",
+      view === "albedo" ? "albedo" : "f_cos_theta_o",
+    ],
+    ...visible().flatMap((k) =>
+      (session.shown[view][k]?.curves ?? []).flatMap((curve) =>
+        curve.x.map((angle, at) => [session.state.subjects[k].name, curve.channel, angle, curve.y[at]]),
+      ),
+    ),
+  ];
 }

@@ -5,15 +5,34 @@ export const VIEWS = ["picture", "lobe", "polar", "cartesian", "albedo", "slice"
 export const MOST_SUBJECTS = 4;
 
 export const DEFAULTS = {
-  subjects: [], theta: 45, phi: 0, channel: "luminance", component: null, stage: "studio", shape: "body", exposure: 0,
-  size: 256, views: ["picture", "lobe", "polar", "albedo"],
-  compare: "side", pair: [0, 1], wipe: 0.5, scale: "linear", normalise: false, dark: null, tour: null,
-  lobes: "over", wire: false,
+  subjects: [],
+  theta: 45,
+  phi: 0,
+  channel: "luminance",
+  component: null,
+  stage: "studio",
+  shape: "body",
+  exposure: 0,
+  size: 256,
+  views: ["picture", "lobe", "polar", "albedo"],
+  compare: "side",
+  pair: [0, 1],
+  wipe: 0.5,
+  scale: "linear",
+  normalise: false,
+  dark: null,
+  tour: null,
+  lobes: "over",
+  wire: false,
 };
 /** What the server needs not know. */
 const OWN = ["compare", "pair", "wipe", "scale", "normalise", "dark", "tour", "lobes", "wire"];
-const WORDS = { compare: ["side", "wipe", "difference"], scale: ["linear", "log"], lobes: ["over", "side"],
-  channel: ["luminance", "rgb", "red", "green", "blue"] };
+const WORDS = {
+  compare: ["side", "wipe", "difference"],
+  scale: ["linear", "log"],
+  lobes: ["over", "side"],
+  channel: ["luminance", "rgb", "red", "green", "blue"],
+};
 
 export const session = {
   state: structuredClone(DEFAULTS),
@@ -88,7 +107,8 @@ export function goTo(patch, push) {
   if (patch.subjects) session.selected = 0;
   const free = new Set(now.keys());
   const former = subjects.map((subject, k) => {
-    const found = now[k] === told(subject) && free.has(k) ? k : [...free].find((at) => now[at] === told(subject)) ?? -1;
+    const found =
+      now[k] === told(subject) && free.has(k) ? k : ([...free].find((at) => now[at] === told(subject)) ?? -1);
     free.delete(found);
     return found;
   });
@@ -110,7 +130,10 @@ export function addSubject(bsdf, name) {
 export function removeSubject(index) {
   const kept = [...session.state.subjects.keys()].filter((k) => k !== index);
   if (session.selected >= index) session.selected = Math.max(session.selected - 1, 0);
-  arrange(kept.map((k) => session.state.subjects[k]), kept);
+  arrange(
+    kept.map((k) => session.state.subjects[k]),
+    kept,
+  );
 }
 
 /** Return the numbers of the subjects to be seen. */
@@ -131,10 +154,15 @@ export function clean(given) {
     if (Array.isArray(usual) && !Array.isArray(value)) continue;
     state[name] = value;
   }
-  state.subjects = state.subjects.slice(0, MOST_SUBJECTS)
+  state.subjects = state.subjects
+    .slice(0, MOST_SUBJECTS)
     .filter((subject) => typeof subject?.bsdf?.type === "string")
-    .map(({ bsdf, name, hidden, colour }, k) => ({ bsdf, name: String(name ?? bsdf.name ?? bsdf.type), hidden: hidden === true,
-      colour: Number.isInteger(colour) && colour >= 0 && colour < 4 ? colour : k }));
+    .map(({ bsdf, name, hidden, colour }, k) => ({
+      bsdf,
+      name: String(name ?? bsdf.name ?? bsdf.type),
+      hidden: hidden === true,
+      colour: Number.isInteger(colour) && colour >= 0 && colour < 4 ? colour : k,
+    }));
   state.theta = clamp(state.theta, 0, 89);
   state.phi = clamp(state.phi, -180, 180);
   state.wipe = clamp(state.wipe, 0, 1);
@@ -161,7 +189,8 @@ const swapQuotes = (text) => text.replace(/["']/g, (mark) => (mark === '"' ? "'"
 /** Return the fragment of the address: what differs from the defaults, as JSON with ' for ", to be read by people. */
 export function fragment() {
   const told = Object.entries(session.state).filter(
-    ([name, value]) => name !== "size" && JSON.stringify(value) !== JSON.stringify(DEFAULTS[name]));
+    ([name, value]) => name !== "size" && JSON.stringify(value) !== JSON.stringify(DEFAULTS[name]),
+  );
   const text = swapQuotes(JSON.stringify(Object.fromEntries(told)));
   return "#" + text.replace(/[\s%"<>`#\\^|\u0080-\uffff]/gu, encodeURIComponent);
 }

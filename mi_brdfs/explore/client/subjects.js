@@ -10,7 +10,8 @@ export function startSubjects() {
   byId("add").onclick = openAdd;
   byId("subject-name").onchange = ({ target }) => changeSubject(session.selected, { name: target.value || "unnamed" });
   byId("solo").onclick = solo;
-  byId("hide").onclick = () => changeSubject(session.selected, { hidden: !session.state.subjects[session.selected].hidden });
+  byId("hide").onclick = () =>
+    changeSubject(session.selected, { hidden: !session.state.subjects[session.selected].hidden });
   byId("remove").onclick = () => removeSubject(session.selected);
   byId("double").onclick = () => {
     const { bsdf, name } = session.state.subjects[session.selected];
@@ -32,12 +33,25 @@ export function startSubjects() {
 export function drawSubjects() {
   const { subjects } = session.state;
   const focused = document.activeElement?.dataset?.chip;
-  byId("chips").replaceChildren(...subjects.map((subject, k) => element("button", {
-    class: `chip${subject.hidden ? " hidden" : ""}`, "data-chip": k, "aria-pressed": String(k === session.selected),
-    style: `--mark:${colourOf(k)}`, onclick: () => {
-      session.selected = k;
-      emit("selected");
-    } }, subject.name, session.info[k]?.error ? element("span", { class: "warning", title: session.info[k].error }, " !") : null)));
+  byId("chips").replaceChildren(
+    ...subjects.map((subject, k) =>
+      element(
+        "button",
+        {
+          class: `chip${subject.hidden ? " hidden" : ""}`,
+          "data-chip": k,
+          "aria-pressed": String(k === session.selected),
+          style: `--mark:${colourOf(k)}`,
+          onclick: () => {
+            session.selected = k;
+            emit("selected");
+          },
+        },
+        subject.name,
+        session.info[k]?.error ? element("span", { class: "warning", title: session.info[k].error }, " !") : null,
+      ),
+    ),
+  );
   if (focused) byId("chips").children[focused]?.focus();
   byId("add").hidden = session.exported || subjects.length >= MOST_SUBJECTS;
   const subject = subjects[session.selected];
@@ -65,8 +79,12 @@ function solo() {
 function nextColour() {
   const { subjects } = session.state;
   const [own, next] = [subjects[session.selected].colour, (subjects[session.selected].colour + 1) % PALETTE.length];
-  change({ subjects: subjects.map((subject, k) => ({ ...subject,
-    colour: k === session.selected ? next : subject.colour === next ? own : subject.colour })) });
+  change({
+    subjects: subjects.map((subject, k) => ({
+      ...subject,
+      colour: k === session.selected ? next : subject.colour === next ? own : subject.colour,
+    })),
+  });
 }
 
 // --- Adding ---------------------------------------------------------------------------------------------------------
@@ -89,9 +107,14 @@ function showFound() {
   }
   const files = hello.files.filter(({ name }) => fits(name, "file measured"));
   const presets = hello.presets.filter((name) => fits(name, "preset"));
-  const groups = [...Object.entries(kinds), ["Files", files.map(({ file, name, kind }) =>
-    [name, "", { type: kind === "material" ? "given" : "tabulated", file }])],
-    ["Presets", presets.map((name) => [name, "", { type: "preset", name }])]];
+  const groups = [
+    ...Object.entries(kinds),
+    [
+      "Files",
+      files.map(({ file, name, kind }) => [name, "", { type: kind === "material" ? "given" : "tabulated", file }]),
+    ],
+    ["Presets", presets.map((name) => [name, "", { type: "preset", name }])],
+  ];
   let room = words.length ? MOST_FOUND : 400;
   const nodes = [];
   for (const [title, items] of groups) {
@@ -99,9 +122,25 @@ function showFound() {
     const shown = items.slice(0, Math.min(room, words.length || title !== "Presets" ? room : 12));
     room -= shown.length;
     const more = items.length - shown.length;
-    nodes.push(element("h3", {}, title), element("ul", {}, ...shown.map(([name, text, bsdf]) =>
-      element("li", {}, element("button", { class: "found", onclick: () => choose(bsdf, name) }, element("b", {}, name),
-        text ? element("span", {}, text) : null)))));
+    nodes.push(
+      element("h3", {}, title),
+      element(
+        "ul",
+        {},
+        ...shown.map(([name, text, bsdf]) =>
+          element(
+            "li",
+            {},
+            element(
+              "button",
+              { class: "found", onclick: () => choose(bsdf, name) },
+              element("b", {}, name),
+              text ? element("span", {}, text) : null,
+            ),
+          ),
+        ),
+      ),
+    );
     if (more) nodes.push(element("p", { class: "note" }, `and ${more} more: type to search`));
   }
   byId("found").replaceChildren(...(nodes.length ? nodes : [element("p", {}, "Nothing has this name.")]));
@@ -146,18 +185,24 @@ function startDrop() {
 async function uploadAll(files) {
   byId("add-dialog").close();
   for (const file of files) {
-    if (session.state.subjects.length >= MOST_SUBJECTS) return emit("error", "There is room for four subjects: remove one first.");
+    if (session.state.subjects.length >= MOST_SUBJECTS)
+      return emit("error", "There is room for four subjects: remove one first.");
     emit("busy", { text: `Uploading ${file.name} …` });
     try {
       const form = new FormData();
       form.append("file", file);
       const response = await fetch("upload", { method: "POST", body: form });
-      const answer = await response.json().catch(() => ({ error: `The server refused ${file.name} (${response.status}).` }));
+      const answer = await response
+        .json()
+        .catch(() => ({ error: `The server refused ${file.name} (${response.status}).` }));
       if (answer.error) throw new Error(answer.error);
       session.hello.files = [...session.hello.files, answer];
       addSubject({ type: "tabulated", file: answer.file }, answer.name);
     } catch (error) {
-      emit("error", error instanceof TypeError ? `${file.name} could not be sent: the server does not answer.` : error.message);
+      emit(
+        "error",
+        error instanceof TypeError ? `${file.name} could not be sent: the server does not answer.` : error.message,
+      );
     }
     emit("idle", {});
   }

@@ -4,8 +4,20 @@ import { change, clean, goTo, session } from "./session.js";
 
 export function startTours() {
   byId("tours").onclick = () => {
-    byId("tour-list").replaceChildren(...session.hello.tours.map(({ name, title, steps }) => element("li", {},
-      element("button", { class: "found", onclick: () => begin(name) }, element("b", {}, title), element("span", {}, `${steps.length} steps`)))));
+    byId("tour-list").replaceChildren(
+      ...session.hello.tours.map(({ name, title, steps }) =>
+        element(
+          "li",
+          {},
+          element(
+            "button",
+            { class: "found", onclick: () => begin(name) },
+            element("b", {}, title),
+            element("span", {}, `${steps.length} steps`),
+          ),
+        ),
+      ),
+    );
     byId("tour-dialog").showModal();
   };
   byId("tour-next").onclick = () => go(session.state.tour.name, session.state.tour.step + 1);

@@ -1,6 +1,6 @@
 // Elements, numbers, scales and colour maps.
 
-/** Okabe and Ito's colours of the subjects, which the colour-blind can tell apart, and dashes for curves that coincide. */
+/** Colours of the subjects, Okabe and Ito's for the colour-blind, and dashes for curves that coincide. */
 export const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7"];
 export const DASHES = ["", "7 3", "2 2.5", "9 3 2 3"];
 export const CHANNELS = { red: "#d1495b", green: "#2f9e6d", blue: "#3f7fd6" };
@@ -62,7 +62,9 @@ export function decades(arrays, peak) {
   const high = Math.log10(peak);
   let dim = peak;
   for (const values of arrays) {
-    const positive = Float64Array.from(values).filter((value) => value > 0).sort();
+    const positive = Float64Array.from(values)
+      .filter((value) => value > 0)
+      .sort();
     if (positive.length) dim = Math.min(dim, positive[Math.floor(0.1 * positive.length)]);
   }
   return [Math.floor(clamp(Math.log10(dim), high - 6, high - 2)), high];
@@ -89,7 +91,14 @@ export function valueScale(arrays, log, least = 0) {
   const reach = high - low + 0.08;
   const marks = [];
   for (let k = low; k <= high; k++) marks.push([10 ** k, power(k)]);
-  return { of: (value) => Math.max((Math.log10(Math.max(value, 1e-300)) - low) / reach, -0.1), marks, log, peak, low, high };
+  return {
+    of: (value) => Math.max((Math.log10(Math.max(value, 1e-300)) - low) / reach, -0.1),
+    marks,
+    log,
+    peak,
+    low,
+    high,
+  };
 }
 
 /** Return the value of a curve at x, straight between its points, or null outside it. */
@@ -107,8 +116,12 @@ export function interpolate(x, y, at) {
 }
 
 // Viridis (van der Walt and Smith, CC0) at every sixteenth of its range.
-const VIRIDIS = ("440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e 1f988b 22a884 35b779 54c568 7ad151 a5db36 " +
-  "d2e21b ece51b fde725").split(" ").map((word) => [0, 2, 4].map((k) => parseInt(word.slice(k, k + 2), 16)));
+const VIRIDIS = (
+  "440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e 1f988b 22a884 35b779 54c568 7ad151 a5db36 " +
+  "d2e21b ece51b fde725"
+)
+  .split(" ")
+  .map((word) => [0, 2, 4].map((k) => parseInt(word.slice(k, k + 2), 16)));
 
 /** Return 256 colours of the map, four bytes each. */
 export const COLOUR_MAP = (() => {
@@ -116,7 +129,8 @@ export const COLOUR_MAP = (() => {
   for (let k = 0; k < 256; k++) {
     const at = (k / 255) * (VIRIDIS.length - 1);
     const low = Math.min(Math.floor(at), VIRIDIS.length - 2);
-    for (let c = 0; c < 3; c++) table[4 * k + c] = VIRIDIS[low][c] + (at - low) * (VIRIDIS[low + 1][c] - VIRIDIS[low][c]);
+    for (let c = 0; c < 3; c++)
+      table[4 * k + c] = VIRIDIS[low][c] + (at - low) * (VIRIDIS[low + 1][c] - VIRIDIS[low][c]);
     table[4 * k + 3] = 255;
   }
   return table;
@@ -135,7 +149,16 @@ export function save(name, data, mime) {
 /** Return a figure as a file of its own, with the colours that it has on the page. */
 export function standalone(figure) {
   const copy = figure.cloneNode(true);
-  const wanted = ["fill", "stroke", "stroke-width", "stroke-dasharray", "opacity", "fill-opacity", "font-size", "text-anchor"];
+  const wanted = [
+    "fill",
+    "stroke",
+    "stroke-width",
+    "stroke-dasharray",
+    "opacity",
+    "fill-opacity",
+    "font-size",
+    "text-anchor",
+  ];
   const originals = [figure, ...figure.querySelectorAll("*")];
   [copy, ...copy.querySelectorAll("*")].forEach((node, k) => {
     const style = getComputedStyle(originals[k]);
