@@ -5,9 +5,13 @@ import { post } from "./link.js";
 import { cards } from "./card.js";
 
 export function startDialogs() {
-  byId("share").onclick = () => {
+  const offer = () => {
     for (const what of ["xml", "dict", "command"])
       byId(`copy-${what}`).disabled = !session.info[session.selected]?.[what];
+  };
+  on("subject", offer);
+  byId("share").onclick = () => {
+    offer();
     byId("share-of").textContent = session.state.subjects[session.selected]?.name ?? "";
     byId("share-dialog").showModal();
   };

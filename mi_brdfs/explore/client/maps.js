@@ -127,11 +127,10 @@ export function mapsImage(view) {
   const size = 4 * Math.max(...canvases.map(({ width }) => width));
   const result = element("canvas", { width: boxes.length * (size + 16), height: size + 32 });
   const context = result.getContext("2d");
-  Object.assign(context, {
-    imageSmoothingEnabled: false,
-    font: "18px system-ui, sans-serif",
-    fillStyle: getComputedStyle(boxes[0]).color,
-  });
+  const style = getComputedStyle(cards[view].node);
+  context.fillStyle = style.backgroundColor;
+  context.fillRect(0, 0, result.width, result.height);
+  Object.assign(context, { imageSmoothingEnabled: false, font: "18px system-ui, sans-serif", fillStyle: style.color });
   canvases.forEach((canvas, k) => {
     context.fillText(boxes[k].querySelector("figcaption").textContent, k * (size + 16), 20);
     context.drawImage(canvas, k * (size + 16), 32, size, size);
