@@ -116,8 +116,9 @@ def test_no_type_or_word_of_a_page_reads_a_file(llvm_rgb):
     ):
         with pytest.raises(StateError):
             Materials().expanded(checked(bsdf))
-    with pytest.raises(StateError, match="is unknown"), Materials().loaded(
-        checked({"type": "walter", "material": "../../../etc/passwd"})
+    with (
+        pytest.raises(StateError, match="is unknown"),
+        Materials().loaded(checked({"type": "walter", "material": "../../../etc/passwd"})),
     ):
         pass
 
@@ -135,7 +136,9 @@ def test_every_plugin_opens_with_its_controls(client, name):
 
 
 def test_controls_have_the_declared_ranges(client):
-    controls = {it["name"]: it for it in of(client.show({"type": "ward", "alpha": 0.3}, views=[]), "subject")[0]["controls"]}
+    controls = {
+        it["name"]: it for it in of(client.show({"type": "ward", "alpha": 0.3}, views=[]), "subject")[0]["controls"]
+    }
     assert controls["alpha"]["value"] == 0.3 and controls["alpha"]["scale"] == "log"
     assert controls["alpha_u"]["value"] is None and controls["alpha_u"]["excludes"] == ["alpha"]
     assert controls["alpha_u"]["also"] == {"alpha_v": 0.3}
@@ -173,7 +176,10 @@ def test_an_error_is_the_plugins_sentence_and_the_others_live_on(client):
 
 @pytest.mark.parametrize("name", ["kurt", "lafortune"])
 def test_lobes_are_added_and_removed(client, name):
-    materials, bsdf = Materials(), {"type": name, "exponent": 9.0} if name == "lafortune" else {"type": name, "alpha": 0.3}
+    materials, bsdf = (
+        Materials(),
+        {"type": name, "exponent": 9.0} if name == "lafortune" else {"type": name, "alpha": 0.3},
+    )
     for count in (1, 2, 3, 2, 1):
         bsdf = materials.expanded({**bsdf, "lobes": str(count)})
         assert "lobes" not in bsdf
@@ -188,7 +194,13 @@ def test_a_preset_is_its_plugin_with_its_values(client):
 
 
 def test_the_copied_xml_and_dict_give_the_same_picture(client):
-    bsdf = {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3, "specular_reflectance": [0.9, 0.5, 0.2], "variant": "ward-duer"}
+    bsdf = {
+        "type": "ward",
+        "alpha_u": 0.1,
+        "alpha_v": 0.3,
+        "specular_reflectance": [0.9, 0.5, 0.2],
+        "variant": "ward-duer",
+    }
     found = client.show(bsdf, views=["picture", "polar"], size=64)
     told, picture = of(found, "subject")[0], of(found, "picture")[0]
     stage = client.session._pictures[0][1].stage
@@ -260,7 +272,9 @@ def test_views_hold_the_plugins_values(client):
     f = np.frombuffer(cells["payload"], np.float32)
     np.testing.assert_allclose(f[np.isfinite(f)], 0.5 / np.pi, rtol=1e-4)
     assert np.isfinite(f).mean() > 0.99  # all but grazing directions
-    middle = np.frombuffer(disc["payload"], np.float32).reshape(disc["height"], -1)[disc["height"] // 2, disc["width"] // 2]
+    middle = np.frombuffer(disc["payload"], np.float32).reshape(disc["height"], -1)[
+        disc["height"] // 2, disc["width"] // 2
+    ]
     assert middle == pytest.approx(0.5 / np.pi, rel=1e-3)
     assert sampler["efficiency"] == pytest.approx(1, abs=1e-5) and len(sampler["dots"]) > 100
 
@@ -311,8 +325,12 @@ def test_a_fit_is_cancelled(with_file):
 def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     scene = ROOT / "scenes" / "cornell_box.xml"
     client = Client(UserScene(scene))
-    first = of(client.show({"type": "lambert", "reflectance": 0.1}, views=["picture"], shape="scene", size=64), "picture")
-    second = of(client.show({"type": "lambert", "reflectance": 0.9}, views=["picture"], shape="scene", size=64), "picture")
+    first = of(
+        client.show({"type": "lambert", "reflectance": 0.1}, views=["picture"], shape="scene", size=64), "picture"
+    )
+    second = of(
+        client.show({"type": "lambert", "reflectance": 0.9}, views=["picture"], shape="scene", size=64), "picture"
+    )
     assert first[0]["payload"] != second[0]["payload"]
     client = Client(UserScene(scene, "nothing"))
     client.send({"type": "lambert"}, views=["picture"], shape="scene")
@@ -327,7 +345,9 @@ def test_the_exported_page_needs_no_network_and_is_small(client, llvm_rgb):
     assert len(text) < 3e6
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
     frames = json.loads(re.search(r'id="exported">(.*?)</script>', text, re.DOTALL)[1])["frames"]
-    kinds_sent = [json.loads(it["text"]).get("view", "subject") if "text" in it else it["header"]["type"] for it in frames]
+    kinds_sent = [
+        json.loads(it["text"]).get("view", "subject") if "text" in it else it["header"]["type"] for it in frames
+    ]
     assert {"picture", "lobe", "polar", "albedo", "slice", "sampler"} <= set(kinds_sent)
 
 

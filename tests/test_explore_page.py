@@ -17,6 +17,7 @@ import pytest
 from latency import Page, edited, serving
 from support import ROOT
 
+from mi_brdfs.explore import explore
 from mi_brdfs.mitsuba.registry import own_models
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
@@ -66,7 +67,10 @@ def test_the_server_greets_and_answers(address):
         ('{"type": "shell"}', "There is no message 'shell'"),
         ('{"type": "state", "state": {"subjects": []}}', "one to 4 subjects"),
         ('{"type": "state", "serial": "x", "state": {"subjects": [{"bsdf": {"type": "ward"}}]}}', "This is no message"),
-        ('{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "filename": "/etc/passwd"}}]}}', "filename"),
+        (
+            '{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "filename": "/etc/passwd"}}]}}',
+            "filename",
+        ),
     ],
 )
 def test_a_malformed_message_is_answered_in_a_sentence(address, message, sentence):
@@ -178,6 +182,17 @@ def test_ctrl_c_ends_it():
     connected(address, lambda page, hello, client: page.send({"type": "lambert"}))
     process.send_signal(signal.SIGINT)
     assert process.wait(20) == 130
+
+
+def test_a_notebook_gets_its_page_and_ends_it():
+    page = explore(
+        {"type": "ward", "alpha": 0.3, "specular_reflectance": {"type": "rgb", "value": [1, 0, 0]}}, "lambert"
+    )
+    assert "<iframe" in page._repr_html_() and "alpha" in page.address
+    connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
+    page.close()
+    with pytest.raises(OSError):
+        connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
 
 
 def test_wrong_arguments_are_told_in_a_sentence():
@@ -292,7 +307,8 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(it.plugins[0], marks=[] if it.plugins[0] == "kurt" else pytest.mark.slow) for it in own_models()]
+    "name",
+    [pytest.param(it.plugins[0], marks=[] if it.plugins[0] == "kurt" else pytest.mark.slow) for it in own_models()],
 )
 def test_every_model_opens(tab, address, name):
     opened(tab, address, {"subjects": [{"bsdf": {"type": name}, "name": name}], **STILL})

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 import webbrowser
 from pathlib import Path
 from typing import Annotated, Any
@@ -37,6 +40,7 @@ def explore(
     host: Annotated[str, typer.Option(help="Who may connect: by default only this machine.")] = "127.0.0.1",
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Default: 8490, or any free one.")] = None,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    until_eof: Annotated[bool, typer.Option("--until-eof", hidden=True)] = False,
     variant: TracingVariant = None,
 ) -> None:
     """Open a page with sliders, lobes and pictures of BSDFs; Ctrl-C ends it."""
@@ -72,6 +76,8 @@ def explore(
 
     def ready(address: str) -> None:
         out.print(address)
+        if until_eof:  # of the process that started this one
+            threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
         err.print("Ctrl-C ends the explorer.")
         if browser:
             with stdout_to_stderr():

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import mitsuba as mi
 
@@ -18,6 +17,7 @@ from ..mitsuba.registry import MODELS, all_models, is_own
 from ..model import EnergyWarning, Model
 from ..parameters.messages import brief, listed, meant
 from ..parameters.published import preset
+from ..parameters.xml import to_xml
 from . import controls
 from .controls import Control
 from .state import Bsdf, StateError
@@ -151,24 +151,6 @@ def plain(bsdf: Mapping[str, Any]) -> Bsdf:
 def properties(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return plain values as Mitsuba's dicts have them."""
     return {name: {"type": "rgb", "value": it} if isinstance(it, list) else it for name, it in values.items()}
-
-
-def to_xml(bsdf: Mapping[str, Any]) -> str:
-    """Return a plugin dict as XML, to paste into a scene."""
-    lines = [f"    {_element(name, value)}" for name, value in bsdf.items() if name != "type"]
-    return "\n".join([f"<bsdf type={quoteattr(bsdf['type'])}>", *lines, "</bsdf>"])
-
-
-def _element(name: str, value: Any) -> str:
-    if isinstance(value, dict):
-        kind, text = "rgb", ", ".join(f"{number:.7g}" for number in value["value"])
-    elif isinstance(value, bool):
-        kind, text = "boolean", str(value).lower()
-    elif isinstance(value, str):
-        kind, text = "string", value
-    else:
-        kind, text = "float", f"{value:.7g}"
-    return f"<{kind} name={quoteattr(name)} value={quoteattr(text)}/>"
 
 
 def _option(value: Any) -> str:

@@ -179,8 +179,12 @@ class Session:
         if self._pictures[k][1].stage is not stage:  # so far it was a quick one
             self._pictures[k] = self._pictures[k][0], stages.Progress(stage)
         progress, before = self._pictures[k][1], self._pictures[k][1].spp
-        with self.materials.loaded(self.materials.expanded(given)) as loaded:
-            progress.advance(loaded)
+        try:
+            with self.materials.loaded(self.materials.expanded(given)) as loaded:
+                progress.advance(loaded)
+        except StateError:
+            del self._pictures[k]  # or it would be tried for ever
+            raise
         if engine.denoise and any(before < count <= progress.spp for count in DENOISED_AT):
             progress.denoised = progress.spp
             self._send_picture(k, state, serial, engine.denoise)

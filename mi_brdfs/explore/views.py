@@ -103,7 +103,7 @@ def _slice(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     wi, wo = HalfDifference().directions(np.sqrt(theta_h * 2 / np.pi), theta_d, np.full(theta_h.shape, np.pi / 2))
     pair = [np.stack(np.broadcast_arrays(w.x, w.y, w.z), axis=-1).astype(np.float32) for w in (wi, wo)]
     seen = np.minimum(pair[0][:, 2], pair[1][:, 2]) > 1e-3
-    wi_seen, wo_seen = (np.where(seen[:, None], w, np.float32([0, 0, 1])) for w in pair)
+    wi_seen, wo_seen = (np.where(seen[:, None], w, np.array([0, 0, 1], np.float32)) for w in pair)
     f = lobes.value(probe, wi_seen, wo_seen, state.channels[0][1]) / wo_seen[:, 2]
     values = np.where(seen, f, np.nan)
     yield {"payload": values.astype("<f4").tobytes(), "width": PIXELS, "height": PIXELS}
