@@ -116,14 +116,20 @@ function startBars() {
           class: "toggle",
           "data-view": view,
           onclick: () => {
-            const { views } = session.state;
-            change({ views: views.includes(view) ? views.filter((each) => each !== view) : [...views, view] });
+            change({ views: withOrWithout(session.state.views, view) });
           },
         },
         view,
       ),
     ),
   );
+}
+
+/** Return views without one, or with it: in its usual place, or last where a tour has put them in another order. */
+function withOrWithout(views, view) {
+  if (views.includes(view)) return views.filter((each) => each !== view);
+  const usual = VIEWS.filter((each) => views.includes(each)).join() === views.join();
+  return usual ? VIEWS.filter((each) => each === view || views.includes(each)) : [...views, view];
 }
 
 const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
@@ -155,7 +161,9 @@ function drawBars() {
   for (const button of byId("views").children) {
     const wanted = state.views.includes(button.dataset.view);
     button.setAttribute("aria-pressed", String(wanted));
-    cards[button.dataset.view].node.hidden = !wanted;
+    const { node } = cards[button.dataset.view];
+    node.hidden = !wanted;
+    node.style.order = state.views.indexOf(button.dataset.view);
   }
   const several = visible().length > 1;
   byId("compare-row").hidden = !several;

@@ -167,7 +167,7 @@ export function clean(given) {
   state.phi = clamp(state.phi, -180, 180);
   state.wipe = clamp(state.wipe, 0, 1);
   state.exposure = clamp(state.exposure, -10, 10);
-  state.views = VIEWS.filter((view) => state.views.includes(view));
+  state.views = [...new Set(state.views)].filter((view) => VIEWS.includes(view));
   const last = Math.max(state.subjects.length - 1, 0);
   state.pair = [0, 1].map((k) => (Number.isInteger(state.pair[k]) ? clamp(state.pair[k], 0, last) : Math.min(k, last)));
   if (!Number.isInteger(state.component)) state.component = null;
