@@ -49,6 +49,16 @@ function drawDots(found, width, height) {
   }
   const at = x - (radius * session.state.theta) / 90;
   svg.append(shape("circle", { cx: at, cy: y, r: 4, class: "source" }), label(at, y - 8, "ωi", "middle", "direction"));
+  svg.addEventListener("pointermove", (event) => {
+    const box = svg.getBoundingClientRect();
+    const scale = width / box.width;
+    const place = [(event.clientX - box.left) * scale - x, (event.clientY - box.top) * scale - y];
+    const theta = (90 * Math.hypot(...place)) / radius;
+    if (theta > 90) return tell(cards.sampler, []);
+    const azimuth = ((degrees(Math.atan2(place[1], -place[0])) + session.state.phi + 540) % 360) - 180;
+    tell(cards.sampler, [[null, `θo ${format(theta)}°, φ ${format(azimuth)}°`]]);
+  });
+  svg.addEventListener("pointerleave", () => tell(cards.sampler, []));
   return svg;
 }
 
@@ -79,6 +89,21 @@ function drawHistogram(found, width, height) {
     const closed = [[it.x(edges[0]), it.bottom], ...points, [it.x(edges[edges.length - 1]), it.bottom]];
     it.svg.append(shape("path", { d: path(closed), fill: colourOf(k), class: "area", stroke: colourOf(k) }));
   }
+  attach(
+    cards.sampler,
+    it.svg,
+    (x) => it.at(x),
+    [0, high],
+    (weight) => {
+      if (weight === null) return tell(cards.sampler, []);
+      const shareAt = (edges, share) => share[edges.findLastIndex((edge) => edge <= weight)] ?? 0;
+      const told = shares.map(([k, edges, share]) => [
+        colourOf(k),
+        `${session.state.subjects[k].name} ${format(100 * shareAt(edges, share))} %`,
+      ]);
+      tell(cards.sampler, [[null, `weight ${format(weight)} of the mean`], ...told]);
+    },
+  );
   return it.svg;
 }
 
