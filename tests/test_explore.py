@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from support import ROOT
 
-from mi_brdfs.explore.engine import Engine
-from mi_brdfs.explore.export import page
-from mi_brdfs.explore.materials import BUILT_IN, Materials, kinds
-from mi_brdfs.explore.session import Session
-from mi_brdfs.explore.stages import UserScene
-from mi_brdfs.explore.state import StateError, checked, parse
-from mi_brdfs.explore.tours import parse as parse_tour
-from mi_brdfs.explore.tours import tours
+from mi_brdfs.explorer.engine import Engine
+from mi_brdfs.explorer.export import page
+from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
+from mi_brdfs.explorer.session import Session
+from mi_brdfs.explorer.stages import UserScene
+from mi_brdfs.explorer.state import StateError, checked, parse
+from mi_brdfs.explorer.tours import parse as parse_tour
+from mi_brdfs.explorer.tours import tours
 from mi_brdfs.measure.sources import find_sources
 from mi_brdfs.mitsuba.registry import own_models
 
@@ -205,7 +205,7 @@ def test_the_copied_xml_and_dict_give_the_same_picture(client):
     told, picture = of(found, "subject")[0], of(found, "picture")[0]
     stage = client.session._pictures[0][1].stage
     for again in (mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.load_dict(eval(told["dict"]))):
-        from mi_brdfs.explore.stages import Progress, encoded
+        from mi_brdfs.explorer.stages import Progress, encoded
 
         progress = Progress(stage)
         progress.advance(again)

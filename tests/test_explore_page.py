@@ -17,7 +17,7 @@ import pytest
 from latency import Page, edited, serving
 from support import ROOT
 
-from mi_brdfs.explore import explore
+from mi_brdfs.explorer import explore
 from mi_brdfs.mitsuba.registry import own_models
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"

@@ -11,8 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from ..mitsuba.errors import one_line
 from .app import command
-from .errors import one_line
 from .options import Parameters, check_output, parameters_of, write_text
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -56,8 +56,8 @@ def explore(
     if not chosen.endswith("_rgb"):
         fail(f"this needs an rgb variant, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
 
-    from ..explore.running import PortError, listening, serve
-    from ..explore.stages import UserScene
+    from ..explorer.running import PortError, listening, serve
+    from ..explorer.stages import UserScene
 
     file, _, material = (scene or "").partition(".xml:")
     user = UserScene(Path(f"{file}.xml" if material else file) if scene else None, material or None, environment)
@@ -92,8 +92,8 @@ def explore(
 
 def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], list[dict[str, Any]]]:
     """Return the files among the targets, and the subjects of the page."""
-    from ..explore.materials import GIVEN, MEASURED, PRESET, Materials, plain
-    from ..explore.state import SUBJECTS, StateError, checked
+    from ..explorer.materials import GIVEN, MEASURED, PRESET, Materials, plain
+    from ..explorer.state import SUBJECTS, StateError, checked
     from ..measure.sources import find_sources, is_measured, value_of
     from ..mitsuba.registry import presets
 
@@ -124,11 +124,11 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
 
 
 def _export(file: Path, variant: str, user: Any, sources: list[Any], data: dict[str, Any]) -> None:
-    from ..explore.engine import Engine
-    from ..explore.export import page
-    from ..explore.materials import Materials
-    from ..explore.stages import stages
-    from ..explore.state import parse
+    from ..explorer.engine import Engine
+    from ..explorer.export import page
+    from ..explorer.materials import Materials
+    from ..explorer.stages import stages
+    from ..explorer.state import parse
 
     try:
         with stdout_to_stderr():

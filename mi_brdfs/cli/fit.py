@@ -11,9 +11,9 @@ import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from ..mitsuba.errors import one_line
 from ..mitsuba.registry import all_models, find_models
 from .app import command
-from .errors import one_line
 from .options import check_output, write_json
 from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant

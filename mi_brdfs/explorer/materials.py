@@ -11,8 +11,8 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..cli.errors import one_line
 from ..measure.sources import BSDFSource
+from ..mitsuba.errors import one_line
 from ..mitsuba.registry import MODELS, all_models, is_own
 from ..model import EnergyWarning, Model
 from ..parameters.messages import brief, listed, meant

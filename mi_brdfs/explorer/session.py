@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
 
-from ..cli.errors import one_line
+from ..mitsuba.errors import one_line
 from . import stages
 from .materials import MEASURED, Materials, plain
 from .state import Bsdf, State, StateError, key_of

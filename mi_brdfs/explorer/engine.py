@@ -11,7 +11,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..cli.errors import one_line
+from ..mitsuba.errors import one_line
 from . import stages
 from .session import Session
 from .state import Bsdf

@@ -17,7 +17,7 @@ from .. import __version__
 from ..measure.sources import BSDFSource, is_measured
 from ..measured import FileError, read
 from ..mitsuba.registry import all_models, presets
-from ..parameters.messages import brief
+from ..parameters.messages import brief, printable
 from . import stages
 from .engine import Engine
 from .materials import Materials, kinds
@@ -99,12 +99,13 @@ class Explorer:
         except web.HTTPRequestEntityTooLarge:
             return _refusal(413, f"A file may have {LARGEST_UPLOAD >> 20} MiB at most.")
         except (FileError, OSError) as error:
-            return _refusal(422, brief(str(error)) if isinstance(error, FileError) else f"It cannot be kept: {error}.")
+            told = printable(str(error)) if isinstance(error, FileError) else f"It cannot be kept: {error.strerror}."
+            return _refusal(422, told)
         self.uploads[key] = BSDFSource(name, key, str(path))
         return web.json_response({"file": key, "name": name})
 
     async def _socket(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(max_msg_size=LARGEST_MESSAGE, heartbeat=20)
+        socket = web.WebSocketResponse(max_msg_size=LARGEST_MESSAGE, heartbeat=20, compress=False)
         await socket.prepare(request)
         loop, outbox = asyncio.get_running_loop(), asyncio.Queue[Frame]()
 
