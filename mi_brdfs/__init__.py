@@ -3,13 +3,13 @@
 ``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
 dict scenes. :func:`list_models` names them, :func:`info` returns a manual page, :func:`preview_scene` a scene that
 shows a material. :func:`presets` names published materials, :func:`preset` returns one. :func:`ranges` and
-:func:`project` keep optimised parameters valid.
+:func:`project` keep optimised parameters valid. ``explore`` opens a page with sliders, lobes and pictures.
 """
 
 import importlib
 import re
 import warnings
-from types import ModuleType
+from typing import Any
 
 from .mitsuba import llvm
 
@@ -41,14 +41,16 @@ _LAZY = ("bench", "cluster", "fit", "gallery", "plot", "sweep", "testing", "vali
 """Modules that are imported when they are used: some need extras, and all take time."""
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> Any:
     if name in _LAZY:
         return importlib.import_module(f"{__name__}.{name}")
+    if name == "explore":
+        return importlib.import_module(f"{__name__}.explorer").explore
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY})
+    return sorted({*globals(), *_LAZY, "explore"})
 
 
 __all__ = [

@@ -208,11 +208,12 @@ def denoised(picture: Picture) -> Picture:
     return dataclasses.replace(picture, image=mi.TensorXf(pixels), bitmap=bitmap)
 
 
-def tonemap(image: np.ndarray) -> np.ndarray:
+def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
     """Map linear RGB of any range to [0, 1], still linear, without flat highlights or hue shifts.
 
-    With ``m`` the largest of a pixel's channels and ``p`` the 99.9th percentile of ``m``, a pixel is multiplied by
-    ``f(m) / m``. Up to 0.8, and everywhere if ``p <= 1``, ``f(m) = m``: a well exposed picture stays as it is. Above,
+    With ``m`` the largest of a pixel's channels and ``p`` the ``peak``, by default the 99.9th percentile of ``m``, a
+    pixel is multiplied by ``f(m) / m``. Up to 0.8, and everywhere if ``p <= 1``, ``f(m) = m``: a well exposed picture
+    stays as it is. Above,
 
         f(m) = 0.8 + 0.2 t (1 + t/T²) / (1 + t),    t = (m - 0.8) / 0.2,    T = (p - 0.8) / 0.2,
 
@@ -221,7 +222,8 @@ def tonemap(image: np.ndarray) -> np.ndarray:
     """
     image = np.nan_to_num(np.maximum(image, 0), nan=0.0, posinf=np.finfo(np.float32).max)
     m = image.max(axis=-1, keepdims=True)
-    T = max((np.percentile(m, 99.9) - SHOULDER) / (1 - SHOULDER), 1.0)
+    p = np.percentile(m, 99.9) if peak is None else peak
+    T = max((p - SHOULDER) / (1 - SHOULDER), 1.0)
     t = np.maximum(m - SHOULDER, 0) / (1 - SHOULDER)
     f = np.where(m > SHOULDER, SHOULDER + (1 - SHOULDER) * t * (1 / (1 + t) + t / (1 + t) / T / T), m)
     return image * np.minimum(f, 1) / np.where(m > 0, m, 1)

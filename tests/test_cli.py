@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import mi_brdfs
-from mi_brdfs.cli.errors import one_line
 from mi_brdfs.mitsuba import llvm
+from mi_brdfs.mitsuba.errors import one_line
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 needs_bad_llvm = pytest.mark.skipif(BAD_LLVM is None or not llvm._has_avx512(), reason="no LLVM here that aborts")

@@ -6,11 +6,11 @@ import pytest
 from support import call, direction, hemisphere
 
 import mi_brdfs
-from mi_brdfs.cli.errors import one_line
 from mi_brdfs.lobes import LambertLobe, Lobe, MicrofacetLobe
 from mi_brdfs.microfacet.distributions import Beckmann
 from mi_brdfs.microfacet.fresnel import Unit
 from mi_brdfs.microfacet.shadowing import VCavity
+from mi_brdfs.mitsuba.errors import one_line
 from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Spelling
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb", "as_before")

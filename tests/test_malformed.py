@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from support import call, direction
 from test_resources import scene_of
 
-from mi_brdfs.cli.errors import one_line
+from mi_brdfs.mitsuba.errors import one_line
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe

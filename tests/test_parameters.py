@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support import call, direction
 
-from mi_brdfs.cli.errors import one_line
+from mi_brdfs.mitsuba.errors import one_line
 
 NAN, INF = float("nan"), float("inf")
 RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}

@@ -51,6 +51,12 @@ def test_mutants_are_caught(mutant):
     assert not report.passed
 
 
+def test_a_dict_is_checked_where_no_variant_is_active():
+    code = "import mi_brdfs; print(mi_brdfs.validation.check({'type': 'lambert'}, only=['weight']).passed)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.stdout == "True\n", done.stderr
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name not in QUICK else []) for name in RIGHT]

@@ -4,7 +4,7 @@ A file for each command. Results go to stdout, errors and progress to stderr. Ex
 usage, 3 if ``check`` could judge nothing, 130 after Ctrl-C.
 """
 
-from . import list, info, presets, measured, doctor, show, render, gallery, plot  # noqa: F401, I001 -- in the order of --help
+from . import list, info, presets, measured, doctor, show, render, gallery, plot, explore  # noqa: F401, I001 -- in the order of --help
 from . import convert, fit, sweep, check, energy, bench  # noqa: F401
 from .app import app, main
 

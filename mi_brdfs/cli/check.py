@@ -17,12 +17,12 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..mitsuba import guests
+from ..mitsuba.errors import one_line
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
 from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
-from .errors import one_line
 from .interrupts import ending_processes, interruptible
 from .options import Parameters, check_names, check_output, parameters_of, write_json, write_text
 from .terminal import Exit, err, fail, out, stdout_to_stderr

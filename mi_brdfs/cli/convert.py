@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import mitsuba as mi
 import typer
 
+from ..mitsuba.errors import one_line
 from .app import command
-from .errors import one_line
 from .interrupts import interruptible
 from .options import Parameters, check_output, parameters_of
 from .terminal import Exit, err, fail, print_paragraph, stdout_to_stderr

@@ -13,10 +13,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from ..mitsuba.errors import one_line
 from ..mitsuba.registry import find_models
 from ..model import Energy, Model
 from .app import command
-from .errors import one_line
 from .interrupts import interruptible
 from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant

@@ -9,8 +9,8 @@ import typer
 from rich.text import Text
 
 from .. import info as manual
+from ..mitsuba.errors import one_line
 from .app import command
-from .errors import one_line
 from .manual import folded, is_underline
 from .terminal import fail, out
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from ..mitsuba.errors import one_line
 from .app import command
-from .errors import one_line
 from .interrupts import interruptible
 from .options import check_output, write_json
 from .terminal import Exit, err, fail, out, print_table

@@ -11,7 +11,7 @@ import mitsuba as mi
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from .errors import one_line
+from ..mitsuba.errors import one_line
 from .interrupts import answer_ctrl_c
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..mitsuba.errors import one_line
 from .app import command
-from .errors import one_line
 from .interrupts import interruptible
 from .options import check_output
 from .terminal import Exit, fail, out, stdout_to_stderr

@@ -8,10 +8,10 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from ..mitsuba.errors import one_line
 from ..mitsuba.registry import presets
 from ..parameters.published import preset, provenance
 from .app import command
-from .errors import one_line
 from .terminal import Exit, err, fail, out, print_paragraph, print_table
 
 LETTERS = {"alpha": "α", "exponent": "n", "b": "B"}

@@ -8,9 +8,9 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
+from ..mitsuba.errors import one_line
 from ..scene_file import RESERVED, SceneFile
 from .app import command
-from .errors import one_line
 from .options import parameters_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail

@@ -9,9 +9,9 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
+from ..mitsuba.errors import one_line
 from ..preview import STAGES, preview_scene
 from .app import command
-from .errors import one_line
 from .options import Parameters, parameters_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail

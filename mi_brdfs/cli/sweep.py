@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from ..mitsuba.errors import one_line
 from .app import command
-from .errors import one_line
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 

@@ -6,7 +6,6 @@ import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
-from xml.sax.saxutils import quoteattr
 
 import mitsuba as mi
 import numpy as np
@@ -15,6 +14,7 @@ from ..measure.directions import direction
 from ..measure.probe import BSDFProbe
 from ..measure.variates import sobol
 from ..model import EnergyWarning
+from ..parameters.xml import to_xml
 from .lanes import rgb_variant
 
 ANGLES = 0, 20, 40, 60, 70, 80
@@ -167,19 +167,4 @@ class Fit:
 
     def to_xml(self) -> str:
         """Return the BSDF as XML, to paste into a scene."""
-        lines = [f"<bsdf type={quoteattr(self.bsdf['type'])}>"]
-        lines += [f"    {_element(name, value)}" for name, value in self.bsdf.items() if name != "type"]
-        return "\n".join([*lines, "</bsdf>"])
-
-
-def _element(name: str, value: Any) -> str:
-    """Return a parameter as an XML element."""
-    if isinstance(value, dict):
-        kind, text = "rgb", ", ".join(f"{number:.7g}" for number in value["value"])
-    elif isinstance(value, bool):
-        kind, text = "boolean", str(value).lower()
-    elif isinstance(value, str):
-        kind, text = "string", value
-    else:
-        kind, text = "float", f"{value:.7g}"
-    return f"<{kind} name={quoteattr(name)} value={quoteattr(text)}/>"
+        return to_xml(self.bsdf)

@@ -146,7 +146,9 @@ def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None) -> Curv
 # --- Maps and meshes ------------------------------------------------------------------------------------------------
 
 
-def disc(probe: BSDFProbe, theta_i: float, azimuth: float, side: int, resolution: int) -> Array:
+def disc(
+    probe: BSDFProbe, theta_i: float, azimuth: float, side: int, resolution: int, channel: int | None = None
+) -> Array:
     """Return a picture of the hemisphere above (1) or below (-1), in rows from the bottom, each pixel the mean over it.
 
     It is the disc of :func:`~mi_brdfs.measure.directions.to_plane` with wi on the left; pixels outside repeat its rim.
@@ -165,12 +167,12 @@ def disc(probe: BSDFProbe, theta_i: float, azimuth: float, side: int, resolution
         corner = np.stack([pixels % n, pixels // n], axis=-1)
         points = 90 * ((corner[:, None] + step / parts) * 2 / n - 1).reshape(-1, 2)
         points /= np.maximum(np.hypot(*points.T) / GRAZING, 1)[:, None]
-        values = value(probe, wi, from_plane(points[:, 0], points[:, 1], side, axis).astype(np.float32))
+        values = value(probe, wi, from_plane(points[:, 0], points[:, 1], side, axis).astype(np.float32), channel)
         picture[pixels] = values.reshape(len(pixels), parts * parts).mean(axis=1)
     return picture.reshape(n, n)
 
 
-def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int) -> list[Mesh]:
+def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, channel: int | None = None) -> list[Mesh]:
     """Return the lobe over all directions, one mesh for each half-space into which it reflects or transmits. Their
     lines are ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws
     directions."""
@@ -185,7 +187,7 @@ def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int) ->
         phi = _lines(np.linspace(0, 360, 2 * resolution), phi, (azimuth + 180) % 360)
         grid = np.stack([angles.ravel() for angles in np.meshgrid(theta, phi, indexing="ij")])
         directions = on_side(direction(*grid).T, side)
-        values = value(probe, wi, directions).reshape(len(theta), len(phi))
+        values = value(probe, wi, directions, channel).reshape(len(theta), len(phi))
         found.append(Mesh(directions.reshape(*values.shape, 3), values))
     return found
 

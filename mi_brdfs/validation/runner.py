@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from ..measure.probe import BSDFProbe
 from ..measure.sources import name_of
-from ..variants import is_measurable
+from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, recompiles, sampling, spectral, textures, values
 from .against import against
 from .outcome import Findings, told
@@ -147,7 +147,7 @@ def _measurable(*bsdfs: dict[str, Any] | mi.BSDF) -> AbstractContextManager:
     if not all(isinstance(bsdf, dict) for bsdf in bsdfs):
         raise ValueError(f"A loaded BSDF of {mi.variant()} cannot be checked: load it in {VARIANT} or another "
                          "vectorized and unpolarized variant, or give its dict.")  # fmt: skip
-    return mi.variant_context(VARIANT)
+    return activated(VARIANT)
 
 
 def _probe(bsdf: dict[str, Any] | mi.BSDF) -> BSDFProbe:

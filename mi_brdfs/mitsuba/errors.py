@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from ..mitsuba.registry import plugin_names
 from ..parameters.messages import brief, meant
+from .registry import plugin_names
 
 
 def one_line(error: BaseException) -> str:

@@ -1,0 +1,78 @@
+// A card of the page: a heading, buttons, a figure, and a line for the values under the pointer.
+import { element, save, shape, standalone } from "./util.js";
+import { session } from "./session.js";
+
+export const cards = {};
+
+/** Add a card for a view; `files` names the kinds of files that it makes of itself. */
+export function makeCard(view, title, note, files = []) {
+  const tools = element("div", { class: "tools" });
+  const figure = element("div", { class: `figure ${view}` });
+  const readout = element("output", { class: "readout" });
+  const card = { view, title, figure, readout, tools, legend: [] };
+  for (const kind of files) {
+    tools.append(
+      element(
+        "button",
+        { class: "quiet", "aria-label": `${title}: save as ${kind}`, onclick: () => saveAs(card, kind) },
+        kind,
+      ),
+    );
+  }
+  card.note = element("span", { class: "note" }, note);
+  card.node = element(
+    "section",
+    { class: "card", id: `view-${view}`, "aria-label": title },
+    element("header", {}, element("div", {}, element("h2", {}, title), card.note), tools),
+    figure,
+    readout,
+  );
+  cards[view] = card;
+  return card;
+}
+
+function saveAs(card, kind) {
+  const name = `${session.state.subjects
+    .map((subject) => subject.name)
+    .join("-")
+    .replace(/[^\p{L}\p{N}.-]+/gu, "_")}-${card.view}`;
+  if (kind === "SVG") {
+    const figures = [...card.figure.querySelectorAll("svg")];
+    figures.forEach((figure, k) =>
+      save(`${name}${figures.length > 1 ? `-${k + 1}` : ""}.svg`, standalone(figure), "image/svg+xml"),
+    );
+  } else if (kind === "CSV") {
+    save(
+      `${name}.csv`,
+      card
+        .table()
+        .map((row) => row.map(quoted).join(","))
+        .join("\n") + "\n",
+      "text/csv",
+    );
+  } else {
+    card.image((blob) => save(`${name}.png`, blob));
+  }
+}
+
+const quoted = (cell) => (/[",\n]/.test(String(cell)) ? `"${String(cell).replace(/"/g, '""')}"` : String(cell ?? ""));
+
+/** Show values in the line below the figure, or else its legend: texts with a colour, and the dashes of a curve. */
+export function tell(card, items) {
+  card.readout.replaceChildren(
+    ...(items.length ? items : card.legend).map(([colour, text, dash]) => {
+      if (dash === undefined)
+        return element("span", { style: colour ? `--mark:${colour}` : null, class: colour ? "marked" : null }, text);
+      return element(
+        "span",
+        {},
+        shape(
+          "svg",
+          { width: 24, height: 8, class: "sample", "aria-hidden": "true" },
+          shape("line", { x1: 0, y1: 4, x2: 24, y2: 4, stroke: colour, "stroke-width": 2, "stroke-dasharray": dash }),
+        ),
+        text,
+      );
+    }),
+  );
+}

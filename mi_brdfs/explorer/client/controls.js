@@ -1,0 +1,282 @@
+// Controls of a subject's parameters, made from what the server declares of them.
+import { byId, clamp, element, format, fromDisplay, toDisplay } from "./util.js";
+import { changeSubject, session, setParameter } from "./session.js";
+
+const STEPS = 1000;
+let built = "";
+let rows = [];
+
+/** Show the controls of the selected subject; values that are being changed stay as they are. */
+export function drawControls() {
+  const k = session.selected;
+  const info = session.info[k];
+  const host = byId("controls");
+  const told = byId("subject-error");
+  if (!session.state.subjects[k]) {
+    host.replaceChildren();
+    told.textContent = built = "";
+    return;
+  }
+  if (session.exported) return drawList(host, session.state.subjects[k].bsdf);
+  const controls = info?.controls ?? [];
+  const form = JSON.stringify([
+    k,
+    session.state.subjects[k].bsdf.type,
+    controls.map(({ name, kind, words, low, high, optional }) => [
+      name,
+      kind,
+      words,
+      low,
+      high,
+      optional,
+      valueOf({ name, value: null }, k) === null && optional,
+    ]),
+  ]);
+  if (info && form !== built) {
+    built = form;
+    rows = controls.map((control) => makeRow(control, k));
+    host.replaceChildren(...grouped(rows));
+  }
+  const own = rows.find(
+    ({ control }) => info?.error && new RegExp(`(^|[^\\w])${control.name}([^\\w]|$)`).test(info.error),
+  );
+  told.textContent = info?.error && !own ? info.error : "";
+  for (const row of rows) {
+    const control = controls.find(({ name }) => name === row.control.name) ?? row.control;
+    row.show(valueOf(control, k));
+    row.error.textContent = row === own ? info.error : "";
+  }
+  byId("notes").textContent = (info?.notes ?? []).join(" · ");
+}
+
+/** In an exported page nothing can be changed: list the parameters. */
+function drawList(host, bsdf) {
+  const told = (value) => (typeof value === "number" ? format(value, 4) : String(value));
+  host.replaceChildren(
+    ...Object.entries(bsdf)
+      .filter(([name]) => name !== "type")
+      .map(([name, value]) =>
+        element(
+          "div",
+          { class: "fixed" },
+          element("span", {}, name.replaceAll("_", " ")),
+          element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
+        ),
+      ),
+  );
+  byId("incidence").textContent = `θi = ${format(session.state.theta)}°, φi = ${format(session.state.phi)}°`;
+}
+
+/** Return the rows under the headings of their groups; those left out follow as buttons. */
+function grouped(all) {
+  const groups = new Map();
+  for (const row of all) groups.set(row.control.group ?? "", [...(groups.get(row.control.group ?? "") ?? []), row]);
+  return [...groups].flatMap(([name, members]) => {
+    const absent = members.filter((row) => row.absent).map(({ node }) => node);
+    return [
+      name ? element("h3", {}, name) : null,
+      ...members.filter((row) => !row.absent).map(({ node }) => node),
+      absent.length ? element("div", { class: "row absent" }, ...absent) : null,
+    ].filter(Boolean);
+  });
+}
+
+/** Return what a parameter is set to, or else what the server says that it is. */
+function valueOf({ name, value }, k) {
+  return session.state.subjects[k].bsdf[name] ?? value ?? null;
+}
+
+function makeRow(control, k) {
+  const id = `control-${control.name}`;
+  const set = (value) => setParameter(k, control, value);
+  const absent = control.optional && valueOf({ name: control.name, value: null }, k) === null && control.value == null;
+  const error = element("p", { class: "error", id: `${id}-error`, role: "alert" });
+  const described = { "aria-describedby": `${id}-error` };
+  const usual =
+    control.default ??
+    { number: middle(control), colour: 0.5, choice: control.words?.[0], flag: true, text: "" }[control.kind];
+  const named = control.name.replaceAll("_", " ");
+  if (absent) {
+    const node = element(
+      "button",
+      { class: "small", title: control.text ?? "", onclick: () => set(usual) },
+      `+ ${named}`,
+    );
+    return { control, node, absent, error, show: () => {} };
+  }
+  const make = { number: makeNumber, colour: makeColour, choice: makeChoice, flag: makeFlag, text: makeText }[
+    control.kind
+  ];
+  const { body, show } = make(control, id, set, described);
+  const [act, sign] = control.optional ? ["leave out", "×"] : ["reset", "↺"];
+  const head = element(
+    "div",
+    { class: "name" },
+    element("label", { for: id, title: control.text ?? "" }, named),
+    element(
+      "button",
+      { class: "quiet small reset", "aria-label": `${act} ${control.name}`, title: act, onclick: () => set(null) },
+      sign,
+    ),
+  );
+  const meaning = control.text ? element("p", { class: "meaning" }, control.text) : null;
+  return {
+    control,
+    node: element("div", { class: `control ${control.kind}` }, head, body, error, meaning),
+    show,
+    error,
+  };
+}
+
+// --- Numbers --------------------------------------------------------------------------------------------------------
+
+const highOf = ({ low, high, value, default: usual }) =>
+  high ?? Math.max(10 * Math.abs(usual ?? 0), 4 * Math.abs(Number(value) || 0), (low ?? 0) + 1);
+const lowOf = ({ low, default: usual }) => low ?? -Math.max(1, 10 * Math.abs(usual ?? 0));
+
+/** Return maps between a number and a slider's place in 0…1. */
+function slide(control) {
+  const [low, high] = [lowOf(control), highOf(control)];
+  if (control.scale !== "log") return [(value) => (value - low) / (high - low), (place) => low + place * (high - low)];
+  const first = low > 0 ? low : high * 1e-6;
+  const reach = Math.log(high / first);
+  return [
+    (value) => Math.log(Math.max(value, first) / first) / reach,
+    (place) => (place <= 0 ? low : first * Math.exp(place * reach)),
+  ];
+}
+
+function middle(control) {
+  return Number(slide(control)[1](0.5).toPrecision(2));
+}
+
+const rounded = (value) => Number(value.toPrecision(4));
+const settled = (input, text) => {
+  if (document.activeElement !== input) input.value = text;
+};
+
+function makeNumber(control, id, set, described) {
+  const [place, value] = slide(control);
+  const slider = element("input", { type: "range", id, min: 0, max: STEPS, step: 1, ...described });
+  const field = element("input", {
+    type: "number",
+    step: "any",
+    "aria-label": `${control.name}, as a number`,
+    ...described,
+  });
+  slider.oninput = () => {
+    const chosen = rounded(value(slider.value / STEPS));
+    field.value = chosen;
+    set(chosen);
+  };
+  slider.onkeydown = coarse(slider);
+  field.onchange = () => field.value !== "" && set(Number(field.value));
+  const show = (given) => {
+    const number = typeof given === "number" ? given : control.default;
+    settled(slider, Math.round(clamp(place(number ?? 0), 0, 1) * STEPS));
+    settled(field, number == null ? "" : rounded(number));
+    slider.setAttribute("aria-valuetext", format(number, 4));
+  };
+  return { body: element("div", { class: "pair" }, slider, field), show };
+}
+
+/** Arrow keys move a slider by a hundredth, with Shift by a thousandth. */
+const coarse = (slider) => (event) => {
+  const way = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+  if (!way || event.shiftKey) return;
+  event.preventDefault();
+  slider.value = Number(slider.value) + way * (STEPS / 100);
+  slider.oninput();
+};
+
+// --- Colours --------------------------------------------------------------------------------------------------------
+
+const asColour = (value) => (Array.isArray(value) ? value : [value ?? 0, value ?? 0, value ?? 0]);
+const hex = (colour) =>
+  "#" +
+  colour
+    .map((v) =>
+      Math.round(255 * toDisplay(clamp(v, 0, 1)))
+        .toString(16)
+        .padStart(2, "0"),
+    )
+    .join("");
+
+/** A colour in linear rgb: a level for all three channels, a number for each, and a picker where they are in 0…1. */
+function makeColour(control, id, set, described) {
+  let current = asColour(control.value);
+  const [place, value] = slide({
+    ...control,
+    value: Math.max(...current),
+    default: Math.max(...asColour(control.default ?? 0)),
+  });
+  const level = element("input", { type: "range", id, min: 0, max: STEPS, step: 1, ...described });
+  const picker = element("input", { type: "color", "aria-label": `${control.name}, as a colour` });
+  const fields = ["red", "green", "blue"].map((channel, c) => {
+    const field = element("input", {
+      type: "number",
+      step: "any",
+      "aria-label": `${control.name}, ${channel}`,
+      class: channel,
+    });
+    field.onchange = () => field.value !== "" && put(current.map((v, at) => (at === c ? Number(field.value) : v)));
+    return field;
+  });
+  const put = (colour) => {
+    current = colour.map(rounded);
+    set(current);
+  };
+  level.oninput = () => {
+    const [wanted, most] = [value(level.value / STEPS), Math.max(...current)];
+    put(most > 0 ? current.map((v) => (v / most) * wanted) : [wanted, wanted, wanted]);
+  };
+  level.onkeydown = coarse(level);
+  picker.oninput = () => put([1, 3, 5].map((at) => fromDisplay(parseInt(picker.value.slice(at, at + 2), 16) / 255)));
+  const show = (given) => {
+    current = asColour(given);
+    settled(level, Math.round(clamp(place(Math.max(...current)), 0, 1) * STEPS));
+    settled(picker, hex(current));
+    fields.forEach((field, c) => settled(field, rounded(Number(current[c]))));
+  };
+  const bounded = (control.high ?? Infinity) <= 1;
+  return {
+    body: element(
+      "div",
+      { class: "colours" },
+      element("div", { class: "pair" }, level, bounded ? picker : null),
+      element("div", { class: "three" }, ...fields),
+    ),
+    show,
+  };
+}
+
+// --- Words ----------------------------------------------------------------------------------------------------------
+
+function makeChoice(control, id, set, described) {
+  const select = element(
+    "select",
+    { id, ...described },
+    ...control.words.map((word) => element("option", { value: word }, word)),
+  );
+  select.onchange = () => set(select.value);
+  return { body: select, show: (value) => (select.value = value ?? control.default ?? "") };
+}
+
+function makeFlag(control, id, set, described) {
+  const box = element("input", { type: "checkbox", id, ...described });
+  box.onchange = () => set(box.checked);
+  return { body: box, show: (value) => (box.checked = Boolean(value)) };
+}
+
+function makeText(control, id, set, described) {
+  const field = element("input", { type: "text", id, spellcheck: "false", ...described });
+  field.onchange = () => set(field.value || null);
+  return { body: field, show: (value) => settled(field, value ?? "") };
+}
+
+/** Take out all parameters that have been set. */
+export function resetAll() {
+  const { bsdf } = session.state.subjects[session.selected];
+  const kept = ["type", "name", "file"].filter((name) => name in bsdf);
+  changeSubject(session.selected, { bsdf: Object.fromEntries(kept.map((name) => [name, bsdf[name]])) });
+}

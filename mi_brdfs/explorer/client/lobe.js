@@ -1,0 +1,347 @@
+// The lobe as a body to turn, drawn by WebGL; the arrow of wi can be dragged.
+import { clamp, decades, degrees, element, format, largest, radians } from "./util.js";
+import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geometry.js";
+import { change, session, visible } from "./session.js";
+import { cards, tell } from "./card.js";
+import { belowOf } from "./link.js";
+import { colourOf } from "./plots.js";
+
+const VERTEX = `#version 300 es
+in vec3 position, normal; uniform mat4 view; out vec3 facing;
+void main() { facing = normal; gl_Position = view * vec4(position, 1.0); }`;
+const FRAGMENT = `#version 300 es
+precision mediump float; in vec3 facing; uniform vec4 colour; uniform vec3 eye; uniform float lit; out vec4 seen;
+void main() {
+  float light = mix(1.0, 0.45 + 0.6 * abs(dot(normalize(facing + vec3(1e-6)), eye)), lit);
+  seen = vec4(colour.rgb * light * colour.a, colour.a);
+}`;
+const camera = { yaw: 1.87, pitch: 0.42, distance: 4.1 };
+let gl, program, canvas, labels, places;
+const bodies = new Map();
+
+/** Put the canvas into its card; return whether there is WebGL. */
+export function startLobe() {
+  const card = cards.lobe;
+  canvas = element("canvas", { tabindex: 0, role: "img" });
+  gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  if (!gl) {
+    card.figure.append(
+      element("p", {}, "This browser has no WebGL 2, which the lobe needs; the polar plot shows its cut."),
+    );
+    return false;
+  }
+  card.legend = [
+    [
+      null,
+      session.exported
+        ? "Drag to turn, or arrow keys"
+        : "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi",
+    ],
+  ];
+  tell(card, []);
+  labels = element("div", { class: "labels" });
+  card.figure.append(canvas, labels);
+  setUp();
+  canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+  canvas.addEventListener("webglcontextrestored", () => {
+    bodies.clear();
+    setUp();
+    drawLobe();
+  });
+  listen();
+  return true;
+}
+
+function setUp() {
+  program = gl.createProgram();
+  for (const [kind, source] of [
+    [gl.VERTEX_SHADER, VERTEX],
+    [gl.FRAGMENT_SHADER, FRAGMENT],
+  ]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.bindAttribLocation(program, 0, "position");
+  gl.bindAttribLocation(program, 1, "normal");
+  gl.linkProgram(program);
+  gl.useProgram(program);
+  gl.clearColor(0, 0, 0, 0);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+}
+
+function upload({ position, normal, faces, lines }) {
+  const made = { array: gl.createVertexArray(), faces: faces.length, lines: lines.length, buffers: [] };
+  gl.bindVertexArray(made.array);
+  const buffer = (target, data) => {
+    made.buffers.push(gl.createBuffer());
+    gl.bindBuffer(target, made.buffers[made.buffers.length - 1]);
+    gl.bufferData(target, data, gl.STATIC_DRAW);
+  };
+  [position, normal].forEach((data, k) => {
+    buffer(gl.ARRAY_BUFFER, data);
+    gl.enableVertexAttribArray(k);
+    gl.vertexAttribPointer(k, 3, gl.FLOAT, false, 0, 0);
+  });
+  const both = new Uint32Array(faces.length + lines.length);
+  both.set(faces);
+  both.set(lines, faces.length);
+  buffer(gl.ELEMENT_ARRAY_BUFFER, both);
+  return made;
+}
+
+function discard(body) {
+  gl.deleteVertexArray(body.array);
+  body.buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+}
+
+/** Return the camera: its place, its axes, and its matrix by columns. */
+function look(aspect) {
+  const { yaw, pitch, distance } = camera;
+  const back = [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
+  const target = [0, 0, places.whole ? 0 : 0.42];
+  const right = [-Math.sin(yaw), Math.cos(yaw), 0];
+  const up = cross(back, right);
+  const far = distance * Math.max(1, 1.15 / aspect) * (places.whole ? 1.25 : 1);
+  const eye = sum(target, scaled(back, far));
+  const zoom = 1 / Math.tan(radians(16));
+  const [near, end] = [0.1, 40];
+  const depth = (end + near) / (near - end);
+  const rows = [
+    [...scaled(right, zoom / aspect), -dot(right, eye) * (zoom / aspect)],
+    [...scaled(up, zoom), -dot(up, eye) * zoom],
+    [...scaled(back, depth), -dot(back, eye) * depth + (2 * end * near) / (near - end)],
+    [...scaled(back, -1), dot(back, eye)],
+  ];
+  const matrix = new Float32Array(16);
+  rows.forEach((row, i) => row.forEach((value, j) => (matrix[4 * j + i] = value)));
+  return { eye, back, right, up, zoom, aspect, matrix };
+}
+
+function project({ matrix }, [x, y, z], [left, top, width, height]) {
+  const at = [0, 1, 3].map((i) => matrix[i] * x + matrix[4 + i] * y + matrix[8 + i] * z + matrix[12 + i]);
+  return [left + (0.5 + (0.5 * at[0]) / at[2]) * width, top + (0.5 - (0.5 * at[1]) / at[2]) * height];
+}
+
+export function drawLobe() {
+  if (!gl || gl.isContextLost()) return;
+  const card = cards.lobe;
+  const { state } = session;
+  const found = visible()
+    .filter((k) => session.shown.lobe[k])
+    .map((k) => ({ subject: k, parts: [session.shown.lobe[k], belowOf("lobe", k)].filter(Boolean) }));
+  const arrays = found.map(({ parts }) => parts.map(({ values }) => values));
+  const peaks = arrays.map((values) => largest(values));
+  const common = Math.max(...peaks, 0) || 1;
+  const log = state.scale === "log";
+  const over = arrays.map((values, k) => (state.normalise ? peaks[k] : common));
+  const [low, high] = log
+    ? decades(
+        arrays.flatMap((values, k) => values.map((part) => part.map((value) => value / over[k]))),
+        1,
+      )
+    : [0, 1];
+  const used = new Set();
+  found.forEach(({ subject, parts }, k) => {
+    const radius = (value) => {
+      const share = value / over[k];
+      return !(share > 0) ? 0 : Math.min(log ? Math.max((Math.log10(share) - low) / (high - low), 0) : share, 1);
+    };
+    for (const part of parts) {
+      const slot = `${subject}${part.below ? "-" : "+"}`;
+      const stamp = `${part.serial} ${over[k]} ${low} ${log}`;
+      used.add(slot);
+      const before = bodies.get(slot);
+      if (before?.stamp === stamp && before.of === part.values) continue;
+      if (before) discard(before);
+      bodies.set(slot, Object.assign(upload(makeBody(part, radius)), { stamp, of: part.values }));
+    }
+  });
+  for (const [slot, body] of bodies) {
+    if (used.has(slot)) continue;
+    discard(body);
+    bodies.delete(slot);
+  }
+  render(found);
+  canvas.setAttribute(
+    "aria-label",
+    `Lobes of f cosθo at θi ${format(state.theta)}°: ${found
+      .map(({ subject }, k) => `${state.subjects[subject].name}, at most ${format(peaks[k])} per steradian`)
+      .join("; ")}. Arrow keys turn it.`,
+  );
+  card.note.textContent =
+    "f cosθo as radius" +
+    (log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "") +
+    (state.normalise ? ", over the maximum" : `, at most ${format(common)}`);
+}
+
+function render(found) {
+  const { state } = session;
+  const ratio = Math.min(window.devicePixelRatio || 1, 2);
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (!width) return;
+  if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
+  if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+  const side = state.lobes === "side" && found.length > 1;
+  const columns = side ? (found.length > 2 || width > height ? 2 : 1) : 1;
+  const rows = side ? Math.ceil(found.length / columns) : 1;
+  const areas = (side ? found : [found]).map((_, k) => [
+    ((k % columns) * width) / columns,
+    (Math.floor(k / columns) * height) / rows,
+    width / columns,
+    height / rows,
+  ]);
+  places = { areas, whole: found.some(({ parts }) => parts.length > 1) };
+  const wi = unit(state.theta, state.phi);
+  const things = upload(furniture(wi));
+  const ink = getComputedStyle(canvas)
+    .color.match(/[\d.]+/g)
+    .slice(0, 3)
+    .map((value) => value / 255);
+  gl.viewport(0, 0, canvas.width, canvas.height);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  labels.replaceChildren();
+  areas.forEach((area, at) => {
+    gl.viewport(area[0] * ratio, canvas.height - (area[1] + area[3]) * ratio, area[2] * ratio, area[3] * ratio);
+    const view = look(area[2] / area[3]);
+    places.view = view;
+    gl.uniformMatrix4fv(gl.getUniformLocation(program, "view"), false, view.matrix);
+    gl.uniform3fv(gl.getUniformLocation(program, "eye"), view.back);
+    const paint = (body, colour, alpha, lit, mode = "faces") => {
+      gl.bindVertexArray(body.array);
+      gl.uniform4f(gl.getUniformLocation(program, "colour"), ...colour, alpha);
+      gl.uniform1f(gl.getUniformLocation(program, "lit"), lit);
+      if (mode === "faces") gl.drawElements(gl.TRIANGLES, body.faces, gl.UNSIGNED_INT, 0);
+      else gl.drawElements(gl.LINES, body.lines, gl.UNSIGNED_INT, 4 * body.faces);
+    };
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    paint(things, ink, 0.75, 0);
+    paint(things, ink, 0.4, 0, "lines");
+    const shown = side ? [found[at]] : found;
+    const alone = shown.length === 1;
+    for (const { subject, parts } of shown) {
+      const colour = [1, 3, 5].map((k) => parseInt(colourOf(subject).slice(k, k + 2), 16) / 255);
+      const faded = session.info[subject]?.error ? 0.3 : 1;
+      for (const { below } of parts) {
+        const body = bodies.get(`${subject}${below ? "-" : "+"}`);
+        gl.depthMask(alone && !state.wire && faded === 1);
+        if (!state.wire) paint(body, colour, (alone ? 0.94 : 0.38) * faded, 1);
+        gl.depthMask(true);
+        if (state.wire || !alone) paint(body, colour, (state.wire ? 0.6 : 0.28) * faded, 0, "lines");
+      }
+    }
+    const mark = (text, point, kind) => {
+      const [x, y] = project(view, point, area);
+      labels.append(element("span", { class: kind, style: `left:${x}px;top:${y}px` }, text));
+    };
+    mark("ωi", scaled(wi, ARROW + 0.1), "direction");
+    mark("n", [0, 0, 1.15], "");
+    mark("u", [1.07, 0, 0], "");
+    if (side) mark(state.subjects[found[at].subject].name, places.whole ? [0, 0, -1.3] : [0, 0, -0.4], "name");
+  });
+  discard(things);
+}
+
+const again = () => requestAnimationFrame(drawLobe);
+
+function listen() {
+  const fingers = new Map();
+  let dragged = null;
+  const local = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+  const areaAt = ([x, y]) =>
+    places?.areas.find(([left, top, width, height]) => x >= left && y >= top && x < left + width && y < top + height);
+  const nearTip = (point, reach) => {
+    const area = areaAt(point);
+    if (session.exported || !area) return null;
+    const tip = project(places.view, scaled(unit(session.state.theta, session.state.phi), ARROW), area);
+    return Math.hypot(point[0] - tip[0], point[1] - tip[1]) < reach ? area : null;
+  };
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    fingers.set(event.pointerId, local(event));
+    dragged = nearTip(local(event), event.pointerType === "touch" ? 40 : 24);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const point = local(event);
+    const before = fingers.get(event.pointerId);
+    canvas.style.cursor = dragged || (!before && nearTip(point, 24)) ? "pointer" : "grab";
+    if (!before) return;
+    if (dragged) {
+      aim(point, dragged);
+    } else if (fingers.size === 2) {
+      const other = [...fingers].find(([id]) => id !== event.pointerId)[1];
+      const gap = (a) => Math.hypot(a[0] - other[0], a[1] - other[1]);
+      zoomBy(gap(before) / Math.max(gap(point), 1));
+    } else {
+      turn((before[0] - point[0]) / 140, (point[1] - before[1]) / 140);
+    }
+    fingers.set(event.pointerId, point);
+  });
+  for (const end of ["pointerup", "pointercancel"]) {
+    canvas.addEventListener(end, (event) => {
+      fingers.delete(event.pointerId);
+      dragged = null;
+    });
+  }
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      if (!event.ctrlKey && document.activeElement !== canvas) return;
+      event.preventDefault();
+      zoomBy(Math.exp(event.deltaY / 600));
+    },
+    { passive: false },
+  );
+  canvas.addEventListener("keydown", (event) => {
+    if (event.key === "+" || event.key === "-") return zoomBy(event.key === "+" ? 0.9 : 1.1);
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    if (!event.shiftKey) return turn(way[0] * 0.1, way[1] * 0.1);
+    const { theta, phi } = session.state;
+    if (!session.exported) change({ theta: clamp(theta - 2 * way[1], 0, 89), phi: wrapped(phi + 5 * way[0]) });
+  });
+  canvas.addEventListener("pointerleave", () => tell(cards.lobe, []));
+}
+
+const wrapped = (phi) => ((phi + 540) % 360) - 180;
+
+function turn(yaw, pitch) {
+  camera.yaw += yaw;
+  camera.pitch = clamp(camera.pitch + pitch, -0.3, 1.5);
+  again();
+}
+
+function zoomBy(factor) {
+  camera.distance = clamp(camera.distance * factor, 1.5, 12);
+  again();
+}
+
+/** Point wi to where the pointer's ray meets the sphere of its tip, at the side where the tip is. */
+function aim([x, y], [left, top, width, height]) {
+  const { eye, back, right, up, zoom, aspect } = places.view;
+  const [u, v] = [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height];
+  let ray = sum(scaled(back, -1), sum(scaled(right, (u * aspect) / zoom), scaled(up, v / zoom)));
+  ray = scaled(ray, 1 / Math.hypot(...ray));
+  const along = -dot(eye, ray);
+  const nearest = sum(eye, scaled(ray, along));
+  const inside = ARROW * ARROW - dot(nearest, nearest);
+  const half = Math.sqrt(Math.max(inside, 0));
+  const tip = unit(session.state.theta, session.state.phi);
+  const candidates = [along - half, along + half]
+    .map((t) => sum(eye, scaled(ray, t)))
+    .filter((point) => point[2] > 0 || inside <= 0);
+  const way = candidates.sort((a, b) => dot(b, tip) / Math.hypot(...b) - dot(a, tip) / Math.hypot(...a))[0];
+  if (!way) return;
+  const theta = degrees(Math.atan2(Math.hypot(way[0], way[1]), Math.max(way[2], 0.001)));
+  const phi = degrees(Math.atan2(way[1], way[0]));
+  change({
+    theta: Math.round(clamp(theta, 0, 89) * 10) / 10,
+    phi: theta < 1 ? session.state.phi : Math.round(phi * 10) / 10,
+  });
+}

@@ -1,0 +1,139 @@
+// Maps in false colours: the θh × θd slice and the hemisphere.
+import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, power } from "./util.js";
+import { session, visible } from "./session.js";
+import { cards, tell } from "./card.js";
+import { belowOf } from "./link.js";
+
+/** Draw the maps of a view beside each other, on one logarithmic scale of colours. */
+export function drawMaps(view) {
+  const card = cards[view];
+  const found = visible().flatMap((k) => {
+    const below = view === "hemisphere" && belowOf(view, k);
+    return [session.shown[view][k], below].filter(Boolean).map((map) => ({ ...map, subject: k }));
+  });
+  const arrays = found.map(({ values }) => values);
+  const peak = largest(arrays);
+  const [low, high] = decades(arrays, peak);
+  card.maps ??= card.figure.appendChild(element("div", { class: "maps" }));
+  card.node.classList.toggle("wide", found.length > 3);
+  card.maps.className = `maps of-${Math.min(found.length, 4)}`;
+  const boxes = [...card.maps.children];
+  found.forEach((map, k) => paint(boxes[k] ?? addBox(card, view), view, map, low, high));
+  boxes.slice(found.length).forEach((box) => box.remove());
+  bar(card, low, high, view === "slice" ? "f, 1/sr" : "f cosθo, 1/sr");
+}
+
+function addBox(card, view) {
+  const canvas = element("canvas", { role: "img", tabindex: 0 });
+  const frame = element("div", { class: "plate" }, canvas, element("i", { class: "spot", hidden: true }));
+  const axes =
+    view === "slice"
+      ? [element("span", { class: "across" }, "θh 0…90°"), element("span", { class: "up" }, "θd 0…90°")]
+      : [element("span", { class: "across" }, "ωi on the left, rim at 90°")];
+  const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
+  card.maps.append(box);
+  let spot = [0.5, 0.5];
+  const show = (x, y) => {
+    spot = [clamp(x, 0, 0.9999), clamp(y, 0, 0.9999)];
+    const mark = frame.querySelector(".spot");
+    mark.hidden = false;
+    mark.style.left = `${100 * spot[0]}%`;
+    mark.style.top = `${100 * spot[1]}%`;
+    tell(card, [[null, where(view, box.map, spot[0], 1 - spot[1])]]);
+  };
+  const hide = () => {
+    frame.querySelector(".spot").hidden = true;
+    tell(card, []);
+  };
+  const follow = (event) => {
+    const area = canvas.getBoundingClientRect();
+    show((event.clientX - area.left) / area.width, (event.clientY - area.top) / area.height);
+  };
+  canvas.addEventListener("pointermove", follow);
+  canvas.addEventListener("pointerdown", follow);
+  canvas.addEventListener("pointerleave", hide);
+  canvas.addEventListener("blur", hide);
+  canvas.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    show(spot[0] + step[0] / 45, spot[1] + step[1] / 45);
+  });
+  return box;
+}
+
+/** Return in words what is at a place, x to the right and y upwards in 0…1. */
+function where(view, map, x, y) {
+  const value = map.values[Math.floor(y * map.height) * map.width + Math.floor(x * map.width)];
+  const name = session.state.subjects[map.subject]?.name;
+  if (view === "slice") {
+    const told = Number.isNaN(value) ? "below the horizon" : `f ${format(value, 4)}`;
+    return `${name}: θh ${format(90 * x)}°, θd ${format(90 * y)}°: ${told}`;
+  }
+  const [along, across] = [2 * x - 1, 2 * y - 1];
+  const theta = 90 * Math.hypot(along, across);
+  if (theta > 90) return `${name}: outside the hemisphere`;
+  const azimuth = ((degrees(Math.atan2(-across, -along)) + session.state.phi + 540) % 360) - 180;
+  return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: f cosθo ${format(value, 4)}`;
+}
+
+function paint(box, view, map, low, high) {
+  box.map = map;
+  const { width, height, values } = map;
+  const canvas = box.querySelector("canvas");
+  const name = session.state.subjects[map.subject].name + (map.below ? ", below" : "");
+  box.querySelector("figcaption").textContent = name;
+  box.classList.toggle("dimmed", Boolean(session.info[map.subject]?.error));
+  canvas.setAttribute(
+    "aria-label",
+    `${view === "slice" ? "Slice over θh and θd" : "Hemisphere"} of ${name}: at most ${format(largest([values]))}`,
+  );
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  const image = new ImageData(width, height);
+  for (let row = 0; row < height; row++) {
+    for (let column = 0; column < width; column++) {
+      const value = values[(height - 1 - row) * width + column];
+      const outside =
+        view === "hemisphere" && Math.hypot((2 * (column + 0.5)) / width - 1, (2 * (row + 0.5)) / height - 1) > 1;
+      if (Number.isNaN(value) || outside) continue;
+      const share = value > 0 ? (Math.log10(value) - low) / (high - low) : 0;
+      const colour = 4 * Math.round(255 * clamp(share, 0, 1));
+      image.data.set(COLOUR_MAP.subarray(colour, colour + 4), 4 * (row * width + column));
+    }
+  }
+  canvas.getContext("2d").putImageData(image, 0, 0);
+}
+
+function bar(card, low, high, unit) {
+  const box = card.figure.querySelector(".bar") ?? card.figure.appendChild(element("div", { class: "bar" }));
+  const stops = Array.from(
+    { length: 17 },
+    (_, k) => `rgb(${[...COLOUR_MAP.subarray(4 * Math.round(k * 15.9375), 4 * Math.round(k * 15.9375) + 3)]})`,
+  );
+  const labels = [];
+  for (let k = low; k <= high; k++)
+    labels.push(element("span", { style: `left:${(100 * (k - low)) / (high - low)}%` }, power(k)));
+  box.replaceChildren(
+    element("div", { class: "ramp", style: `background:linear-gradient(90deg,${stops})` }),
+    element("div", { class: "labels" }, ...labels),
+    element("div", { class: "unit" }, `${unit}, logarithmic`),
+  );
+}
+
+/** Return the maps of a view on one canvas, four times as large, with their names. */
+export function mapsImage(view) {
+  const boxes = [...cards[view].maps.children];
+  const canvases = boxes.map((box) => box.querySelector("canvas"));
+  const size = 4 * Math.max(...canvases.map(({ width }) => width));
+  const result = element("canvas", { width: boxes.length * (size + 16), height: size + 32 });
+  const context = result.getContext("2d");
+  const style = getComputedStyle(cards[view].node);
+  context.fillStyle = style.backgroundColor;
+  context.fillRect(0, 0, result.width, result.height);
+  Object.assign(context, { imageSmoothingEnabled: false, font: "18px system-ui, sans-serif", fillStyle: style.color });
+  canvases.forEach((canvas, k) => {
+    context.fillText(boxes[k].querySelector("figcaption").textContent, k * (size + 16), 20);
+    context.drawImage(canvas, k * (size + 16), 32, size, size);
+  });
+  return result;
+}

@@ -1,0 +1,206 @@
+// The pictures: side by side, wiped over each other, or their difference.
+import { clamp, element, format, fromDisplay } from "./util.js";
+import { change, session, visible } from "./session.js";
+import { cards, tell } from "./card.js";
+import { colourOf } from "./plots.js";
+
+const SIZES = [128, 192, 256, 384, 512, 640, 768, 1024];
+const canvases = new Map();
+let stack, handle;
+
+export function startPicture() {
+  const card = cards.picture;
+  stack = element("div", { class: "pictures" });
+  handle = element("div", {
+    class: "divider",
+    role: "slider",
+    tabindex: 0,
+    "aria-label": "Divider between the two pictures",
+    "aria-valuemin": 0,
+    "aria-valuemax": 100,
+  });
+  card.figure.append(stack);
+  handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
+  handle.addEventListener("pointermove", (event) => {
+    if (!handle.hasPointerCapture(event.pointerId)) return;
+    const box = handle.parentElement.getBoundingClientRect();
+    slideTo((event.clientX - box.left) / box.width);
+  });
+  handle.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -0.02, ArrowRight: 0.02, ArrowDown: -0.02, ArrowUp: 0.02, Home: -1, End: 1 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    slideTo(session.state.wipe + step);
+  });
+  card.image = (done) => stack.querySelector("canvas") && flat().toBlob(done);
+}
+
+function slideTo(share) {
+  change({ wipe: clamp(share, 0, 1) });
+  drawPicture();
+}
+
+/** Return the size in pixels to ask for: what the layout shows, at most 512 unless the window is very large. */
+export function wantedSize() {
+  const shown = stack?.querySelector(".frame")?.clientWidth || 256;
+  const sharp = Math.min(shown * (window.devicePixelRatio || 1), 512);
+  return SIZES.findLast((size) => size <= sharp * 1.05) ?? SIZES[0];
+}
+
+const modeOf = () => (visible().length < 2 ? "side" : session.state.compare);
+
+/** Return the two subjects that are compared. */
+export function pairOf() {
+  const seen = visible();
+  const [a, b] = session.state.pair;
+  return a !== b && seen.includes(a) && seen.includes(b) ? [a, b] : seen.slice(0, 2);
+}
+
+export function drawPicture() {
+  const mode = modeOf();
+  const shown = mode === "side" ? visible() : pairOf();
+  const layout = `${mode} ${shown.join()}`;
+  if (stack.dataset.layout !== layout) build(mode, shown, layout);
+  for (const k of shown) {
+    const answer = session.shown.picture[k];
+    const canvas = canvases.get(k);
+    if (answer && canvas.answer !== answer) put(canvas, answer);
+    else if (!answer) canvas.width = canvas.width;
+    canvas.closest(".frame").classList.toggle("dimmed", Boolean(session.info[k]?.error));
+    canvas.setAttribute(
+      "aria-label",
+      `${session.state.subjects[k].name}, rendered in the stage ${session.state.stage}`,
+    );
+    const caption = stack.querySelector(`[data-subject="${k}"]`);
+    caption.querySelector("b").textContent = session.state.subjects[k].name;
+    caption.style.setProperty("--mark", colourOf(k));
+    caption.querySelector("small").textContent = answer
+      ? `${answer.spp} spp${answer.denoised ? ", denoised" : ""}`
+      : "";
+  }
+  if (mode === "wipe") {
+    const share = session.state.wipe;
+    canvases.get(shown[0]).style.clipPath = `inset(0 ${100 * (1 - share)}% 0 0)`;
+    handle.style.left = `${100 * share}%`;
+    handle.setAttribute("aria-valuenow", Math.round(100 * share));
+    handle.setAttribute(
+      "aria-valuetext",
+      `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * share)} %`,
+    );
+  }
+  if (mode === "difference") drawDifference(shown);
+}
+
+function build(mode, shown, layout) {
+  stack.dataset.layout = layout;
+  cards.picture.node.classList.toggle("wide", mode === "side" && shown.length > 1);
+  stack.className = `pictures ${mode} of-${mode === "side" ? shown.length : 1}`;
+  for (const k of shown) if (!canvases.has(k)) canvases.set(k, element("canvas", { role: "img" }));
+  const caption = (k) => element("figcaption", { "data-subject": k, class: "marked" }, element("b"), element("small"));
+  for (const k of shown) canvases.get(k).style.clipPath = "";
+  if (mode === "side") {
+    stack.replaceChildren(
+      ...shown.map((k) => element("figure", {}, element("div", { class: "frame" }, watched(k)), caption(k))),
+    );
+  } else {
+    const frame = element("div", { class: "frame" }, watched(shown[1]), watched(shown[0]));
+    if (mode === "wipe") frame.append(handle);
+    else frame.append(element("canvas", { class: "difference", role: "img" }));
+    stack.replaceChildren(
+      element(
+        "figure",
+        {},
+        frame,
+        element("div", { class: "captions" }, ...shown.map(caption)),
+        mode === "difference" ? element("p", { class: "scale" }) : null,
+      ),
+    );
+  }
+}
+
+function watched(k) {
+  const canvas = canvases.get(k);
+  canvas.onpointermove = (event) => point(canvas, k, event);
+  canvas.onpointerleave = () => tell(cards.picture, []);
+  return canvas;
+}
+
+function point(canvas, k, event) {
+  const box = canvas.getBoundingClientRect();
+  const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  const shown = modeOf() === "side" ? [k] : pairOf();
+  tell(
+    cards.picture,
+    shown.flatMap((each) => {
+      const answer = session.shown.picture[each];
+      if (!answer) return [];
+      const at =
+        4 *
+        (Math.floor(clamp(y, 0, 0.999) * answer.height) * answer.width + Math.floor(clamp(x, 0, 0.999) * answer.width));
+      const scale = 2 ** -session.state.exposure;
+      const values = [0, 1, 2].map(
+        (c) =>
+          (answer.pixels[at + c] === 255 ? "≥ " : "") + format(fromDisplay(answer.pixels[at + c] / 255) * scale, 2),
+      );
+      return [[colourOf(each), `radiance ${values.join(", ")}`]];
+    }),
+  );
+}
+
+function put(canvas, answer) {
+  canvas.answer = answer;
+  if (canvas.width !== answer.width || canvas.height !== answer.height)
+    Object.assign(canvas, { width: answer.width, height: answer.height });
+  canvas.getContext("2d").putImageData(new ImageData(answer.pixels, answer.width, answer.height), 0, 0);
+}
+
+/** Show |a - b| of the values shown, times the power of two that makes all but a thousandth of it visible. */
+function drawDifference([a, b]) {
+  const canvas = stack.querySelector("canvas.difference");
+  const [first, second] = [session.shown.picture[a], session.shown.picture[b]];
+  const told = stack.querySelector(".scale");
+  if (!first || !second || first.width !== second.width || first.height !== second.height) {
+    if (!canvas.first) told.textContent = "Waiting for both pictures …";
+    return;
+  }
+  if (canvas.first === first && canvas.second === second) return;
+  Object.assign(canvas, { first, second });
+  const count = first.width * first.height;
+  const histogram = new Uint32Array(256);
+  let total = 0;
+  const image = new ImageData(first.width, first.height);
+  for (let k = 0; k < 4 * count; k++) {
+    if (k % 4 === 3) continue;
+    const off = Math.abs(first.pixels[k] - second.pixels[k]);
+    image.data[k] = off;
+    histogram[off]++;
+    total += off;
+  }
+  let [high, above] = [255, 0];
+  while (high > 0 && (above += histogram[high]) < 0.003 * count) high--;
+  const gain = Math.min(2 ** Math.floor(Math.log2(255 / Math.max(high, 1))), 64);
+  for (let k = 0; k < 4 * count; k++) image.data[k] = k % 4 === 3 ? 255 : image.data[k] * gain;
+  Object.assign(canvas, { width: first.width, height: first.height });
+  canvas.getContext("2d").putImageData(image, 0, 0);
+  told.textContent =
+    `|a − b| of the values shown (sRGB, 0…1), ${gain === 1 ? "as it is" : `${gain} times`}: white is ` +
+    `${format(1 / gain)}; mean ${format(total / count / 3 / 255, 2)}`;
+  canvas.setAttribute("aria-label", told.textContent);
+}
+
+/** Return the pictures as they are shown, on one canvas. */
+function flat() {
+  const frames = [...stack.querySelectorAll(".frame")];
+  const size = Math.max(...[...stack.querySelectorAll("canvas")].map(({ width }) => width));
+  const result = element("canvas", { width: size * frames.length, height: size });
+  const context = result.getContext("2d");
+  frames.forEach((frame, at) => {
+    const layers = [...frame.querySelectorAll("canvas")];
+    const difference = frame.querySelector("canvas.difference");
+    for (const layer of difference ? [difference] : layers) {
+      const share = modeOf() === "wipe" && layer === layers[1] ? session.state.wipe : 1;
+      context.drawImage(layer, 0, 0, share * layer.width, layer.height, at * size, 0, share * size, size);
+    }
+  });
+  return result;
+}

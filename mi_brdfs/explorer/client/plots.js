@@ -1,0 +1,379 @@
+// Curves: the plane of incidence as polar and cartesian plots; and albedo.
+import {
+  CHANNELS,
+  DASHES,
+  PALETTE,
+  clamp,
+  degrees,
+  format,
+  interpolate,
+  largest,
+  radians,
+  shape,
+  valueScale,
+} from "./util.js";
+import { session, visible } from "./session.js";
+import { cards, tell } from "./card.js";
+
+export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k];
+
+/** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
+function curvesOf(view) {
+  return visible().flatMap((k) =>
+    (session.shown[view][k]?.curves ?? []).map((curve) => ({
+      ...curve,
+      subject: k,
+      dimmed: Boolean(session.info[k]?.error),
+      dash: DASHES[session.state.subjects[k].colour],
+      colour: CHANNELS[curve.channel] ?? colourOf(k),
+      name: session.state.subjects[k].name + (CHANNELS[curve.channel] ? `, ${curve.channel}` : ""),
+    })),
+  );
+}
+
+/** Return curves of f cosθ, each over its subject's maximum if they are to be normalised. */
+function lobesOf(view) {
+  const curves = curvesOf(view);
+  if (!session.state.normalise) return curves;
+  const peak = {};
+  for (const curve of curves) peak[curve.subject] = Math.max(peak[curve.subject] ?? 0, largest([curve.y]));
+  return curves.map((curve) => ({ ...curve, y: curve.y.map((value) => value / peak[curve.subject]) }));
+}
+
+/** Return the path through points, without those that cannot be told from the one before. */
+export function path(points) {
+  let text = "";
+  let last = null;
+  points.forEach(([x, y], k) => {
+    if (!Number.isFinite(x + y)) return;
+    if (last && k < points.length - 1 && Math.abs(x - last[0]) + Math.abs(y - last[1]) < 0.25) return;
+    text += `${last ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`;
+    last = [x, y];
+  });
+  return text;
+}
+
+export const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
+export const label = (x, y, text, anchor = "middle", kind = "tick") =>
+  shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
+export const drawing = (width, height, summary) =>
+  shape("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", tabindex: 0, "aria-label": summary });
+
+export function stroke(curve, points) {
+  return shape("path", {
+    d: path(points),
+    class: curve.dimmed ? "curve dimmed" : "curve",
+    stroke: curve.colour,
+    "stroke-dasharray": curve.dash,
+  });
+}
+
+export function summary(curves, what, unit) {
+  const parts = curves.map(({ name, x, y }) => {
+    const peak = largest([y]);
+    return `${name}: at most ${format(peak)}${unit} at ${format(x[y.findIndex((value) => value === peak)] ?? 0)}°`;
+  });
+  return `${what}. ${parts.join("; ") || "No data yet"}.`;
+}
+
+/** A crosshair that pointer and arrow keys move: `angleAt` maps a place to an angle, `cross` draws it. */
+export function attach(card, svg, angleAt, range, cross) {
+  let angle = null;
+  const move = (to) => {
+    angle = to;
+    cross(to);
+  };
+  const follow = (event) => {
+    const box = svg.getBoundingClientRect();
+    const scale = svg.viewBox.baseVal.width / box.width;
+    move(angleAt((event.clientX - box.left) * scale, (event.clientY - box.top) * scale));
+  };
+  svg.addEventListener("pointermove", follow);
+  svg.addEventListener("pointerdown", follow);
+  svg.addEventListener("pointerleave", () => move(null));
+  svg.addEventListener("blur", () => move(null));
+  svg.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -10, ArrowUp: 10 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    move(clamp((angle ?? session.state.theta) + step * (event.shiftKey ? 0.1 : 1), ...range));
+  });
+}
+
+/** Where the plane of incidence is looked at, in both of its plots. */
+let cursor = null;
+const crosses = {};
+
+function pointAt(angle) {
+  cursor = angle;
+  for (const cross of Object.values(crosses)) cross();
+}
+
+export const widthOf = (card, most = 620) => Math.max(Math.min(card.figure.clientWidth, most), 240);
+
+function replaceFigure(card, ...nodes) {
+  const focused = card.figure.contains(document.activeElement) && document.activeElement.tagName === "svg";
+  card.figure.replaceChildren(...nodes);
+  if (focused) nodes[0].focus();
+}
+
+/** Put the legend and the unit of curves of f cosθ into their card. */
+function describe(card, curves) {
+  card.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
+  card.note.textContent = `${unitOf()}, at θi = ${format(session.state.theta)}°`;
+}
+
+const unitOf = () => (session.state.normalise ? "f cosθo / maximum" : "f cosθo, 1/sr");
+
+// --- Polar ----------------------------------------------------------------------------------------------------------
+
+export function drawPolar() {
+  const card = cards.polar;
+  const curves = lobesOf("polar");
+  describe(card, curves);
+  const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
+  const scale = valueScale(
+    curves.map(({ y }) => y),
+    session.state.scale === "log",
+  );
+  const width = widthOf(card);
+  const margin = 26;
+  const radius = (width - 2 * margin) / 2;
+  const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
+  const middle = [width / 2, margin + radius];
+  const place = (angle, reach) => [
+    middle[0] + radius * Math.max(reach, 0) * Math.sin(radians(angle)),
+    middle[1] - radius * Math.max(reach, 0) * Math.cos(radians(angle)),
+  ];
+  const svg = drawing(width, height, summary(curves, `Polar plot of ${unitOf()} in the plane of incidence`, ""));
+
+  const ring = (reach, kind) => {
+    const [x, y] = place(-90, reach);
+    const r = radius * reach;
+    const around = `M${x} ${y}a${r} ${r} 0 0 1 ${2 * r} 0` + (whole ? `a${r} ${r} 0 0 1 ${-2 * r} 0` : "");
+    return shape("path", { d: around, class: kind });
+  };
+  for (const [value, text] of scale.marks) {
+    const reach = scale.of(value);
+    if (reach <= 0.02) continue;
+    svg.append(ring(reach, "grid"));
+    if (reach > 0.14) svg.append(label(middle[0] + radius * reach, middle[1] + 14, text));
+  }
+  svg.append(ring(1, "rim"));
+  for (let angle = whole ? -180 : -90; angle < (whole ? 180 : 91); angle += 30) {
+    const [x, y] = place(angle, 1);
+    const [tx, ty] = place(angle, 1 + 15 / radius);
+    svg.append(line(...middle, x, y, "grid"));
+    if (Math.abs(angle) !== 90) svg.append(label(tx, ty + 4, `${Math.abs(angle)}°`));
+  }
+  svg.append(line(middle[0] - radius, middle[1], middle[0] + radius, middle[1], "axis"));
+  const { theta } = session.state;
+  svg.append(shape("path", { d: path([middle, place(theta, 1)]), class: "mirror" }));
+  for (const curve of curves)
+    svg.append(
+      stroke(
+        curve,
+        curve.x.map((angle, k) => place(angle, scale.of(curve.y[k]))),
+      ),
+    );
+  const tip = place(-theta, 1);
+  svg.append(line(...tip, ...place(-theta, 0.06), "incident"));
+  svg.append(
+    shape("path", {
+      d: path([place(-theta + 2.5, 0.13), place(-theta, 0.03), place(-theta - 2.5, 0.13)]),
+      class: "incident",
+    }),
+  );
+  svg.append(label(...place(-theta - 4, 0.97), "ωi", "middle", "direction"));
+  const overlay = shape("g");
+  svg.append(overlay);
+
+  crosses.polar = () => {
+    overlay.replaceChildren();
+    if (cursor === null) return tell(card, []);
+    overlay.append(shape("path", { d: path([middle, place(cursor, 1)]), class: "cross" }));
+    dots(overlay, curves, (value) => place(cursor, scale.of(value)));
+    tell(card, [[null, `θo ${format(cursor)}°`], ...valuesAt(curves)]);
+  };
+  attach(
+    card,
+    svg,
+    (x, y) => {
+      const angle = degrees(Math.atan2(x - middle[0], middle[1] - y));
+      return whole ? angle : clamp(angle, -89.9, 89.9);
+    },
+    whole ? [-180, 180] : [-89.9, 89.9],
+    pointAt,
+  );
+  replaceFigure(card, svg);
+  crosses.polar();
+}
+
+function dots(overlay, curves, place) {
+  for (const curve of curves) {
+    const value = interpolate(curve.x, curve.y, cursor);
+    if (value === null) continue;
+    const [cx, cy] = place(value);
+    overlay.append(shape("circle", { cx, cy, r: 4, fill: curve.colour, class: "dot" }));
+  }
+}
+
+const valuesAt = (curves) =>
+  curves.map((curve) => [
+    curve.colour,
+    `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`,
+    curve.dash,
+  ]);
+
+// --- Cartesian ------------------------------------------------------------------------------------------------------
+
+let drawings = 0;
+
+/** Draw axes; return the drawing and where values are in it. */
+export function axes(width, height, across, scale, what, unit = "°") {
+  const [left, right, top, bottom] = [46, 14, 14, 26];
+  const svg = drawing(width, height, what);
+  const clip = `inside-${++drawings}`;
+  svg.append(
+    shape(
+      "clipPath",
+      { id: clip },
+      shape("rect", { x: left, y: top - 4, width: width - left - right, height: height - top - bottom + 6 }),
+    ),
+  );
+  const x = (value) => left + ((value - across.low) / (across.high - across.low)) * (width - left - right);
+  const y = (value) => height - bottom - clamp(scale.of(value), -0.1, 9) * (height - top - bottom);
+  for (const [value, text] of scale.marks) {
+    svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
+  }
+  for (const value of across.marks) {
+    svg.append(
+      line(x(value), top, x(value), height - bottom, "grid"),
+      label(x(value), height - bottom + 17, `${format(value)}${unit}`),
+    );
+  }
+  svg.append(line(left, height - bottom, width - right, height - bottom, "axis"));
+  const at = (place) =>
+    clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
+  return { svg, x, y, at, clip, top, bottom: height - bottom };
+}
+
+/** Draw curves over an angle; `mark` adds to the drawing before them, `moved` tells of the crosshair. */
+function graph(card, curves, across, scale, what, mark, crossing) {
+  const width = widthOf(card, 760);
+  const it = axes(width, Math.round(clamp(0.62 * width, 200, 380)), across, scale, what);
+  mark?.(it);
+  const inside = shape("g", { "clip-path": `url(#${it.clip})` });
+  for (const curve of curves)
+    inside.append(
+      stroke(
+        curve,
+        curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])]),
+      ),
+    );
+  it.svg.append(inside);
+  const overlay = shape("g");
+  it.svg.append(overlay);
+  const cross = (angle, symbol) => {
+    overlay.replaceChildren();
+    if (angle === null) return tell(card, []);
+    overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
+    cursorAt(angle, () => dots(overlay, curves, (value) => [it.x(angle), it.y(value)]));
+    tell(card, [[null, `${symbol} ${format(angle)}°`], ...cursorAt(angle, () => valuesAt(curves))]);
+  };
+  attach(
+    card,
+    it.svg,
+    (x) => it.at(x),
+    [across.low, across.high],
+    (angle) => crossing(angle, cross),
+  );
+  replaceFigure(card, it.svg);
+  return cross;
+}
+
+function cursorAt(angle, act) {
+  const before = cursor;
+  cursor = angle;
+  const result = act();
+  cursor = before;
+  return result;
+}
+
+export function drawCartesian() {
+  const curves = lobesOf("cartesian");
+  describe(cards.cartesian, curves);
+  const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
+  const across = whole
+    ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] }
+    : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
+  const scale = valueScale(
+    curves.map(({ y }) => y),
+    session.state.scale === "log",
+  );
+  const { theta } = session.state;
+  const mark = ({ svg, x, top, bottom }) => {
+    svg.append(
+      line(x(-theta), top, x(-theta), bottom, "incident"),
+      label(x(-theta) + 5, top + 10, "ωi", "start", "direction"),
+    );
+    svg.append(line(x(theta), top, x(theta), bottom, "mirror"));
+  };
+  const cross = graph(
+    cards.cartesian,
+    curves,
+    across,
+    scale,
+    summary(curves, `Plot of ${unitOf()} over the angle in the plane of incidence`, ""),
+    mark,
+    pointAt,
+  );
+  crosses.cartesian = () => cross(cursor, "θo");
+  crosses.cartesian();
+}
+
+export function drawAlbedo() {
+  const curves = curvesOf("albedo");
+  // Where energy is gained without end, the scale is that of angles up to 85°.
+  const scale = valueScale(
+    curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)),
+    false,
+    1.02,
+  );
+  const gained = largest(curves.map(({ y }) => y));
+  cards.albedo.note.textContent = "over the angle of incidence" + (gained > 1.005 ? `, up to ${format(gained)}` : "");
+  const mark = ({ svg, x, y, top, bottom }) => {
+    svg.append(
+      line(x(0), y(1), x(90), y(1), "unity"),
+      line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"),
+    );
+  };
+  graph(
+    cards.albedo,
+    curves,
+    { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] },
+    scale,
+    summary(curves, "Albedo over the angle of incidence, with a line at 1", ""),
+    mark,
+    (angle, cross) => cross(angle, "θi"),
+  );
+  cards.albedo.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
+  tell(cards.albedo, []);
+}
+
+/** Return the curves of a view as rows of a table. */
+export function table(view) {
+  return [
+    [
+      "subject",
+      "channel",
+      view === "albedo" ? "theta_i_degrees" : "theta_o_degrees",
+      view === "albedo" ? "albedo" : "f_cos_theta_o",
+    ],
+    ...visible().flatMap((k) =>
+      (session.shown[view][k]?.curves ?? []).flatMap((curve) =>
+        curve.x.map((angle, at) => [session.state.subjects[k].name, curve.channel, angle, curve.y[at]]),
+      ),
+    ),
+  ];
+}

@@ -1,0 +1,207 @@
+// What the page shows: its state, the server's answers, and who listens.
+import { clamp } from "./util.js";
+
+export const VIEWS = ["picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"];
+export const MOST_SUBJECTS = 4;
+
+export const DEFAULTS = {
+  subjects: [],
+  theta: 45,
+  phi: 0,
+  channel: "luminance",
+  component: null,
+  stage: "studio",
+  shape: "body",
+  exposure: 0,
+  size: 256,
+  views: ["picture", "lobe", "polar", "albedo"],
+  compare: "side",
+  pair: [0, 1],
+  wipe: 0.5,
+  scale: "linear",
+  normalise: false,
+  dark: null,
+  tour: null,
+  lobes: "over",
+  wire: false,
+};
+/** What the server needs not know. */
+const OWN = ["compare", "pair", "wipe", "scale", "normalise", "dark", "tour", "lobes", "wire"];
+const WORDS = {
+  compare: ["side", "wipe", "difference"],
+  scale: ["linear", "log"],
+  lobes: ["over", "side"],
+  channel: ["luminance", "rgb", "red", "green", "blue"],
+};
+
+export const session = {
+  state: structuredClone(DEFAULTS),
+  serial: 0,
+  /** The subjects as they were sent. */
+  sent: [],
+  selected: 0,
+  exported: document.getElementById("exported") !== null,
+  connected: false,
+  hello: null,
+  /** The server's account of each subject: error, controls, xml … */
+  info: [],
+  /** The latest answer of each view, by subject. */
+  shown: Object.fromEntries([...VIEWS, "lobeBelow", "hemisphereBelow"].map((view) => [view, []])),
+  /** For each subject the first state that it is in: answers to older ones are about another. */
+  oldest: [],
+};
+
+const listeners = {};
+
+export function on(event, listener) {
+  (listeners[event] ??= []).push(listener);
+}
+
+export function emit(event, ...details) {
+  for (const listener of listeners[event] ?? []) listener(...details);
+}
+
+/** Merge a patch into the state. `push` makes a step of the browser's history of it. */
+export function change(patch, push = false) {
+  session.state = clean({ ...session.state, ...patch });
+  session.selected = clamp(session.selected, 0, Math.max(session.state.subjects.length - 1, 0));
+  emit("state", push, Object.keys(patch));
+}
+
+/** Change a subject. */
+export function changeSubject(index, patch) {
+  change({ subjects: session.state.subjects.map((subject, k) => (k === index ? { ...subject, ...patch } : subject)) });
+}
+
+/** Set a parameter of a subject, or with null remove it: with it go those that it excludes, and come those that it
+ * cannot be without. */
+export function setParameter(index, { name, excludes = [], also = {} }, value) {
+  const bsdf = { ...session.state.subjects[index].bsdf };
+  for (const other of value === null ? [name, ...Object.keys(also)] : excludes) delete bsdf[other];
+  if (value !== null) changeSubject(index, { bsdf: { ...also, ...bsdf, [name]: value } });
+  else changeSubject(index, { bsdf });
+}
+
+/** Take the dict that the server made of a short one, unless it was changed meanwhile. */
+export function adopt(index, bsdf) {
+  const now = session.state.subjects[index]?.bsdf;
+  if (bsdf && now && JSON.stringify(now) === JSON.stringify(session.sent[index]?.bsdf)) changeSubject(index, { bsdf });
+}
+
+/** Replace the subjects, each given with the number that it had, or -1; what the server has shown of them stays. */
+function arrange(subjects, former, patch = {}, push = true) {
+  const moved = (list) => former.map((k) => (k < 0 ? undefined : list[k]));
+  session.info = moved(session.info);
+  for (const view of Object.keys(session.shown)) session.shown[view] = moved(session.shown[view]);
+  session.oldest = former.map((k, at) => (k === at ? session.oldest[k] : session.serial + 1));
+  const place = session.state.pair.map((k) => former.indexOf(k));
+  const pair = place.map((k, at) => (k >= 0 ? k : place[1 - at] === at ? 1 - at : at));
+  change({ pair, ...patch, subjects }, push);
+}
+
+/** Go to another state, of a tour or an address. */
+export function goTo(patch, push) {
+  const told = ({ bsdf }) => JSON.stringify(bsdf);
+  const now = session.state.subjects.map(told);
+  const subjects = patch.subjects ?? session.state.subjects;
+  if (patch.subjects) session.selected = 0;
+  const free = new Set(now.keys());
+  const former = subjects.map((subject, k) => {
+    const found =
+      now[k] === told(subject) && free.has(k) ? k : ([...free].find((at) => now[at] === told(subject)) ?? -1);
+    free.delete(found);
+    return found;
+  });
+  arrange(subjects, former, patch, push);
+}
+
+export function addSubject(bsdf, name) {
+  const { subjects } = session.state;
+  if (subjects.length >= MOST_SUBJECTS) {
+    emit("error", "There is room for four subjects: remove one first.");
+    return;
+  }
+  const taken = subjects.map((subject) => subject.colour);
+  const colour = [0, 1, 2, 3].find((k) => !taken.includes(k));
+  session.selected = subjects.length;
+  arrange([...subjects, { bsdf, name, hidden: false, colour }], [...subjects.keys(), -1]);
+}
+
+export function removeSubject(index) {
+  const kept = [...session.state.subjects.keys()].filter((k) => k !== index);
+  if (session.selected >= index) session.selected = Math.max(session.selected - 1, 0);
+  arrange(
+    kept.map((k) => session.state.subjects[k]),
+    kept,
+  );
+}
+
+/** Return the numbers of the subjects to be seen. */
+export function visible() {
+  return [...session.state.subjects.keys()].filter((k) => !session.state.subjects[k].hidden);
+}
+
+/** Return a state without what has no place in one: it may come from an address. */
+export function clean(given) {
+  const state = { ...structuredClone(DEFAULTS) };
+  for (const [name, value] of Object.entries(given ?? {})) {
+    if (!(name in DEFAULTS) || value === undefined) continue;
+    const usual = DEFAULTS[name];
+    if (typeof usual === "number" && !Number.isFinite(value)) continue;
+    if (typeof usual === "boolean" && typeof value !== "boolean") continue;
+    if (typeof usual === "string" && typeof value !== "string") continue;
+    if (WORDS[name] && !WORDS[name].includes(value)) continue;
+    if (Array.isArray(usual) && !Array.isArray(value)) continue;
+    state[name] = value;
+  }
+  state.subjects = state.subjects
+    .slice(0, MOST_SUBJECTS)
+    .filter((subject) => typeof subject?.bsdf?.type === "string")
+    .map(({ bsdf, name, hidden, colour }, k) => ({
+      bsdf,
+      name: String(name ?? bsdf.name ?? bsdf.type),
+      hidden: hidden === true,
+      colour: Number.isInteger(colour) && colour >= 0 && colour < 4 ? colour : k,
+    }));
+  state.theta = clamp(state.theta, 0, 89);
+  state.phi = clamp(state.phi, -180, 180);
+  state.wipe = clamp(state.wipe, 0, 1);
+  state.exposure = clamp(state.exposure, -10, 10);
+  state.views = [...new Set(state.views)].filter((view) => VIEWS.includes(view));
+  const last = Math.max(state.subjects.length - 1, 0);
+  state.pair = [0, 1].map((k) => (Number.isInteger(state.pair[k]) ? clamp(state.pair[k], 0, last) : Math.min(k, last)));
+  if (!Number.isInteger(state.component)) state.component = null;
+  if (typeof state.dark !== "boolean") state.dark = null;
+  if (typeof state.tour?.name !== "string") state.tour = null;
+  return state;
+}
+
+/** Return the state without what is the page's own. */
+export function stateForServer() {
+  const sent = Object.fromEntries(Object.entries(session.state).filter(([name]) => !OWN.includes(name)));
+  return { ...sent, subjects: sent.subjects.map(({ bsdf, name, hidden }) => ({ bsdf, name, hidden })) };
+}
+
+// --- The address ----------------------------------------------------------------------------------------------------
+
+const swapQuotes = (text) => text.replace(/["']/g, (mark) => (mark === '"' ? "'" : '"'));
+
+/** Return the fragment of the address: what differs from the defaults, as JSON with ' for ", to be read by people. */
+export function fragment() {
+  const told = Object.entries(session.state).filter(
+    ([name, value]) => name !== "size" && JSON.stringify(value) !== JSON.stringify(DEFAULTS[name]),
+  );
+  const text = swapQuotes(JSON.stringify(Object.fromEntries(told)));
+  return "#" + text.replace(/[\s%"<>`#\\^|\u0080-\uffff]/gu, encodeURIComponent);
+}
+
+/** Return the state that a fragment holds, or null. */
+export function readFragment(text) {
+  try {
+    const plain = decodeURIComponent(text.replace(/^#/, ""));
+    const found = JSON.parse(plain.startsWith("{'") || plain === "{}" ? swapQuotes(plain) : plain);
+    return Array.isArray(found.subjects) ? clean(found) : null;
+  } catch {
+    return null;
+  }
+}

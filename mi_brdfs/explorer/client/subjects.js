@@ -1,0 +1,209 @@
+// The subjects: chips, the editor's head, and the dialog that adds one.
+import { PALETTE, byId, element } from "./util.js";
+import { MOST_SUBJECTS, addSubject, change, changeSubject, emit, on, removeSubject, session } from "./session.js";
+import { colourOf } from "./plots.js";
+import { drawControls, resetAll } from "./controls.js";
+
+const MOST_FOUND = 80;
+
+export function startSubjects() {
+  byId("add").onclick = openAdd;
+  byId("subject-name").onchange = ({ target }) => changeSubject(session.selected, { name: target.value || "unnamed" });
+  byId("solo").onclick = solo;
+  byId("hide").onclick = () =>
+    changeSubject(session.selected, { hidden: !session.state.subjects[session.selected].hidden });
+  byId("remove").onclick = () => removeSubject(session.selected);
+  byId("double").onclick = () => {
+    const { bsdf, name } = session.state.subjects[session.selected];
+    addSubject(structuredClone(bsdf), `${name} 2`);
+  };
+  byId("reset").onclick = resetAll;
+  byId("colour").onclick = nextColour;
+  byId("search").oninput = showFound;
+  byId("add-dialog").addEventListener("keydown", walk);
+  byId("file").onchange = ({ target }) => {
+    uploadAll(target.files);
+    target.value = "";
+  };
+  byId("choose-file").onclick = () => byId("file").click();
+  startDrop();
+  on("hello", showFound);
+}
+
+export function drawSubjects() {
+  const { subjects } = session.state;
+  const focused = document.activeElement?.dataset?.chip;
+  byId("chips").replaceChildren(
+    ...subjects.map((subject, k) =>
+      element(
+        "button",
+        {
+          class: `chip${subject.hidden ? " hidden" : ""}`,
+          "data-chip": k,
+          "aria-pressed": String(k === session.selected),
+          style: `--mark:${colourOf(k)}`,
+          onclick: () => {
+            session.selected = k;
+            emit("selected");
+          },
+        },
+        subject.name,
+        session.info[k]?.error ? element("span", { class: "warning", title: session.info[k].error }, " !") : null,
+      ),
+    ),
+  );
+  if (focused) byId("chips").children[focused]?.focus();
+  byId("add").hidden = session.exported || subjects.length >= MOST_SUBJECTS;
+  const subject = subjects[session.selected];
+  byId("editor").hidden = !subject;
+  if (!subject) return;
+  const field = byId("subject-name");
+  if (document.activeElement !== field) field.value = subject.name;
+  byId("subject-type").textContent = subject.bsdf.type === "preset" ? `preset ${subject.bsdf.name}` : subject.bsdf.type;
+  byId("colour").style.setProperty("--mark", colourOf(session.selected));
+  byId("hide").textContent = subject.hidden ? "Show" : "Hide";
+  byId("solo").disabled = byId("remove").disabled = subjects.length < 2;
+  byId("double").disabled = subjects.length >= MOST_SUBJECTS;
+  byId("fit").hidden = subject.bsdf.type !== "tabulated" || !session.hello?.models?.length;
+  drawControls();
+}
+
+/** Show the selected subject alone, or all again. */
+function solo() {
+  const { subjects } = session.state;
+  const alone = subjects.every(({ hidden }, k) => hidden === (k !== session.selected));
+  change({ subjects: subjects.map((subject, k) => ({ ...subject, hidden: alone ? false : k !== session.selected })) });
+}
+
+/** Give the subject the next colour, and its own to whom that belongs. */
+function nextColour() {
+  const { subjects } = session.state;
+  const [own, next] = [subjects[session.selected].colour, (subjects[session.selected].colour + 1) % PALETTE.length];
+  change({
+    subjects: subjects.map((subject, k) => ({
+      ...subject,
+      colour: k === session.selected ? next : subject.colour === next ? own : subject.colour,
+    })),
+  });
+}
+
+// --- Adding ---------------------------------------------------------------------------------------------------------
+
+function openAdd() {
+  byId("search").value = "";
+  showFound();
+  byId("add-dialog").showModal();
+  byId("search").focus();
+}
+
+function showFound() {
+  const { hello } = session;
+  if (!hello) return;
+  const words = byId("search").value.toLowerCase().split(/\s+/).filter(Boolean);
+  const fits = (...texts) => words.every((word) => texts.join(" ").toLowerCase().includes(word));
+  const kinds = {};
+  for (const { name, title, group } of hello.types) {
+    if (fits(name, title, group)) (kinds[group] ??= []).push([name, title === name ? "" : title, { type: name }]);
+  }
+  const files = hello.files.filter(({ name }) => fits(name, "file measured"));
+  const presets = hello.presets.filter((name) => fits(name, "preset"));
+  const groups = [
+    ...Object.entries(kinds),
+    [
+      "Files",
+      files.map(({ file, name, kind }) => [name, "", { type: kind === "material" ? "given" : "tabulated", file }]),
+    ],
+    ["Presets", presets.map((name) => [name, "", { type: "preset", name }])],
+  ];
+  let room = words.length ? MOST_FOUND : 400;
+  const nodes = [];
+  for (const [title, items] of groups) {
+    if (!items.length) continue;
+    const shown = items.slice(0, Math.min(room, words.length || title !== "Presets" ? room : 12));
+    room -= shown.length;
+    const more = items.length - shown.length;
+    nodes.push(
+      element("h3", {}, title),
+      element(
+        "ul",
+        {},
+        ...shown.map(([name, text, bsdf]) =>
+          element(
+            "li",
+            {},
+            element(
+              "button",
+              { class: "found", onclick: () => choose(bsdf, name) },
+              element("b", {}, name),
+              text ? element("span", {}, text) : null,
+            ),
+          ),
+        ),
+      ),
+    );
+    if (more) nodes.push(element("p", { class: "note" }, `and ${more} more: type to search`));
+  }
+  byId("found").replaceChildren(...(nodes.length ? nodes : [element("p", {}, "Nothing has this name.")]));
+}
+
+function choose(bsdf, name) {
+  byId("add-dialog").close();
+  addSubject(bsdf, name);
+}
+
+/** Arrow keys walk through what was found; Enter in the search field takes the first. */
+function walk(event) {
+  const items = [...byId("found").querySelectorAll("button")];
+  const at = items.indexOf(document.activeElement);
+  if (event.key === "ArrowDown" || event.key === "ArrowUp") {
+    event.preventDefault();
+    const next = at + (event.key === "ArrowDown" ? 1 : -1);
+    (next < 0 ? byId("search") : items[Math.min(next, items.length - 1)])?.focus();
+  } else if (event.key === "Enter" && event.target === byId("search")) {
+    event.preventDefault();
+    items[0]?.click();
+  }
+}
+
+// --- Files ----------------------------------------------------------------------------------------------------------
+
+function startDrop() {
+  const carriesFiles = (event) => !session.exported && [...(event.dataTransfer?.types ?? [])].includes("Files");
+  let depth = 0;
+  const tell = (inside) => document.documentElement.classList.toggle("dropping", inside);
+  addEventListener("dragenter", (event) => carriesFiles(event) && tell(++depth > 0));
+  addEventListener("dragleave", (event) => carriesFiles(event) && tell((depth = Math.max(depth - 1, 0)) > 0));
+  addEventListener("dragover", (event) => carriesFiles(event) && event.preventDefault());
+  addEventListener("drop", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    tell((depth = 0) > 0);
+    uploadAll(event.dataTransfer.files);
+  });
+}
+
+async function uploadAll(files) {
+  byId("add-dialog").close();
+  for (const file of files) {
+    if (session.state.subjects.length >= MOST_SUBJECTS)
+      return emit("error", "There is room for four subjects: remove one first.");
+    emit("busy", { text: `Uploading ${file.name} …` });
+    try {
+      const form = new FormData();
+      form.append("file", file);
+      const response = await fetch("upload", { method: "POST", body: form });
+      const answer = await response
+        .json()
+        .catch(() => ({ error: `The server refused ${file.name} (${response.status}).` }));
+      if (answer.error) throw new Error(answer.error);
+      session.hello.files = [...session.hello.files, answer];
+      addSubject({ type: "tabulated", file: answer.file }, answer.name);
+    } catch (error) {
+      emit(
+        "error",
+        error instanceof TypeError ? `${file.name} could not be sent: the server does not answer.` : error.message,
+      );
+    }
+    emit("idle", {});
+  }
+}

@@ -1,0 +1,234 @@
+"""Controls by what a plugin declares, and by what ``mitsuba.traverse`` shows of others: nothing is said per model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from ..model import Model
+from ..parameters import Choice, Colour, File, Flag, FresnelSet, Number, OneOf, Parameter, PerLobe, Preset, Rotation
+from ..ranges import VALUES
+from .state import Bsdf
+
+Control = dict[str, Any]
+
+WIDEST = 1e5
+"""The end of a slider where the range has none."""
+FINEST = 1e-3
+"""The beginning of a logarithmic one, as a part of what ends it, where the range begins at 0."""
+LOBES = "lobes"
+"""The control of the number of lobes, which no plugin has as a parameter."""
+PARTNERS = {"eta": {"k": [1.0, 1.0, 1.0]}, "k": {"eta": [1.0, 1.0, 1.0]}}
+"""What is given together with a parameter that cannot be alone."""
+
+
+def controls_of(model: type[Model], bsdf: Bsdf) -> list[Control]:
+    """Return the controls of a model's plugin dict, in the order of its declarations."""
+    return list(_controls(model.declared(), bsdf, ""))
+
+
+def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator[Control]:
+    for parameter in declared:
+        names = parameter.names
+        if isinstance(parameter, Number):
+            yield from _numbers(parameter, bsdf, group)
+        elif isinstance(parameter, Rotation):
+            yield _number(names[0], parameter.text, (-0.5, 0.5), bsdf, None, group)
+        elif isinstance(parameter, Colour):
+            yield _colour(names[0], parameter.text, parameter.limits, bsdf, parameter.default, group)
+        elif isinstance(parameter, Choice):
+            yield _choice(names[0], parameter.text, parameter.choices, bsdf, group)
+        elif isinstance(parameter, Flag):
+            value = bsdf.get(names[0], parameter.default)
+            yield _control(names[0], parameter.text, "flag", value, parameter.default, group)
+        elif isinstance(parameter, OneOf):
+            yield _choice(parameter.name, parameter.text, tuple(parameter.words), bsdf, group, parameter.names[1:])
+            word = bsdf.get(parameter.name, next(iter(parameter.words)))
+            yield from _controls(parameter.words.get(word, {}).values(), bsdf, group)
+        elif isinstance(parameter, PerLobe):
+            yield from _lobes(parameter, bsdf)
+        elif isinstance(parameter, FresnelSet):
+            yield from _fresnel(parameter, bsdf)
+        elif not isinstance(parameter, (File, Preset)):
+            for row in parameter.rows():
+                yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group)
+
+
+def _numbers(parameter: Number, bsdf: Bsdf, group: str) -> Iterator[Control]:
+    single, pair = parameter.names[0], parameter.pair
+    spellings = [parameter.other] if parameter.spelling else []
+    others = any(name in bsdf for name in [*pair, *spellings])
+    default = None if others else parameter.default
+    first = _number(single, parameter.text, parameter.limits, bsdf, default, group)
+    yield first | {"optional": bool(pair or spellings) or parameter.default is None, "excludes": [*pair, *spellings]}
+    middle = bsdf.get(single, parameter.default)
+    for name, other in zip(pair, reversed(pair), strict=True):
+        text = f"{parameter.text}, {'along dp_du' if name == pair[0] else 'across'}"
+        control = _number(name, text, parameter.limits, bsdf, None, group)
+        yield control | {"excludes": [single, *spellings], "also": {other: middle}}
+    if parameter.spelling:
+        control = _number(parameter.other, parameter.spelling.text, parameter.spelling.limits, bsdf, None, group)
+        yield control | {"excludes": [single, *pair]}
+
+
+def _lobes(parameter: PerLobe, bsdf: Bsdf) -> Iterator[Control]:
+    count = lobe_count(parameter, bsdf)
+    words = [str(k) for k in range(1, len(parameter.numbers))]
+    yield _control(LOBES, "number of lobes", "choice", str(count), "1", "") | {"words": words}
+    for number in parameter.numbers[1 : count + 1] if numbered(parameter, bsdf) else [""]:
+        own = [it.numbered(number) for it in parameter.declared.values()]
+        yield from _controls(own, bsdf, f"lobe {number[1:]}" if number else "")
+
+
+def numbered(parameter: PerLobe, bsdf: Bsdf) -> bool:
+    """Return whether the names of lobes have numbers in a plugin dict."""
+    return any(name in bsdf for number in parameter.numbers[1:] for name in _lobe_names(parameter, number))
+
+
+def lobe_count(parameter: PerLobe, bsdf: Bsdf) -> int:
+    """Return the number of lobes of a plugin dict."""
+    given = [k for k, number in enumerate(parameter.numbers) if any(n in bsdf for n in _lobe_names(parameter, number))]
+    return max([1, *given])
+
+
+def _lobe_names(parameter: PerLobe, number: str) -> list[str]:
+    return [name for it in parameter.declared.values() for name in it.numbered(number).names]
+
+
+def with_lobes(model: type[Model], bsdf: Bsdf) -> Bsdf:
+    """Return a plugin dict with as many lobes as its ``lobes`` says; new ones are like the last."""
+    wanted, found = bsdf[LOBES], {name: value for name, value in bsdf.items() if name != LOBES}
+    parameter = next((it for it in model.declared() if isinstance(it, PerLobe)), None)
+    if parameter is None or str(wanted) not in [str(k) for k in range(1, len(parameter.numbers))]:
+        return found
+    count, now = int(wanted), lobe_count(parameter, found)
+    last = "" if not numbered(parameter, found) else f"_{now}"
+    for it in parameter.declared.values():
+        for single, template in zip(it.numbered("").names, it.numbered(last).names, strict=True):
+            value = found.get(template)
+            if value is None and isinstance(it, (Number, Colour)) and single == it.name:
+                value = None if any(name in found for name in it.numbered(last).names) else it.default
+            lobes = [found.pop(f"{single}_{k}", value) for k in range(1, len(parameter.numbers))]
+            kept = lobes[:count]
+            if now == 1 and not last:
+                kept = [found.get(single, value)] * count
+            found.pop(single, None)
+            names = [single] if count == 1 else [f"{single}_{k}" for k in range(1, count + 1)]
+            found |= {name: each for name, each in zip(names, kept, strict=True) if each is not None}
+    return found
+
+
+def _fresnel(parameter: FresnelSet, bsdf: Bsdf) -> Iterator[Control]:
+    group = "Fresnel"
+    for name, text in (("eta", "index of refraction of a conductor"), ("k", "its extinction coefficient")):
+        yield (
+            _colour(name, text, parameter.RANGES[name], bsdf, None, group)
+            | {"also": PARTNERS[name]}
+            | _gives_way(parameter, name)
+        )
+    names = ["none", *sorted({path.name.removesuffix(".eta.spd") for path in conductors().glob("*.eta.spd")})]
+    text = "a conductor of Mitsuba's"
+    yield _choice("material", text, tuple(names), bsdf, group) | _gives_way(parameter, "material") | {
+        "value": bsdf.get("material"), "default": None, "optional": True}  # fmt: skip
+    text = "Schlick's approximation, with this reflectance at normal incidence"
+    yield _colour("f0", text, (0, 1), bsdf, None, group) | _gives_way(parameter, "f0")
+    for name, text in (("int_ior", "index of refraction of a dielectric"), ("ext_ior", "… and of what is outside")):
+        yield _number(name, text, (1, 3), bsdf, None, group) | _gives_way(parameter, name)
+    others = [name for name in parameter.names if name not in parameter.RANGES and name != "material"]
+    for row in parameter.rows():
+        if row.name in others:
+            yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group) | {"optional": True}
+
+
+def conductors() -> Path:
+    """Return the folder of Mitsuba's conductors."""
+    return Path(mi.__file__).parent / "data" / "ior"
+
+
+def _gives_way(parameter: FresnelSet, name: str) -> dict[str, Any]:
+    return {"excludes": parameter.rivals(name)}
+
+
+# --- Plugins that declare nothing -----------------------------------------------------------------------------------
+
+
+def traversed(bsdf: mi.BSDF, given: Mapping[str, Any]) -> list[Control]:
+    """Return the controls of the numbers and colours that ``mitsuba.traverse`` shows."""
+    found = []
+    for key, value in mi.traverse(bsdf):
+        numbers = np.ravel(np.array(value, np.float64)) if _is_value(value) else np.zeros(0)
+        name, short = key_to_name(key), key.rpartition(".")[2]
+        if len(numbers) == 1 and np.isfinite(numbers).all():
+            limits = _guess(short if short not in VALUES else name, float(numbers[0]))
+            found.append(_number(name, key, limits, {name: float(numbers[0])}, float(numbers[0]), ""))
+        elif len(numbers) == 3 and np.isfinite(numbers).all():
+            colour = [float(f"{it:.6g}") for it in numbers]
+            high = 1.0 if max(colour) <= 1 else math.ceil(2 * max(colour))
+            found.append(_colour(name, key, (0, high), {name: colour}, colour, ""))
+    return [it | {"default": given.get(it["name"], it["default"])} for it in found]
+
+
+def key_to_name(key: str) -> str:
+    """Return the property that a key of ``mitsuba.traverse`` belongs to."""
+    head, _, last = key.rpartition(".")
+    return head if head and last in VALUES else key
+
+
+def _is_value(value: Any) -> bool:
+    return isinstance(value, (int, float, mi.Float, mi.Color3f)) and not isinstance(value, bool)
+
+
+def _guess(name: str, value: float) -> tuple[float, float]:
+    """Return a range for a number that declares none."""
+    if "alpha" in name:
+        return 1e-3, 1.0
+    if 0 <= value <= 1:
+        return 0.0, 1.0
+    return (0.0, 2 * value) if value > 0 else (2 * value, -2 * value)
+
+
+# --- Their form -----------------------------------------------------------------------------------------------------
+
+
+def _control(name: str, text: str, kind: str, value: Any, default: Any, group: str) -> Control:
+    return {
+        "name": name, "text": text, "kind": kind, "value": value, "default": default, "group": group,
+        "optional": False, "excludes": [], "also": {},
+    }  # fmt: skip
+
+
+def _number(name: str, text: str, limits: tuple[float, float], bsdf: Bsdf, default: Any, group: str) -> Control:
+    low, high, scale = slider(*limits)
+    value = bsdf.get(name, default)
+    control = _control(name, text, "number", value, default, group)
+    return control | {"low": low, "high": high, "scale": scale, "optional": default is None}
+
+
+def _colour(name: str, text: str, limits: tuple[float, float], bsdf: Bsdf, default: Any, group: str) -> Control:
+    value = bsdf.get(name, default)
+    value, default = ([it] * 3 if isinstance(it, (int, float)) else it for it in (value, default))
+    top = limits[1] if limits[1] <= 10 else 10.0
+    control = _control(name, text, "colour", value, default, group)
+    return control | {"low": limits[0], "high": top, "scale": "linear", "optional": default is None}
+
+
+def _choice(
+    name: str, text: str, words: tuple[str, ...], bsdf: Bsdf, group: str, excludes: list[str] | None = None
+) -> Control:
+    control = _control(name, text, "choice", bsdf.get(name, words[0]), words[0], group)
+    return control | {"words": list(words), "excludes": excludes or []}
+
+
+def slider(low: float, high: float) -> tuple[float, float, str]:
+    """Return the ends of a slider for a declared range, and its scale: logarithmic for what spans decades."""
+    if math.isinf(high) or high > 1000:
+        high = min(high, WIDEST)
+        return (low if low > 0 else min(FINEST * high, 0.01)), high, "log" if low >= 0 else "linear"
+    if 0 < low < 0.01 * high:
+        return max(low, FINEST * high), high, "log"
+    return low, high, "linear"

@@ -1,0 +1,87 @@
+"""A page that needs no server: the explorer's own page with the frames of its views in it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from dataclasses import replace
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from . import stages
+from .materials import Materials
+from .state import State, StateError
+from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+SPP = 64
+"""Samples per pixel of its pictures."""
+SIZE = 320
+"""… and the most pixels of a side."""
+
+
+def page(state: State, materials: Materials, engine: Engine, page_state: dict[str, Any]) -> str:
+    """Return the page with all views of a state; ``page_state`` is what the page itself said of it.
+
+    Raises:
+        StateError: if a subject cannot be shown.
+    """
+    state = replace(state, size=min(state.size, SIZE))
+    sent = [{"text": frame} if isinstance(frame, str) else _split(frame) for frame in _frames(state, materials, engine)]
+    data = json.dumps({"state": page_state, "frames": sent}).replace("</", "<\\/")
+    return _inlined(f'<script type="application/json" id="exported">{data}</script>')
+
+
+def _frames(state: State, materials: Materials, engine: Engine) -> list[Frame]:
+    found: list[Frame] = []
+    for k, given in enumerate(state.subjects):
+        bsdf = materials.expanded(given)
+        with materials.loaded(bsdf) as loaded:
+            probe = ComponentProbe(loaded, state.component)
+            names = [probe.name_of(i) for i in range(loaded.component_count())]
+            told = {"controls": materials.controls(bsdf), "components": names, "error": None, "notes": [], "bsdf": None}
+            found.append(text(type="subject", serial=0, subject=k, **told, **materials.written(bsdf)))
+            for view in VIEWS:
+                found += frames(view, probe, state, 0, k)
+        progress = stages.Progress(engine.stage(stages.Setting.of(state)))
+        while progress.spp < SPP:
+            with materials.loaded(bsdf) as loaded:
+                progress.advance(loaded)
+        linear = progress.pixels()
+        payload = stages.encoded(engine.denoise(linear) if engine.denoise else linear, state.exposure)
+        height, width = linear.shape[:2]
+        header = {"width": width, "height": height, "spp": progress.spp, "final": True}
+        found.append(packed(payload, type="picture", serial=0, subject=k, denoised=bool(engine.denoise), **header))
+    return found
+
+
+def _split(frame: bytes) -> dict[str, Any]:
+    """Return the header of a binary frame, and its payload as text."""
+    end = 4 + int.from_bytes(frame[:4], "little")
+    return {"header": json.loads(frame[4:end]), "payload": base64.b64encode(frame[end:]).decode()}
+
+
+def _inlined(data: str) -> str:
+    """Return the page with its files in it, and the data in front of its scripts."""
+    client = files(__package__) / "client"
+
+    def read(name: str) -> str:
+        return (client / name.rpartition("/")[2]).read_text(encoding="utf-8")
+
+    source = read("index.html")
+    source = re.sub(r'<link rel="stylesheet" href="([^"]+)"[^>]*>', lambda it: f"<style>{read(it[1])}</style>", source)
+    scripts = re.findall(r'<script type="module" src="([^"]+)"></script>', source)
+    if not scripts:
+        raise StateError("The page has no script.")
+    merged = "\n".join(_without_imports(read(name)) for name in scripts)
+    source = re.sub(r'\s*<script type="module" src="[^"]+"></script>', "", source)
+    return source.replace("</body>", f'{data}\n<script type="module">{merged}</script>\n</body>')
+
+
+def _without_imports(script: str) -> str:
+    """Return a module's text without its imports and exports: all modules become one."""
+    script = re.sub(r"^import\b[^;]*;\n", "", script, flags=re.MULTILINE)
+    return re.sub(r"^export (?=(const|let|function|class|async)\b)", "", script, flags=re.MULTILINE)

@@ -1,0 +1,195 @@
+"""The BSDFs that a page may show: plugins by name, with plain values, and files that were named or uploaded."""
+
+from __future__ import annotations
+
+import shlex
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import mitsuba as mi
+
+from ..measure.sources import BSDFSource
+from ..mitsuba.errors import one_line
+from ..mitsuba.registry import MODELS, all_models, is_own
+from ..model import EnergyWarning, Model
+from ..parameters.messages import brief, listed, meant
+from ..parameters.published import preset
+from ..parameters.xml import to_xml
+from . import controls
+from .controls import Control
+from .state import Bsdf, StateError
+
+BUILT_IN = (
+    "conductor", "dielectric", "diffuse", "plastic", "principled", "principledthin", "roughconductor",
+    "roughdielectric", "roughplastic", "thindielectric",
+)  # fmt: skip
+"""Mitsuba's BSDFs that need nothing but numbers and colours."""
+MEASURED, GIVEN, PRESET = "tabulated", "given", "preset"
+"""The types of subjects that are files, materials of the command line, and published materials."""
+
+
+@dataclass
+class Materials:
+    """What a session may load, besides plugins: ``files``, by the names that a page knows them by."""
+
+    files: Mapping[str, BSDFSource] = field(default_factory=dict)
+    _loaded: dict[str, mi.BSDF] = field(default_factory=dict)
+    """Materials of XML files, which take long to load."""
+
+    def model_of(self, bsdf: Bsdf) -> type[Model] | None:
+        """Return the model of a plugin dict, None for what declares nothing."""
+        return MODELS.get(bsdf["type"])
+
+    def expanded(self, bsdf: Bsdf) -> Bsdf:
+        """Return a plugin dict with what its short forms stand for: a published material, the example of a model of
+        which only the type is given, another number of lobes.
+
+        Raises:
+            StateError: if there is no such type, file or material.
+        """
+        kind = bsdf["type"]
+        if kind == PRESET:
+            try:
+                return plain(preset(str(bsdf.get("name", ""))))
+            except ValueError as error:
+                raise StateError(str(error)) from None
+        if kind in (MEASURED, GIVEN):
+            self._source(bsdf)
+            return bsdf
+        if kind in BUILT_IN:
+            return bsdf
+        if kind not in MODELS:
+            known = [*MODELS, *BUILT_IN, MEASURED]
+            near = meant(kind, known)
+            raise StateError(f"There is no BSDF {brief(kind)!r} here" + (f"; did you mean {near!r}?" if near else "."))
+        if set(bsdf) == {"type"}:
+            return {**plain(MODELS[kind].example()), "type": kind}
+        return controls.with_lobes(MODELS[kind], bsdf) if controls.LOBES in bsdf else bsdf
+
+    def _source(self, bsdf: Bsdf) -> BSDFSource:
+        file = str(bsdf.get("file", ""))
+        if file not in self.files:
+            raise StateError(f"{brief(file) or 'A file'} is not here: name it on the command line, or drop it in.")
+        return self.files[file]
+
+    @contextmanager
+    def loaded(self, bsdf: Bsdf) -> Iterator[mi.BSDF]:
+        """Load an expanded plugin dict. Nothing should keep it: Dr.Jit compiles kernels for all BSDFs that live.
+
+        Raises:
+            StateError: with the plugin's sentence.
+        """
+        kind = bsdf["type"]
+        values = {name: value for name, value in bsdf.items() if name not in ("type", "file")}
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
+                if kind == GIVEN:
+                    source = self._source(bsdf)
+                    if source.word not in self._loaded:
+                        found = source.load()
+                        self._loaded[source.word] = mi.load_dict(found) if isinstance(found, dict) else found
+                    yield _with_values(self._loaded[source.word], values)
+                elif kind == MEASURED:
+                    yield mi.load_dict({**_source_dict(self._source(bsdf)), **properties(values)})
+                elif kind in MODELS:
+                    yield mi.load_dict({"type": kind, **properties(values)})
+                else:
+                    yield _built_in(kind, values)
+        except (RuntimeError, ValueError, TypeError) as error:
+            raise StateError(one_line(error)) from None
+
+    def controls(self, bsdf: Bsdf) -> list[Control]:
+        """Return the controls of an expanded plugin dict."""
+        if bsdf["type"] == MEASURED:
+            found = controls.controls_of(MODELS.get(MEASURED) or _tabulated(), bsdf)
+            return [it for it in found if it["name"] != "differentiable"]
+        if model := self.model_of(bsdf):
+            return controls.controls_of(model, bsdf)
+        with self.loaded({"type": bsdf["type"], **({"file": bsdf["file"]} if "file" in bsdf else {})}) as usual:
+            defaults = {it["name"]: it["value"] for it in controls.traversed(usual, {})}
+        with self.loaded(bsdf) as loaded:
+            return controls.traversed(loaded, defaults)
+
+    def written(self, bsdf: Bsdf) -> dict[str, str]:
+        """Return an expanded plugin dict as XML, as a Python dict, and as a command."""
+        kind = bsdf["type"]
+        values = properties({name: value for name, value in bsdf.items() if name not in ("type", "file")})
+        if kind == GIVEN:
+            word = self._source(bsdf).word
+            return {"xml": f"<!-- {word} -->", "dict": f"# {word}", "command": shlex.join(["mi-brdfs", "show", word])}
+        named = {"type": kind, **values}
+        word = kind
+        if kind == MEASURED:
+            named = {**_source_dict(self._source(bsdf)), **values}
+            word = named["filename"]
+        options = [text for name, value in values.items() for text in ("-D", f"{name}={_option(value)}")]
+        return {
+            "xml": to_xml(named),
+            "dict": repr(named),
+            "command": shlex.join(["mi-brdfs", "show", word, *options]),
+        }
+
+
+def kinds() -> list[dict[str, str]]:
+    """Return the types that a page may add."""
+    found = []
+    for model in sorted(all_models(), key=lambda it: (not is_own(it), it.plugins)):
+        group = "mi_brdfs" if is_own(model) else "guests"
+        found.append({"name": model.plugins[0], "title": model.summary().rstrip("."), "group": group})
+    return found + [{"name": name, "title": name, "group": "Mitsuba"} for name in BUILT_IN]
+
+
+def plain(bsdf: Mapping[str, Any]) -> Bsdf:
+    """Return a plugin dict with its colours as [r, g, b]."""
+    return {name: list(value["value"]) if isinstance(value, dict) else value for name, value in bsdf.items()}
+
+
+def properties(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return plain values as Mitsuba's dicts have them."""
+    return {name: {"type": "rgb", "value": it} if isinstance(it, list) else it for name, it in values.items()}
+
+
+def _option(value: Any) -> str:
+    """Return a value as -D takes it."""
+    if isinstance(value, dict):
+        return ";".join(f"{number:.7g}" for number in value["value"])
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else f"{value:.7g}"
+
+
+def _source_dict(source: BSDFSource) -> dict[str, Any]:
+    found = source.load()
+    assert isinstance(found, dict)  # a measured file
+    return found
+
+
+def _tabulated() -> type[Model]:
+    from ..measured.tabulated import Tabulated
+
+    return Tabulated
+
+
+def _built_in(kind: str, values: Bsdf) -> mi.BSDF:
+    """Return one of Mitsuba's BSDFs with some values of what ``mitsuba.traverse`` shows: not all are parameters."""
+    try:
+        return mi.load_dict({"type": kind, **properties(values)})
+    except RuntimeError:
+        if not values:
+            raise
+    return _with_values(mi.load_dict({"type": kind}), values)
+
+
+def _with_values(bsdf: mi.BSDF, values: Bsdf) -> mi.BSDF:
+    params = mi.traverse(bsdf)
+    keys = {controls.key_to_name(key): key for key, _ in params}
+    for name, value in values.items():
+        if name not in keys:
+            raise StateError(f"There is no value {name}; there are {listed(keys, 'and')}.")
+        params[keys[name]] = mi.Color3f(value) if isinstance(value, list) else value
+    params.update()
+    return bsdf

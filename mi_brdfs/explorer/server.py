@@ -1,0 +1,189 @@
+"""The server of the page: HTTP for its files and uploads, a websocket for a session."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import tempfile
+from collections import ChainMap
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from aiohttp import WSMsgType, web
+
+from .. import __version__
+from ..measure.sources import BSDFSource, is_measured
+from ..measured import FileError, read
+from ..mitsuba.registry import all_models, presets
+from ..parameters.messages import brief, printable
+from . import stages
+from .engine import Engine
+from .materials import Materials, kinds
+from .session import Session
+from .state import SUBJECTS, StateError, parse
+from .tours import tours
+from .views import Frame, text
+
+LARGEST_UPLOAD, LARGEST_MESSAGE = 64 << 20, 1 << 16
+UPLOADS = 16
+"""The most files that a session may hold."""
+CLIENT = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'"
+LOCAL = "127.0.0.1", "localhost", "[::1]"
+
+
+class Explorer:
+    """What all pages of a server share."""
+
+    def __init__(self, engine: Engine, sources: list[BSDFSource], initial: dict[str, Any], hosts: list[str]) -> None:
+        self.engine, self.initial, self.hosts = engine, initial, hosts
+        self.named = {it.word: it for it in sources}
+        self.folder = tempfile.TemporaryDirectory(prefix="mi-brdfs-explore-")
+        self.uploads: dict[str, BSDFSource] = {}
+
+    def application(self) -> web.Application:
+        app = web.Application(client_max_size=LARGEST_UPLOAD + (1 << 16), middlewares=[self._guard])
+        app.router.add_get("/", self._index)
+        app.router.add_get("/client/{name}", self._client)
+        app.router.add_get("/socket", self._socket)
+        app.router.add_post("/upload", self._upload)
+        app.on_shutdown.append(self._close)
+        return app
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
+        """Refuse requests that another page of the browser sends, under its own name or under ours."""
+        origin = request.headers.get("Origin")
+        if not self._is_ours(request.host) or (origin and not self._is_ours(origin.partition("://")[2])):
+            raise web.HTTPForbidden(text="This server answers only its own page.")
+        response = await handler(request)
+        if not response.prepared:
+            response.headers["Content-Security-Policy"] = POLICY
+            response.headers["Cache-Control"] = "no-store"
+        return response
+
+    def _is_ours(self, host: str) -> bool:
+        name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
+        return name in self.hosts
+
+    async def _index(self, request: web.Request) -> web.Response:
+        return web.Response(text=_read("index.html"), content_type="text/html")
+
+    async def _client(self, request: web.Request) -> web.Response:
+        name = request.match_info["name"]
+        kind = CLIENT.get(name.rpartition(".")[2])
+        if kind is None or not (files(__package__) / "client" / name).is_file():
+            raise web.HTTPNotFound
+        return web.Response(text=_read(name), content_type=kind)
+
+    async def _upload(self, request: web.Request) -> web.Response:
+        """Keep a measured file that can be read."""
+        try:
+            if len(self.uploads) >= UPLOADS:
+                raise FileError(f"There are {UPLOADS} uploaded files already; start the explorer anew.")
+            form = await request.post()
+            field = form.get("file")
+            if not isinstance(field, web.FileField):
+                raise FileError("Nothing was uploaded.")
+            name = Path(field.filename.replace("\\", "/")).name
+            key = f"upload-{len(self.uploads) + 1}/{name}"
+            path = Path(self.folder.name) / f"{len(self.uploads) + 1}{''.join(Path(name).suffixes[-2:])}"
+            path.write_bytes(field.file.read())
+            try:
+                await asyncio.wrap_future(self.engine.call(lambda: read(path)))
+            except ValueError as error:
+                path.unlink()
+                raise FileError(str(error).replace(str(path), name)) from None
+        except web.HTTPRequestEntityTooLarge:
+            return _refusal(413, f"A file may have {LARGEST_UPLOAD >> 20} MiB at most.")
+        except (FileError, OSError) as error:
+            told = printable(str(error)) if isinstance(error, FileError) else f"It cannot be kept: {error.strerror}."
+            return _refusal(422, told)
+        self.uploads[key] = BSDFSource(name, key, str(path))
+        return web.json_response({"file": key, "name": name})
+
+    async def _socket(self, request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse(max_msg_size=LARGEST_MESSAGE, heartbeat=20, compress=False)
+        await socket.prepare(request)
+        loop, outbox = asyncio.get_running_loop(), asyncio.Queue[Frame]()
+
+        def send(frame: Frame) -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(outbox.put_nowait, frame)
+
+        session = Session(Materials(ChainMap(self.uploads, self.named)), send, outbox.qsize)
+        self.engine.sessions.append(session)
+        writer = asyncio.create_task(_write(socket, outbox))
+        await outbox.put(self._hello())
+        try:
+            async for message in socket:
+                if message.type == WSMsgType.TEXT:
+                    self._take(session, message.data)
+        finally:
+            session.close()
+            writer.cancel()
+            self.engine.wake()
+        return socket
+
+    def _take(self, session: Session, data: str) -> None:
+        """Hand a message to the session; what is wrong with it is its answer."""
+        try:
+            message = json.loads(data)
+            kind = message["type"]
+            if kind == "state":
+                shapes = [it for it in ("body", "sphere", "scene") if it != "scene" or self.engine.user.scene]
+                state = parse(message["state"], stages.stages(self.engine.user), shapes)
+                session.show(state, int(message.get("serial", 0)))
+            elif kind in ("chi2", "fit", "cancel", "save"):
+                session.ask(message)
+            else:
+                raise StateError(f"There is no message {brief(str(kind))!r}.")
+        except StateError as error:
+            session.send(text(type="error", text=str(error)))
+        except (ValueError, KeyError, TypeError):
+            session.send(text(type="error", text="This is no message of the explorer."))
+        self.engine.wake()
+
+    def _hello(self) -> str:
+        from ..fit import METRICS
+
+        user = self.engine.user
+        named = [{"file": it.word, "name": it.name, "kind": "measured" if is_measured(it.source) else "material"}
+                 for it in self.named.values()]  # fmt: skip
+        return text(
+            type="hello",
+            version=__version__,
+            variant=self.engine.variant,
+            types=kinds(),
+            presets=presets(),
+            files=named,
+            scene=user.scene.name if user.scene else None,
+            stages=stages.stages(user),
+            models=[model.plugins[0] for model in all_models()],
+            metrics=list(METRICS),
+            tours=tours(),
+            limits={"subjects": SUBJECTS, "upload": LARGEST_UPLOAD},
+            state=self.initial,
+        )
+
+    async def _close(self, app: web.Application) -> None:
+        self.engine.end()
+        self.folder.cleanup()
+
+
+async def _write(socket: web.WebSocketResponse, outbox: asyncio.Queue[Frame]) -> None:
+    """Send frames as they come, until the page is gone."""
+    with contextlib.suppress(ConnectionError, RuntimeError):
+        while True:
+            frame = await outbox.get()
+            await (socket.send_bytes(frame) if isinstance(frame, bytes) else socket.send_str(frame))
+
+
+def _read(name: str) -> str:
+    return (files(__package__) / "client" / name).read_text(encoding="utf-8")
+
+
+def _refusal(status: int, sentence: str) -> web.Response:
+    return web.json_response({"error": sentence}, status=status)

@@ -1,0 +1,265 @@
+"""What one page sees: the latest state that it sent, and what of that it has been shown.
+
+Nothing is queued: each step looks at the latest state for the first thing that the page has not, so that edits in
+between cost nothing.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import mitsuba as mi
+
+from ..mitsuba.errors import one_line
+from . import stages
+from .materials import MEASURED, Materials, plain
+from .state import Bsdf, State, StateError, key_of
+from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
+
+if TYPE_CHECKING:
+    from .engine import Engine
+
+BACKLOG = 6
+"""Frames that wait to be sent, from which on pictures are not refined."""
+DENOISED_AT = 16, 64, 256
+"""The samples per pixel at which a picture is denoised."""
+TESTED = ("chi2",)
+
+
+class Cancelled(Exception):
+    """The page does not wait for it any more."""
+
+
+class Session:
+    """The engine's thread calls :meth:`step`, the server's all others.
+
+    Args:
+        materials: what may be loaded.
+        send: takes frames to the page.
+        waiting: tells how many of these have not arrived.
+    """
+
+    def __init__(self, materials: Materials, send: Callable[[Frame], None], waiting: Callable[[], int]) -> None:
+        self.materials, self.send, self.waiting = materials, send, waiting
+        self.closed = False
+        self._lock = threading.Lock()
+        self._latest: tuple[State, int] | None = None
+        self._requests: list[dict[str, Any]] = []
+        self._cancelled = False
+        self._told: dict[int, str] = {}
+        self._broken: set[str] = set()
+        self._shown: dict[tuple[str, int], Any] = {}
+        self._pictures: dict[int, tuple[Any, stages.Progress]] = {}
+        self._idle = True
+
+    # --- The server's side --------------------------------------------------------------------------------------------
+
+    def show(self, state: State, serial: int) -> None:
+        """Take a state, in place of the former one."""
+        with self._lock:
+            self._latest = state, serial
+
+    def ask(self, request: dict[str, Any]) -> None:
+        """Take a request of another kind, or cancel the one at work."""
+        with self._lock:
+            if request["type"] == "cancel":
+                self._cancelled = True
+            else:
+                self._requests.append(request)
+
+    def close(self) -> None:
+        self.closed = True
+
+    # --- The engine's side --------------------------------------------------------------------------------------------
+
+    def step(self, engine: Engine) -> bool:
+        """Do the next thing, and return whether there was one."""
+        with self._lock:
+            latest, request = self._latest, self._requests.pop(0) if self._requests else None
+            self._cancelled = self._cancelled and request is None
+        if latest is None or self.closed:
+            return False
+        state, serial = latest
+        if request:
+            self._answer(request, state, engine)
+            return True
+        did = self._tell(state, serial) or self._draw(state, serial, engine) or self._refine(state, serial, engine)
+        if not did and not self._idle:
+            self.send(text(type="idle"))
+        self._idle = not did
+        return did
+
+    def _tell(self, state: State, serial: int) -> bool:
+        """Send the controls of a subject that is new or has changed."""
+        for k, given in enumerate(state.subjects):
+            key = key_of(given)
+            if self._told.get(k) != key:
+                self._told[k] = key
+                message: dict[str, Any] = {"type": "subject", "serial": serial, "subject": k, "bsdf": None}
+                message |= {"controls": [], "components": [], "notes": [], "error": None}
+                try:
+                    bsdf = self.materials.expanded(given)
+                    message["bsdf"] = None if key_of(bsdf) == key else bsdf
+                    message["controls"] = self.materials.controls(bsdf)
+                    message |= self.materials.written(bsdf)
+                    with self.materials.loaded(bsdf) as loaded:
+                        probe = ComponentProbe(loaded)
+                        message["components"] = [probe.name_of(i) for i in range(loaded.component_count())]
+                        if mi.has_flag(loaded.flags(), mi.BSDFFlags.Anisotropic):
+                            message["notes"].append("anisotropic")
+                    self._broken.discard(key)
+                except StateError as error:
+                    message["error"] = str(error)
+                    self._broken.add(key)
+                self.send(text(**message))
+                return True
+        return False
+
+    def _visible(self, state: State) -> list[tuple[int, str, Bsdf]]:
+        """Return the subjects that can be seen, each with its number and key."""
+        keys = [key_of(it) for it in state.subjects]
+        return [
+            (k, keys[k], it)
+            for k, it in enumerate(state.subjects)
+            if not state.hidden[k] and keys[k] not in self._broken
+        ]
+
+    def _draw(self, state: State, serial: int, engine: Engine) -> bool:
+        """Draw the first thing that is missing: pictures first."""
+        setting = stages.Setting.of(state)
+        for view in state.views:
+            for k, key, given in self._visible(state):
+                depends = (setting, state.exposure) if view == "picture" else VIEWS[view].depends(state)
+                wanted = key, state.component if view != "picture" else None, depends
+                if self._shown.get((view, k)) == wanted:
+                    continue
+                self._shown[view, k] = wanted
+                try:
+                    self._draw_one(view, k, given, state, serial, engine)
+                except (StateError, RuntimeError, ValueError) as error:
+                    self.send(text(type="error", text=one_line(error)))
+                return True
+        return False
+
+    def _draw_one(self, view: str, k: int, given: Bsdf, state: State, serial: int, engine: Engine) -> None:
+        bsdf = self.materials.expanded(given)
+        if engine.is_new(bsdf, view if view != "picture" else stages.Setting.of(state)):
+            self.send(text(type="busy", text=f"Compiling {bsdf['type']} …"))
+        if view == "picture":
+            key = key_of(given), stages.Setting.of(state)
+            if self._pictures.get(k, (None,))[0] != key:
+                progress = stages.Progress(engine.stage(key[1].quick()))
+                with self.materials.loaded(bsdf) as loaded:
+                    progress.advance(loaded)
+                self._pictures[k] = key, progress
+            self._send_picture(k, state, serial)
+            return
+        with self.materials.loaded(bsdf) as loaded:
+            for frame in frames(view, ComponentProbe(loaded, state.component), state, serial, k):
+                self.send(frame)
+
+    def _refine(self, state: State, serial: int, engine: Engine) -> bool:
+        """Add a pass to the picture that has the fewest."""
+        if "picture" not in state.views or self.waiting() > BACKLOG:
+            return False
+        setting = stages.Setting.of(state)
+        rough = [
+            (self._pictures[k][1].spp, k, given)
+            for k, key, given in self._visible(state)
+            if k in self._pictures and self._pictures[k][0] == (key, setting) and not self._pictures[k][1].finished
+        ]
+        if not rough:
+            return False
+        _, k, given = min(rough, key=lambda it: it[:2])
+        stage = engine.stage(setting)
+        if self._pictures[k][1].stage is not stage:  # so far it was a quick one
+            self._pictures[k] = self._pictures[k][0], stages.Progress(stage)
+        progress, before = self._pictures[k][1], self._pictures[k][1].spp
+        try:
+            with self.materials.loaded(self.materials.expanded(given)) as loaded:
+                progress.advance(loaded)
+        except StateError:
+            del self._pictures[k]  # or it would be tried for ever
+            raise
+        if engine.denoise and any(before < count <= progress.spp for count in DENOISED_AT):
+            progress.denoised = progress.spp
+            self._send_picture(k, state, serial, engine.denoise)
+        elif not progress.denoised:
+            self._send_picture(k, state, serial)
+        return True
+
+    def _send_picture(self, k: int, state: State, serial: int, denoise: Callable | None = None) -> None:
+        progress = self._pictures[k][1]
+        linear = progress.pixels()
+        payload = stages.encoded(denoise(linear) if denoise else linear, state.exposure)
+        height, width = linear.shape[:2]
+        header = {"width": width, "height": height, "spp": progress.spp, "final": progress.finished}
+        self.send(packed(payload, type="picture", serial=serial, subject=k, denoised=bool(denoise), **header))
+
+    # --- Requests -----------------------------------------------------------------------------------------------------
+
+    def _answer(self, request: dict[str, Any], state: State, engine: Engine) -> None:
+        kind, k = request["type"], request.get("subject", 0)
+        if not isinstance(k, int) or not 0 <= k < len(state.subjects):
+            return
+        try:
+            if kind == "chi2":
+                self._test(k, state)
+            elif kind == "fit":
+                self._fit(k, request, state)
+            elif kind == "save" and request.get("what") == "exr":
+                self._save_exr(k, state)
+            elif kind == "save" and request.get("what") == "page":
+                self._save_page(state, engine, request)
+        except Cancelled:
+            self.send(text(type="fit", subject=k, error="Cancelled."))
+        except (StateError, RuntimeError, ValueError, OSError) as error:
+            self.send(text(type=kind if kind in ("fit", "chi2") else "error", subject=k, error=one_line(error),
+                           text=one_line(error)))  # fmt: skip
+
+    def _test(self, k: int, state: State) -> None:
+        from ..validation import check
+
+        with self.materials.loaded(self.materials.expanded(state.subjects[k])) as bsdf:
+            report = check(bsdf, only=["chi2"], angles=[max(state.theta, 1.0)])
+        told = " ".join(dict.fromkeys(f"{it.subject}: {it.sentence}" for it in report.findings))
+        self.send(text(type="chi2", subject=k, passed=report.passed, text=told))
+
+    def _fit(self, k: int, request: dict[str, Any], state: State) -> None:
+        from ..fit import fit
+
+        bsdf = state.subjects[k]
+        if bsdf["type"] != MEASURED:
+            raise StateError("Only measured files can be fitted.")
+        source = self.materials.files.get(str(bsdf.get("file")))
+        if source is None:
+            raise StateError("This file is not here any more; drop it in again.")
+
+        def progress(done: int, total: int) -> None:
+            if self._cancelled or self.closed:
+                raise Cancelled
+            self.send(text(type="fit", subject=k, done=done, total=total, bsdf=None))
+
+        best = fit(source.source, str(request.get("model")), metric=str(request.get("metric")), starts=4,
+                   progress=progress)[0]  # fmt: skip
+        told = f"Error {best.held_out:.3g} on directions that were not fitted. " + " ".join(best.remarks())
+        self.send(text(type="fit", subject=k, done=1, total=1, bsdf=plain(best.bsdf), text=told.strip()))
+
+    def _save_exr(self, k: int, state: State) -> None:
+        if k not in self._pictures:
+            raise StateError("There is no picture yet.")
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "picture.exr"
+            self._pictures[k][1].bitmap().write(str(file))
+            payload = file.read_bytes()
+        self.send(packed(payload, type="file", name=f"{state.subjects[k]['type']}.exr", mime="image/x-exr"))
+
+    def _save_page(self, state: State, engine: Engine, request: dict[str, Any]) -> None:
+        from .export import page
+
+        payload = page(state, self.materials, engine, request.get("state") or {}).encode()
+        self.send(packed(payload, type="file", name="explorer.html", mime="text/html"))

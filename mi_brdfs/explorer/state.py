@@ -1,0 +1,135 @@
+"""The state of a page: what it shows. It comes from a browser, as data, and is checked before anything is done."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..parameters.messages import brief, listed
+
+SUBJECTS = 4
+"""The most subjects of a page."""
+PARAMETERS = 64
+"""The most parameters of a subject."""
+SIZES = 64, 1024
+"""The least and the largest side of a picture, in pixels."""
+STEEPEST = 89.0
+VIEWS = "picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"
+CHANNELS = "luminance", "rgb", "red", "green", "blue"
+SHAPES = "body", "sphere", "scene"
+NAME, WORD = re.compile(r"[A-Za-z]\w{0,63}(\.\w{1,64}){0,3}"), re.compile(r"[\w .+/-]{0,100}")
+
+Bsdf = dict[str, Any]
+"""A plugin dict of plain values: numbers, words, true or false, and colours as [r, g, b]."""
+
+
+class StateError(ValueError):
+    """A state that cannot be shown, with what is wrong with it in a sentence."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What a page shows; its members are those of the protocol."""
+
+    subjects: tuple[Bsdf, ...]
+    hidden: tuple[bool, ...]
+    theta: float = 45.0
+    phi: float = 0.0
+    channel: str = "luminance"
+    component: int | None = None
+    stage: str = "studio"
+    shape: str = "body"
+    exposure: float = 0.0
+    size: int = 256
+    views: tuple[str, ...] = ("picture", "lobe", "polar", "albedo")
+
+    @property
+    def channels(self) -> list[tuple[str, int | None]]:
+        """The channels of curves, by name and number; None is the luminance."""
+        colours = [("red", 0), ("green", 1), ("blue", 2)]
+        if self.channel == "rgb":
+            return list(colours)
+        return [(self.channel, dict(colours).get(self.channel))]
+
+
+def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> State:
+    """Return the state that a page sent, with the defaults for what it does not say.
+
+    Raises:
+        StateError: if it is not a state.
+    """
+    if not isinstance(data, Mapping):
+        raise StateError("The state of a page is an object.")
+    subjects = data.get("subjects")
+    if not isinstance(subjects, list) or not 1 <= len(subjects) <= SUBJECTS:
+        raise StateError(f"A page has one to {SUBJECTS} subjects.")
+    if not all(isinstance(it, Mapping) for it in subjects):
+        raise StateError("A subject is an object with a bsdf.")
+    views = data.get("views", State.views)
+    if not isinstance(views, (list, tuple)) or not set(map(str, views)) <= set(VIEWS):
+        raise StateError(f"views are {listed(VIEWS)}.")
+    component = data.get("component")
+    return State(
+        subjects=tuple(checked(it.get("bsdf")) for it in subjects),
+        hidden=tuple(bool(it.get("hidden")) for it in subjects),
+        theta=_number(data, "theta", 0, STEEPEST),
+        phi=_number(data, "phi", -360, 360),
+        channel=_word(data, "channel", CHANNELS),
+        component=None if component is None else int(_number(data, "component", 0, 99)),
+        stage=_word(data, "stage", stages),
+        shape=_word(data, "shape", shapes),
+        exposure=_number(data, "exposure", -20, 20),
+        size=int(_number(data, "size", *SIZES)),
+        views=tuple(view for view in VIEWS if view in views),
+    )
+
+
+def checked(bsdf: Any) -> Bsdf:
+    """Return a plugin dict of plain values.
+
+    Raises:
+        StateError: if it is none, or names a file: those are known by names of their own.
+    """
+    if not isinstance(bsdf, Mapping) or not isinstance(bsdf.get("type"), str):
+        raise StateError("A subject needs a bsdf with a type.")
+    if len(bsdf) > PARAMETERS:
+        raise StateError(f"A bsdf has at most {PARAMETERS} parameters.")
+    for name, value in bsdf.items():
+        if not isinstance(name, str) or not NAME.fullmatch(name) or name == "filename":
+            raise StateError(f"{brief(str(name))} cannot be a parameter here.")
+        if not _is_plain(value):
+            raise StateError(f"{name} must be a number, a word, true, false or a colour [r, g, b].")
+    return dict(bsdf)
+
+
+def key_of(value: Any) -> str:
+    """Return a text that is the same for equal values."""
+    return json.dumps(value, sort_keys=True)
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, list):
+        return len(value) == 3 and all(_is_number(it) for it in value)
+    return isinstance(value, bool) or _is_number(value) or (isinstance(value, str) and bool(WORD.fullmatch(value)))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _number(data: Mapping[str, Any], name: str, low: float, high: float) -> float:
+    value = data.get(name, getattr(State, name))
+    if not _is_number(value):
+        raise StateError(f"{name} is a number.")
+    return min(max(float(value), low), high)
+
+
+def _word(data: Mapping[str, Any], name: str, words: Sequence[str]) -> str:
+    value = data.get(name, getattr(State, name))
+    if value not in words:
+        raise StateError(f"{name} = {brief(str(value))!r} is unknown; it is {listed(words)}.")
+    return str(value)

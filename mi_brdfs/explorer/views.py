@@ -1,0 +1,157 @@
+"""The views of one subject, as the frames that a page draws. The plugin itself is asked, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..measure.arrays import luminance
+from ..measure.directions import direction
+from ..measure.probe import BSDFProbe, Part
+from ..measure.variates import lattice, sampling_efficiency
+from ..measured.coordinates import HalfDifference
+from ..plot import lobes
+from .state import State
+
+Frame = str | bytes
+"""A text or a binary frame of the websocket."""
+
+PARALLELS = 40
+PIXELS = 96
+"""The side of a hemisphere and of a slice, in pixels."""
+DOTS = 400
+BINS = 48
+HEAVIEST = 4.0
+"""The last bin of the histogram of weights, in their mean, holds all that are heavier."""
+ANGLES = (0, 10, 20, 30, 40, 50, 60, 70, 75, 80, 85, 88)
+"""The angles of incidence at which the efficiency of the sampler is measured, in degrees."""
+
+
+def text(**message: Any) -> str:
+    """Return a message as a text frame; numbers that are none become null."""
+    return json.dumps(message, allow_nan=False, default=_plain)
+
+
+def packed(payload: bytes, **header: Any) -> bytes:
+    """Return a binary frame: the length of the header, the header, and the payload, which begins at a multiple of 4."""
+    words = json.dumps(header, default=_plain).encode()
+    words += b" " * (-len(words) % 4)
+    return len(words).to_bytes(4, "little") + words + payload
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [float(f"{it:.5g}") if np.isfinite(it) else None for it in value.ravel().tolist()]
+    return value.item()
+
+
+@dataclass
+class ComponentProbe(BSDFProbe):
+    """A probe whose whole is one component, where the BSDF has it."""
+
+    component: int | None = None
+
+    @cached_property
+    def whole(self) -> Part:
+        found = [part for part in self.components if part.component == self.component]
+        return found[0] if found else BSDFProbe(self.bsdf).whole
+
+
+@dataclass
+class View:
+    """One kind of view: what it depends on, besides the BSDF and the component, and how it is drawn."""
+
+    depends: Callable[[State], Any]
+    frames: Callable[[ComponentProbe, State], Iterator[dict[str, Any]]]
+    """Yield what goes into frames, with the ``payload`` of binary ones."""
+
+
+def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    for k, mesh in enumerate(lobes.meshes(probe, state.theta, state.phi, PARALLELS, state.channels[0][1])):
+        wo = mesh.wo.astype(np.float64)
+        theta = np.degrees(np.arctan2(np.hypot(wo[:, 0, 0], wo[:, 0, 1]), abs(wo[:, 0, 2])))
+        phi = np.degrees(np.unwrap(np.arctan2(wo[-1, :, 1], wo[-1, :, 0])))
+        yield {"payload": mesh.value.astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
+
+
+def _cut(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    curves = [
+        {"channel": name, "x": curve.theta, "y": curve.value}
+        for name, channel in state.channels
+        for curve in [lobes.in_plane_of_incidence(probe, state.theta, state.phi, channel)]
+    ]
+    yield {"curves": curves}
+
+
+def _albedo(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    curves = [
+        {"channel": name, "x": curve.theta, "y": curve.value}
+        for name, channel in state.channels
+        for curve in [lobes.albedo(probe, state.phi, channel)]
+    ]
+    yield {"curves": curves}
+
+
+def _slice(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    at = (np.arange(PIXELS) + 0.5) * (np.pi / 2) / PIXELS
+    theta_h, theta_d = (it.ravel() for it in np.meshgrid(at, at))
+    wi, wo = HalfDifference().directions(np.sqrt(theta_h * 2 / np.pi), theta_d, np.full(theta_h.shape, np.pi / 2))
+    pair = [np.stack(np.broadcast_arrays(w.x, w.y, w.z), axis=-1).astype(np.float32) for w in (wi, wo)]
+    seen = np.minimum(pair[0][:, 2], pair[1][:, 2]) > 1e-3
+    wi_seen, wo_seen = (np.where(seen[:, None], w, np.array([0, 0, 1], np.float32)) for w in pair)
+    f = lobes.value(probe, wi_seen, wo_seen, state.channels[0][1]) / wo_seen[:, 2]
+    values = np.where(seen, f, np.nan)
+    yield {"payload": values.astype("<f4").tobytes(), "width": PIXELS, "height": PIXELS}
+
+
+def _hemisphere(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    for side in (1, -1) if lobes.transmits(probe) else (1,):
+        picture = lobes.disc(probe, state.theta, state.phi, side, PIXELS, state.channels[0][1])
+        yield {"payload": picture.astype("<f4").tobytes(), "width": PIXELS, "height": PIXELS, "below": side < 0}
+
+
+def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    wi, points = direction(state.theta, state.phi), lattice(8, 3)
+    samples = probe.sample(probe.whole, wi, points)
+    weight = luminance(samples.weight)
+    mean = weight.mean()
+    counts, edges = np.histogram(np.minimum(weight / (mean or 1), HEAVIEST), BINS, (0, HEAVIEST))
+    angles = np.array([direction(theta, state.phi) for theta in ANGLES])
+    eta = sampling_efficiency(luminance(probe.weights(probe.whole, angles, lattice(7, 5))))
+    yield {
+        "eta": {"x": np.array(ANGLES, float), "y": eta},
+        "histogram": {"edges": edges, "count": counts.tolist()},
+        "dots": [[round(float(it), 4) for it in w] for w in samples.wo[samples.lit][:DOTS]],
+        "efficiency": float(sampling_efficiency(weight)),
+    }
+
+
+def _at_wi(state: State) -> Any:
+    return state.theta, state.phi, state.channel
+
+
+VIEWS = {
+    "lobe": View(_at_wi, _lobe),
+    "polar": View(_at_wi, _cut),
+    "cartesian": View(_at_wi, _cut),
+    "albedo": View(lambda state: (state.phi, state.channel), _albedo),
+    "slice": View(lambda state: state.channel, _slice),
+    "hemisphere": View(_at_wi, _hemisphere),
+    "sampler": View(lambda state: (state.theta, state.phi), _sampler),
+}
+"""By name, in the order in which they are drawn."""
+
+
+def frames(name: str, probe: ComponentProbe, state: State, serial: int, subject: int) -> Iterable[Frame]:
+    """Yield the frames of a view of a subject."""
+    for found in VIEWS[name].frames(probe, state):
+        common = {"serial": serial, "subject": subject}
+        if "payload" in found:
+            yield packed(found.pop("payload"), type=name, **common, **found)
+        else:
+            yield text(type="view", view=name, **common, **found)

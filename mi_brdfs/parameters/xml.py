@@ -1,0 +1,25 @@
+"""Plugin dicts as XML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+
+def to_xml(bsdf: Mapping[str, Any]) -> str:
+    """Return a plugin dict of numbers, words and rgb colours as XML, to paste into a scene."""
+    lines = [f"    {_element(name, value)}" for name, value in bsdf.items() if name != "type"]
+    return "\n".join([f"<bsdf type={quoteattr(bsdf['type'])}>", *lines, "</bsdf>"])
+
+
+def _element(name: str, value: Any) -> str:
+    if isinstance(value, dict):
+        kind, text = "rgb", ", ".join(f"{number:.7g}" for number in value["value"])
+    elif isinstance(value, bool):
+        kind, text = "boolean", str(value).lower()
+    elif isinstance(value, str):
+        kind, text = "string", value
+    else:
+        kind, text = "float", f"{value:.7g}"
+    return f"<{kind} name={quoteattr(name)} value={quoteattr(text)}/>"

@@ -1,0 +1,379 @@
+"""The explorer without a browser: what a page sends, and what it gets."""
+
+import json
+import re
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import ROOT
+
+from mi_brdfs.explorer.engine import Engine
+from mi_brdfs.explorer.export import page
+from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
+from mi_brdfs.explorer.session import Session
+from mi_brdfs.explorer.stages import UserScene
+from mi_brdfs.explorer.state import StateError, checked, parse
+from mi_brdfs.explorer.tours import parse as parse_tour
+from mi_brdfs.explorer.tours import tours
+from mi_brdfs.measure.sources import find_sources
+from mi_brdfs.mitsuba.registry import own_models
+
+STAGES = ["studio", "lamp", "point"]
+LOFT = str(ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf")
+MODELS = [model.plugins[0] for model in own_models()]
+
+
+class Client:
+    """A page in this thread: its states are worked off at once."""
+
+    def __init__(self, user=None, sources=()):
+        self.engine, self.frames = Engine("llvm_ad_rgb", user or UserScene()), []
+        self.engine.denoise = None
+        self.waiting = 0
+        self.session = Session(
+            Materials({it.word: it for it in sources}), self.frames.append, lambda: self.waiting
+        )  # fmt: skip
+        self.serial = 0
+
+    def send(self, bsdf, *others, **members):
+        self.serial += 1
+        subjects = [{"bsdf": it} for it in (bsdf, *others)]
+        self.session.show(parse({"subjects": subjects, **members}, STAGES, ("body", "sphere", "scene")), self.serial)
+
+    def work(self, steps=200):
+        """What came, by type or view: header, payload."""
+        self.frames.clear()
+        for _ in range(steps):
+            if not self.session.step(self.engine):
+                break
+        return [opened(frame) for frame in self.frames]
+
+    def show(self, bsdf, *others, refine=False, **members):
+        self.send(bsdf, *others, **members)
+        self.waiting = 0 if refine else 99
+        found = self.work()
+        assert not [it for it in found if it["type"] == "error"], found
+        return found
+
+
+def opened(frame):
+    if isinstance(frame, str):
+        return json.loads(frame)
+    end = 4 + int.from_bytes(frame[:4], "little")
+    assert end % 4 == 0
+    return {**json.loads(frame[4:end]), "payload": frame[end:]}
+
+
+def of(found, name, subject=0):
+    return [it for it in found if it.get("view", it["type"]) == name and it.get("subject", subject) == subject]
+
+
+@pytest.fixture
+def client(llvm_rgb):
+    return Client()
+
+
+# --- States -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("state", "sentence"),
+    [
+        ([], "The state of a page is an object"),
+        ({}, "one to 4 subjects"),
+        ({"subjects": []}, "one to 4 subjects"),
+        ({"subjects": [{"bsdf": {"type": "ward"}}] * 5}, "one to 4 subjects"),
+        ({"subjects": [3]}, "A subject is an object"),
+        ({"subjects": [{"bsdf": {"alpha": 1}}]}, "needs a bsdf with a type"),
+        ({"subjects": [{"bsdf": {"type": "tabulated", "filename": "/etc/passwd"}}]}, "filename cannot be a parameter"),
+        ({"subjects": [{"bsdf": {"type": "ward", "alpha": {"type": "bitmap"}}}]}, "alpha must be a number"),
+        ({"subjects": [{"bsdf": {"type": "ward", "alpha": float("nan")}}]}, "alpha must be a number"),
+        ({"subjects": [{"bsdf": {"type": "ward", "x" * 99: 1}}]}, "cannot be a parameter"),
+        ({"subjects": [{"bsdf": {"type": "ward"}}], "theta": "steep"}, "theta is a number"),
+        ({"subjects": [{"bsdf": {"type": "ward"}}], "stage": "moon"}, "stage = 'moon' is unknown"),
+        ({"subjects": [{"bsdf": {"type": "ward"}}], "views": ["xray"]}, "views are picture"),
+    ],
+)
+def test_a_state_that_is_none_is_refused_in_a_sentence(state, sentence):
+    with pytest.raises(StateError, match=re.escape(sentence)):
+        parse(state, STAGES)
+
+
+def test_numbers_beyond_their_range_are_brought_into_it():
+    state = parse({"subjects": [{"bsdf": {"type": "ward"}}], "theta": 200, "size": 1e9}, STAGES)
+    assert (state.theta, state.size) == (89, 1024)
+
+
+def test_no_type_or_word_of_a_page_reads_a_file(llvm_rgb):
+    for bsdf in (
+        {"type": "tabulated", "file": "/etc/passwd"},
+        {"type": "given", "file": LOFT},
+        {"type": "measured"},
+        {"type": "../ward"},
+        {"type": "twosided"},
+    ):
+        with pytest.raises(StateError):
+            Materials().expanded(checked(bsdf))
+    with (
+        pytest.raises(StateError, match="is unknown"),
+        Materials().loaded(checked({"type": "walter", "material": "../../../etc/passwd"})),
+    ):
+        pass
+
+
+# --- Subjects ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [it["name"] for it in kinds()])
+def test_every_plugin_opens_with_its_controls(client, name):
+    found = client.show({"type": name}, views=["polar", "sampler"])
+    (told,) = of(found, "subject")
+    assert told["error"] is None and told["controls"] and told["xml"].startswith("<bsdf")
+    assert of(found, "polar")[0]["curves"][0]["channel"] == "luminance"
+    assert len(of(found, "sampler")[0]["histogram"]["count"]) > 9
+
+
+def test_controls_have_the_declared_ranges(client):
+    controls = {
+        it["name"]: it for it in of(client.show({"type": "ward", "alpha": 0.3}, views=[]), "subject")[0]["controls"]
+    }
+    assert controls["alpha"]["value"] == 0.3 and controls["alpha"]["scale"] == "log"
+    assert controls["alpha_u"]["value"] is None and controls["alpha_u"]["excludes"] == ["alpha"]
+    assert controls["alpha_u"]["also"] == {"alpha_v": 0.3}
+    assert "duer" in " ".join(controls["variant"]["words"])
+    assert controls["diffuse_reflectance"]["kind"] == "colour" and controls["diffuse_reflectance"]["high"] == 1
+
+
+CHANGES = [
+    ({"type": "ward", "alpha": 0.2}, {"alpha": 0.4}),
+    ({"type": "ward", "alpha": 0.2}, {"variant": "ward-duer"}),
+    ({"type": "walter", "alpha": 0.2}, {"diffuse_reflectance": [0.5, 0.1, 0.1]}),
+    ({"type": "walter", "alpha": 0.2}, {"f0": [0.1, 0.1, 0.1]}),
+    ({"type": "roughdiffuse", "alpha": 0.8}, {"use_fast_approx": True}),
+    ({"type": "phong"}, {"exponent": 300.0}),
+    ({"type": "roughconductor", "alpha": 0.2}, {"alpha": 0.3}),
+    ({"type": "roughplastic"}, {"eta": 2.0}),
+]
+
+
+@pytest.mark.parametrize(("before", "change"), CHANGES, ids=[f"{b['type']}-{next(iter(c))}" for b, c in CHANGES])
+def test_each_kind_of_control_changes_picture_and_curves(client, before, change):
+    first = client.show(before, views=["picture", "polar"], size=64)
+    second = client.show({**before, **change}, views=["picture", "polar"], size=64)
+    assert of(first, "picture")[0]["payload"] != of(second, "picture")[0]["payload"]
+    assert of(first, "polar")[0]["curves"][0]["y"] != of(second, "polar")[0]["curves"][0]["y"]
+    assert of(second, "polar")[0]["serial"] == 2
+
+
+def test_an_error_is_the_plugins_sentence_and_the_others_live_on(client):
+    found = client.show({"type": "ward", "alpha": -1}, {"type": "lambert"}, views=["polar"])
+    assert "ward: alpha = -1 is not allowed" in of(found, "subject")[0]["error"]
+    assert not of(found, "polar") and of(found, "polar", 1)
+    assert of(client.show({"type": "ward", "alpha": 0.1}, {"type": "lambert"}, views=["polar"]), "polar")
+
+
+@pytest.mark.parametrize("name", ["kurt", "lafortune"])
+def test_lobes_are_added_and_removed(client, name):
+    materials, bsdf = (
+        Materials(),
+        {"type": name, "exponent": 9.0} if name == "lafortune" else {"type": name, "alpha": 0.3},
+    )
+    for count in (1, 2, 3, 2, 1):
+        bsdf = materials.expanded({**bsdf, "lobes": str(count)})
+        assert "lobes" not in bsdf
+        with materials.loaded(bsdf) as loaded:
+            assert loaded.component_count() == count + 1  # and the diffuse one
+    assert bsdf["exponent" if name == "lafortune" else "alpha"] == (9.0 if name == "lafortune" else 0.3)
+
+
+def test_a_preset_is_its_plugin_with_its_values(client):
+    (told,) = of(client.show({"type": "preset", "name": "ngan/ward/blue-acrylic"}, views=[]), "subject")
+    assert told["bsdf"]["type"] == "ward" and told["bsdf"]["alpha"] > 0
+
+
+def test_the_copied_xml_and_dict_give_the_same_picture(client):
+    bsdf = {
+        "type": "ward",
+        "alpha_u": 0.1,
+        "alpha_v": 0.3,
+        "specular_reflectance": [0.9, 0.5, 0.2],
+        "variant": "ward-duer",
+    }
+    found = client.show(bsdf, views=["picture", "polar"], size=64)
+    told, picture = of(found, "subject")[0], of(found, "picture")[0]
+    stage = client.session._pictures[0][1].stage
+    for again in (mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.load_dict(eval(told["dict"]))):
+        from mi_brdfs.explorer.stages import Progress, encoded
+
+        progress = Progress(stage)
+        progress.advance(again)
+        assert encoded(progress.pixels(), 0) == picture["payload"]
+    assert told["command"].startswith("mi-brdfs show ward -D alpha_u=0.1")
+
+
+# --- Work -------------------------------------------------------------------------------------------------------------
+
+
+def test_only_the_last_of_many_edits_is_drawn(client):
+    client.show({"type": "ward", "alpha": 0.5}, views=["polar"])
+    for k in range(100):
+        client.send({"type": "ward", "alpha": 0.1 + 0.001 * k}, views=["polar"])
+    found = client.work()
+    assert [it["serial"] for it in of(found, "polar")] == [101]
+
+
+def test_what_did_not_change_is_not_drawn_again(client):
+    client.show({"type": "ward"}, {"type": "lambert"}, views=["polar", "albedo"])
+    assert not of(client.show({"type": "ward"}, {"type": "lambert"}, views=["polar", "albedo"], wipe=0.7), "polar")
+    found = client.show({"type": "ward"}, {"type": "lambert"}, views=["polar", "albedo"], theta=60)
+    assert of(found, "polar") and of(found, "polar", 1) and not of(found, "albedo")
+
+
+def test_no_kernel_is_compiled_where_a_value_changes(client):
+    views = ["picture", "lobe", "polar", "albedo", "slice", "sampler"]
+    bsdf = {"type": "walter", "alpha": 0.3, "diffuse_reflectance": [0.2, 0.1, 0.1]}
+    for theta in (30, 50):  # lobes have as many lines as the sampler asks for: sizes differ, kernels do not
+        client.show(bsdf, views=views, size=64, theta=theta)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        client.show({**bsdf, "alpha": 0.2, "diffuse_reflectance": [0.3, 0.2, 0.1]}, views=views, size=64, theta=40)
+        history = [it for it in dr.kernel_history() if it["type"] == dr.KernelType.JIT]
+    assert history and all(it["cache_hit"] for it in history)
+
+
+def test_pictures_are_refined_until_they_are_finished(client):
+    found = of(client.show({"type": "lambert"}, views=["picture"], size=64, refine=True), "picture")
+    spp = [it["spp"] for it in found]
+    assert spp == sorted(spp) and spp[-1] >= 256 and found[-1]["final"] and not found[0]["final"]
+    pixels = np.frombuffer(found[-1]["payload"], np.uint8).reshape(64, 64, 4)
+    assert (pixels[..., 3] == 255).all() and 60 < pixels[..., :3].mean() < 200
+
+
+def test_exposure_makes_brighter_without_rendering_anew(client):
+    first = of(client.show({"type": "lambert"}, views=["picture"], size=64), "picture")[0]
+    brighter = of(client.show({"type": "lambert"}, views=["picture"], size=64, exposure=1), "picture")[0]
+    assert brighter["spp"] == first["spp"]
+    assert np.frombuffer(brighter["payload"], np.uint8).mean() > np.frombuffer(first["payload"], np.uint8).mean() + 10
+
+
+def test_views_hold_the_plugins_values(client):
+    """A diffuse BRDF is ρ/π everywhere, its lobe ρ cosθ/π, its albedo ρ, and its sampler perfect."""
+    views = ["lobe", "polar", "albedo", "slice", "hemisphere", "sampler"]
+    found = client.show({"type": "lambert", "reflectance": 0.5}, views=views)
+    lobe, cut, albedo, cells, disc, sampler = (of(found, name)[0] for name in views)
+    values = np.frombuffer(lobe["payload"], np.float32).reshape(len(lobe["theta"]), len(lobe["phi"]))
+    expected = 0.5 / np.pi * np.cos(np.radians(lobe["theta"]))
+    np.testing.assert_allclose(values, expected[:, None] + 0 * values, atol=1e-5)
+    curve = cut["curves"][0]
+    np.testing.assert_allclose(curve["y"], 0.5 / np.pi * np.cos(np.radians(curve["x"])), atol=1e-5)
+    np.testing.assert_allclose(albedo["curves"][0]["y"], 0.5, rtol=1e-4)
+    f = np.frombuffer(cells["payload"], np.float32)
+    np.testing.assert_allclose(f[np.isfinite(f)], 0.5 / np.pi, rtol=1e-4)
+    assert np.isfinite(f).mean() > 0.99  # all but grazing directions
+    middle = np.frombuffer(disc["payload"], np.float32).reshape(disc["height"], -1)[
+        disc["height"] // 2, disc["width"] // 2
+    ]
+    assert middle == pytest.approx(0.5 / np.pi, rel=1e-3)
+    assert sampler["efficiency"] == pytest.approx(1, abs=1e-5) and len(sampler["dots"]) > 100
+
+
+def test_channels_and_components(client):
+    bsdf = {"type": "ward", "diffuse_reflectance": [0.8, 0.4, 0.1], "specular_reflectance": 0.1}
+    rgb = of(client.show(bsdf, views=["albedo"], channel="rgb"), "albedo")[0]["curves"]
+    assert [it["channel"] for it in rgb] == ["red", "green", "blue"]
+    assert rgb[0]["y"][0] - rgb[2]["y"][0] == pytest.approx(0.7, abs=1e-3)
+    whole = of(client.show(bsdf, views=["polar"]), "polar")[0]["curves"][0]["y"]
+    parts = [of(client.show(bsdf, views=["polar"], component=k), "polar")[0]["curves"][0] for k in (0, 1)]
+    assert max(max(it["y"]) for it in parts) < max(whole)
+
+
+def test_chi_square_on_request(client):
+    client.show({"type": "walter", "alpha": 0.2}, views=[])
+    client.session.ask({"type": "chi2", "subject": 0})
+    (answer,) = of(client.work(), "chi2")
+    assert answer["passed"] and "p-value" in answer["text"], answer
+
+
+# --- Files ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def with_file(llvm_rgb):
+    return Client(sources=list(find_sources(LOFT)))
+
+
+def test_a_measured_file_opens_and_is_fitted(with_file):
+    subject = {"type": "tabulated", "file": LOFT}
+    found = with_file.show(subject, views=["polar"])
+    assert of(found, "subject")[0]["error"] is None and of(found, "polar")[0]["curves"][0]["y"]
+    with_file.session.ask({"type": "fit", "subject": 0, "model": "lambert", "metric": "log"})
+    *progress, last = of(with_file.work(), "fit")
+    assert progress and progress[-1]["done"] <= progress[-1]["total"]
+    assert last["bsdf"]["type"] == "lambert" and "Error" in last["text"]
+    assert of(with_file.show(subject, last["bsdf"], views=["polar"]), "polar", 1)
+
+
+def test_a_fit_is_cancelled(with_file):
+    with_file.show({"type": "tabulated", "file": LOFT}, views=[])
+    with_file.session.ask({"type": "fit", "subject": 0, "model": "lambert", "metric": "log"})
+    with_file.session.send = lambda frame: with_file.session.ask({"type": "cancel"}) or with_file.frames.append(frame)
+    assert of(with_file.work(), "fit")[-1]["error"] == "Cancelled."
+
+
+def test_the_users_scene_has_its_material_replaced(llvm_rgb):
+    scene = ROOT / "scenes" / "cornell_box.xml"
+    client = Client(UserScene(scene))
+    first = of(
+        client.show({"type": "lambert", "reflectance": 0.1}, views=["picture"], shape="scene", size=64), "picture"
+    )
+    second = of(
+        client.show({"type": "lambert", "reflectance": 0.9}, views=["picture"], shape="scene", size=64), "picture"
+    )
+    assert first[0]["payload"] != second[0]["payload"]
+    client = Client(UserScene(scene, "nothing"))
+    client.send({"type": "lambert"}, views=["picture"], shape="scene")
+    client.waiting = 99
+    (error,) = of(client.work(), "error")
+    assert "has no material nothing; it has" in error["text"]
+
+
+def test_the_exported_page_needs_no_network_and_is_small(client, llvm_rgb):
+    data = {"subjects": [{"bsdf": {"type": "ward"}}, {"bsdf": {"type": "lambert"}}]}
+    text = page(parse(data, STAGES), Materials(), client.engine, data)
+    assert len(text) < 3e6
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
+    frames = json.loads(re.search(r'id="exported">(.*?)</script>', text, re.DOTALL)[1])["frames"]
+    kinds_sent = [
+        json.loads(it["text"]).get("view", "subject") if "text" in it else it["header"]["type"] for it in frames
+    ]
+    assert {"picture", "lobe", "polar", "albedo", "slice", "sampler"} <= set(kinds_sent)
+
+
+# --- Tours ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_tour_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="a tour has a title"):
+        parse_tour("x", "# Title\n\n## Step\n\nno state\n")
+
+
+def test_there_are_six_tours():
+    assert len(tours()) >= 6
+
+
+@pytest.mark.parametrize("tour", tours(), ids=lambda it: it["name"])
+def test_every_step_of_a_tour_can_be_shown(client, tour):
+    state = {"subjects": [{"bsdf": {"type": "walter"}}]}
+    for step in tour["steps"]:
+        state |= step["state"]
+        subjects = [it["bsdf"] for it in state["subjects"]]
+        found = client.show(*subjects, **{k: v for k, v in state.items() if k != "subjects"} | {"views": ["polar"]})
+        assert not [it["error"] for it in of(found, "subject") if it["error"]], step["title"]
+        assert step["text"]
+
+
+def test_built_ins_that_are_offered_exist(llvm_rgb):
+    for name in BUILT_IN:
+        assert isinstance(mi.load_dict({"type": name}), mi.BSDF)

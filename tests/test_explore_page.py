@@ -1,0 +1,421 @@
+"""The explorer's page in Chromium, where it is installed, and its server by its own process."""
+
+import asyncio
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from latency import Page, edited, serving
+from support import ROOT
+
+from mi_brdfs.explorer import explore
+from mi_brdfs.mitsuba.registry import own_models
+
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@pytest.fixture(scope="module")
+def address():
+    process, address = serving("ward", "walter", "-D", "alpha=0.2")
+    yield address
+    process.terminate()
+    process.wait(20)
+
+
+# --- The server -------------------------------------------------------------------------------------------------------
+
+
+def connected(address, conversation):
+    """Run a conversation over a new socket."""
+    from aiohttp import ClientSession
+
+    async def talk():
+        async with ClientSession() as client, client.ws_connect(f"{address}socket", max_msg_size=1 << 26) as ws:
+            page = Page(ws)
+            hello = await page.frame()
+            return await conversation(page, hello, client)
+
+    return asyncio.run(talk())
+
+
+def test_the_server_greets_and_answers(address):
+    async def conversation(page, hello, client):
+        assert hello["type"] == "hello" and len(hello["presets"]) > 1000
+        assert [it["bsdf"]["type"] for it in hello["state"]["subjects"]] == ["ward", "walter"]
+        await page.send({"type": "lambert"}, views=["picture", "polar"])
+        found = await page.until("picture", "polar")
+        assert found["picture"]["spp"] == 1
+
+    connected(address, conversation)
+
+
+@pytest.mark.parametrize(
+    ("message", "sentence"),
+    [
+        ("no JSON", "This is no message"),
+        ("{}", "This is no message"),
+        ('{"type": "shell"}', "There is no message 'shell'"),
+        ('{"type": "state", "state": {"subjects": []}}', "one to 4 subjects"),
+        ('{"type": "state", "serial": "x", "state": {"subjects": [{"bsdf": {"type": "ward"}}]}}', "This is no message"),
+        (
+            '{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "filename": "/etc/passwd"}}]}}',
+            "filename",
+        ),
+    ],
+)
+def test_a_malformed_message_is_answered_in_a_sentence(address, message, sentence):
+    async def conversation(page, hello, client):
+        await page.socket.send_str(message)
+        assert sentence in (await page.frame())["text"]
+        await page.send({"type": "lambert"}, views=["polar"])
+        await page.until("polar")
+
+    connected(address, conversation)
+
+
+def test_other_pages_of_the_browser_are_refused(address):
+    from aiohttp import ClientSession, WSServerHandshakeError
+
+    async def talk():
+        async with ClientSession() as client:
+            for headers in ({"Host": "evil.example"}, {"Origin": "https://evil.example"}):
+                async with client.get(address, headers=headers) as answer:
+                    assert answer.status == 403
+                async with client.post(f"{address}upload", headers=headers) as answer:
+                    assert answer.status == 403
+                with pytest.raises(WSServerHandshakeError):
+                    await client.ws_connect(f"{address}socket", headers=headers)
+            for path in ("client/../server.py", "client/..%2fserver.py", "client/server.py", "etc/passwd"):
+                async with client.get(address + path) as answer:
+                    assert answer.status == 404
+
+    asyncio.run(talk())
+
+
+def uploaded(address, name, payload):
+    from aiohttp import ClientSession, FormData
+
+    async def talk():
+        async with ClientSession() as client:
+            form = FormData(quote_fields=False)
+            form.add_field("file", payload, filename=name)
+            async with client.post(f"{address}upload", data=form) as answer:
+                return answer.status, await answer.json()
+
+    return asyncio.run(talk())
+
+
+def test_an_uploaded_file_is_a_subject(address):
+    status, answer = uploaded(address, "../../black.bsdf", LOFT.read_bytes())
+    assert status == 200 and answer["name"] == "black.bsdf"
+
+    async def conversation(page, hello, client):
+        await page.send({"type": "tabulated", "file": answer["file"]}, views=["picture", "polar"])
+        found = await page.until("subject", "picture", "polar")
+        assert found["subject"]["error"] is None
+
+    connected(address, conversation)
+
+
+@pytest.mark.parametrize(
+    ("name", "payload"),
+    [("x.binary", b"no MERL file"), ("x.bsdf", b"\0" * 1000), ("x", b""), ("x.exr", os.urandom(5000))],
+)
+def test_a_malformed_upload_is_refused_in_a_sentence(address, name, payload):
+    status, answer = uploaded(address, name, payload)
+    assert status == 422 and answer["error"] and "/tmp" not in answer["error"] and "Traceback" not in answer["error"]
+    test_the_server_greets_and_answers(address)
+
+
+def test_an_upload_that_is_too_large_is_refused(address):
+    status, answer = uploaded(address, "x.binary", bytes((64 << 20) + (1 << 18)))
+    assert (status, answer) == (413, {"error": "A file may have 64 MiB at most."})
+
+
+def test_a_page_that_is_killed_leaves_the_server_alive(address):
+    async def conversation(page, hello, client):
+        await page.send({"type": "ward"}, views=["picture"], size=512)
+        page.socket._response.connection.transport.abort()
+
+    connected(address, conversation)
+    test_the_server_greets_and_answers(address)
+
+
+def test_a_hundred_edits_a_second_do_not_queue_up(address):
+    async def conversation(page, hello, client):
+        await page.send({"type": "ward"}, views=["picture", "polar"])
+        told = await page.until("subject", "picture", "polar")
+        rng, bsdf = np.random.default_rng(2), told["subject"]["bsdf"]
+        start = time.perf_counter()
+        for k in range(200):
+            await page.send(edited(bsdf, told["subject"]["controls"], rng), views=["picture", "polar"])
+            await asyncio.sleep(max(0, start + 0.01 * (k + 1) - time.perf_counter()))
+        found = await page.until("picture", "polar")
+        return found["seconds"]
+
+    assert connected(address, conversation) < 3
+
+
+def test_a_port_in_use_is_said_in_a_sentence():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        command = [sys.executable, "-m", "mi_brdfs", "explore", "--no-browser", "--port", str(taken.getsockname()[1])]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and re.search(r"port \d+ is in use; choose another", done.stderr)
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_it():
+    process, address = serving("lambert")
+    connected(address, lambda page, hello, client: page.send({"type": "lambert"}))
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 130
+
+
+def test_a_notebook_gets_its_page_and_ends_it():
+    page = explore(
+        {"type": "ward", "alpha": 0.3, "specular_reflectance": {"type": "rgb", "value": [1, 0, 0]}}, "lambert"
+    )
+    assert "<iframe" in page._repr_html_() and "alpha" in page.address
+    connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
+    page.close()
+    with pytest.raises(OSError):
+        connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
+
+
+def test_wrong_arguments_are_told_in_a_sentence():
+    for arguments, sentence in (
+        (["wrd"], "ward"),
+        (["ward"] * 5, "4 BSDFs at most"),
+        (["ward", "--scene", "none.xml"], "no such file"),
+        (["ward", "--environment", "none.exr"], "no such file"),
+        (["ward", "-D", "alpah=1", "--export", "x.html"], "alpah"),
+        (["ward", "--export", "none/x.html"], "there is no folder"),
+    ):
+        command = [sys.executable, "-m", "mi_brdfs", "explore", "--no-browser", "--port", "0", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        assert done.returncode != 0 and sentence in done.stderr and "Traceback" not in done.stderr, done.stderr
+
+
+@pytest.mark.slow
+def test_random_edits_leave_the_memory_as_it_is():
+    """Thirty minutes, or as many as MI_BRDFS_MINUTES says, of edits of every model: nothing crashes or gets stuck."""
+    minutes = float(os.environ.get("MI_BRDFS_MINUTES", 30))
+    process, address = serving("lambert")
+    sizes = []
+
+    async def conversation(page, hello, client):
+        rng, told = np.random.default_rng(3), {}
+        views = ["picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"]
+        for name in hello["models"]:  # all kernels
+            await page.send({"type": name}, views=views)
+            told[name] = (await page.until("subject", *views))["subject"]
+        start = time.perf_counter()
+        while time.perf_counter() - start < 60 * minutes:
+            name = hello["models"][rng.integers(len(told))]
+            for _ in range(rng.integers(1, 20)):
+                bsdf = edited(told[name]["bsdf"] or {"type": name}, told[name]["controls"], rng)
+                stage = ("studio", "lamp", "point")[rng.integers(3)]
+                await page.send(bsdf, views=views, theta=float(rng.uniform(0, 89)), stage=stage)
+                await asyncio.sleep(rng.exponential(0.02))
+            await page.until(*views)
+            sizes.append(int(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process.pid}/status").read_text())[1]) / 1024)
+
+    try:
+        connected(address, conversation)
+    finally:
+        process.terminate()
+    settled, last = np.median(sizes[len(sizes) // 10 : len(sizes) // 5]), np.median(sizes[-len(sizes) // 10 :])
+    assert last - settled < 50, f"{settled:.0f} MB became {last:.0f} MB in {len(sizes)} rounds"
+
+
+# --- The page ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium")
+    playwright = pytest.importorskip("playwright.sync_api", reason="there is no Playwright")
+    with playwright.sync_playwright() as running:
+        flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        yield running.chromium.launch(executable_path=CHROMIUM, args=flags)
+
+
+@pytest.fixture
+def tab(browser):
+    """A page of 1440 pixels, in which no script may fail."""
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page, errors = context.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.set_default_timeout(60_000)
+    yield page
+    context.close()
+    assert not errors
+
+
+def opened(tab, address, state=None):
+    """Open a page, and wait until it shows a picture."""
+    tab.goto("about:blank")
+    tab.goto(address + (f"#{json.dumps(state)}" if state else ""))
+    drawn(tab)
+    return tab
+
+
+def drawn(tab):
+    tab.wait_for_function(
+        "() => [...document.querySelectorAll('.pictures canvas')].some(it => it.width > 1 && "
+        "it.getContext('2d').getImageData(0, 0, it.width, it.height).data.some(v => v > 0 && v < 255))"
+    )
+
+
+def looks(tab, what=".pictures canvas"):
+    """A number that changes with a picture."""
+    return tab.evaluate(f"() => [...document.querySelectorAll('{what}')].map(it => it.toDataURL()).join()")
+
+
+def changes(tab, act, what=".pictures canvas"):
+    """Do something, and wait until a picture is another one."""
+    before = looks(tab, what)
+    act()
+    tab.wait_for_function(
+        f"before => [...document.querySelectorAll('{what}')].map(it => it.toDataURL()).join() !== before", arg=before
+    )
+
+
+STILL = {"stage": "point", "views": ["picture", "lobe", "polar"]}
+
+
+def test_the_page_shows_what_it_was_started_with(tab, address):
+    opened(tab, address)
+    assert tab.locator("#chips").inner_text().split() == ["ward", "walter"]
+    assert tab.locator("#view-polar svg path").count() > 1
+    assert tab.locator(".pictures canvas").count() == 2
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(it.plugins[0], marks=[] if it.plugins[0] == "kurt" else pytest.mark.slow) for it in own_models()],
+)
+def test_every_model_opens(tab, address, name):
+    opened(tab, address, {"subjects": [{"bsdf": {"type": name}, "name": name}], **STILL})
+    assert tab.locator("#controls input").count()
+    assert not tab.locator("#alert").is_visible() and tab.locator("#subject-error").inner_text() == ""
+
+
+def test_each_kind_of_control_changes_the_picture(tab, address):
+    ward = {"type": "ward", "alpha": 0.2, "specular_reflectance": [0.3, 0.3, 0.3]}
+    opened(tab, address, {"subjects": [{"bsdf": ward, "name": "ward"}], **STILL, "views": ["picture", "polar"]})
+    curve = "() => document.querySelector('#view-polar svg').outerHTML"
+
+    def moved(act):
+        before = tab.evaluate(curve)
+        act()
+        tab.wait_for_function(f"before => ({curve})() !== before", arg=before)
+
+    number = tab.get_by_label("alpha, as a number")
+    moved(lambda: (number.fill("0.4"), number.press("Enter")))
+    moved(lambda: tab.locator("#controls input[type=range]").nth(2).press("ArrowLeft"))
+    moved(lambda: tab.locator("#controls select").first.select_option("ward-duer"))
+    red = tab.get_by_label("specular_reflectance, red")
+    moved(lambda: (red.fill("0.9"), red.press("Enter")))
+    moved(lambda: (tab.locator("#theta-field").fill("70"), tab.locator("#theta-field").press("Enter")))
+    number.fill("-1"), number.press("Enter")
+    tab.wait_for_function("() => document.querySelector('#editor').innerText.includes('alpha = -1 is not allowed')")
+    assert "alpha" in tab.evaluate("() => decodeURIComponent(location.hash)")
+
+
+def test_wi_is_dragged(tab, address):
+    opened(tab, address, {"subjects": [{"bsdf": {"type": "ward"}, "name": "ward"}], **STILL})
+    tab.locator("#view-lobe canvas").scroll_into_view_if_needed()
+    tab.wait_for_selector("#view-lobe .labels .direction")
+    box = tab.locator("#view-lobe .labels .direction").first.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    before = tab.locator("#theta-field").input_value()
+    tab.mouse.move(x, y + 8)
+    tab.mouse.down()
+    tab.mouse.move(x - 40, y + 40, steps=5)
+    tab.mouse.up()
+    assert tab.locator("#theta-field").input_value() != before
+
+
+def test_two_are_compared(tab, address):
+    state = {"subjects": [{"bsdf": {"type": it}, "name": it} for it in ("ward", "lambert")], "views": ["picture"]}
+    opened(tab, address, {**state, "stage": "point"})
+    tab.locator("#compare").select_option("wipe")
+    divider = tab.get_by_role("slider", name="Divider")
+    divider.focus()
+    divider.press("Home")
+    assert divider.get_attribute("aria-valuenow") == "0"
+    tab.locator("#compare").select_option("difference")
+    tab.wait_for_selector(".pictures canvas")
+
+
+def test_a_measured_file_is_loaded_and_copied(tab, address):
+    opened(tab, address, {"subjects": [{"bsdf": {"type": "lambert"}, "name": "lambert"}], **STILL})
+    tab.locator("#add").click()
+    tab.locator("#file").set_input_files(str(LOFT))
+    tab.wait_for_function("() => document.querySelectorAll('.pictures canvas').length === 2")
+    assert "AnoBlack" in tab.locator("#chips").inner_text()
+    tab.locator("#share").click()
+    tab.locator("#copy-xml").click()
+    tab.wait_for_function("async () => (await navigator.clipboard.readText()).includes('<bsdf type=\"tabulated\"')")
+
+
+def test_a_tour_runs(tab, address):
+    opened(tab, address)
+    tab.locator("#tours").click()
+    tab.locator("#tour-list button, #tour-list a").first.click()
+    titles = {tab.locator("#tour-title").inner_text()}
+    while tab.locator("#tour-next").is_enabled() and len(titles) < 3:
+        tab.locator("#tour-next").click()
+        titles.add(tab.locator("#tour-title").inner_text())
+    drawn(tab)
+    assert len(titles) > 1
+    tab.locator("#tour-leave").click()
+    assert not tab.locator("#tour").is_visible()
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_is_wider_than_the_screen(tab, address, width, scheme):
+    tab.set_viewport_size({"width": width, "height": 844})
+    tab.emulate_media(color_scheme=scheme)
+    opened(tab, address, {
+        "subjects": [{"bsdf": {"type": "kurt"}, "name": "a rather long name of a material"}],
+        "views": ["picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"],
+    })  # fmt: skip
+    assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
+    small = tab.evaluate(
+        "() => [...document.querySelectorAll('button, select, input[type=range]')].filter(it => it.offsetParent)"
+        ".filter(it => it.getBoundingClientRect().right > innerWidth + 1).map(it => it.outerHTML)"
+    )
+    assert not small
+
+
+def test_the_exported_page_works_from_the_disk(tab, tmp_path):
+    file = tmp_path / "page.html"
+    command = [sys.executable, "-m", "mi_brdfs", "explore", "ward", "lambert", "--export", str(file)]
+    subprocess.run(command, check=True, timeout=200)
+    assert file.stat().st_size < 3e6
+    requests = []
+    tab.on("request", lambda request: requests.append(request.url))
+    tab.goto(file.as_uri())
+    drawn(tab)
+    assert tab.locator("#view-polar svg path").count() > 1
+    assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [file.as_uri()]
+    canvas = tab.locator("#view-lobe canvas")
+    changes(tab, lambda: canvas.press("ArrowLeft"), "#view-lobe canvas")
