@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from support import ROOT
 
-from mi_brdfs.explorer.engine import Engine
 from mi_brdfs.explorer.export import page
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
-from mi_brdfs.explorer.stages import UserScene
+from mi_brdfs.explorer.stages import Progress, Stages, UserScene, encoded
 from mi_brdfs.explorer.state import StateError, checked, parse
 from mi_brdfs.explorer.tours import parse as parse_tour
 from mi_brdfs.explorer.tours import tours
@@ -29,11 +28,11 @@ class Client:
     """A page in this thread: its states are worked off at once."""
 
     def __init__(self, user=None, sources=()):
-        self.engine, self.frames = Engine("llvm_ad_rgb", user or UserScene()), []
-        self.engine.denoise = None
+        self.scenes, self.frames = Stages(user or UserScene()), []
+        self.scenes.denoise = None
         self.waiting = 0
         self.session = Session(
-            Materials({it.word: it for it in sources}), self.frames.append, lambda: self.waiting
+            Materials({it.word: it for it in sources}), self.scenes, self.frames.append, lambda: self.waiting
         )  # fmt: skip
         self.serial = 0
 
@@ -46,7 +45,7 @@ class Client:
         """What came, by type or view: header, payload."""
         self.frames.clear()
         for _ in range(steps):
-            if not self.session.step(self.engine):
+            if not self.session.step():
                 break
         return [opened(frame) for frame in self.frames]
 
@@ -205,8 +204,6 @@ def test_the_copied_xml_and_dict_give_the_same_picture(client):
     told, picture = of(found, "subject")[0], of(found, "picture")[0]
     stage = client.session._pictures[0][1].stage
     for again in (mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.load_dict(eval(told["dict"]))):
-        from mi_brdfs.explorer.stages import Progress, encoded
-
         progress = Progress(stage)
         progress.advance(again)
         assert encoded(progress.pixels(), 0) == picture["payload"]
@@ -341,7 +338,7 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
 
 def test_the_exported_page_needs_no_network_and_is_small(client, llvm_rgb):
     data = {"subjects": [{"bsdf": {"type": "ward"}}, {"bsdf": {"type": "lambert"}}]}
-    text = page(parse(data, STAGES), Materials(), client.engine, data)
+    text = page(parse(data, STAGES), Materials(), client.scenes, data)
     assert len(text) < 3e6
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
     frames = json.loads(re.search(r'id="exported">(.*?)</script>', text, re.DOTALL)[1])["frames"]

@@ -67,7 +67,7 @@ def explore(
     state: dict[str, Any] = {"subjects": subjects, "stage": "environment" if environment else "studio"}
     state["shape"] = "scene" if scene else "body"
     if export:
-        _export(export, chosen, user, sources, state)
+        _export(export, user, sources, state)
         return
     try:
         on = listening(host, port)
@@ -123,18 +123,17 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     return sources, subjects
 
 
-def _export(file: Path, variant: str, user: Any, sources: list[Any], data: dict[str, Any]) -> None:
-    from ..explorer.engine import Engine
+def _export(file: Path, user: Any, sources: list[Any], data: dict[str, Any]) -> None:
     from ..explorer.export import page
     from ..explorer.materials import Materials
-    from ..explorer.stages import stages
+    from ..explorer.stages import Stages
     from ..explorer.state import parse
 
     try:
         with stdout_to_stderr():
-            engine = Engine(variant, user)
-            state = parse(data, stages(user))
-            write_text(file, page(state, Materials({it.word: it for it in sources}), engine, data))
+            scenes = Stages(user)
+            state = parse(data, scenes.names)
+            write_text(file, page(state, Materials({it.word: it for it in sources}), scenes, data))
     except (ValueError, RuntimeError) as error:
         fail(one_line(error))
     out.print(str(file))

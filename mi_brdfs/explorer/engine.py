@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
 from queue import SimpleQueue
@@ -12,29 +11,21 @@ from typing import Any
 import mitsuba as mi
 
 from ..mitsuba.errors import one_line
-from . import stages
 from .session import Session
-from .state import Bsdf
+from .stages import Stages, UserScene
 from .views import text
-
-KEPT = 4
-"""Scenes that stay loaded."""
 
 
 class Engine(threading.Thread):
     """Serves all sessions in turn, a step of each."""
 
-    def __init__(self, variant: str, user: stages.UserScene) -> None:
+    def __init__(self, variant: str, user: UserScene) -> None:
         super().__init__(name="mi_brdfs explorer", daemon=True)
-        self.variant, self.user = variant, user
-        self.denoise: Callable | None = stages.denoiser()
+        self.variant = variant
+        self.stages = Stages(user)
         self.sessions: list[Session] = []
-        self.problem: str | None = None
-        """Why it ended, if that was not asked for."""
         self._wake = threading.Condition()
         self._ended = False
-        self._known: set[Any] = set()
-        self._stages: OrderedDict[stages.Setting, stages.Stage] = OrderedDict()
         self._calls: SimpleQueue[tuple[Callable[[], Any], Future]] = SimpleQueue()
 
     def wake(self) -> None:
@@ -67,26 +58,10 @@ class Engine(threading.Thread):
 
     def _step(self, session: Session) -> bool:
         try:
-            return session.step(self)
+            return session.step()
         except Exception as error:
             session.send(text(type="error", text=one_line(error)))
             return True
-
-    def stage(self, setting: stages.Setting) -> stages.Stage:
-        """Return the scene of a setting."""
-        if setting not in self._stages:
-            self._stages[setting] = stages.load(setting, self.user)
-            while len(self._stages) > KEPT:
-                self._stages.popitem(last=False)
-        self._stages.move_to_end(setting)
-        return self._stages[setting]
-
-    def is_new(self, bsdf: Bsdf, purpose: Any) -> bool:
-        """Return whether kernels for a BSDF of this structure may have to be compiled."""
-        words = tuple(sorted((name, it if isinstance(it, (str, bool)) else None) for name, it in bsdf.items()))
-        known = (words, purpose) in self._known
-        self._known.add((words, purpose))
-        return not known
 
 
 def _run(function: Callable[[], Any], future: Future) -> None:

@@ -7,15 +7,12 @@ import json
 import re
 from dataclasses import replace
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import stages
 from .materials import Materials
 from .state import State, StateError
 from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
-
-if TYPE_CHECKING:
-    from .engine import Engine
 
 SPP = 64
 """Samples per pixel of its pictures."""
@@ -23,19 +20,19 @@ SIZE = 320
 """… and the most pixels of a side."""
 
 
-def page(state: State, materials: Materials, engine: Engine, page_state: dict[str, Any]) -> str:
+def page(state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any]) -> str:
     """Return the page with all views of a state; ``page_state`` is what the page itself said of it.
 
     Raises:
         StateError: if a subject cannot be shown.
     """
     state = replace(state, size=min(state.size, SIZE))
-    sent = [{"text": frame} if isinstance(frame, str) else _split(frame) for frame in _frames(state, materials, engine)]
+    sent = [{"text": frame} if isinstance(frame, str) else _split(frame) for frame in _frames(state, materials, scenes)]
     data = json.dumps({"state": page_state, "frames": sent}).replace("</", "<\\/")
     return _inlined(f'<script type="application/json" id="exported">{data}</script>')
 
 
-def _frames(state: State, materials: Materials, engine: Engine) -> list[Frame]:
+def _frames(state: State, materials: Materials, scenes: stages.Stages) -> list[Frame]:
     found: list[Frame] = []
     for k, given in enumerate(state.subjects):
         bsdf = materials.expanded(given)
@@ -46,15 +43,15 @@ def _frames(state: State, materials: Materials, engine: Engine) -> list[Frame]:
             found.append(text(type="subject", serial=0, subject=k, **told, **materials.written(bsdf)))
             for view in VIEWS:
                 found += frames(view, probe, state, 0, k)
-        progress = stages.Progress(engine.stage(stages.Setting.of(state)))
+        progress = stages.Progress(scenes.stage(stages.Setting.of(state)))
         while progress.spp < SPP:
             with materials.loaded(bsdf) as loaded:
                 progress.advance(loaded)
         linear = progress.pixels()
-        payload = stages.encoded(engine.denoise(linear) if engine.denoise else linear, state.exposure)
+        payload = stages.encoded(scenes.denoise(linear) if scenes.denoise else linear, state.exposure)
         height, width = linear.shape[:2]
         header = {"width": width, "height": height, "spp": progress.spp, "final": True}
-        found.append(packed(payload, type="picture", serial=0, subject=k, denoised=bool(engine.denoise), **header))
+        found.append(packed(payload, type="picture", serial=0, subject=k, denoised=bool(scenes.denoise), **header))
     return found
 
 

@@ -18,7 +18,6 @@ from ..measure.sources import BSDFSource, is_measured
 from ..measured import FileError, read
 from ..mitsuba.registry import all_models, presets
 from ..parameters.messages import brief, printable
-from . import stages
 from .engine import Engine
 from .materials import Materials, kinds
 from .session import Session
@@ -113,7 +112,7 @@ class Explorer:
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(outbox.put_nowait, frame)
 
-        session = Session(Materials(ChainMap(self.uploads, self.named)), send, outbox.qsize)
+        session = Session(Materials(ChainMap(self.uploads, self.named)), self.engine.stages, send, outbox.qsize)
         self.engine.sessions.append(session)
         writer = asyncio.create_task(_write(socket, outbox))
         await outbox.put(self._hello())
@@ -133,8 +132,7 @@ class Explorer:
             message = json.loads(data)
             kind = message["type"]
             if kind == "state":
-                shapes = [it for it in ("body", "sphere", "scene") if it != "scene" or self.engine.user.scene]
-                state = parse(message["state"], stages.stages(self.engine.user), shapes)
+                state = parse(message["state"], self.engine.stages.names, self.engine.stages.shapes)
                 session.show(state, int(message.get("serial", 0)))
             elif kind in ("chi2", "fit", "cancel", "save"):
                 session.ask(message)
@@ -149,7 +147,7 @@ class Explorer:
     def _hello(self) -> str:
         from ..fit import METRICS
 
-        user = self.engine.user
+        scenes = self.engine.stages
         named = [{"file": it.word, "name": it.name, "kind": "measured" if is_measured(it.source) else "material"}
                  for it in self.named.values()]  # fmt: skip
         return text(
@@ -159,8 +157,8 @@ class Explorer:
             types=kinds(),
             presets=presets(),
             files=named,
-            scene=user.scene.name if user.scene else None,
-            stages=stages.stages(user),
+            scene=scenes.user.scene.name if scenes.user.scene else None,
+            stages=scenes.names,
             models=[model.plugins[0] for model in all_models()],
             metrics=list(METRICS),
             tours=tours(),

@@ -10,18 +10,16 @@ import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mitsuba as mi
 
 from ..mitsuba.errors import one_line
 from . import stages
+from .export import page
 from .materials import MEASURED, Materials, plain
 from .state import Bsdf, State, StateError, key_of
 from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
-
-if TYPE_CHECKING:
-    from .engine import Engine
 
 BACKLOG = 6
 """Frames that wait to be sent, from which on pictures are not refined."""
@@ -39,12 +37,15 @@ class Session:
 
     Args:
         materials: what may be loaded.
+        scenes: where it is shown.
         send: takes frames to the page.
         waiting: tells how many of these have not arrived.
     """
 
-    def __init__(self, materials: Materials, send: Callable[[Frame], None], waiting: Callable[[], int]) -> None:
-        self.materials, self.send, self.waiting = materials, send, waiting
+    def __init__(
+        self, materials: Materials, scenes: stages.Stages, send: Callable[[Frame], None], waiting: Callable[[], int]
+    ) -> None:
+        self.materials, self.scenes, self.send, self.waiting = materials, scenes, send, waiting
         self.closed = False
         self._lock = threading.Lock()
         self._latest: tuple[State, int] | None = None
@@ -76,7 +77,7 @@ class Session:
 
     # --- The engine's side --------------------------------------------------------------------------------------------
 
-    def step(self, engine: Engine) -> bool:
+    def step(self) -> bool:
         """Do the next thing, and return whether there was one."""
         with self._lock:
             latest, request = self._latest, self._requests.pop(0) if self._requests else None
@@ -85,9 +86,9 @@ class Session:
             return False
         state, serial = latest
         if request:
-            self._answer(request, state, engine)
+            self._answer(request, state)
             return True
-        did = self._tell(state, serial) or self._draw(state, serial, engine) or self._refine(state, serial, engine)
+        did = self._tell(state, serial) or self._draw(state, serial) or self._refine(state, serial)
         if not did and not self._idle:
             self.send(text(type="idle"))
         self._idle = not did
@@ -128,7 +129,7 @@ class Session:
             if not state.hidden[k] and keys[k] not in self._broken
         ]
 
-    def _draw(self, state: State, serial: int, engine: Engine) -> bool:
+    def _draw(self, state: State, serial: int) -> bool:
         """Draw the first thing that is missing: pictures first."""
         setting = stages.Setting.of(state)
         for view in state.views:
@@ -139,20 +140,20 @@ class Session:
                     continue
                 self._shown[view, k] = wanted
                 try:
-                    self._draw_one(view, k, given, state, serial, engine)
+                    self._draw_one(view, k, given, state, serial)
                 except (StateError, RuntimeError, ValueError) as error:
                     self.send(text(type="error", text=one_line(error)))
                 return True
         return False
 
-    def _draw_one(self, view: str, k: int, given: Bsdf, state: State, serial: int, engine: Engine) -> None:
+    def _draw_one(self, view: str, k: int, given: Bsdf, state: State, serial: int) -> None:
         bsdf = self.materials.expanded(given)
-        if engine.is_new(bsdf, view if view != "picture" else stages.Setting.of(state)):
+        if self.scenes.is_new(bsdf, view if view != "picture" else stages.Setting.of(state)):
             self.send(text(type="busy", text=f"Compiling {bsdf['type']} …"))
         if view == "picture":
             key = key_of(given), stages.Setting.of(state)
             if self._pictures.get(k, (None,))[0] != key:
-                progress = stages.Progress(engine.stage(key[1].quick()))
+                progress = stages.Progress(self.scenes.stage(key[1].quick()))
                 with self.materials.loaded(bsdf) as loaded:
                     progress.advance(loaded)
                 self._pictures[k] = key, progress
@@ -162,7 +163,7 @@ class Session:
             for frame in frames(view, ComponentProbe(loaded, state.component), state, serial, k):
                 self.send(frame)
 
-    def _refine(self, state: State, serial: int, engine: Engine) -> bool:
+    def _refine(self, state: State, serial: int) -> bool:
         """Add a pass to the picture that has the fewest."""
         if "picture" not in state.views or self.waiting() > BACKLOG:
             return False
@@ -175,7 +176,7 @@ class Session:
         if not rough:
             return False
         _, k, given = min(rough, key=lambda it: it[:2])
-        stage = engine.stage(setting)
+        stage = self.scenes.stage(setting)
         if self._pictures[k][1].stage is not stage:  # so far it was a quick one
             self._pictures[k] = self._pictures[k][0], stages.Progress(stage)
         progress, before = self._pictures[k][1], self._pictures[k][1].spp
@@ -185,9 +186,9 @@ class Session:
         except StateError:
             del self._pictures[k]  # or it would be tried for ever
             raise
-        if engine.denoise and any(before < count <= progress.spp for count in DENOISED_AT):
+        if self.scenes.denoise and any(before < count <= progress.spp for count in DENOISED_AT):
             progress.denoised = progress.spp
-            self._send_picture(k, state, serial, engine.denoise)
+            self._send_picture(k, state, serial, self.scenes.denoise)
         elif not progress.denoised:
             self._send_picture(k, state, serial)
         return True
@@ -202,7 +203,7 @@ class Session:
 
     # --- Requests -----------------------------------------------------------------------------------------------------
 
-    def _answer(self, request: dict[str, Any], state: State, engine: Engine) -> None:
+    def _answer(self, request: dict[str, Any], state: State) -> None:
         kind, k = request["type"], request.get("subject", 0)
         if not isinstance(k, int) or not 0 <= k < len(state.subjects):
             return
@@ -214,7 +215,7 @@ class Session:
             elif kind == "save" and request.get("what") == "exr":
                 self._save_exr(k, state)
             elif kind == "save" and request.get("what") == "page":
-                self._save_page(state, engine, request)
+                self._save_page(state, request)
         except Cancelled:
             self.send(text(type="fit", subject=k, error="Cancelled."))
         except (StateError, RuntimeError, ValueError, OSError) as error:
@@ -258,8 +259,6 @@ class Session:
             payload = file.read_bytes()
         self.send(packed(payload, type="file", name=f"{state.subjects[k]['type']}.exr", mime="image/x-exr"))
 
-    def _save_page(self, state: State, engine: Engine, request: dict[str, Any]) -> None:
-        from .export import page
-
-        payload = page(state, self.materials, engine, request.get("state") or {}).encode()
+    def _save_page(self, state: State, request: dict[str, Any]) -> None:
+        payload = page(state, self.materials, self.scenes, request.get("state") or {}).encode()
         self.send(packed(payload, type="file", name="explorer.html", mime="text/html"))

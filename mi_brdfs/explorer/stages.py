@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,7 +18,7 @@ import numpy as np
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
 from ..render import FilmPasses, tonemap
-from .state import State
+from .state import Bsdf, State
 
 MOST = 256
 """Samples per pixel, after which a picture is finished."""
@@ -25,6 +26,8 @@ LONGEST = 0.08
 """The longest that a pass should take, in seconds: edits wait for its end."""
 QUICK = 256
 """The most pixels of a side of the first pass, which shows an edit at once."""
+KEPT = 4
+"""Scenes that stay loaded."""
 STEP = 128
 """Larger sides are multiples of it: scenes of a few sizes stay loaded."""
 PEAK = 8.0
@@ -87,11 +90,6 @@ class Stage:
         finally:
             for shape, usual in zip(self.shapes, self.usual, strict=True):
                 shape.set_bsdf(usual)
-
-
-def stages(user: UserScene) -> list[str]:
-    """Return the stages that there are."""
-    return [*STAGES, *([ENVIRONMENT] if user.environment else [])]
 
 
 def load(setting: Setting, user: UserScene) -> Stage:
@@ -193,8 +191,48 @@ def encoded(linear: np.ndarray, exposure: float) -> bytes:
     return np.concatenate([(rgb * 255 + 0.5).astype(np.uint8), alpha], axis=-1).tobytes()
 
 
-def denoiser() -> Any:
-    """Return the function that denoises rgb, or None without the extra that brings it."""
+class Stages:
+    """The scenes that stay loaded for all sessions, what denoises their pictures, and which kernels there are."""
+
+    def __init__(self, user: UserScene) -> None:
+        self.user = user
+        self.denoise = _denoiser()
+        """A function of rgb, or None without the extra that brings it."""
+        self._loaded: OrderedDict[Setting, Stage] = OrderedDict()
+        self._known: set[Any] = set()
+
+    @property
+    def names(self) -> list[str]:
+        """The words for the light."""
+        return [*STAGES, *([ENVIRONMENT] if self.user.environment else [])]
+
+    @property
+    def shapes(self) -> list[str]:
+        """The words for what is lit."""
+        return ["body", "sphere", *(["scene"] if self.user.scene else [])]
+
+    def stage(self, setting: Setting) -> Stage:
+        """Return the scene of a setting.
+
+        Raises:
+            ValueError: if the user's scene has no such material.
+        """
+        if setting not in self._loaded:
+            self._loaded[setting] = load(setting, self.user)
+            while len(self._loaded) > KEPT:
+                self._loaded.popitem(last=False)
+        self._loaded.move_to_end(setting)
+        return self._loaded[setting]
+
+    def is_new(self, bsdf: Bsdf, purpose: Any) -> bool:
+        """Return whether kernels for a BSDF of this structure may have to be compiled."""
+        words = tuple(sorted((name, it if isinstance(it, (str, bool)) else None) for name, it in bsdf.items()))
+        known = (words, purpose) in self._known
+        self._known.add((words, purpose))
+        return not known
+
+
+def _denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
     try:
         import mitsuba_oidn
     except ImportError:
