@@ -27,8 +27,9 @@ JOINING = 10
 ROUNDS = 4
 """How often a task is given to workers anew after those that had it died, each time as often as the scheduler allows,
 four times by default."""
-AHEAD = 3
-"""Tasks submitted per worker: one runs, and the next ones are there when it ends."""
+AHEAD = 1.5
+"""Tasks submitted per worker: each runs one, and some are there when one ends; more would wait for one worker while
+another, which joined later, has nothing to do."""
 
 
 def run_on_workers(
@@ -109,8 +110,9 @@ class _Run:
         self.count += 1
         task = f"{self.id}-{self.count}"
         future = self.client.submit(
-            call_as, self.common, self.function.__module__, self.function.__name__, arguments, key=task, pure=False
-        )
+            call_as, self.common, self.function.__module__, self.function.__name__, arguments,
+            key=task, pure=False, priority=-self.count,  # in this order, also of those submitted at once
+        )  # fmt: skip
         self.pending[future] = key, arguments, rounds
         future.add_done_callback(self.ended.put)
 
