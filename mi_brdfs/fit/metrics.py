@@ -11,9 +11,10 @@ the least error is the same. With dωi = sinθi dθi dφi, and dωo alike:
 
 So Löw's weight is sinθi on a grid of equal steps, which gives θo near the normal more weight than a solid angle does.
 The first three agree with the loss functions of BBM (github.com/bsdfbenchmark/bbm, ``include/loss``), which sum over
-channels and samples and take no root; the papers' own text was not at hand. For Fores et al. only the abstract was:
-"cube root" and that it is compared with root mean squares. Others read it as the mean of |f cosθi - f' cosθi|^⅔ (code
-of Sztrajman et al. 2021). The cut of 80° is that of Ngan et al. as it is commonly told; it is not part of a metric.
+channels, average over samples and take no root; the papers' own text was not at hand. For Fores et al. only the
+abstract was: "cube root" and that it is compared with root mean squares. Others read it as the mean of
+|f cosθi - f' cosθi|^⅔ (code of Sztrajman et al. 2021). The cut of 80° is that of Ngan et al. as it is commonly told; it
+is not part of a metric.
 
 J. Löw, J. Kronander, A. Ynnerman, J. Unger, BRDF models for accurate and efficient rendering of glossy surfaces, ACM
 TOG 31(1), 2012, doi:10.1145/2077341.2077350. A. Ngan, F. Durand, W. Matusik, Experimental analysis of BRDF models,
