@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,13 @@ PARTNERS = {"eta": {"k": [1.0, 1.0, 1.0]}, "k": {"eta": [1.0, 1.0, 1.0]}}
 def controls_of(model: type[Model], bsdf: Bsdf) -> list[Control]:
     """Return the controls of a model's plugin dict, in the order of its declarations."""
     return list(_controls(model.declared(), bsdf, ""))
+
+
+def with_defaults(model: type[Model], bsdf: Bsdf) -> Bsdf:
+    """Return a plugin dict with the numbers and colours of which it says nothing, and all colours as rgb: kernels
+    depend on what is given, and on what kind."""
+    found = {it["name"]: it["value"] for it in controls_of(model, bsdf) if it["kind"] in ("number", "colour")}
+    return bsdf | {name: value for name, value in found.items() if value is not None}
 
 
 def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator[Control]:
@@ -131,7 +139,7 @@ def _fresnel(parameter: FresnelSet, bsdf: Bsdf) -> Iterator[Control]:
             | {"also": PARTNERS[name]}
             | _gives_way(parameter, name)
         )
-    names = ["none", *sorted({path.name.removesuffix(".eta.spd") for path in conductors().glob("*.eta.spd")})]
+    names = ["none", *conductors()]
     text = "a conductor of Mitsuba's"
     yield _choice("material", text, tuple(names), bsdf, group) | _gives_way(parameter, "material") | {
         "value": bsdf.get("material"), "default": None, "optional": True}  # fmt: skip
@@ -145,9 +153,11 @@ def _fresnel(parameter: FresnelSet, bsdf: Bsdf) -> Iterator[Control]:
             yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group) | {"optional": True}
 
 
-def conductors() -> Path:
-    """Return the folder of Mitsuba's conductors."""
-    return Path(mi.__file__).parent / "data" / "ior"
+@cache
+def conductors() -> list[str]:
+    """Return the names of Mitsuba's conductors."""
+    folder = Path(mi.__file__).parent / "data" / "ior"
+    return sorted({path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd")})
 
 
 def _gives_way(parameter: FresnelSet, name: str) -> dict[str, Any]:

@@ -24,14 +24,13 @@ class Engine(threading.Thread):
         self.variant = variant
         self.stages = Stages(user)
         self.sessions: list[Session] = []
-        self._wake = threading.Condition()
+        self._wake = threading.Event()
         self._ended = False
         self._calls: SimpleQueue[tuple[Callable[[], Any], Future]] = SimpleQueue()
 
     def wake(self) -> None:
         """Say that a session has something new."""
-        with self._wake:
-            self._wake.notify()
+        self._wake.set()
 
     def call(self, function: Callable[[], Any]) -> Future:
         """Call a function in this thread, between two steps."""
@@ -53,8 +52,8 @@ class Engine(threading.Thread):
             worked = [self._step(session) for session in list(self.sessions)]
             self.sessions = [session for session in self.sessions if not session.closed]
             if not any(worked):
-                with self._wake:
-                    self._wake.wait(0.05)
+                self._wake.wait(0.05)
+            self._wake.clear()
 
     def _step(self, session: Session) -> bool:
         try:

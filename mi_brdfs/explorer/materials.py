@@ -96,7 +96,7 @@ class Materials:
                 elif kind == MEASURED:
                     yield mi.load_dict({**_source_dict(self._source(bsdf)), **properties(values)})
                 elif kind in MODELS:
-                    yield mi.load_dict({"type": kind, **properties(values)})
+                    yield mi.load_dict(properties(controls.with_defaults(MODELS[kind], bsdf)))
                 else:
                     yield _built_in(kind, values)
         except (RuntimeError, ValueError, TypeError) as error:

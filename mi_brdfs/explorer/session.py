@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ from .materials import MEASURED, Materials, plain
 from .state import Bsdf, State, StateError, key_of
 from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
 
+PAUSE = 0.15
+"""The seconds without an edit after which pictures are refined: a pass at work would hold up the next one."""
 BACKLOG = 6
 """Frames that wait to be sent, from which on pictures are not refined."""
 DENOISED_AT = 16, 64, 256
@@ -49,6 +52,7 @@ class Session:
         self.closed = False
         self._lock = threading.Lock()
         self._latest: tuple[State, int] | None = None
+        self._edited = 0.0
         self._requests: list[dict[str, Any]] = []
         self._cancelled = False
         self._told: dict[int, str] = {}
@@ -62,7 +66,7 @@ class Session:
     def show(self, state: State, serial: int) -> None:
         """Take a state, in place of the former one."""
         with self._lock:
-            self._latest = state, serial
+            self._latest, self._edited = (state, serial), time.perf_counter()
 
     def ask(self, request: dict[str, Any]) -> None:
         """Take a request of another kind, or cancel the one at work."""
@@ -165,7 +169,7 @@ class Session:
 
     def _refine(self, state: State, serial: int) -> bool:
         """Add a pass to the picture that has the fewest."""
-        if "picture" not in state.views or self.waiting() > BACKLOG:
+        if "picture" not in state.views or self.waiting() > BACKLOG or time.perf_counter() - self._edited < PAUSE:
             return False
         setting = stages.Setting.of(state)
         rough = [

@@ -24,6 +24,8 @@ Frame = str | bytes
 PARALLELS = 40
 PIXELS = 96
 """The side of a hemisphere and of a slice, in pixels."""
+LOG2_COUNT = 6
+"""Samples for each angle of an albedo, 2^10 in all."""
 DOTS = 400
 BINS = 48
 HEAVIEST = 4.0
@@ -92,7 +94,7 @@ def _albedo(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     curves = [
         {"channel": name, "x": curve.theta, "y": curve.value}
         for name, channel in state.channels
-        for curve in [lobes.albedo(probe, state.phi, channel)]
+        for curve in [lobes.albedo(probe, state.phi, channel, LOG2_COUNT)]
     ]
     yield {"curves": curves}
 

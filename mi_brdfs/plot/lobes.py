@@ -128,14 +128,14 @@ def refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
     return Curve(np.concatenate(points)[order], np.concatenate(values)[order])
 
 
-def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None) -> Curve:
+def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None, log2_count: int = 9) -> Curve:
     """Return the fraction of light reflected or transmitted over the angle of incidence, delta functions included.
 
     It is the mean weight of samples of the BSDF's own sampler, with the same variates at each angle, so that the curve
     is smooth.
     """
     theta = np.concatenate([np.arange(0, 87, 3), [87, 88, 88.5, 89, 89.5, 89.9]])
-    points = lattice(9, 5)
+    points = lattice(log2_count, 5)
     part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
     samples = probe.sample(part, wi, np.tile(points, (len(theta), 1)))
