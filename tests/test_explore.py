@@ -286,7 +286,7 @@ def test_channels_and_components(client):
     bsdf = {"type": "ward", "diffuse_reflectance": [0.8, 0.4, 0.1], "specular_reflectance": 0.1}
     rgb = of(client.show(bsdf, views=["albedo"], channel="rgb"), "albedo")[0]["curves"]
     assert [it["channel"] for it in rgb] == ["red", "green", "blue"]
-    assert rgb[0]["y"][0] - rgb[2]["y"][0] == pytest.approx(0.7, abs=1e-3)
+    assert rgb[0]["y"][0] - rgb[2]["y"][0] == pytest.approx(0.7, abs=2e-3)  # by 2048 samples, some on the other lobe
     whole = of(client.show(bsdf, views=["polar"]), "polar")[0]["curves"][0]["y"]
     parts = [of(client.show(bsdf, views=["polar"], component=k), "polar")[0]["curves"][0] for k in (0, 1)]
     assert max(max(it["y"]) for it in parts) < max(whole)

@@ -383,7 +383,7 @@ def test_a_tour_runs(tab, address):
     while tab.locator("#tour-next").is_enabled() and len(titles) < 3:
         tab.locator("#tour-next").click()
         titles.add(tab.locator("#tour-title").inner_text())
-    drawn(tab)
+    tab.wait_for_function("() => document.querySelectorAll('#grid svg path, #grid canvas').length > 2")
     assert len(titles) > 1
     tab.locator("#tour-leave").click()
     assert not tab.locator("#tour").is_visible()

@@ -24,8 +24,8 @@ Frame = str | bytes
 PARALLELS = 40
 PIXELS = 96
 """The side of a hemisphere and of a slice, in pixels."""
-LOG2_COUNT = 6
-"""Samples for each angle of an albedo, 2^10 in all."""
+LOG2_COUNT = 7
+"""Samples for each angle of an albedo, 2^11 in all."""
 DOTS = 400
 BINS = 48
 HEAVIEST = 4.0
