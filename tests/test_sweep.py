@@ -3,6 +3,8 @@
 import csv
 import json
 import re
+import subprocess
+import sys
 
 import drjit as dr
 import mitsuba as mi
@@ -66,6 +68,26 @@ def test_a_killed_worker_costs_nothing_but_time(serial, tmp_path):
     sizes += [outcome.size for outcome in outcomes if not outcome.error]
     assert sum(sizes) == sweep.finished() == sweep.total == 12
     assert results(tmp_path) == results(serial)
+
+
+def test_one_process_fits_where_there_is_no_dask(tmp_path):
+    code = "import sys; sys.modules['distributed'] = None; from mi_brdfs.cli import main; main()"
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "sweep",
+        str(LOFT[0]),
+        "--model",
+        "lambert",
+        "--starts",
+        "1",
+        "-o",
+        str(tmp_path),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180)
+    assert done.returncode == 0 and "lambert" in done.stdout, done.stderr
+    assert 'one process fits; pip install "mi_brdfs[cluster]"' in " ".join(done.stderr.split())
 
 
 @pytest.mark.usefixtures("llvm_rgb")

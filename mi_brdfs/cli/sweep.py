@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Generator
 from contextlib import closing
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,7 +28,7 @@ def sweep(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
     model: Annotated[str, typer.Option(metavar="TYPE,…|all", help="The models, as `list` shows them.")] = "all",
     metric: Annotated[
-        str, typer.Option(metavar="METRIC,…", help="The errors to make small: log, l2, ngan, cube-root.")
+        str, typer.Option(metavar="METRIC,…", help="The errors to make small, as `fit` has them.")
     ] = "log",
     starts: Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")] = 10,
     cut: Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")] = 80,
@@ -70,6 +71,9 @@ def sweep(
         fail(f"this needs an rgb variant with derivatives, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
     if workers is None and not scheduler:
         workers = min(os.cpu_count() or 1, 8)
+        if find_spec("distributed") is None:
+            workers = 0
+            err.print('mi-brdfs: one process fits; pip install "mi_brdfs[cluster]" for all cores')
     try:
         names = [] if model == "all" else model.split(",")
         plan = Sweep(files, names, output, metrics=metric.split(","), seeds=seeds, starts=starts, cut=cut)

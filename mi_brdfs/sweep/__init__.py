@@ -8,7 +8,7 @@ From Python::
         print(outcome)
     print(medians(sweep.rows()))
 
-It needs ``pip install 'mi_brdfs[cluster]'``.
+It needs ``pip install 'mi_brdfs[sweep]'``, and for more than one process ``mi_brdfs[cluster]``.
 """
 
 from ..cluster import ClusterError

@@ -13,7 +13,7 @@ try:
     import pyarrow as pa
     from pyarrow import parquet
 except ImportError:
-    raise ImportError("a sweep needs PyArrow: pip install 'mi_brdfs[cluster]'") from None
+    raise ImportError("a sweep needs PyArrow: pip install 'mi_brdfs[sweep]'") from None
 
 from ..fit import METRICS
 
