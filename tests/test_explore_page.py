@@ -201,12 +201,15 @@ def test_wrong_arguments_are_told_in_a_sentence():
         (["ward"] * 5, "4 BSDFs at most"),
         (["ward", "--scene", "none.xml"], "no such file"),
         (["ward", "--environment", "none.exr"], "no such file"),
-        (["ward", "-D", "alpah=1", "--export", "x.html"], "alpah"),
+        (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
+        (["lambert", "--export", "/dev/full"], "cannot write /dev/full: No space left on device"),
+        (["scenes/catalogue.xml"], "has several materials; name one of"),
     ):
         command = [sys.executable, "-m", "mi_brdfs", "explore", "--no-browser", "--port", "0", *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=ROOT)
         assert done.returncode != 0 and sentence in done.stderr and "Traceback" not in done.stderr, done.stderr
+        assert done.stderr.count("mi-brdfs:") == 1
 
 
 @pytest.mark.slow

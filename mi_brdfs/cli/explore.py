@@ -93,7 +93,7 @@ def explore(
 def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], list[dict[str, Any]]]:
     """Return the files among the targets, and the subjects of the page."""
     from ..explorer.materials import GIVEN, MEASURED, PRESET, Materials, plain
-    from ..explorer.state import SUBJECTS, StateError, checked
+    from ..explorer.state import SUBJECTS, checked
     from ..measure.sources import find_sources, is_measured, value_of
     from ..mitsuba.registry import presets
 
@@ -110,15 +110,17 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
                 found = list(find_sources(target, given if not is_measured(target) else {}))
                 if len(found) > 1:
                     words = ", ".join(it.word for it in found)
-                    fail(f"{target} has several materials; name one of {words}", Exit.USAGE)
+                    raise ValueError(f"{target} has several materials; name one of {words}")
                 sources += found
                 kind = MEASURED if is_measured(target) else GIVEN
                 subject = {"type": kind, "file": found[0].word, **(values if kind == MEASURED else {})}
             else:
                 subject = {"type": target, **values}
-                Materials().expanded(subject)
-            subjects.append({"bsdf": checked(subject), "name": Path(target).name if sources else target})
-        except (StateError, ValueError, RuntimeError) as error:
+            materials = Materials({it.word: it for it in sources})
+            with materials.loaded(materials.expanded(checked(subject))):
+                pass
+            subjects.append({"bsdf": subject, "name": Path(target).name if Path(target).exists() else target})
+        except (ValueError, RuntimeError) as error:
             fail(one_line(error), Exit.USAGE)
     return sources, subjects
 
@@ -133,7 +135,8 @@ def _export(file: Path, user: Any, sources: list[Any], data: dict[str, Any]) -> 
         with stdout_to_stderr():
             scenes = Stages(user)
             state = parse(data, scenes.names)
-            write_text(file, page(state, Materials({it.word: it for it in sources}), scenes, data))
+            text = page(state, Materials({it.word: it for it in sources}), scenes, data)
     except (ValueError, RuntimeError) as error:
         fail(one_line(error))
+    write_text(file, text)
     out.print(str(file))

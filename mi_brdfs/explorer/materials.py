@@ -16,7 +16,7 @@ from ..mitsuba.errors import one_line
 from ..mitsuba.registry import MODELS, all_models, is_own
 from ..model import EnergyWarning, Model
 from ..parameters.messages import brief, listed, meant
-from ..parameters.published import preset
+from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
 from . import controls
 from .controls import Control
@@ -63,7 +63,7 @@ class Materials:
             return bsdf
         if kind not in MODELS:
             known = [*MODELS, *BUILT_IN, MEASURED]
-            near = meant(kind, known)
+            near = meant(kind, known) or closest(kind, names())
             raise StateError(f"There is no BSDF {brief(kind)!r} here" + (f"; did you mean {near!r}?" if near else "."))
         if set(bsdf) == {"type"}:
             return {**plain(MODELS[kind].example()), "type": kind}

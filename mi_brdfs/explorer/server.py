@@ -31,6 +31,8 @@ UPLOADS = 16
 CLIENT = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
 POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'"
 LOCAL = "127.0.0.1", "localhost", "[::1]"
+ANY = {"0.0.0.0", "::"}
+"""The addresses of all networks, which a machine has other names in."""
 
 
 class Explorer:
@@ -55,7 +57,7 @@ class Explorer:
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
         """Refuse requests that another page of the browser sends, under its own name or under ours."""
         origin = request.headers.get("Origin")
-        if not self._is_ours(request.host) or (origin and not self._is_ours(origin.partition("://")[2])):
+        if not self._is_ours(request.host) or (origin and origin.partition("://")[2] != request.host):
             raise web.HTTPForbidden(text="This server answers only its own page.")
         response = await handler(request)
         if not response.prepared:
@@ -65,7 +67,7 @@ class Explorer:
 
     def _is_ours(self, host: str) -> bool:
         name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
-        return name in self.hosts
+        return name in self.hosts or not ANY.isdisjoint(self.hosts)
 
     async def _index(self, request: web.Request) -> web.Response:
         return web.Response(text=_read("index.html"), content_type="text/html")
