@@ -85,7 +85,8 @@ def _looking_in(*folders: Path) -> Iterator[None]:
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     for folder in reversed(folders):
-        resolver.prepend(str(folder))
+        if folder != Path("."):  # where files are looked for anyway, under the names that they are given
+            resolver.prepend(str(folder))
     mi.set_file_resolver(resolver)
     try:
         yield

@@ -68,7 +68,7 @@ def test_shell(line, tmp_path):
 def test_no_command_is_left_out():
     assert {line.split()[1] for line in lines()} == {
         "list", "info", "presets", "doctor", "show", "render", "plot", "gallery", "measured", "convert", "fit",
-        "sweep", "check", "energy", "bench",
+        "sweep", "explore", "check", "energy", "bench",
     }  # fmt: skip
     assert all(more.strip() in README for more in SHORTER.values())
 

@@ -25,6 +25,8 @@ class ForwardDirections:
 
     BROADER = 2
     """How much |η² - 1| adds to z²."""
+    STEEP = 0.1
+    """The least sum of two sines that is divided by: far from the horizon nothing is drawn."""
 
     def __init__(
         self, fresnel: Dielectric, wi: mi.Vector3f, slope2: mi.Float = 1e6, slope2_v: mi.Float | None = None
@@ -47,7 +49,8 @@ class ForwardDirections:
             return 0, sigma
         difference = z * z - self.z * self.z
         root = safe_sqrt(sin * sin - dr.square(self.ridge) * difference)
-        return self.ridge * difference / ((self.sin + sin) * dr.maximum(sin + root, SMALL)), sigma
+        sines = dr.maximum(self.sin + sin, self.STEEP) * dr.maximum(sin + root, self.STEEP)
+        return self.ridge * difference / sines, sigma
 
     def draw(self, v: mi.Point2f) -> mi.Vector3f:
         ratio = dr.sqrt(v.x) / (1 + self.z)  # z'/(z + z')

@@ -223,8 +223,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
     STEEP = 0.65
-    """How many of the steep facets δ counts: those whose slope is at least a half. Twice as many where both the
-    distribution and the shadowing term favour them: some would weigh too much."""
+    """How many of the steep facets δ counts: those whose slope is at least a half."""
     LARGEST = 0.5
     """The largest δ, for the reason of :attr:`AntitheticSteepNormals.LARGEST`."""
     STEEP_IMPLICIT = 0.7
@@ -245,7 +244,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         if not self.steep:
             return x, y, leaning, 0
         steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
-        steep *= self.STEEP * (2 if distribution.long_tailed and lobe.shadowing.favours_steep else 1)
+        steep *= self.STEEP
         if isinstance(lobe.shadowing, Implicit):
             # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
             steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), EPSILON))
