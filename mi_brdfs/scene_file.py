@@ -85,8 +85,7 @@ def _looking_in(*folders: Path) -> Iterator[None]:
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     for folder in reversed(folders):
-        if folder != Path("."):  # where files are looked for anyway, under the names that they are given
-            resolver.prepend(str(folder))
+        resolver.prepend("" if folder == Path(".") else str(folder))  # messages show it in front of names
     mi.set_file_resolver(resolver)
     try:
         yield

@@ -301,9 +301,7 @@ def test_without_the_extra(monkeypatch):
         run(powers, {"a": (2, 1)}, workers=2)
 
 
-@pytest.mark.skipif(
-    "MI_BRDFS_IDLE" not in os.environ, reason="measures time: MI_BRDFS_IDLE=1 says that the machine is idle"
-)
+@pytest.mark.skipif("MI_BRDFS_IDLE" not in os.environ, reason="measures time: set MI_BRDFS_IDLE=1 on an idle machine")
 def test_two_workers_render_at_least_1_7_times_as_fast_as_one():
     """On a machine with two idle cores; ``-s`` shows the times, which include the start of the processes."""
     file = SceneFile(str(ROOT / "scenes/cornell_box.xml"), {"width": "256", "height": "256"})

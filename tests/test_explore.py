@@ -234,7 +234,7 @@ def test_what_did_not_change_is_not_drawn_again(client):
 
 @pytest.fixture
 def same_bsdfs():
-    """BSDFs of other tests that nobody holds go before a test, and not during it: kernels are made for all that live."""
+    """BSDFs of other tests that nobody holds go before a test, and not during it: kernels are for all that live."""
     gc.collect()
     gc.disable()
     yield
