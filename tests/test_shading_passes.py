@@ -15,7 +15,9 @@ from mi_brdfs.mitsuba import integrator as adapter
 
 def in_passes(scene, monkeypatch, samples=4, **given):
     """The picture that ``mi-brdfs render`` makes, in passes of some samples."""
-    monkeypatch.setattr(render, "_samples_per_pass", lambda threads: samples * int(np.prod(scene.sensors()[0].film().size())))
+    monkeypatch.setattr(
+        render, "_samples_per_pass", lambda threads: samples * int(np.prod(scene.sensors()[0].film().size()))
+    )
     picture = render.render(scene, **given)
     return np.array(picture.image, np.float64), picture
 

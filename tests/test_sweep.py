@@ -246,10 +246,10 @@ def test_the_command_prints_a_table_of_what_workers_found(serial, tmp_path):
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
     options = "--model", "lambert,burley", "--metric", ",".join(METRICS), "--starts", 300, "--workers", 2, "-o", "made"
-    status, out, err = interrupted(tmp_path, "sweep", *LOFT, *options, running=r"[1-9]/24")
-    finished = re.search(r"Interrupted; (\d+) of 24 fits are finished: the same command goes on from there\.", err)
+    status, out, err = interrupted(tmp_path, "sweep", *LOFT, *options, running=r"[1-9]/36")
+    finished = re.search(r"Interrupted; (\d+) of 36 fits are finished: the same command goes on from there\.", err)
     assert status == 130 and finished and "Traceback" not in err
-    assert 0 < len(results(tmp_path / "made")) == int(finished[1]) < 24
+    assert 0 < len(results(tmp_path / "made")) == int(finished[1]) < 36
     assert "| log " in out
     assert not [it for it in psutil.process_iter(["cmdline"]) if str(tmp_path) in " ".join(it.info["cmdline"] or [])]
 
