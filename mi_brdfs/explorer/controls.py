@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -13,6 +11,7 @@ import numpy as np
 
 from ..model import Model
 from ..parameters import Choice, Colour, File, Flag, FresnelSet, Number, OneOf, Parameter, PerLobe, Preset, Rotation
+from ..parameters.fresnel import conductors
 from ..ranges import VALUES
 from .state import Bsdf
 
@@ -151,13 +150,6 @@ def _fresnel(parameter: FresnelSet, bsdf: Bsdf) -> Iterator[Control]:
     for row in parameter.rows():
         if row.name in others:
             yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group) | {"optional": True}
-
-
-@cache
-def conductors() -> list[str]:
-    """Return the names of Mitsuba's conductors."""
-    folder = Path(mi.__file__).parent / "data" / "ior"
-    return sorted({path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd")})
 
 
 def _gives_way(parameter: FresnelSet, name: str) -> dict[str, Any]:

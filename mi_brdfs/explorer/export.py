@@ -47,11 +47,8 @@ def _frames(state: State, materials: Materials, scenes: stages.Stages) -> list[F
         while progress.spp < SPP:
             with materials.loaded(bsdf) as loaded:
                 progress.advance(loaded)
-        linear = progress.pixels()
-        payload = stages.encoded(scenes.denoise(linear) if scenes.denoise else linear, state.exposure)
-        height, width = linear.shape[:2]
-        header = {"width": width, "height": height, "spp": progress.spp, "final": True}
-        found.append(packed(payload, type="picture", serial=0, subject=k, denoised=bool(scenes.denoise), **header))
+        payload, header = stages.shown(progress, state.exposure, scenes.denoise)
+        found.append(packed(payload, type="picture", serial=0, subject=k, final=True, **header))
     return found
 
 

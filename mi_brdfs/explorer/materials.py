@@ -13,8 +13,8 @@ import mitsuba as mi
 
 from ..measure.sources import BSDFSource
 from ..mitsuba.errors import one_line
-from ..mitsuba.registry import MODELS, all_models, is_own
-from ..model import EnergyWarning, Model
+from ..mitsuba.registry import DATA, MODELS, all_models, is_own
+from ..model import EnergyWarning
 from ..parameters.messages import brief, listed, meant
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
@@ -38,10 +38,6 @@ class Materials:
     files: Mapping[str, BSDFSource] = field(default_factory=dict)
     _loaded: dict[str, mi.BSDF] = field(default_factory=dict)
     """Materials of XML files, which take long to load."""
-
-    def model_of(self, bsdf: Bsdf) -> type[Model] | None:
-        """Return the model of a plugin dict, None for what declares nothing."""
-        return MODELS.get(bsdf["type"])
 
     def expanded(self, bsdf: Bsdf) -> Bsdf:
         """Return a plugin dict with what its short forms stand for: a published material, the example of a model of
@@ -105,9 +101,9 @@ class Materials:
     def controls(self, bsdf: Bsdf) -> list[Control]:
         """Return the controls of an expanded plugin dict."""
         if bsdf["type"] == MEASURED:
-            found = controls.controls_of(MODELS.get(MEASURED) or _tabulated(), bsdf)
+            found = controls.controls_of(DATA[MEASURED], bsdf)
             return [it for it in found if it["name"] != "differentiable"]
-        if model := self.model_of(bsdf):
+        if model := MODELS.get(bsdf["type"]):
             return controls.controls_of(model, bsdf)
         with self.loaded({"type": bsdf["type"], **({"file": bsdf["file"]} if "file" in bsdf else {})}) as usual:
             defaults = {it["name"]: it["value"] for it in controls.traversed(usual, {})}
@@ -166,12 +162,6 @@ def _source_dict(source: BSDFSource) -> dict[str, Any]:
     found = source.load()
     assert isinstance(found, dict)  # a measured file
     return found
-
-
-def _tabulated() -> type[Model]:
-    from ..measured.tabulated import Tabulated
-
-    return Tabulated
 
 
 def _built_in(kind: str, values: Bsdf) -> mi.BSDF:

@@ -28,7 +28,6 @@ BACKLOG = 6
 """Frames that wait to be sent, from which on pictures are not refined."""
 DENOISED_AT = 16, 64, 256
 """The samples per pixel at which a picture is denoised."""
-TESTED = ("chi2",)
 
 
 class Cancelled(Exception):
@@ -199,11 +198,8 @@ class Session:
 
     def _send_picture(self, k: int, state: State, serial: int, denoise: Callable | None = None) -> None:
         progress = self._pictures[k][1]
-        linear = progress.pixels()
-        payload = stages.encoded(denoise(linear) if denoise else linear, state.exposure)
-        height, width = linear.shape[:2]
-        header = {"width": width, "height": height, "spp": progress.spp, "final": progress.finished}
-        self.send(packed(payload, type="picture", serial=serial, subject=k, denoised=bool(denoise), **header))
+        payload, header = stages.shown(progress, state.exposure, denoise)
+        self.send(packed(payload, type="picture", serial=serial, subject=k, final=progress.finished, **header))
 
     # --- Requests -----------------------------------------------------------------------------------------------------
 

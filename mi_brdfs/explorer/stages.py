@@ -17,7 +17,7 @@ import numpy as np
 
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
-from ..render import FilmPasses, tonemap
+from ..render import pass_source, tonemap
 from .state import Bsdf, State
 
 MOST = 256
@@ -77,8 +77,7 @@ class Stage:
 
     @cached_property
     def passes(self) -> Any:
-        integrator = self.scene.integrator()
-        return integrator if hasattr(integrator, "sums") else FilmPasses(integrator)
+        return pass_source(self.scene.integrator())
 
     @contextmanager
     def showing(self, bsdf: mi.BSDF) -> Iterator[None]:
@@ -189,6 +188,17 @@ def encoded(linear: np.ndarray, exposure: float) -> bytes:
     rgb = np.where(mapped <= 0.0031308, low, high)
     alpha = np.full((*rgb.shape[:2], 1), 255, np.uint8)
     return np.concatenate([(rgb * 255 + 0.5).astype(np.uint8), alpha], axis=-1).tobytes()
+
+
+def shown(
+    progress: Progress, exposure: float, denoise: Callable[[np.ndarray], np.ndarray] | None
+) -> tuple[bytes, dict[str, Any]]:
+    """Return the payload of a picture's frame, denoised if there is a function for it, and what its header says of
+    it."""
+    linear = progress.pixels()
+    height, width = linear.shape[:2]
+    header = {"width": width, "height": height, "spp": progress.spp, "denoised": denoise is not None}
+    return encoded(denoise(linear) if denoise else linear, exposure), header
 
 
 class Stages:

@@ -81,22 +81,17 @@ def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
         yield {"payload": mesh.value.astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
 
 
+def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> Iterator[dict[str, Any]]:
+    drawn = [(name, of_channel(channel)) for name, channel in state.channels]
+    yield {"curves": [{"channel": name, "x": curve.theta, "y": curve.value} for name, curve in drawn]}
+
+
 def _cut(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
-    curves = [
-        {"channel": name, "x": curve.theta, "y": curve.value}
-        for name, channel in state.channels
-        for curve in [lobes.in_plane_of_incidence(probe, state.theta, state.phi, channel)]
-    ]
-    yield {"curves": curves}
+    return _curves(state, lambda channel: lobes.in_plane_of_incidence(probe, state.theta, state.phi, channel))
 
 
 def _albedo(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
-    curves = [
-        {"channel": name, "x": curve.theta, "y": curve.value}
-        for name, channel in state.channels
-        for curve in [lobes.albedo(probe, state.phi, channel, LOG2_COUNT)]
-    ]
-    yield {"curves": curves}
+    return _curves(state, lambda channel: lobes.albedo(probe, state.phi, channel, LOG2_COUNT))
 
 
 def _slice(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import ClassVar
 
@@ -113,8 +114,7 @@ class FresnelSet(Parameter):
         material = reader.text("material")
         if material == "none":
             return {}
-        folder = Path(mi.__file__).parent / "data" / "ior"
-        known = sorted(path.name.removesuffix(".eta.spd") for path in folder.glob("*.eta.spd"))
+        known = conductors()
         if material not in known:
             closest = meant(material, known)
             hint = f'; did you mean "{closest}"? It' if closest else "; it"
@@ -125,7 +125,7 @@ class FresnelSet(Parameter):
                 f'= {shown(material)} is unknown{hint} must be "none", for F = 1, or one of Mitsuba\'s conductors '
                 + ", ".join(first),
             )
-        return {name: _measured(folder / f"{material}.{name}.spd") for name in ("eta", "k")}
+        return {name: _measured(_indices() / f"{material}.{name}.spd") for name in ("eta", "k")}
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Fresnel:
         if self.word:
@@ -161,6 +161,16 @@ class FresnelSet(Parameter):
                          "indices of refraction of a dielectric, inside and outside"),
         ]  # fmt: skip
         return rows + OTHERS.rows() if TERMS else rows
+
+
+@cache
+def conductors() -> list[str]:
+    """Return the names of Mitsuba's conductors."""
+    return sorted(path.name.removesuffix(".eta.spd") for path in _indices().glob("*.eta.spd"))
+
+
+def _indices() -> Path:
+    return Path(mi.__file__).parent / "data" / "ior"
 
 
 def _measured(path: Path) -> mi.Texture:
