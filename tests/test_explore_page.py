@@ -389,7 +389,7 @@ def test_a_tour_runs(tab, address):
     tab.wait_for_function("() => document.querySelectorAll('#grid svg path, #grid canvas').length > 2")
     assert len(titles) > 1
     tab.locator("#tour-leave").click()
-    assert not tab.locator("#tour").is_visible()
+    tab.locator("#tour").wait_for(state="hidden")
 
 
 @pytest.mark.parametrize("width", [390, 1440])

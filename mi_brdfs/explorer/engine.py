@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import ctypes
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from queue import SimpleQueue
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from ..mitsuba.errors import one_line
 from .session import Session
 from .stages import Stages, UserScene
 from .views import text
+
+RELEASE = 1.0
+"""The seconds after which memory that is free is given back, as edits of any size leave it in pieces."""
 
 
 class Engine(threading.Thread):
@@ -46,11 +52,15 @@ class Engine(threading.Thread):
 
     def run(self) -> None:
         mi.set_variant(self.variant)
+        released = time.monotonic()
         while not self._ended:
             while not self._calls.empty():
                 _run(*self._calls.get())
             worked = [self._step(session) for session in list(self.sessions)]
             self.sessions = [session for session in self.sessions if not session.closed]
+            if any(worked) and time.monotonic() - released > RELEASE:
+                _release_memory()
+                released = time.monotonic()
             if not any(worked):
                 self._wake.wait(0.05)
             self._wake.clear()
@@ -68,3 +78,13 @@ def _run(function: Callable[[], Any], future: Future) -> None:
         future.set_result(function())
     except Exception as error:
         future.set_exception(error)
+
+
+def _release_memory() -> None:
+    """Return memory that Dr.Jit and the C library keep for later to the system. (glibc does not by itself: in half an
+    hour of edits, a server grew by 85 MB without a leak.)"""
+    dr.flush_malloc_cache()
+    try:
+        ctypes.CDLL(None).malloc_trim(0)
+    except (AttributeError, TypeError, OSError):
+        pass  # another C library, which has no such call
