@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from queue import SimpleQueue
 from typing import Any
 
@@ -84,7 +85,5 @@ def _release_memory() -> None:
     """Return memory that Dr.Jit and the C library keep for later to the system. (glibc does not by itself: in half an
     hour of edits, a server grew by 85 MB without a leak.)"""
     dr.flush_malloc_cache()
-    try:
+    with suppress(AttributeError, TypeError, OSError):  # another C library has no such call
         ctypes.CDLL(None).malloc_trim(0)
-    except (AttributeError, TypeError, OSError):
-        pass  # another C library, which has no such call
