@@ -191,6 +191,15 @@ def test_lobes_are_added_and_removed(client, name):
     assert bsdf["exponent" if name == "lafortune" else "alpha"] == (9.0 if name == "lafortune" else 0.3)
 
 
+def test_a_new_lobe_is_like_the_last_and_the_others_stay(client):
+    given = {"type": "lafortune", "cz_1": 0.5, "cz_2": 0.9, "exponent_2": 20.0, "lobes": "3"}
+    assert Materials().expanded(given) == {
+        "type": "lafortune", "cxy_1": -1, "cxy_2": -1, "cxy_3": -1, "cz_1": 0.5, "cz_2": 0.9, "cz_3": 0.9,
+        "exponent_1": 30, "exponent_2": 20, "exponent_3": 20,
+        "specular_reflectance_1": 0.2, "specular_reflectance_2": 0.2, "specular_reflectance_3": 0.2,
+    }  # fmt: skip
+
+
 def test_a_preset_is_its_plugin_with_its_values(client):
     (told,) = of(client.show({"type": "preset", "name": "ngan/ward/blue-acrylic"}, views=[]), "subject")
     assert told["bsdf"]["type"] == "ward" and told["bsdf"]["alpha"] > 0
@@ -255,6 +264,14 @@ def test_no_kernel_is_compiled_where_a_value_changes(client, name):
             client.show(edited(bsdf, controls, rng), views=views, size=64, theta=40)
         history = [it for it in dr.kernel_history() if it["type"] == dr.KernelType.JIT]
     assert history and all(it["cache_hit"] for it in history)
+
+
+def test_the_page_is_told_of_what_has_to_be_compiled(client):
+    def told(alpha, stage):
+        return bool(of(client.show({"type": "ward", "alpha": alpha}, views=["picture"], size=64, stage=stage), "busy"))
+
+    assert [told(0.1, "studio"), told(0.2, "studio"), told(0.3, "lamp")] == [True, False, True]
+    assert [told(0.4, "studio"), told(0.5, "studio")] == [True, False]  # Dr.Jit compiles for the emitters of both
 
 
 def test_pictures_are_refined_until_they_are_finished(client):

@@ -113,21 +113,24 @@ def with_lobes(model: type[Model], bsdf: Bsdf) -> Bsdf:
     parameter = next((it for it in model.declared() if isinstance(it, PerLobe)), None)
     if parameter is None or str(wanted) not in [str(k) for k in range(1, len(parameter.numbers))]:
         return found
-    count, now = int(wanted), lobe_count(parameter, found)
-    last = "" if not numbered(parameter, found) else f"_{now}"
-    for it in parameter.declared.values():
-        for single, template in zip(it.numbered("").names, it.numbered(last).names, strict=True):
-            value = found.get(template)
-            if value is None and isinstance(it, (Number, Colour)) and single == it.name:
-                value = None if any(name in found for name in it.numbered(last).names) else it.default
-            lobes = [found.pop(f"{single}_{k}", value) for k in range(1, len(parameter.numbers))]
-            kept = lobes[:count]
-            if now == 1 and not last:
-                kept = [found.get(single, value)] * count
-            found.pop(single, None)
-            names = [single] if count == 1 else [f"{single}_{k}" for k in range(1, count + 1)]
-            found |= {name: each for name, each in zip(names, kept, strict=True) if each is not None}
+    count = int(wanted)
+    numbers = parameter.numbers[1 : lobe_count(parameter, found) + 1] if numbered(parameter, found) else [""]
+    lobes = [_popped(parameter, number, found) for number in numbers]
+    lobes = (lobes + count * lobes[-1:])[:count]
+    for number, lobe in zip(parameter.numbers[1:] if count > 1 else [""], lobes, strict=False):
+        found |= {f"{name}{number}": value for name, value in lobe.items()}
     return found
+
+
+def _popped(parameter: PerLobe, number: str, bsdf: Bsdf) -> Bsdf:
+    """Take the values of a lobe out of a plugin dict, or its defaults; return them by the names without a number."""
+    lobe = {}
+    for it in parameter.declared.values():
+        names = zip(it.names, it.numbered(number).names, strict=True)
+        given = {name: bsdf.pop(own) for name, own in names if own in bsdf}
+        usual = {it.name: it.default} if isinstance(it, (Number, Colour)) and it.default is not None else {}
+        lobe |= given or usual
+    return lobe
 
 
 def _fresnel(parameter: FresnelSet, bsdf: Bsdf) -> Iterator[Control]:

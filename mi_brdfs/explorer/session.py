@@ -151,7 +151,7 @@ class Session:
 
     def _draw_one(self, view: str, k: int, given: Bsdf, state: State, serial: int) -> None:
         bsdf = self.materials.expanded(given)
-        if self.scenes.is_new(bsdf, view if view != "picture" else stages.Setting.of(state)):
+        if self.scenes.is_new(bsdf, view if view != "picture" else stages.Setting.of(state).quick()):
             self.send(text(type="busy", text=f"Compiling {bsdf['type']} …"))
         if view == "picture":
             key = key_of(given), stages.Setting.of(state)

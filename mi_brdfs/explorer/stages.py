@@ -234,11 +234,13 @@ class Stages:
         self._loaded.move_to_end(setting)
         return self._loaded[setting]
 
-    def is_new(self, bsdf: Bsdf, purpose: Any) -> bool:
-        """Return whether kernels for a BSDF of this structure may have to be compiled."""
+    def is_new(self, bsdf: Bsdf, purpose: str | Setting) -> bool:
+        """Return whether kernels for a BSDF of this structure may have to be compiled, for a view or a picture."""
         words = tuple(sorted((name, it if isinstance(it, (str, bool)) else None) for name, it in bsdf.items()))
-        known = (words, purpose) in self._known
-        self._known.add((words, purpose))
+        # Dr.Jit compiles a picture's kernel for the emitters and BSDFs of all scenes that are loaded.
+        scenes = frozenset({*self._loaded, purpose}) if isinstance(purpose, Setting) else None
+        known = (words, purpose, scenes) in self._known
+        self._known.add((words, purpose, scenes))
         return not known
 
 
