@@ -44,7 +44,7 @@ class Client:
         subjects = [{"bsdf": it} for it in (bsdf, *others)]
         self.session.show(parse({"subjects": subjects, **members}, STAGES, ("body", "sphere", "scene")), self.serial)
 
-    def work(self, steps=200):
+    def work(self, steps=400):
         """What came, by type or view: header, payload."""
         self.frames.clear()
         self.session._edited = 0  # there is no other edit to wait for
@@ -194,7 +194,8 @@ def test_lobes_are_added_and_removed(client, name):
 def test_a_new_lobe_is_like_the_last_and_the_others_stay(client):
     given = {"type": "lafortune", "cz_1": 0.5, "cz_2": 0.9, "exponent_2": 20.0, "lobes": "3"}
     assert Materials().expanded(given) == {
-        "type": "lafortune", "cxy_1": -1, "cxy_2": -1, "cxy_3": -1, "cz_1": 0.5, "cz_2": 0.9, "cz_3": 0.9,
+        "type": "lafortune", "cx_1": -1, "cx_2": -1, "cx_3": -1, "cy_1": -1, "cy_2": -1, "cy_3": -1,
+        "cz_1": 0.5, "cz_2": 0.9, "cz_3": 0.9,
         "exponent_1": 30, "exponent_2": 20, "exponent_3": 20,
         "specular_reflectance_1": 0.2, "specular_reflectance_2": 0.2, "specular_reflectance_3": 0.2,
     }  # fmt: skip
