@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import dask
-from distributed import CancelledError, Client, Future, LocalCluster
+from distributed import CancelledError, Client, Future, LocalCluster, futures_of
 from distributed.scheduler import KilledWorker
 
 from . import ClusterError
@@ -27,9 +27,13 @@ JOINING = 10
 ROUNDS = 4
 """How often a task is given to workers anew after those that had it died, each time as often as the scheduler allows,
 four times by default."""
-AHEAD = 1.5
-"""Tasks submitted per worker: each runs one, and some are there when one ends; more would wait for one worker while
+AHEAD = 2
+"""Tasks submitted per worker: each runs one, and one is there when it ends; more would wait for one worker while
 another, which joined later, has nothing to do."""
+LOOKING = 0.1
+"""Seconds after which the workers are counted again while some of this machine's have not joined …"""
+LOOKING_ON = 1
+"""… and otherwise."""
 
 
 def run_on_workers(
@@ -71,7 +75,12 @@ class _Run:
         self.client, self.processes, self.function = client, processes, function
         self.id = f"mi_brdfs-{uuid.uuid4().hex}"
         self.count = 0
-        self.common = client.submit(_same, common, key=f"{self.id}-common")
+        # Dask gives tasks to workers that have what these need, so all would wait for the first that has it: a
+        # scheduler's workers get copies, and those of this machine, which begin later, get it with each task.
+        self.common: Any = common
+        if not processes:
+            self.common = client.submit(_same, common, key=f"{self.id}-common")
+            client.replicate([self.common])
         self.pending: dict[Future, tuple[str, tuple, int]] = {}
         self.ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self.workers, self.asked = 0, -1.0
@@ -88,7 +97,7 @@ class _Run:
             if not self.pending:
                 return
             try:
-                future = self.ended.get(timeout=0.2)
+                future = self.ended.get(timeout=LOOKING)
             except queue.Empty:
                 self._look_after_workers()
                 continue
@@ -104,7 +113,7 @@ class _Run:
     def cancel(self) -> None:
         """Take back what no worker has begun."""
         if self.client.status == "running":
-            self.client.cancel([*self.pending, self.common], force=True)
+            self.client.cancel([*self.pending, *futures_of(self.common)], force=True)
 
     def _submit(self, key: str, arguments: tuple, rounds: int = 1) -> None:
         self.count += 1
@@ -129,8 +138,9 @@ class _Run:
         raise ClusterError(_gone(self.client) if isinstance(error, CancelledError) else _of_worker(error))
 
     def _worker_count(self) -> int:
-        """Return the number of workers, asked for once a second."""
-        if time.monotonic() - self.asked > 1:
+        """Return the number of workers, asked for now and then."""
+        complete = not self.processes or self.workers >= len(self.processes.running)
+        if time.monotonic() - self.asked > (LOOKING_ON if complete else LOOKING):
             try:
                 self.workers = len(self.client.nthreads())
             except (OSError, TimeoutError):

@@ -31,7 +31,7 @@ def passes_on(
         film, integrator = scene.sensors()[sensor].film(), scene.integrator()
         film.prepare(integrator.aov_names())  # the film of a scene that is not rendered has no channels yet
         shared = (uuid.uuid4().hex, file.copied() if scheduler else file, sensor, window)
-        tasks = ((str(index), job) for index, job in enumerate(jobs))
+        tasks = ((str(index), (index == 0, *job)) for index, job in enumerate(jobs))
         early, following = {}, 0
         for key, result in run(pass_sums, tasks, workers=workers, scheduler=scheduler, shared=shared):
             if isinstance(result, Failed):
@@ -44,17 +44,28 @@ def passes_on(
     return passes
 
 
-def pass_sums(run: str, file: SceneFile, sensor: int, window: list[int] | None, seed: int, spp: int) -> np.ndarray:
-    """Return the sums of a pass, in a worker."""
+def pass_sums(
+    run: str, file: SceneFile, sensor: int, window: list[int] | None, first: bool, seed: int, spp: int
+) -> np.ndarray:
+    """Return the sums of a pass, in a worker, as one thread computes them after the passes before it.
+
+    A scene completes textures and tables at their first use. This splits the kernels of that pass, and other kernels
+    round differently: so the first pass of a picture is computed with a new scene, and no other is.
+    """
     global _loaded
-    if _loaded is None or _loaded[0] != run:
+    is_new = first or _loaded is None or _loaded[0] != run
+    if is_new:
         _loaded = None  # two scenes may be too much
         _loaded = run, file.load()
         if window:
             crop(_loaded[1].sensors()[sensor], *window)
+    assert _loaded
     scene = _loaded[1]
+    source, camera = pass_source(scene.integrator()), scene.sensors()[sensor]
     with one_thread():
-        return np.array(pass_source(scene.integrator()).sums(scene, scene.sensors()[sensor], seed=seed, spp=spp))
+        if is_new and not first:
+            np.array(source.sums(scene, camera, seed=seed, spp=spp))
+        return np.array(source.sums(scene, camera, seed=seed, spp=spp))
 
 
 def _as_drjit(sums: np.ndarray) -> Any:
