@@ -214,7 +214,8 @@ def test_wrong_arguments_are_told_in_a_sentence():
 
 @pytest.mark.slow
 def test_random_edits_leave_the_memory_as_it_is():
-    """Half a minute, or as long as MI_BRDFS_MINUTES says, of edits of every model: nothing crashes or gets stuck."""
+    """Half a minute, or as long as MI_BRDFS_MINUTES says, of edits of every model: nothing crashes or gets stuck; ``-s``
+    shows the memory."""
     minutes = float(os.environ.get("MI_BRDFS_MINUTES", 0.5))
     process, address = serving("lambert")
     sizes = []
@@ -241,7 +242,8 @@ def test_random_edits_leave_the_memory_as_it_is():
     finally:
         process.terminate()
     settled, last = np.median(sizes[len(sizes) // 10 : len(sizes) // 5]), np.median(sizes[-len(sizes) // 10 :])
-    assert last - settled < 50, f"{settled:.0f} MB became {last:.0f} MB in {len(sizes)} rounds"
+    print(told := f"{settled:.0f} MB became {last:.0f} MB in {len(sizes)} rounds")
+    assert last - settled < 50, told
 
 
 # --- The page ---------------------------------------------------------------------------------------------------------
