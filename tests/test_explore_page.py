@@ -214,8 +214,8 @@ def test_wrong_arguments_are_told_in_a_sentence():
 
 @pytest.mark.slow
 def test_random_edits_leave_the_memory_as_it_is():
-    """Half a minute, or as long as MI_BRDFS_MINUTES says, of edits of every model: nothing crashes or gets stuck; ``-s``
-    shows the memory."""
+    """Half a minute, or as long as MI_BRDFS_MINUTES says, of edits of every model: nothing crashes or gets stuck. The
+    memory is shown with ``-s``."""
     minutes = float(os.environ.get("MI_BRDFS_MINUTES", 0.5))
     process, address = serving("lambert")
     sizes = []

@@ -124,7 +124,7 @@ def with_lobes(model: type[Model], bsdf: Bsdf) -> Bsdf:
 
 def _popped(parameter: PerLobe, number: str, bsdf: Bsdf) -> Bsdf:
     """Take the values of a lobe out of a plugin dict, or its defaults; return them by the names without a number."""
-    lobe = {}
+    lobe: Bsdf = {}
     for it in parameter.declared.values():
         names = zip(it.names, it.numbered(number).names, strict=True)
         given = {name: bsdf.pop(own) for name, own in names if own in bsdf}
