@@ -34,28 +34,32 @@ class Cap:
         """The density of normals over D, for uniform points, per solid angle of the reflected direction."""
 
     def draw(self, v: mi.Point2f) -> mi.Vector3f:
-        """Draw a point."""
+        """Draw a point, and return its normal: the sum of it and the stretched ``wi``, both of length one."""
         z = draw_linear(-self.bias, v.y) * (1 + self.b) - self.b
         sin = safe_sqrt(1 - z * z)
         sin_phi, cos_phi = dr.sincos(dr.two_pi * v.x)
-        return mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
+        return self.unit + mi.Vector3f(sin * cos_phi, sin * sin_phi, z)
 
-    def facet(self, point: mi.Vector3f) -> Facet:
-        """Return the facet of a point."""
-        normal = self.unit + point
+    def normal(self, facet: Facet) -> mi.Vector3f:
+        """Return that sum for a facet."""
+        normal = self.distribution.unstretched(facet)
+        return normal * (2 * dr.dot(self.unit, normal) * dr.rcp(dr.squared_norm(normal)))
+
+    def image(self, normal: mi.Vector3f) -> mi.Vector3f:
+        """Return the normal of the point's mirror image about the axis of the cap."""
+        return mi.Vector3f(2 * self.unit.x - normal.x, 2 * self.unit.y - normal.y, normal.z)
+
+    def facet(self, normal: mi.Vector3f) -> Facet:
+        """Return the facet of a normal."""
         z = dr.maximum(normal.z, SMALL)  # the normal vanishes at the end of a cap that is nearly the whole sphere
         h = mi.Vector3f(self.distribution.alpha_u * normal.x, self.distribution.alpha_v * normal.y, z)
-        return Facet.reflecting(self.wi, h * dr.rsqrt(dr.squared_norm(h)))
+        inverse, cos = dr.rcp(dr.squared_norm(h)), dr.dot(self.wi, h)
+        scale = dr.sqrt(inverse)
+        return Facet(self.wi, dr.fma(h, 2 * cos * inverse, -self.wi), h * scale, cos * scale)
 
-    def point(self, facet: Facet) -> mi.Vector3f:
-        """Return the point of a facet."""
-        normal = self.distribution.unstretched(facet)
-        scale = 2 * dr.dot(self.unit, normal) * dr.rcp(dr.squared_norm(normal))
-        return dr.fma(normal, scale, -self.unit)
-
-    def density(self, facet: Facet, point: mi.Vector3f) -> mi.Float:
-        """Return the density of the reflected direction of a facet and its point."""
-        height = dr.maximum(point.z + self.b, 0) * dr.rcp(1 + self.b)
+    def density(self, facet: Facet, normal: mi.Vector3f) -> mi.Float:
+        """Return the density of the direction that a facet reflects, given its normal."""
+        height = dr.maximum(normal.z - self.unit.z + self.b, 0) * dr.rcp(1 + self.b)
         return self.distribution.eval(facet) * self.scale * linear_density(-self.bias, height)
 
 
@@ -70,7 +74,7 @@ class BoundedVisibleNormals(Sampler):
 
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         cap = Cap(lobe.distribution, facet.wi)
-        return cap.density(facet, cap.point(facet))
+        return cap.density(facet, cap.normal(facet))
 
 
 class AntitheticVisibleNormals(Sampler):
@@ -81,21 +85,17 @@ class AntitheticVisibleNormals(Sampler):
 
     def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         cap = Cap(lobe.distribution, wi)
-        point = cap.draw(v)
-        facet, image = cap.facet(point), cap.facet(self._image(point))
+        normal = cap.draw(v)
+        facet, image = cap.facet(normal), cap.facet(cap.image(normal))
         weight, other = self._weight(reflected(lobe, facet)), self._weight(reflected(lobe, image))
         return select(u * (weight + other) < weight, facet.wo, image.wo)
 
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
         cap = Cap(lobe.distribution, facet.wi)
-        point = cap.point(facet)
+        normal = cap.normal(facet)
         weight = self._weight(lobe.shadowed(facet))  # as in AntitheticNormals
-        other = self._weight(reflected(lobe, cap.facet(self._image(point))))
-        return 2 * cap.density(facet, point) * (weight / (weight + other))
-
-    @staticmethod
-    def _image(point: mi.Vector3f) -> mi.Vector3f:
-        return mi.Vector3f(-point.x, -point.y, point.z)
+        other = self._weight(reflected(lobe, cap.facet(cap.image(normal))))
+        return 2 * cap.density(facet, normal) * (weight / (weight + other))
 
     @staticmethod
     def _weight(reflected: mi.Float) -> mi.Float:
