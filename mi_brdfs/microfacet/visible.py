@@ -31,7 +31,7 @@ class Cap:
         k = (1 - a2) * s2 / (s2 + a2 * wi.z * wi.z)
         self.b, self.bias = k * self.unit.z, self.BIAS * alpha
         self.scale = 0.5 / (k * wi.z + length)
-        """The density of normals over D, for uniform points, per solid angle of the reflected direction."""
+        """The density of reflected directions over D, for uniform points."""
 
     def draw(self, v: mi.Point2f) -> mi.Vector3f:
         """Draw a point, and return its normal: the sum of it and the stretched ``wi``, both of length one."""
@@ -81,7 +81,10 @@ class AntitheticVisibleNormals(Sampler):
     """Draw two such normals, whose points in the cap are mirror images about its axis, and choose one in proportion to
     how much each reflects: where the Fresnel term, or the shadowing, is larger for one, it is smaller for the other. As
     both points have the same density in the cap, the chosen direction has the density 2 p W/(W + W') and the weight
-    (W + W')/2, where p and W ∝ F G are those of a single draw."""
+    (W + W')/2, where p and W ∝ F G are those of a single draw.
+
+    Kernels with a :meth:`complete` that hands on the pair's weights were slower: what it saves is less than waiting for
+    the directions of other lobes costs."""
 
     def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         cap = Cap(lobe.distribution, wi)
