@@ -32,9 +32,14 @@ class Distribution(Term):
         self.alpha_u, self.alpha_v = alpha_u, alpha_v
         self.anisotropic = alpha_u is not alpha_v
 
+    def unstretched(self, facet: Facet) -> mi.Vector3f:
+        """(h_x/αu, h_y/αv, h_z), with reciprocals that Dr.Jit computes once for all facets."""
+        return mi.Vector3f(facet.h.x * dr.rcp(self.alpha_u), facet.h.y * dr.rcp(self.alpha_v), facet.h.z)
+
     def steepness(self, facet: Facet) -> mi.Float:
         """(h_x/αu)² + (h_y/αv)²."""
-        return dr.square(facet.h.x / self.alpha_u) + dr.square(facet.h.y / self.alpha_v)
+        h = self.unstretched(facet)
+        return h.x * h.x + h.y * h.y
 
     def mean_square_slope(self) -> mi.Float:
         """About the mean square slope, over both axes."""
@@ -115,7 +120,8 @@ class GGX(Distribution):
     long_tailed = True
 
     def eval(self, facet: Facet) -> mi.Float:
-        return 1 / (dr.pi * self.alpha_u * self.alpha_v * dr.square(self.steepness(facet) + dr.square(facet.cos_h)))
+        squared = dr.square(dr.rcp(dr.squared_norm(self.unstretched(facet))))
+        return squared * dr.rcp(dr.pi * self.alpha_u * self.alpha_v)
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         x = dr.minimum(g * tan2, LARGEST_TAN2)

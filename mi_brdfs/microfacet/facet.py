@@ -57,7 +57,7 @@ class Facet:
     def reflecting(cls, wi: mi.Vector3f, h: mi.Vector3f) -> Facet:
         """Return the facet with the normal ``h``."""
         cos_d = dr.dot(wi, h)
-        return cls(wi, 2 * cos_d * h - wi, h, cos_d)
+        return cls(wi, dr.fma(h, 2 * cos_d, -wi), h, cos_d)
 
     def image(self) -> Facet:
         """Return the facet mirrored about the normal, which reflects the same ``wi``."""

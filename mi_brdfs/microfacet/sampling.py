@@ -24,8 +24,8 @@ class FacetLobe(Protocol):
     shadowing: Shadowing
     fresnel: Fresnel
 
-    def weight_over_ndf(self, facet: Facet) -> mi.Float:
-        """f cosθ_o·4cosθ_d/D for a reflectance of 1, as one number."""
+    def shadowed(self, facet: Facet) -> mi.Float:
+        """F G as one number."""
 
 
 class Sampler:
@@ -116,7 +116,7 @@ class AntitheticNormals(Sampler):
         if given is not None:
             facet = facet.where(drawn, given)
         image = facet.image()
-        weight, other = reflected(lobe, facet), reflected(lobe, image)
+        weight, other = self._weight(facet, reflected(lobe, facet)), self._weight(image, reflected(lobe, image))
         is_image = select(drawn, u * (weight + other) >= weight, False)
         # Anew, as narrow distributions, and the weights of grazing images, see the rounding of the direction.
         facet = Facet.between(wi, select(is_image, image.wo, facet.wo))
@@ -133,8 +133,17 @@ class AntitheticNormals(Sampler):
         distribution, (x, y) = lobe.distribution, facet.azimuth
         cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
         density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
-        weight, other = reflected_above(lobe, facet), reflected(lobe, facet.image())
+        image = facet.image()
+        # The facet is known to reflect above the horizon. Its F and G are those of the lobe's value: Dr.Jit computes
+        # them once.
+        weight, other = self._weight(facet, lobe.shadowed(facet)), self._weight(image, reflected(lobe, image))
         return density / (2 * facet.cos_d) * (weight / (weight + other))
+
+    @staticmethod
+    def _weight(facet: Facet, reflected: mi.Float) -> mi.Float:
+        """W of a facet that reflects F G, except for factors common to both of a pair. It is never zero: the derivative
+        of W/(W + W') divides by the square of the sum."""
+        return dr.maximum(reflected * facet.cos_d, EPSILON)
 
 
 class Line:
@@ -304,16 +313,9 @@ def draw_linear(bias: mi.Float, u: mi.Float) -> mi.Float:
 
 
 def reflected(lobe: FacetLobe, facet: Facet) -> mi.Float:
-    """What a facet reflects, ``lobe.weight_over_ndf``, or next to nothing if that leads below the horizon. It is never
-    zero: the derivative of a share in what a pair reflects divides by the square of that."""
+    """What a facet reflects, F G, or nothing if that leads below the horizon."""
     valid = (facet.cos_d > SMALL) & (facet.cos_o > 0)
     # Elsewhere the formulas need not make sense, but must be finite.
     wo = mi.Vector3f(facet.wo.x, facet.wo.y, dr.maximum(facet.wo.z, SMALL))
     safe = Facet(facet.wi, wo, facet.h, dr.maximum(facet.cos_d, SMALL))
-    return dr.maximum(select(valid, lobe.weight_over_ndf(safe), 0), EPSILON)
-
-
-def reflected_above(lobe: FacetLobe, facet: Facet) -> mi.Float:
-    """The same of a facet that is known to reflect above the horizon, as ``eval_pdf`` knows. Its terms are those of the
-    lobe's value, so Dr.Jit computes them once."""
-    return dr.maximum(lobe.weight_over_ndf(facet), EPSILON)
+    return select(valid, lobe.shadowed(safe), 0)

@@ -216,16 +216,17 @@ class SheenLobe(Lobe):
         m2 = m * m
         value = m2 * m2 * m * wo.z
 
-        largest = self._largest(frame.sin)
-        t = dr.clip(m / largest, SMALL, 1 - 1e-6)  # rounding must not leave a density of 0
+        scale = dr.rcp(self._largest(frame.sin))
+        t = dr.clip(m * scale, SMALL, 1 - 1e-6)  # rounding must not leave a density of 0
         t_3_5 = t * t * t * dr.sqrt(t)
-        density = 13.5 * t_3_5 * dr.square(1 - t_3_5 * t) / (4 * cos_d * largest)  # dcos = 4 cosθ_d dm
+        density = 13.5 / 4 * t_3_5 * dr.square(1 - t_3_5 * t) * scale / cos_d  # dcos = 4 cosθ_d dm
 
         axial, lateral = -wi.z * cos, frame.sin * safe_sqrt(1 - cos * cos)
         highest = dr.maximum(axial + lateral, wo.z)
         whole = axial >= lateral
         circle = wo.z * dr.inv_two_pi / dr.select(whole, dr.maximum(axial, EPSILON), 1)
-        arc = 0.375 * wo.z / highest * safe_sqrt((lateral + wo.z - axial) / highest)
+        inverse = dr.rcp(highest)
+        arc = 0.375 * (wo.z * inverse) * safe_sqrt((lateral + wo.z - axial) * inverse)
         return self.reflectance * value, density * dr.select(whole, circle, arc)
 
     def sample(self, wi, u, v):

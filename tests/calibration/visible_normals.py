@@ -13,7 +13,7 @@ from harness import Fit, attributes, main, number, variance_loss
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet.distributions import GGX
 from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
-from mi_brdfs.microfacet.visible import BoundedVisibleNormals
+from mi_brdfs.microfacet.visible import Cap
 
 ANGLES = 5, 30, 60, 80
 
@@ -22,7 +22,7 @@ def fits() -> Iterator[Fit]:
     facets = [GGX(alpha, alpha) for alpha in map(number, (0.1, 0.25, 0.5, 0.75, 1))]
     reflectances = Unit(), Schlick(number(0.04)), Dielectric(number(1.5))
     lobes = [MicrofacetLobe(1, it, it.smith(correlated=False), f) for it in facets for f in reflectances]
-    yield attributes(BoundedVisibleNormals, "BIAS", variance_loss(lobes, ANGLES))
+    yield attributes(Cap, "BIAS", variance_loss(lobes, ANGLES))
 
 
 if __name__ == "__main__":
