@@ -1,4 +1,7 @@
+import os
 import signal
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads that wait for work take CPU time of others
 
 import pytest
 from catalogue import OTHER_VARIANTS

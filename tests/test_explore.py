@@ -11,7 +11,6 @@ import pytest
 from latency import edited
 from support import ROOT
 
-from mi_brdfs.explorer.export import page
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
 from mi_brdfs.explorer.stages import Progress, Stages, UserScene, encoded
@@ -369,18 +368,6 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     client.waiting = 99
     (error,) = of(client.work(), "error")
     assert "has no material nothing; it has" in error["text"]
-
-
-def test_the_exported_page_needs_no_network_and_is_small(client, llvm_rgb):
-    data = {"subjects": [{"bsdf": {"type": "ward"}}, {"bsdf": {"type": "lambert"}}]}
-    text = page(parse(data, STAGES), Materials(), client.scenes, data)
-    assert len(text) < 3e6
-    assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
-    frames = json.loads(re.search(r'id="exported">(.*?)</script>', text, re.DOTALL)[1])["frames"]
-    kinds_sent = [
-        json.loads(it["text"]).get("view", "subject") if "text" in it else it["header"]["type"] for it in frames
-    ]
-    assert {"picture", "lobe", "polar", "albedo", "slice", "sampler"} <= set(kinds_sent)
 
 
 # --- Tours ------------------------------------------------------------------------------------------------------------

@@ -71,8 +71,9 @@ def test_passes_the_checker(row):
 
 @pytest.mark.parametrize("variant_name", OTHER_VARIANTS, scope="module")
 @pytest.mark.parametrize("row", ROWS, ids=str)
-def test_weight_is_value_over_density(row, variant):
-    """In variants other than the checker's, with eval_pdf = (eval, pdf), and eval_pdf_sample both at once."""
+def test_weights_and_reciprocity(row, variant):
+    """In variants other than the checker's, with eval_pdf = (eval, pdf), and eval_pdf_sample both at once; and values
+    are reciprocal where the model is."""
     bsdf, context = mi.load_dict(row.bsdf), mi.BSDFContext()
     count = 40 if is_scalar() else 20_000
     rng = np.random.default_rng(3)
@@ -94,6 +95,22 @@ def test_weight_is_value_over_density(row, variant):
     np.testing.assert_allclose(both[1], call(bsdf.pdf, context, wi, other)[0], rtol=1e-5)
     np.testing.assert_allclose(both[2], wo, atol=1e-6)
     np.testing.assert_allclose(both[4], weight, rtol=1e-4, atol=1e-7)
+
+    if row.reciprocal:
+        wi, wo = near_mirrors(count)
+        forth, back = call(bsdf.eval, context, wi, wo)[0], call(bsdf.eval, context, wo, wi)[0]
+        assert forth.max() > 0
+        np.testing.assert_allclose(forth * wi[:, 2:], back * wo[:, 2:], rtol=1e-4, atol=1e-12)
+
+
+@functools.cache
+def near_mirrors(count):
+    """Pairs of directions, half of them near each other's mirror direction, where narrow lobes are."""
+    wi, wo = hemisphere(count, 5), hemisphere(count, 6)
+    near = wo[::2] * 0.03 + wi[::2] * [-1, -1, 1]
+    near[:, 2] = np.maximum(near[:, 2], 0.02)
+    wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
+    return wi, wo
 
 
 @functools.cache
@@ -123,18 +140,3 @@ def test_density_integrates_to_one_at_most(row):
             wo, solid_angle = mirror_grid((0, 0), *grid, power=1) if row.transmits else mirror_grid(angles, *grid)
             pdf = call(bsdf.pdf, context, direction(*angles), wo)[0]
             assert 0.2 < (pdf[:, 0] * solid_angle).sum() < 1 + 1e-3
-
-
-@pytest.mark.parametrize("variant_name", OTHER_VARIANTS, scope="module")
-@pytest.mark.parametrize("row", [row for row in ROWS if row.reciprocal], ids=str)
-def test_reciprocity(row, variant):
-    bsdf, context = mi.load_dict(row.bsdf), mi.BSDFContext()
-    count = 40 if is_scalar() else 20_000
-    wi, wo = hemisphere(count, 5), hemisphere(count, 6)
-    # Half of the pairs near each other's mirror direction, where narrow lobes are.
-    near = wo[::2] * 0.03 + wi[::2] * [-1, -1, 1]
-    near[:, 2] = np.maximum(near[:, 2], 0.02)
-    wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
-    forth, back = call(bsdf.eval, context, wi, wo)[0], call(bsdf.eval, context, wo, wi)[0]
-    assert forth.max() > 0
-    np.testing.assert_allclose(forth * wi[:, 2:], back * wo[:, 2:], rtol=1e-4, atol=1e-12)

@@ -87,7 +87,9 @@ def best(fit: Fit) -> tuple[np.ndarray, float]:
         return constants, float(fit.loss(*constants))
     code = np.array(fit.code, float)
     simplex = np.stack([code, *(code + np.diag(np.where(code, fit.step * code, fit.step)))])
-    options = {"initial_simplex": simplex, "xatol": 2e-3 * abs(code).max(), "fatol": 0, "maxfev": 40 * (len(code) + 1)}
+    # Both tolerances must be met, so an infinite one leaves the decision to the constants'.
+    options = {"initial_simplex": simplex, "xatol": 2e-3 * abs(code).max(), "fatol": np.inf}
+    options["maxfev"] = 40 * (len(code) + 1)
     result = minimize(lambda values: fit.loss(*values), code, method="Nelder-Mead", options=options)
     return result.x, float(result.fun)
 
