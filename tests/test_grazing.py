@@ -108,6 +108,7 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
     (87.7, 14.2, None, kit("gtr", "schlick", alpha=0.001935, gamma=1.68, int_ior=0.6186, ext_ior=0.01252)),
     (83.8, -98.5, 0, {"type": "schlick", "variant": "interreflection", "roughness": 0.0002397, "isotropy": 0.0314,
                       "specular_reflectance": rgb(0.3161, 0.7048, 0.285), "diffuse_reflectance": 0.2}),
+    (88.7, 61.8, None, kit("epd", "vcavity", alpha=0.0001282, gamma=0.1082)),
     (88.9, 90.0, 1, {"type": "blinnphong", "normalization": "original", "exponent": 0.00319,
                      "diffuse_reflectance": 0.5}),
 ]  # fmt: skip
