@@ -109,6 +109,8 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
     (83.8, -98.5, 0, {"type": "schlick", "variant": "interreflection", "roughness": 0.0002397, "isotropy": 0.0314,
                       "specular_reflectance": rgb(0.3161, 0.7048, 0.285), "diffuse_reflectance": 0.2}),
     (88.7, 61.8, None, kit("epd", "vcavity", alpha=0.0001282, gamma=0.1082)),
+    (86.2, -156.8, 1, {"type": "brady", "normalization": "none", "f0": rgb(0.01938, 0.6215, 0.1537), "exponent": 2.021,
+                       "beta": 1.974, "specular_reflectance": rgb(64.97, 0.04308, 0.001169)}),
     (88.9, 90.0, 1, {"type": "blinnphong", "normalization": "original", "exponent": 0.00319,
                      "diffuse_reflectance": 0.5}),
 ]  # fmt: skip

@@ -223,6 +223,9 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
 
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
+    LEANING = 0.93
+    """The largest λ, and the part of the steep lines that lean. The rest bounds the weights of facets across the plane
+    of incidence."""
     STEEP = 1.2
     """How many of the steep facets δ counts: those whose slope is at least one."""
     LARGEST = 0.5
@@ -241,7 +244,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
-        leaning = dr.minimum(seen / (seen + cos2), 0.95)  # others lie across the plane of incidence
+        leaning = dr.minimum(seen / (seen + cos2), self.LEANING)
         if not self.steep:
             return x, y, leaning, 0
         steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
@@ -258,8 +261,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         x, y, leaning, steep = self._along(lobe, wi)
         is_steep, u = choose(u, steep) if self.steep else (False, u)
-        leans, u = choose(u, leaning)
-        leans |= is_steep
+        leans, u = choose(u, select(is_steep, self.LEANING, leaning))
         sin, cos = dr.sincos(dr.two_pi * v)
         sin = dr.select(leans, 2 * v - 1, sin)
         cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
@@ -284,7 +286,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
             if isinstance(lobe.shadowing, Implicit):
                 height = dr.maximum(versine(facet.cos_h, facet.sin2_h), 1e-12)  # at the normal there is no end
                 steepest *= 0.5 * dr.sqrt((1 - line.lowest) / height)
-            density = dr.lerp(density, lines * steepest, steep)
+            density = dr.lerp(density, dr.lerp(1, lines, self.LEANING) * steepest, steep)
         return density
 
 
