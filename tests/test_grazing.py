@@ -104,6 +104,13 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
                             k=rgb(0.00279, 0.002173, 0.005052))),
     (87.6, 177.5, None, kit("ggx", "ashikhmin-premoze", alpha=0.02423, eta=rgb(0.01313, 0.01666, 23.02),
                             k=rgb(0.1534, 0.001129, 0.5858))),
+    (88.3, -151.9, None, kit("gtr", "ashikhmin-premoze", alpha=0.0001579, gamma=1.436)),
+    (87.7, 14.2, None, kit("gtr", "schlick", alpha=0.001935, gamma=1.68, int_ior=0.6186, ext_ior=0.01252)),
+    (83.8, -98.5, 0, {"type": "schlick", "variant": "interreflection", "roughness": 0.0002397, "isotropy": 0.0314,
+                      "specular_reflectance": rgb(0.3161, 0.7048, 0.285), "diffuse_reflectance": 0.2}),
+    (88.7, 61.8, None, kit("epd", "vcavity", alpha=0.0001282, gamma=0.1082)),
+    (86.2, -156.8, 1, {"type": "brady", "normalization": "none", "f0": rgb(0.01938, 0.6215, 0.1537), "exponent": 2.021,
+                       "beta": 1.974, "specular_reflectance": rgb(64.97, 0.04308, 0.001169)}),
     (88.9, 90.0, 1, {"type": "blinnphong", "normalization": "original", "exponent": 0.00319,
                      "diffuse_reflectance": 0.5}),
 ]  # fmt: skip

@@ -190,8 +190,8 @@ class AntitheticSteepNormals(AntitheticNormals):
     """The pair for shadowing terms under which, at grazing, a facet reflects the more the steeper it is, wherever it
     faces: on a part of the lines the half vectors are uniform."""
 
-    STEEP = 1
-    """How many of the facets whose slope is at least a half the part counts; tests/calibration/half_vectors.py fits
+    STEEP = 2.2
+    """How many of the facets whose slope is at least one the part counts; tests/calibration/half_vectors.py fits
     it."""
     LARGEST = 0.5
     """The largest part: facets that nearly all lie near the horizon are no more uniform than flat ones."""
@@ -225,14 +225,18 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     leans to.
 
     Of a distribution with a long tail, or under some shadowing terms, the few steep facets may reflect more at grazing
-    than all others together. On a part δ of the leaning lines the half vectors are uniform, or have a density
-    ∝ 1/√(1 - cosθ_h) under the implicit term, whatever the distribution: that bounds their weights.
+    than all others together. For a part δ of the samples the lines lean, too, and the half vectors on them are uniform,
+    or have a density ∝ 1/√(1 - cosθ_h) under the implicit term, whatever the distribution: that bounds their weights.
+    λ is a part of the others.
     """
 
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
-    STEEP = 0.65
-    """How many of the steep facets δ counts: those whose slope is at least a half."""
+    LEANING = 0.93
+    """The largest λ, and the part of the steep lines that lean. The rest bounds the weights of facets across the plane
+    of incidence."""
+    STEEP = 1.2
+    """How many of the steep facets δ counts: those whose slope is at least one."""
     LARGEST = 0.5
     """The largest δ, for the reason of :attr:`AntitheticSteepNormals.LARGEST`."""
     STEEP_IMPLICIT = 0.7
@@ -249,7 +253,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
-        leaning = dr.minimum(seen / (seen + cos2), 0.95)  # others lie across the plane of incidence
+        leaning = dr.minimum(seen / (seen + cos2), self.LEANING)
         if not self.steep:
             return x, y, leaning, 0
         steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
@@ -259,14 +263,14 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
             steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), EPSILON))
         else:
             steep = dr.minimum(steep / (steep + dr.sqrt(seen + cos2)), self.LARGEST)
-        return x, y, leaning + (1 - leaning) * steep, steep
+        return x, y, leaning, steep
 
     def _azimuth(
         self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Float
     ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         x, y, leaning, steep = self._along(lobe, wi)
-        leans, u = choose(u, leaning)
         is_steep, u = choose(u, steep) if self.steep else (False, u)
+        leans, u = choose(u, select(is_steep, self.LEANING, leaning))
         sin, cos = dr.sincos(dr.two_pi * v)
         sin = dr.select(leans, 2 * v - 1, sin)
         cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
@@ -277,9 +281,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         tan2 = line.inverse_cdf(draw_linear(dr.select(leans, self.OUTWARD, self._bias(lobe, wi)), v))
         if not self.steep:
             return tan2
-        return dr.select(
-            leans & is_steep, line.uniform(dr.square(v) if isinstance(lobe.shadowing, Implicit) else v), tan2
-        )
+        return dr.select(is_steep, line.uniform(dr.square(v) if isinstance(lobe.shadowing, Implicit) else v), tan2)
 
     def _density(
         self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
@@ -287,19 +289,20 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         x, y, leaning, steep = self._along(lobe, facet.wi)
         lines = 0.5 * dr.pi * abs(cos * x + sin * y)
         outward = linear_density(self.OUTWARD, line.part(facet)) * q / line.mass
+        density = dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
         if self.steep:
             steepest = line.uniform_density()
             if isinstance(lobe.shadowing, Implicit):
                 height = dr.maximum(versine(facet.cos_h, facet.sin2_h), 1e-12)  # at the normal there is no end
                 steepest *= 0.5 * dr.sqrt((1 - line.lowest) / height)
-            outward = dr.lerp(outward, steepest, steep)
-        return dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
+            density = dr.lerp(density, dr.lerp(1, lines, self.LEANING) * steepest, steep)
+        return density
 
 
 def steep_facets(distribution: Distribution, wi: mi.Vector3f) -> mi.Float:
-    """How many facets of the plane of incidence have a slope of at least a half."""
+    """How many facets of the plane of incidence have a slope of at least one."""
     slope2 = dr.maximum(distribution.mean_square_slope_along(wi), EPSILON)
-    return distribution.cdf(0.25, (wi.x * wi.x + wi.y * wi.y) / slope2)[1]
+    return distribution.cdf(1, (wi.x * wi.x + wi.y * wi.y) / slope2)[1]
 
 
 def linear_density(bias: mi.Float, m: mi.Float) -> mi.Float:

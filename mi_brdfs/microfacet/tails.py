@@ -28,6 +28,7 @@ from .laws import (
     cosine_power,
     cosine_power_cdf,
     inverse_cosine_power_cdf,
+    power_32,
     tan2_of_versine,
     versine_of_tan2,
 )
@@ -213,9 +214,9 @@ class EPD(Isotropic):
 
     long_tailed = True
     # tests/calibration/epd.py fits these.
-    FAR, GROWTH = 1.7, 1.38
+    FAR, GROWTH = 1.7, 1.44
     """How far the law reaches, in medians, and by which ratio, to the power of each of"""
-    STEPS = (-14, 0, 2, 5, 6, 8, 20)
+    STEPS = (-28, -12, 0, 2, 4, 6, 12)
     """these, the slopes at which D is evaluated differ from that. The last is for the end of the last ramp: D is
     nothing at infinity."""
 
@@ -274,6 +275,6 @@ class EPD(Isotropic):
 
 
 def fall(x: mi.Float) -> mi.Float:
-    """About exp(-x), to a few percent where that is no small number."""
-    y = dr.minimum(x, 60) / 8
-    return 1 / dr.square(dr.square(dr.square(1 + y * (1 + 0.5 * y))))
+    """About exp(-x): to a few percent up to x = 10, as far as the median of low powers."""
+    y = dr.minimum(x, 60) / 32
+    return 1 / power_32(1 + y * (1 + 0.5 * y))[0]

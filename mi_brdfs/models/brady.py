@@ -64,7 +64,7 @@ class Brady(Model):
 class Projected(Shadowing):
     """The shadowing term that turns 1/(cosθ_i cosθ_o) into 1/(wi·h)."""
 
-    lean = 1
+    lean = 1.6
 
     def __call__(self, facet):
         return facet.cos_i * facet.cos_o / facet.cos_d

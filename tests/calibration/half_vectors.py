@@ -18,7 +18,7 @@ from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
 from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer, AntitheticSteepNormals
 from mi_brdfs.microfacet.tails import ABC, EPD, GTR
 from mi_brdfs.models.blinnphong import ResponseShadowing
-from mi_brdfs.models.brady import Projected
+from mi_brdfs.models.brady import Exponential, Projected
 from mi_brdfs.models.schlick import Unshadowed
 
 ANGLES = 5, 30, 60, 80
@@ -85,11 +85,12 @@ def fits() -> Iterator[Fit]:
         "Neumann": shadowing.Neumann(),
         "AshikhminPremoze": shadowing.AshikhminPremoze(),
         "KurtShadowing": shadowing.KurtShadowing(number(0.25)),
-        "Projected": Projected(),
         "ResponseShadowing": ResponseShadowing(),
         "Unshadowed": Unshadowed(),
     }.items():
         yield of_lean(name, lobes(short_tailed, [term], unit))
+    brady = [Exponential(number(beta**2), number(0.5 * a), True) for beta, a in product((0.2, 0.3, 0.5), (0.8, 1.4, 2))]
+    yield of_lean("Projected", lobes(brady, [Projected()], unit))
 
 
 def of_lean(name, of_term) -> Fit:
