@@ -36,11 +36,10 @@ def _frames(state: State, materials: Materials, scenes: stages.Stages) -> list[F
     found: list[Frame] = []
     for k, given in enumerate(state.subjects):
         bsdf = materials.expanded(given)
+        told = {"controls": materials.controls(bsdf), **materials.written(bsdf), **materials.described(bsdf)}
+        found.append(text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told))
         with materials.loaded(bsdf) as loaded:
             probe = ComponentProbe(loaded, state.component)
-            names = [probe.name_of(i) for i in range(loaded.component_count())]
-            told = {"controls": materials.controls(bsdf), "components": names, "error": None, "notes": [], "bsdf": None}
-            found.append(text(type="subject", serial=0, subject=k, **told, **materials.written(bsdf)))
             for view in VIEWS:
                 found += frames(view, probe, state, 0, k)
         progress = stages.Progress(scenes.stage(stages.Setting.of(state)))

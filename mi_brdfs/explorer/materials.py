@@ -11,6 +11,7 @@ from typing import Any
 
 import mitsuba as mi
 
+from ..measure.probe import BSDFProbe
 from ..measure.sources import BSDFSource
 from ..mitsuba.errors import one_line
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
@@ -109,6 +110,15 @@ class Materials:
             defaults = {it["name"]: it["value"] for it in controls.traversed(usual, {})}
         with self.loaded(bsdf) as loaded:
             return controls.traversed(loaded, defaults)
+
+    def described(self, bsdf: Bsdf) -> dict[str, list[str]]:
+        """Return the names of the components of an expanded plugin dict, and notes about it."""
+        with self.loaded(bsdf) as loaded:
+            probe = BSDFProbe(loaded)
+            return {
+                "components": [probe.name_of(i) for i in range(loaded.component_count())],
+                "notes": ["anisotropic"] if mi.has_flag(loaded.flags(), mi.BSDFFlags.Anisotropic) else [],
+            }
 
     def written(self, bsdf: Bsdf) -> dict[str, str]:
         """Return an expanded plugin dict as XML, as a Python dict, and as a command."""

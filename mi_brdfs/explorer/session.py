@@ -13,8 +13,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
-
 from ..mitsuba.errors import one_line
 from . import stages
 from .export import page
@@ -110,11 +108,7 @@ class Session:
                     message["bsdf"] = None if key_of(bsdf) == key else bsdf
                     message["controls"] = self.materials.controls(bsdf)
                     message |= self.materials.written(bsdf)
-                    with self.materials.loaded(bsdf) as loaded:
-                        probe = ComponentProbe(loaded)
-                        message["components"] = [probe.name_of(i) for i in range(loaded.component_count())]
-                        if mi.has_flag(loaded.flags(), mi.BSDFFlags.Anisotropic):
-                            message["notes"].append("anisotropic")
+                    message |= self.materials.described(bsdf)
                     self._broken.discard(key)
                 except StateError as error:
                     message["error"] = str(error)
