@@ -29,12 +29,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .cluster import ClusterError
 from .variants import is_scalar
 
 SHOULDER = 0.8
 
 Passes = Callable[["mi.Scene", int, Iterable[tuple[int, int]]], Generator[Any, None, None]]
+
+
+class PassesError(RuntimeError):
+    """Why what computes passes elsewhere cannot begin or go on."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,7 @@ def render(
     ``passes`` computes the passes elsewhere, as of :func:`mi_brdfs.cluster.passes.passes_on`: called with the scene,
     the sensor's index, and the seed and samples per pixel of each pass, it yields their sums in this order. The result
     is that of one thread, bit for bit, on processors of the same instruction set. If a
-    :class:`mi_brdfs.cluster.ClusterError` ends it, the finished passes are returned, with a warning.
+    :class:`PassesError` ends it, the finished passes are returned, with a warning.
     """
     camera = scene.sensors()[sensor]
     film, sampler, integrator = camera.film(), camera.sampler(), scene.integrator()
@@ -120,7 +123,7 @@ def render(
                     on_pass(done, total)
                     if interrupt.pressed or (seconds is not None and time.perf_counter() - start >= seconds):
                         break
-            except ClusterError as error:
+            except PassesError as error:
                 if not done:
                     raise
                 warnings.warn(str(error), stacklevel=2)

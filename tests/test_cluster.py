@@ -26,7 +26,7 @@ from mi_brdfs.cluster.passes import passes_on
 from mi_brdfs.cluster.worker import _file
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.mitsuba.registry import info
-from mi_brdfs.render import one_thread, pass_source, render
+from mi_brdfs.render import PassesError, one_thread, pass_source, render
 from mi_brdfs.scene_file import SceneFile
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -284,13 +284,13 @@ def test_what_is_finished_when_the_scheduler_goes_is_kept(scene):
     def passes(scene, sensor, jobs):
         for _, (seed, spp) in zip(range(left), jobs, strict=False):
             yield source.sums(scene, scene.sensors()[sensor], seed=seed, spp=spp)
-        raise ClusterError("The scheduler has gone.")
+        raise PassesError("The scheduler has gone.")
 
     with pytest.warns(UserWarning, match=r"^The scheduler has gone\.$"):
         picture = render(loaded, spp=32, passes=passes)
     assert (picture.spp, picture.total, picture.interrupted) == (12, 32, True)
     left = 0
-    with pytest.raises(ClusterError):
+    with pytest.raises(PassesError):
         render(loaded, spp=32, passes=passes)
 
 

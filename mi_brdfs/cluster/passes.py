@@ -9,10 +9,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..render import Passes, crop, one_thread, pass_source
+from ..render import Passes, PassesError, crop, one_thread, pass_source
 from ..scene_file import SceneFile
 from ..variants import is_scalar
-from . import Failed, run
+from . import ClusterError, Failed, run
 
 _loaded: tuple[str, Any] | None = None
 """The scene of the run that this worker takes part in, by the run's id."""
@@ -33,13 +33,16 @@ def passes_on(
         shared = (uuid.uuid4().hex, file.copied() if scheduler else file, sensor, window)
         tasks = ((str(index), (index == 0, *job)) for index, job in enumerate(jobs))
         early, following = {}, 0
-        for key, result in run(pass_sums, tasks, workers=workers, scheduler=scheduler, shared=shared):
-            if isinstance(result, Failed):
-                raise RuntimeError(result.error)
-            early[int(key)] = result
-            while following in early:  # floats are added in the order of the passes
-                yield _as_drjit(early.pop(following))
-                following += 1
+        try:
+            for key, result in run(pass_sums, tasks, workers=workers, scheduler=scheduler, shared=shared):
+                if isinstance(result, Failed):
+                    raise RuntimeError(result.error)
+                early[int(key)] = result
+                while following in early:  # floats are added in the order of the passes
+                    yield _as_drjit(early.pop(following))
+                    following += 1
+        except ClusterError as error:
+            raise PassesError(str(error)) from error
 
     return passes
 
