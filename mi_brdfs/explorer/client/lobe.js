@@ -4,7 +4,7 @@ import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geo
 import { change, session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { belowOf } from "./link.js";
-import { colourOf } from "./plots.js";
+import { colourOf } from "./drawing.js";
 
 const VERTEX = `#version 300 es
 in vec3 position, normal; uniform mat4 view; out vec3 facing;

@@ -2,7 +2,7 @@
 import { clamp, element, format, fromDisplay } from "./util.js";
 import { change, session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { colourOf } from "./plots.js";
+import { colourOf } from "./drawing.js";
 
 const SIZES = [128, 192, 256, 384, 512, 640, 768, 1024];
 const canvases = new Map();

@@ -1,21 +1,8 @@
 // Curves: the plane of incidence as polar and cartesian plots; and albedo.
-import {
-  CHANNELS,
-  DASHES,
-  PALETTE,
-  clamp,
-  degrees,
-  format,
-  interpolate,
-  largest,
-  radians,
-  shape,
-  valueScale,
-} from "./util.js";
+import { CHANNELS, DASHES, clamp, degrees, format, interpolate, largest, radians, shape, valueScale } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-
-export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k];
+import { attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
 
 /** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
 function curvesOf(view) {
@@ -40,66 +27,6 @@ function lobesOf(view) {
   return curves.map((curve) => ({ ...curve, y: curve.y.map((value) => value / peak[curve.subject]) }));
 }
 
-/** Return the path through points, without those that cannot be told from the one before. */
-export function path(points) {
-  let text = "";
-  let last = null;
-  points.forEach(([x, y], k) => {
-    if (!Number.isFinite(x + y)) return;
-    if (last && k < points.length - 1 && Math.abs(x - last[0]) + Math.abs(y - last[1]) < 0.25) return;
-    text += `${last ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`;
-    last = [x, y];
-  });
-  return text;
-}
-
-export const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
-export const label = (x, y, text, anchor = "middle", kind = "tick") =>
-  shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
-export const drawing = (width, height, summary) =>
-  shape("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", tabindex: 0, "aria-label": summary });
-
-export function stroke(curve, points) {
-  return shape("path", {
-    d: path(points),
-    class: curve.dimmed ? "curve dimmed" : "curve",
-    stroke: curve.colour,
-    "stroke-dasharray": curve.dash,
-  });
-}
-
-export function summary(curves, what, unit) {
-  const parts = curves.map(({ name, x, y }) => {
-    const peak = largest([y]);
-    return `${name}: at most ${format(peak)}${unit} at ${format(x[y.findIndex((value) => value === peak)] ?? 0)}°`;
-  });
-  return `${what}. ${parts.join("; ") || "No data yet"}.`;
-}
-
-/** A crosshair that pointer and arrow keys move: `angleAt` maps a place to an angle, `cross` draws it. */
-export function attach(card, svg, angleAt, range, cross) {
-  let angle = null;
-  const move = (to) => {
-    angle = to;
-    cross(to);
-  };
-  const follow = (event) => {
-    const box = svg.getBoundingClientRect();
-    const scale = svg.viewBox.baseVal.width / box.width;
-    move(angleAt((event.clientX - box.left) * scale, (event.clientY - box.top) * scale));
-  };
-  svg.addEventListener("pointermove", follow);
-  svg.addEventListener("pointerdown", follow);
-  svg.addEventListener("pointerleave", () => move(null));
-  svg.addEventListener("blur", () => move(null));
-  svg.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -10, ArrowUp: 10 }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    move(clamp((angle ?? session.state.theta) + step * (event.shiftKey ? 0.1 : 1), ...range));
-  });
-}
-
 /** Where the plane of incidence is looked at, in both of its plots. */
 let cursor = null;
 const crosses = {};
@@ -108,8 +35,6 @@ function pointAt(angle) {
   cursor = angle;
   for (const cross of Object.values(crosses)) cross();
 }
-
-export const widthOf = (card, most = 620) => Math.max(Math.min(card.figure.clientWidth, most), 240);
 
 function replaceFigure(card, ...nodes) {
   const focused = card.figure.contains(document.activeElement) && document.activeElement.tagName === "svg";
@@ -226,37 +151,6 @@ const valuesAt = (curves) =>
   ]);
 
 // --- Cartesian ------------------------------------------------------------------------------------------------------
-
-let drawings = 0;
-
-/** Draw axes; return the drawing and where values are in it. */
-export function axes(width, height, across, scale, what, unit = "°") {
-  const [left, right, top, bottom] = [46, 14, 14, 26];
-  const svg = drawing(width, height, what);
-  const clip = `inside-${++drawings}`;
-  svg.append(
-    shape(
-      "clipPath",
-      { id: clip },
-      shape("rect", { x: left, y: top - 4, width: width - left - right, height: height - top - bottom + 6 }),
-    ),
-  );
-  const x = (value) => left + ((value - across.low) / (across.high - across.low)) * (width - left - right);
-  const y = (value) => height - bottom - clamp(scale.of(value), -0.1, 9) * (height - top - bottom);
-  for (const [value, text] of scale.marks) {
-    svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
-  }
-  for (const value of across.marks) {
-    svg.append(
-      line(x(value), top, x(value), height - bottom, "grid"),
-      label(x(value), height - bottom + 17, `${format(value)}${unit}`),
-    );
-  }
-  svg.append(line(left, height - bottom, width - right, height - bottom, "axis"));
-  const at = (place) =>
-    clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
-  return { svg, x, y, at, clip, top, bottom: height - bottom };
-}
 
 /** Draw curves over an angle; `mark` adds to the drawing before them, `moved` tells of the crosshair. */
 function graph(card, curves, across, scale, what, mark, crossing) {

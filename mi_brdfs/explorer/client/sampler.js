@@ -2,7 +2,7 @@
 import { DASHES, clamp, degrees, element, format, interpolate, radians, shape, ticks, valueScale } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./plots.js";
+import { attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
 
 /** Draw the directions, weights and efficiencies of the samplers, with a box of tests below. */
 export function drawSampler(chi2) {

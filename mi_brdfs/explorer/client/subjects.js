@@ -1,7 +1,7 @@
 // The subjects: chips, the editor's head, and the dialog that adds one.
 import { PALETTE, byId, element } from "./util.js";
 import { MOST_SUBJECTS, addSubject, change, changeSubject, emit, on, removeSubject, session } from "./session.js";
-import { colourOf } from "./plots.js";
+import { colourOf } from "./drawing.js";
 import { drawControls, resetAll } from "./controls.js";
 
 const MOST_FOUND = 80;
