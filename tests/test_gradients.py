@@ -11,7 +11,7 @@ from support import direction, hemisphere, interaction
 LINEAR = ("reflectance", "subsurface", "metallic", "specular.", "tint", "sheen", "clearcoat.")
 """Parts of the keys of parameters in which a picture is linear or quadratic: a central difference is exact."""
 
-NOISY = ("burley", "kurt two lobes", "walter dielectric")
+NOISY = ("burley", "kurt two lobes", "schlick interreflection", "walter dielectric")
 """Several lobes that share a parameter, or a weak influence: other samples are chosen after a step, which makes the
 differences noisy."""
 

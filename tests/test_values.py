@@ -6,6 +6,8 @@ import pytest
 from catalogue import EXTREME, ROWS
 from support import call, direction, hemisphere, sphere
 
+ROUNDING = 2e-7
+"""A few float32 ulp of the length of a direction."""
 COSINES = [1, 0.999, 0.9, 0.7, 0.4, 0.1, 0.05, 0.02]
 
 
@@ -13,7 +15,8 @@ COSINES = [1, 0.999, 0.9, 0.7, 0.4, 0.1, 0.05, 0.02]
 @pytest.mark.parametrize("row", [*ROWS, *EXTREME], ids=str)
 def test_matches_the_reference(row):
     """Within 1e-4 where f is above 1e-6 of its peak: a few float32 ulp, times the at most 14 e-foldings of a lobe. What
-    is seen there can be sampled."""
+    is seen there can be sampled. Where total reflection begins, the slope of F has no end: there it may differ by what
+    a rounded direction makes of the reference."""
     bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
     rng = np.random.default_rng(7)
     wi = np.repeat([direction(np.degrees(np.arccos(cosine)), 37) for cosine in COSINES], 6000, axis=0)
@@ -24,12 +27,15 @@ def test_matches_the_reference(row):
     wo[uniform] = around(uniform.sum(), 9)
     value, pdf = (result[:, 0] for result in call(bsdf.eval_pdf, ctx, wi, wo))
     expected = row.reference(wi, wo)
-    of_each_cosine = (np.split(array, len(COSINES)) for array in (value, pdf, expected))
-    for value, pdf, expected in zip(*of_each_cosine, strict=True):
-        checked = expected > 1e-6 * expected.max()
-        assert checked.sum() > 500
-        np.testing.assert_allclose(value[checked], expected[checked], rtol=1e-4)
-        assert (pdf[checked] > 0).all()
+    highest = expected.reshape(len(COSINES), -1).max(axis=1)
+    checked = expected > np.repeat(1e-6 * highest, 6000)
+    assert (checked.reshape(len(COSINES), -1).sum(axis=1) > 500).all()
+    assert (pdf[checked] > 0).all()
+    other = checked & (abs(value - expected) > 1e-4 * expected)
+    if other.any():
+        rounded = [row.reference(wi[other], wo[other] + [0, 0, error]) for error in (-ROUNDING, ROUNDING)]
+        sensitivity = abs(rounded - expected[other]).max(axis=0)
+        np.testing.assert_array_less(abs(value - expected)[other], 1e-4 * expected[other] + sensitivity)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -83,7 +83,9 @@ class Ramps:
 
     def __init__(self, points: list[Any], heights: list[Any]) -> None:
         highest = functools.reduce(dr.maximum, heights)
-        heights = [dr.maximum(height, SMALL * highest) for height in heights]  # it must not vanish
+        self.least = SMALL * highest
+        """It must not vanish, also where an end of a ramp is rounded."""
+        heights = [dr.maximum(height, self.least) for height in heights]
         self.ramps: list[tuple[Any, ...]] = []
         """Of each ramp its left end, the mass up to there, and its height there and slope."""
         self.total = 0
@@ -103,7 +105,7 @@ class Ramps:
 
     def eval(self, c: mi.Float) -> mi.Float:
         start, _, height, slope = self._ramp(c, 0)
-        return (height + (c - start) * slope) / self.total
+        return dr.maximum(height + (c - start) * slope, self.least) / self.total
 
     def cdf(self, c: mi.Float) -> mi.Float:
         start, mass, height, slope = self._ramp(c, 0)

@@ -232,7 +232,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
 
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
-    LEANING = 0.93
+    LEANING = 0.95
     """The largest λ, and the part of the steep lines that lean. The rest bounds the weights of facets across the plane
     of incidence."""
     STEEP = 1.2
