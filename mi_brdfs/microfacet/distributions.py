@@ -120,8 +120,8 @@ class GGX(Distribution):
     long_tailed = True
 
     def eval(self, facet: Facet) -> mi.Float:
-        squared = dr.square(dr.rcp(dr.squared_norm(self.unstretched(facet))))
-        return squared * dr.rcp(dr.pi * self.alpha_u * self.alpha_v)
+        h = self.unstretched(facet)
+        return dr.square(dr.rcp(dr.dot(h, h))) * dr.rcp(dr.pi * self.alpha_u * self.alpha_v)
 
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         x = dr.minimum(g * tan2, LARGEST_TAN2)

@@ -23,7 +23,7 @@ class Cap:
     def __init__(self, distribution: Distribution, wi: mi.Vector3f) -> None:
         self.distribution, self.wi = distribution, wi
         stretched = mi.Vector3f(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, wi.z)
-        length = dr.norm(stretched)
+        length = dr.sqrt(dr.dot(stretched, stretched))
         self.unit = stretched * dr.rcp(length)
         alpha = dr.minimum(dr.minimum(distribution.alpha_u, distribution.alpha_v), 1)
         s = 1 + sin_theta(wi)
@@ -43,7 +43,7 @@ class Cap:
     def normal(self, facet: Facet) -> mi.Vector3f:
         """Return that sum for a facet."""
         normal = self.distribution.unstretched(facet)
-        return normal * (2 * dr.dot(self.unit, normal) * dr.rcp(dr.squared_norm(normal)))
+        return normal * (2 * dr.dot(self.unit, normal) * dr.rcp(dr.dot(normal, normal)))
 
     def image(self, normal: mi.Vector3f) -> mi.Vector3f:
         """Return the normal of the point's mirror image about the axis of the cap."""
@@ -53,7 +53,7 @@ class Cap:
         """Return the facet of a normal."""
         z = dr.maximum(normal.z, SMALL)  # the normal vanishes at the end of a cap that is nearly the whole sphere
         h = mi.Vector3f(self.distribution.alpha_u * normal.x, self.distribution.alpha_v * normal.y, z)
-        inverse, cos = dr.rcp(dr.squared_norm(h)), dr.dot(self.wi, h)
+        inverse, cos = dr.rcp(dr.dot(h, h)), dr.dot(self.wi, h)
         scale = dr.sqrt(inverse)
         return Facet(self.wi, dr.fma(h, 2 * cos * inverse, -self.wi), h * scale, cos * scale)
 
