@@ -18,11 +18,11 @@ import numpy as np
 
 import mi_brdfs
 from mi_brdfs.fit import METRICS, Observations, fit, observe
+from mi_brdfs.measure.arrays import interaction, numbers
 from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.parameters import FresnelSet
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
-from support import interaction, numbers  # isort: skip
 
 BATCH = 10
 """Materials fitted at a time."""

@@ -31,9 +31,10 @@ AHEAD = 2
 """Tasks submitted per worker: each runs one, and one is there when it ends; more would wait for one worker while
 another, which joined later, has nothing to do."""
 LOOKING = 0.1
-"""Seconds after which the workers are counted again while some of this machine's have not joined …"""
+"""Seconds to wait for a result before looking after the workers; these are counted again after as many while some of
+this machine's have not joined …"""
 LOOKING_ON = 1
-"""… and otherwise."""
+"""… and after these otherwise."""
 
 
 def run_on_workers(

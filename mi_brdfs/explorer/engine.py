@@ -59,11 +59,11 @@ class Engine(threading.Thread):
                 _run(*self._calls.get())
             worked = [self._step(session) for session in list(self.sessions)]
             self.sessions = [session for session in self.sessions if not session.closed]
-            if any(worked) and time.monotonic() - released > RELEASE:
-                _release_memory()
-                released = time.monotonic()
             if not any(worked):
                 self._wake.wait(0.05)
+            elif time.monotonic() - released > RELEASE:
+                _release_memory()
+                released = time.monotonic()
             self._wake.clear()
 
     def _step(self, session: Session) -> bool:

@@ -68,8 +68,7 @@ class SmithGGX(Smith):
     """Λ = ½(√(1 + 1/a²) - 1) with 1/a² = ((αu v_x)² + (αv v_y)²)/v_z²: exact for GGX."""
 
     def stretched(self, v: mi.Vector3f) -> mi.Float:
-        stretched = mi.Vector3f(self.alpha_u * v.x, self.alpha_v * v.y, v.z)
-        return dr.sqrt(dr.dot(stretched, stretched))
+        return dr.sqrt(self.slope2(v) + v.z * v.z)
 
 
 class SmithBeckmann(Smith):
