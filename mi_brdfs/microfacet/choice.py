@@ -6,8 +6,9 @@ from __future__ import annotations
 from .distributions import GGX, AshikhminShirleyNormals, Distribution
 from .forward import WithForwardShare
 from .fresnel import Dielectric, Fresnel, Schlick
-from .sampling import AntitheticNormals, AntitheticNormalsTowardViewer, AntitheticSteepNormals, Sampler
-from .shadowing import SchlickSmith, Shadowing, SmithGGX
+from .grazing import AntitheticImplicitNormals, AntitheticNormalsTowardViewer, AntitheticSteepNormals
+from .sampling import AntitheticNormals, Sampler
+from .shadowing import Implicit, SchlickSmith, Shadowing, SmithGGX
 from .visible import AntitheticVisibleNormals, BoundedVisibleNormals
 
 
@@ -30,5 +31,6 @@ def _sampler_of_facets(distribution: Distribution, shadowing: Shadowing, fresnel
     # Those normals are drawn without a cosine, and so steep ones more often.
     favours_steep = shadowing.favours_steep and not isinstance(distribution, AshikhminShirleyNormals)
     if shadowing.lean:
-        return AntitheticNormalsTowardViewer(shadowing.lean, distribution.long_tailed or favours_steep)
+        leaning = AntitheticImplicitNormals if isinstance(shadowing, Implicit) else AntitheticNormalsTowardViewer
+        return leaning(shadowing.lean, distribution.long_tailed or favours_steep)
     return AntitheticSteepNormals() if favours_steep else AntitheticNormals()

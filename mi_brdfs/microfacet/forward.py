@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -10,7 +11,7 @@ import mitsuba as mi
 from ..math import EPSILON, SMALL, choose, normalize_or, safe_sqrt, select, sin_theta
 from .facet import Facet
 from .fresnel import Dielectric
-from .sampling import FacetLobe, Sampler
+from .sampling import FacetLobe, Sampler, draw_linear, linear_density
 
 
 class ForwardDirections:
@@ -18,11 +19,18 @@ class ForwardDirections:
     reflects by far the most.
 
     Where both directions are low, with the cosines z and z' and the azimuth δ from the plane of incidence, cosθ_d² is
-    about ((z + z')² + δ²)/4. z' has the density ∝ z'/(z + z')³. tan(δ/2) has one ∝ (σ² + (tan(δ/2) - m)²)^(-3/2): m is
-    where the half vector lies on the ridge of anisotropic facets, and σ is (z + z')/2, limited by how far the facets
-    reach across. Where the indices differ more, up to total reflection at cosθ_d = √|η² - 1|, z is larger in σ.
+    about ((z + z')² + δ²)/4. z' has the density ∝ (z' + c)/(s + z')³, i.e. r = z'/(s + z') has a linear one; s is z,
+    but less where the reflectance falls sooner, near the critical angle. tan(δ/2) has a density ∝ (σ² + (tan(δ/2) -
+    m)²)^(-3/2): m is where the half vector lies on the ridge of anisotropic facets, and σ is (z + z')/2, limited by how
+    far the facets reach across. Where the indices differ more, up to total reflection at cosθ_d = √|η² - 1|, z is
+    larger in σ.
     """
 
+    BIAS = -0.85
+    """τ of :func:`.sampling.linear_density`: at -1 there would be no samples in the horizon, where some shadowing terms
+    let facets reflect."""
+    FALL = 8
+    """By which factor the reflectance falls until z' is about s."""
     BROADER = 2
     """How much |η² - 1| adds to z²."""
     STEEP = 0.1
@@ -33,13 +41,29 @@ class ForwardDirections:
     ) -> None:
         """For facets of some mean square slope, along u if another one along v is given."""
         self.z, self.sin = lowest_cosine(wi), sin_theta(wi)
-        self.broader = dr.sqrt(self.z * self.z + self.BROADER * abs(dr.square(fresnel.eta) - 1))
+        step = dr.square(fresnel.eta) - 1
+        self.broader = dr.sqrt(self.z * self.z + self.BROADER * abs(step))
+        self.scale = self._scale(step)
+        self.largest = dr.rcp(1 + self.scale)
+        """The r of z' = 1."""
         self.x, self.y = x, y = normalize_or(wi.x, wi.y, (1, 0))
         self.across, self.ridge = dr.rcp(slope2), None
         if slope2_v is not None:
             u, v = self.across, dr.rcp(slope2_v)
             self.across = x * x * v + y * y * u
             self.ridge = x * y * (u - v) / (1 + self.across)
+
+    def _scale(self, step: mi.Float) -> mi.Float:
+        """s for η² - 1."""
+        # Near η = 1, F is about exp(-4 arsinh(c/√(η² - 1))), or with arcosh and √(1 - η²) beyond total reflection.
+        lowest2 = lowest_cos_d2(self.z, self.sin)
+        c = dr.maximum(dr.sqrt(lowest2), safe_sqrt(-step))
+        fall = math.log(self.FALL) / 4
+        fallen = math.cosh(fall) * c + math.sinh(fall) * safe_sqrt(c * c + step)
+        # cosθ_d² = lowest2 + z z'/2 + sinθ_i z'²/4 in the plane of incidence, up to terms in z'³.
+        rise = dr.square(fallen) - lowest2
+        near = 4 * rise / (self.z + dr.sqrt(self.z * self.z + 4 * self.sin * rise))
+        return dr.rsqrt(1 / dr.square(self.z) + 1 / dr.square(near))
 
     def _azimuth(self, z: mi.Float, sin: mi.Float) -> tuple[Any, mi.Float]:
         """Return ``(m, σ)`` of a z' = cosθ_o."""
@@ -53,8 +77,8 @@ class ForwardDirections:
         return self.ridge * difference / sines, sigma
 
     def draw(self, v: mi.Point2f) -> mi.Vector3f:
-        ratio = dr.sqrt(v.x) / (1 + self.z)  # z'/(z + z')
-        z = self.z * ratio / (1 - ratio)
+        r = draw_linear(self.BIAS, v.x) * self.largest
+        z = self.scale * r / (1 - r)
         sin = safe_sqrt(1 - z * z)
         m, sigma = self._azimuth(z, sin)
         uniform = 2 * v.y - 1
@@ -71,11 +95,10 @@ class ForwardDirections:
         m, sigma = self._azimuth(z, safe_sqrt(1 - z * z))
         tan = (self.x * y - self.y * x) / dr.maximum(1 - (self.x * x + self.y * y), SMALL)
         inverse = dr.rsqrt(1 + dr.square((tan - m) / sigma))
-        scale = dr.rcp(self.z + z)
-        return (
-            0.5 * dr.square((1 + self.z) * scale) * (self.z * scale) * z
-            * (1 + tan * tan) / sigma * inverse * dr.square(inverse)
-        )  # fmt: skip
+        scale = dr.rcp(self.scale + z)
+        r = dr.minimum(z * scale, self.largest) / self.largest
+        height = linear_density(self.BIAS, r) * self.scale / self.largest * dr.square(scale)
+        return height * 0.25 * (1 + tan * tan) / sigma * inverse * dr.square(inverse)
 
 
 class ForwardShare(NamedTuple):
@@ -92,7 +115,10 @@ class ForwardShare(NamedTuple):
         is typical of the rest."""
         step2 = dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) * dr.select(fresnel.eta < 1, TOTAL, 1)
         distinct = dr.square(dr.square(dr.square(step2 / INDISTINCT)))
-        forward = fraction * fresnel(LOWEST * lowest_cosine(wi)) / (1 + distinct)
+        z = lowest_cosine(wi)
+        # Of narrow lobes only the last directions before the horizon are like that.
+        last = fresnel(dr.sqrt(lowest_cos_d2(z, sin_theta(wi))))
+        forward = fraction * dr.lerp(fresnel(LOWEST * z), last, z * z / typical) / (1 + distinct)
         rest = dr.maximum(fresnel(dr.minimum(dr.sqrt(typical), 1)), EPSILON)
         return cls(forward, LARGEST * forward / (forward + rest))
 
@@ -101,7 +127,7 @@ INDISTINCT = 0.016
 """The reflectance at normal incidence below which dielectrics need a share of forward directions,"""
 TOTAL = 0.33
 """to which it counts by this factor if they reflect totally."""
-LARGEST = 0.8
+LARGEST = 0.6
 """The share where they need it most."""
 LOWEST = 0.8
 """The cosθ_d of these directions, relative to cosθ_i."""
@@ -110,6 +136,11 @@ LOWEST = 0.8
 def lowest_cosine(wi: mi.Vector3f) -> mi.Float:
     """Return the z of above, not too small for what divides by it."""
     return dr.maximum(wi.z, 1e-3)
+
+
+def lowest_cos_d2(z: mi.Float, sin: mi.Float) -> mi.Float:
+    """Return the cosθ_d² of the direction opposite in the horizon, (1 - sinθ_i)/2."""
+    return 0.5 * z * z / (1 + sin)
 
 
 class WithForwardShare(Sampler):

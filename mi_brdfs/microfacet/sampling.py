@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, SMALL, choose, clamp, normalize_or, safe_sqrt, select
+from ..math import EPSILON, SMALL, clamp, normalize_or, safe_sqrt, select
 from .distributions import Distribution
 from .facet import Facet
 from .fresnel import Fresnel
-from .laws import tan2_of_versine, versine
-from .shadowing import Implicit, Shadowing
+from .laws import tan2_of_versine
+from .shadowing import Shadowing
 
 
 class FacetLobe(Protocol):
@@ -172,6 +172,10 @@ class Line:
         """The m of a facet on the line."""
         return clamp(self.distribution.cdf(facet.tan2_h, self.g)[0] / self.mass, 0, 1)
 
+    def complement(self, facet: Facet) -> mi.Float:
+        """1 - C of a facet on the line."""
+        return self.distribution.cdf(facet.tan2_h, self.g)[1]
+
     def inverse_cdf(self, m: mi.Float) -> mi.Float:
         """The tan²θ_h of an m."""
         return self.distribution.inverse_cdf(m * self.mass, self.rest + (1 - m) * self.mass, self.g)
@@ -184,125 +188,6 @@ class Line:
         """Of half vectors drawn so; the azimuth is uniform in ψ, not in that of the half vector."""
         stretch = self.distribution.alpha_u * self.distribution.alpha_v * self.g
         return dr.inv_two_pi / (stretch * (1 - self.lowest))
-
-
-class AntitheticSteepNormals(AntitheticNormals):
-    """The pair for shadowing terms under which, at grazing, a facet reflects the more the steeper it is, wherever it
-    faces: on a part of the lines the half vectors are uniform."""
-
-    STEEP = 2.2
-    """How many of the facets whose slope is at least one the part counts; tests/calibration/half_vectors.py fits
-    it."""
-    LARGEST = 0.5
-    """The largest part: facets that nearly all lie near the horizon are no more uniform than flat ones."""
-
-    def _steep(self, lobe: FacetLobe, wi: mi.Vector3f) -> mi.Float:
-        steep = self.STEEP * dr.square(dr.square(1 - wi.z)) * steep_facets(lobe.distribution, wi)
-        return dr.minimum(steep, self.LARGEST)
-
-    def _azimuth(
-        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Float
-    ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
-        is_steep, u = choose(u, self._steep(lobe, wi))
-        u, cos, sin, _ = super()._azimuth(lobe, wi, u, v)
-        return u, cos, sin, is_steep
-
-    def _tan2(self, lobe: FacetLobe, wi: mi.Vector3f, line: Line, which: Any, v: mi.Float) -> mi.Float:
-        return dr.select(which, line.uniform(v), super()._tan2(lobe, wi, line, None, v))
-
-    def _density(
-        self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
-    ) -> mi.Float:
-        density = super()._density(lobe, line, facet, cos, sin, q)
-        return dr.lerp(density, line.uniform_density(), self._steep(lobe, facet.wi))
-
-
-class AntitheticNormalsTowardViewer(AntitheticNormals):
-    """The pair for shadowing terms under which, at grazing, those facets count that lean towards ``wi``, along the
-    plane of incidence: a part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and τ = -0.75.
-
-    Smith's term leans by 1, the implicit one by 4; V-cavities do not, nor do dielectrics, which reflect less where it
-    leans to.
-
-    Of a distribution with a long tail, or under some shadowing terms, the few steep facets may reflect more at grazing
-    than all others together. For a part δ of the samples the lines lean, too, and the half vectors on them are uniform,
-    or have a density ∝ 1/√(1 - cosθ_h) under the implicit term, whatever the distribution: that bounds their weights.
-    λ is a part of the others.
-    """
-
-    # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
-    OUTWARD = -0.75
-    LEANING = 0.95
-    """The largest λ, and the part of the steep lines that lean. The rest bounds the weights of facets across the plane
-    of incidence."""
-    STEEP = 1.2
-    """How many of the steep facets δ counts: those whose slope is at least one."""
-    LARGEST = 0.5
-    """The largest δ, for the reason of :attr:`AntitheticSteepNormals.LARGEST`."""
-    STEEP_IMPLICIT = 0.7
-    """The largest δ under the implicit term."""
-
-    def __init__(self, lean: float, steep: bool) -> None:
-        self.lean, self.steep = lean, steep
-
-    def _along(self, lobe: FacetLobe, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
-        """``(x, y, λ, δ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
-        distribution = lobe.distribution
-        x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
-        # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
-        cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
-        seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
-        leaning = dr.minimum(seen / (seen + cos2), self.LEANING)
-        if not self.steep:
-            return x, y, leaning, 0
-        steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
-        steep *= self.STEEP
-        if isinstance(lobe.shadowing, Implicit):
-            # The implicit term is ∝ both cosines: the more a facet leans, the brighter it is, up to the steep ones.
-            steep = self.STEEP_IMPLICIT * dr.sqrt(dr.maximum(steep / (steep + seen + cos2), EPSILON))
-        else:
-            steep = dr.minimum(steep / (steep + dr.sqrt(seen + cos2)), self.LARGEST)
-        return x, y, leaning, steep
-
-    def _azimuth(
-        self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Float
-    ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
-        x, y, leaning, steep = self._along(lobe, wi)
-        is_steep, u = choose(u, steep) if self.steep else (False, u)
-        leans, u = choose(u, select(is_steep, self.LEANING, leaning))
-        sin, cos = dr.sincos(dr.two_pi * v)
-        sin = dr.select(leans, 2 * v - 1, sin)
-        cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
-        return u, cos * x - sin * y, cos * y + sin * x, (leans, is_steep)
-
-    def _tan2(self, lobe: FacetLobe, wi: mi.Vector3f, line: Line, which: Any, v: mi.Float) -> mi.Float:
-        leans, is_steep = which
-        tan2 = line.inverse_cdf(draw_linear(dr.select(leans, self.OUTWARD, self._bias(lobe, wi)), v))
-        if not self.steep:
-            return tan2
-        return dr.select(is_steep, line.uniform(dr.square(v) if isinstance(lobe.shadowing, Implicit) else v), tan2)
-
-    def _density(
-        self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
-    ) -> mi.Float:
-        x, y, leaning, steep = self._along(lobe, facet.wi)
-        lines = 0.5 * dr.pi * abs(cos * x + sin * y)
-        outward = linear_density(self.OUTWARD, line.part(facet)) * q / line.mass
-        density = dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
-        if self.steep:
-            steepest = line.uniform_density()
-            if isinstance(lobe.shadowing, Implicit):
-                height = dr.maximum(versine(facet.cos_h, facet.sin2_h), 1e-12)  # at the normal there is no end
-                steepest *= 0.5 * dr.sqrt((1 - line.lowest) / height)
-            density = dr.lerp(density, dr.lerp(1, lines, self.LEANING) * steepest, steep)
-        return density
-
-
-def steep_facets(distribution: Distribution, wi: mi.Vector3f) -> mi.Float:
-    """How many facets of the plane of incidence have a slope of at least one."""
-    slope2 = dr.maximum(distribution.mean_square_slope_along(wi), EPSILON)
-    return distribution.cdf(1, (wi.x * wi.x + wi.y * wi.y) / slope2)[1]
 
 
 def linear_density(bias: mi.Float, m: mi.Float) -> mi.Float:

@@ -33,7 +33,8 @@ class BlinnPhong(Model):
     Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); no sample falls below the horizon.
+    (mi_brdfs.microfacet.grazing.AntitheticImplicitNormals, for the original normalization
+    AntitheticNormalsTowardViewer); no sample falls below the horizon.
 
     Example
     -------

@@ -31,7 +31,7 @@ class Brady(Model):
     lobes falls like cosθ_i towards grazing angles. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.AntitheticNormalsTowardViewer); no sample falls below the horizon.
+    (mi_brdfs.microfacet.grazing.AntitheticNormalsTowardViewer); no sample falls below the horizon.
 
     Example
     -------

@@ -15,7 +15,12 @@ from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet import shadowing
 from mi_brdfs.microfacet.distributions import GGX, Beckmann, Blinn
 from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
-from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer, AntitheticSteepNormals
+from mi_brdfs.microfacet.grazing import (
+    AntitheticImplicitNormals,
+    AntitheticNormalsTowardViewer,
+    AntitheticSteepNormals,
+)
+from mi_brdfs.microfacet.sampling import AntitheticNormals
 from mi_brdfs.microfacet.tails import ABC, EPD, GTR
 from mi_brdfs.models.blinnphong import ResponseShadowing
 from mi_brdfs.models.brady import Exponential, Projected
@@ -76,7 +81,7 @@ def fits() -> Iterator[Fit]:
     upright = lobes([*broad, *(Blinn(number(exponent)) for exponent in (0.1, 1))], upright[1:], unit)
     yield attributes(AntitheticSteepNormals, "STEEP", variance_loss(upright, STEEPEST))
     implicit = lobes([*long_tailed, *longer_tailed], [shadowing.Implicit()], unit)
-    yield attributes(AntitheticNormalsTowardViewer, "STEEP_IMPLICIT", variance_loss(implicit, STEEPEST))
+    yield attributes(AntitheticImplicitNormals, "STEEPEST", variance_loss(implicit, STEEPEST))
 
     for name, term in {
         "Smith": smith,
@@ -98,7 +103,7 @@ def of_lean(name, of_term) -> Fit:
 
     def loss(lean):
         for lobe in of_term:
-            lobe.sampler = AntitheticNormalsTowardViewer(number(lean), lobe.sampler.steep)
+            lobe.sampler = type(lobe.sampler)(number(lean), lobe.sampler.steep)
         return measured()
 
     return Fit(f"{name}.lean", [of_term[0].shadowing.lean], loss)

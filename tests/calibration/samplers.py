@@ -17,7 +17,8 @@ from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet.distributions import GGX
 from mi_brdfs.microfacet.forward import WithForwardShare
 from mi_brdfs.microfacet.fresnel import Conductor, Dielectric, Schlick, Unit
-from mi_brdfs.microfacet.sampling import AntitheticNormals, AntitheticNormalsTowardViewer
+from mi_brdfs.microfacet.grazing import AntitheticNormalsTowardViewer
+from mi_brdfs.microfacet.sampling import AntitheticNormals
 from mi_brdfs.microfacet.shadowing import SchlickSmith
 from mi_brdfs.microfacet.visible import AntitheticVisibleNormals, BoundedVisibleNormals
 
