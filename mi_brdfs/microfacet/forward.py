@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -29,8 +28,8 @@ class ForwardDirections:
     BIAS = -0.85
     """τ of :func:`.sampling.linear_density`: at -1 there would be no samples in the horizon, where some shadowing terms
     let facets reflect."""
-    FALL = 8
-    """By which factor the reflectance falls until z' is about s."""
+    FALL = 3
+    """By which factor the reflectance falls from the horizon to z' = s."""
     BROADER = 2
     """How much |η² - 1| adds to z²."""
     STEEP = 0.1
@@ -55,11 +54,11 @@ class ForwardDirections:
 
     def _scale(self, step: mi.Float) -> mi.Float:
         """s for η² - 1."""
-        # Near η = 1, F is about exp(-4 arsinh(c/√(η² - 1))), or with arcosh and √(1 - η²) beyond total reflection.
+        # Near η = 1, F is (η² - 1)²/(c + g)⁴ with g² = c² + η² - 1, beyond total reflection.
         lowest2 = lowest_cos_d2(self.z, self.sin)
         c = dr.maximum(dr.sqrt(lowest2), safe_sqrt(-step))
-        fall = math.log(self.FALL) / 4
-        fallen = math.cosh(fall) * c + math.sinh(fall) * safe_sqrt(c * c + step)
+        total = dr.sqrt(dr.sqrt(self.FALL)) * (c + safe_sqrt(c * c + step))
+        fallen = 0.5 * (total - step / total)
         # cosθ_d² = lowest2 + z z'/2 + sinθ_i z'²/4 in the plane of incidence, up to terms in z'³.
         rise = dr.square(fallen) - lowest2
         near = 4 * rise / (self.z + dr.sqrt(self.z * self.z + 4 * self.sin * rise))
@@ -113,20 +112,19 @@ class ForwardShare(NamedTuple):
     def of(cls, fresnel: Dielectric, wi: mi.Vector3f, fraction: mi.Float, typical: mi.Float) -> ForwardShare:
         """For what ``fraction`` the lobe would have there if it reflected everything, and the square of the cosθ_d that
         is typical of the rest."""
-        step2 = dr.square((fresnel.eta - 1) / (fresnel.eta + 1)) * dr.select(fresnel.eta < 1, TOTAL, 1)
+        step2 = dr.square((fresnel.eta - 1) / (fresnel.eta + 1))
         distinct = dr.square(dr.square(dr.square(step2 / INDISTINCT)))
         z = lowest_cosine(wi)
         # Of narrow lobes only the last directions before the horizon are like that.
+        narrow = dr.square(dr.square(z * z / typical))
         last = fresnel(dr.sqrt(lowest_cos_d2(z, sin_theta(wi))))
-        forward = fraction * dr.lerp(fresnel(LOWEST * z), last, z * z / typical) / (1 + distinct)
+        forward = fraction * dr.lerp(fresnel(LOWEST * z), last, narrow) / (1 + distinct)
         rest = dr.maximum(fresnel(dr.minimum(dr.sqrt(typical), 1)), EPSILON)
         return cls(forward, LARGEST * forward / (forward + rest))
 
 
 INDISTINCT = 0.016
-"""The reflectance at normal incidence below which dielectrics need a share of forward directions,"""
-TOTAL = 0.33
-"""to which it counts by this factor if they reflect totally."""
+"""The reflectance at normal incidence below which dielectrics need a share of forward directions."""
 LARGEST = 0.6
 """The share where they need it most."""
 LOWEST = 0.8
@@ -158,12 +156,13 @@ class WithForwardShare(Sampler):
             u2, v2 = dr.square(distribution.alpha_u), dr.square(distribution.alpha_v)
             along = u2 * x * x + v2 * y * y
             slope2 = distribution.inverse_cdf(0.75, 0.25, 1 / along)
-            directions = ForwardDirections(fresnel, wi, u2 * (slope2 / along), v2 * (slope2 / along))
+            u2, v2 = u2 * (slope2 / along), v2 * (slope2 / along)
+            directions, steepest2 = ForwardDirections(fresnel, wi, u2, v2), dr.maximum(u2, v2)
         else:
-            slope2 = distribution.inverse_cdf(0.75, 0.25, 1 / dr.square(distribution.alpha_u))
+            slope2 = steepest2 = distribution.inverse_cdf(0.75, 0.25, 1 / dr.square(distribution.alpha_u))
             directions = ForwardDirections(fresnel, wi, slope2)
         z2 = dr.square(lowest_cosine(wi))
-        cos2 = z2 + slope2 / (1 + slope2)
+        cos2 = z2 + slope2 / (1 + steepest2)
         low = z2 / cos2
         share = ForwardShare.of(fresnel, wi, dr.sqrt(low) * (1 - low), cos2)
         return share, directions

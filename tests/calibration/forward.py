@@ -35,6 +35,7 @@ def fits() -> Iterator[Fit]:
 
     yield attributes(forward, "INDISTINCT", of_indices(1.1, 1.2, 1.3, 1.5))
     yield attributes(forward, "LARGEST", of_indices(1.01, 1.05, 1.1, 1.2))
+    yield attributes(forward.ForwardDirections, "FALL", of_indices(0.85, 0.95, 0.99, 1.05))
 
 
 if __name__ == "__main__":
