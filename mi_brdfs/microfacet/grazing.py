@@ -59,9 +59,6 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
 
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
-    LEANING = 0.95
-    """The largest λ, and the part of the steep lines that lean. The rest bounds the weights of facets across the plane
-    of incidence."""
     STEEP = 1.2
     """How many of the steep facets δ counts: those whose slope is at least one."""
     LARGEST = 0.5
@@ -78,7 +75,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
-        leaning = dr.minimum(seen / (seen + cos2), self.LEANING)
+        leaning = dr.minimum(seen / (seen + cos2), lobe.shadowing.most_leaning)
         if not self.steep:
             return x, y, leaning, 0
         steep = dr.square(dr.square(1 - wi.z)) * self._brighter(lobe, wi, 0.5) * steep_facets(distribution, wi)
@@ -89,7 +86,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     ) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         x, y, leaning, steep = self._along(lobe, wi)
         is_steep, u = choose(u, steep) if self.steep else (False, u)
-        leans, u = choose(u, select(is_steep, self.LEANING, leaning))
+        leans, u = choose(u, select(is_steep, lobe.shadowing.most_leaning, leaning))
         sin, cos = dr.sincos(dr.two_pi * v)
         sin = dr.select(leans, 2 * v - 1, sin)
         cos = dr.select(leans, safe_sqrt(1 - sin * sin), cos)
@@ -108,7 +105,8 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         outward = self._outward_density(line, facet) * q / line.mass
         density = dr.lerp(super()._density(lobe, line, facet, cos, sin, q), lines * outward, leaning)
         if self.steep:
-            density = dr.lerp(density, dr.lerp(1, lines, self.LEANING) * self._steep_density(line, facet), steep)
+            lines = dr.lerp(1, lines, lobe.shadowing.most_leaning)
+            density = dr.lerp(density, lines * self._steep_density(line, facet), steep)
         return density
 
     def _steep(self, steep: mi.Float, others: mi.Float) -> mi.Float:

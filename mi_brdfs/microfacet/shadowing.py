@@ -20,6 +20,9 @@ class Shadowing(Term):
     lean: ClassVar[float] = 0
     """How far the facets visible at grazing angles lean towards the viewer, fitted by
     tests/calibration/half_vectors.py."""
+    most_leaning: ClassVar[float] = 0.95
+    """The largest part of the samples that lean so, and of those of steep facets. The rest bounds the weights of facets
+    across the plane of incidence."""
     favours_steep: ClassVar[bool] = False
     """Whether G cosθ_d/(cosθ_i cosθ_h) has no bound, so that at grazing few steep facets may reflect most of all,
     whatever the distribution."""

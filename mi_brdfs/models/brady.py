@@ -65,6 +65,7 @@ class Projected(Shadowing):
     """The shadowing term that turns 1/(cosθ_i cosθ_o) into 1/(wi·h)."""
 
     lean = 1.6
+    most_leaning = 0.8  # without 1/cosθ_d, steep facets would lean more
 
     def __call__(self, facet):
         return facet.cos_i * facet.cos_o / facet.cos_d
