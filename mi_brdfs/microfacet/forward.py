@@ -76,8 +76,8 @@ class ForwardDirections:
         return self.ridge * difference / sines, sigma
 
     def draw(self, v: mi.Point2f) -> mi.Vector3f:
-        r = draw_linear(self.BIAS, v.x) * self.largest
-        z = self.scale * r / (1 - r)
+        r = draw_linear(self.BIAS, v.x)  # over the largest
+        z = dr.minimum(self.scale * r / (self.scale + (1 - r)), 1)
         sin = safe_sqrt(1 - z * z)
         m, sigma = self._azimuth(z, sin)
         uniform = 2 * v.y - 1
