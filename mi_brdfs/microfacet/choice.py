@@ -32,5 +32,5 @@ def _sampler_of_facets(distribution: Distribution, shadowing: Shadowing, fresnel
     favours_steep = shadowing.favours_steep and not isinstance(distribution, AshikhminShirleyNormals)
     if shadowing.lean:
         leaning = AntitheticImplicitNormals if isinstance(shadowing, Implicit) else AntitheticNormalsTowardViewer
-        return leaning(shadowing.lean, distribution.long_tailed or favours_steep)
+        return leaning(steep=distribution.long_tailed or favours_steep)
     return AntitheticSteepNormals() if favours_steep else AntitheticNormals()

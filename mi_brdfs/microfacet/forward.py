@@ -43,8 +43,6 @@ class ForwardDirections:
         step = dr.square(fresnel.eta) - 1
         self.broader = dr.sqrt(self.z * self.z + self.BROADER * abs(step))
         self.scale = self._scale(step)
-        self.largest = dr.rcp(1 + self.scale)
-        """The r of z' = 1."""
         self.x, self.y = x, y = normalize_or(wi.x, wi.y, (1, 0))
         self.across, self.ridge = dr.rcp(slope2), None
         if slope2_v is not None:
@@ -76,14 +74,14 @@ class ForwardDirections:
         return self.ridge * difference / sines, sigma
 
     def draw(self, v: mi.Point2f) -> mi.Vector3f:
-        r = draw_linear(self.BIAS, v.x)  # over the largest
+        r = draw_linear(self.BIAS, v.x)  # over that of z' = 1, 1/(1 + s)
         z = dr.minimum(self.scale * r / (self.scale + (1 - r)), 1)
         sin = safe_sqrt(1 - z * z)
         m, sigma = self._azimuth(z, sin)
         uniform = 2 * v.y - 1
         tan = m + sigma * uniform / dr.maximum(safe_sqrt(1 - uniform * uniform), SMALL)
-        scale = dr.rcp(1 + tan * tan)
-        sin_delta, cos_delta = 2 * tan * scale, (1 - tan * tan) * scale
+        cos2 = dr.rcp(1 + tan * tan)  # of δ/2
+        sin_delta, cos_delta = 2 * tan * cos2, (1 - tan * tan) * cos2
         x, y = -cos_delta * self.x - sin_delta * self.y, sin_delta * self.x - cos_delta * self.y
         return mi.Vector3f(sin * x, sin * y, z)
 
@@ -94,10 +92,10 @@ class ForwardDirections:
         m, sigma = self._azimuth(z, safe_sqrt(1 - z * z))
         tan = (self.x * y - self.y * x) / dr.maximum(1 - (self.x * x + self.y * y), SMALL)
         inverse = dr.rsqrt(1 + dr.square((tan - m) / sigma))
-        scale = dr.rcp(self.scale + z)
-        r = dr.minimum(z * scale, self.largest) / self.largest
-        height = linear_density(self.BIAS, r) * self.scale / self.largest * dr.square(scale)
-        return height * 0.25 * (1 + tan * tan) / sigma * inverse * dr.square(inverse)
+        unit, nearer = 1 + self.scale, dr.rcp(self.scale + z)
+        r = dr.minimum(z * nearer * unit, 1)
+        density_z = linear_density(self.BIAS, r) * self.scale * unit * dr.square(nearer)
+        return density_z * 0.25 * (1 + tan * tan) / sigma * inverse * dr.square(inverse)
 
 
 class ForwardShare(NamedTuple):

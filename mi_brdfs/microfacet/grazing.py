@@ -64,8 +64,8 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     LARGEST = 0.5
     """The largest δ, for the reason of :attr:`AntitheticSteepNormals.LARGEST`."""
 
-    def __init__(self, lean: float, steep: bool) -> None:
-        self.lean, self.steep = lean, steep
+    def __init__(self, steep: bool) -> None:
+        self.steep = steep
 
     def _along(self, lobe: FacetLobe, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         """``(x, y, λ, δ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
@@ -74,7 +74,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
-        seen = self.lean * dr.inv_pi * slope2 * dr.square(brighter)
+        seen = lobe.shadowing.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), lobe.shadowing.most_leaning)
         if not self.steep:
             return x, y, leaning, 0

@@ -83,30 +83,19 @@ def fits() -> Iterator[Fit]:
     implicit = lobes([*long_tailed, *longer_tailed], [shadowing.Implicit()], unit)
     yield attributes(AntitheticImplicitNormals, "STEEPEST", variance_loss(implicit, STEEPEST))
 
-    for name, term in {
-        "Smith": smith,
-        "SchlickSmith": schlick,
-        "Implicit": shadowing.Implicit(),
-        "Neumann": shadowing.Neumann(),
-        "AshikhminPremoze": shadowing.AshikhminPremoze(),
-        "KurtShadowing": shadowing.KurtShadowing(number(0.25)),
-        "ResponseShadowing": ResponseShadowing(),
-        "Unshadowed": Unshadowed(),
+    for kind, term in {
+        shadowing.Smith: smith,
+        shadowing.SchlickSmith: schlick,
+        shadowing.Implicit: shadowing.Implicit(),
+        shadowing.Neumann: shadowing.Neumann(),
+        shadowing.AshikhminPremoze: shadowing.AshikhminPremoze(),
+        shadowing.KurtShadowing: shadowing.KurtShadowing(number(0.25)),
+        ResponseShadowing: ResponseShadowing(),
+        Unshadowed: Unshadowed(),
     }.items():
-        yield of_lean(name, lobes(short_tailed, [term], unit))
+        yield attributes(kind, "lean", variance_loss(lobes(short_tailed, [term], unit), GRAZING))
     brady = [Exponential(number(beta**2), number(0.5 * a), True) for beta, a in product((0.2, 0.3, 0.5), (0.8, 1.4, 2))]
-    yield of_lean("Projected", lobes(brady, [Projected()], unit))
-
-
-def of_lean(name, of_term) -> Fit:
-    measured = variance_loss(of_term, GRAZING)
-
-    def loss(lean):
-        for lobe in of_term:
-            lobe.sampler = type(lobe.sampler)(number(lean), lobe.sampler.steep)
-        return measured()
-
-    return Fit(f"{name}.lean", [of_term[0].shadowing.lean], loss)
+    yield attributes(Projected, "lean", variance_loss(lobes(brady, [Projected()], unit), GRAZING))
 
 
 if __name__ == "__main__":

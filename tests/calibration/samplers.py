@@ -57,7 +57,7 @@ def main():
             chosen = lobes[0].sampler
             # A dielectric's has a share of its own besides.
             chosen, losses = type(chosen.sampler if isinstance(chosen, WithForwardShare) else chosen), {}
-            leaning = AntitheticNormalsTowardViewer(lobes[0].shadowing.lean, steep=True)
+            leaning = AntitheticNormalsTowardViewer(steep=True)
             for sampler in BoundedVisibleNormals(), AntitheticVisibleNormals(), AntitheticNormals(), leaning:
                 for lobe in lobes:
                     lobe.sampler = sampler
