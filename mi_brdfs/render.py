@@ -19,7 +19,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -132,8 +132,10 @@ def render(
         sampler.set_sample_count(own_count)
     if not done:
         raise KeyboardInterrupt
-    source.put(film, raw, done)
-    return Picture(film.develop(), film.bitmap(), done, total, interrupt.pressed and done != total)
+    with one_thread() if passes else nullcontext():  # reconstruction filters add floats, too
+        source.put(film, raw, done)
+        bitmap = film.bitmap()
+    return Picture(film.develop(), bitmap, done, total, interrupt.pressed and done != total)
 
 
 def pass_source(integrator: mi.Integrator) -> Any:

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import dask
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import psutil
@@ -160,6 +161,25 @@ def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, addre
         picture = render(loaded, spp=32, seed=5, passes=passes_on(file, scheduler=address))
         assert np.array_equal(np.array(expected.bitmap), np.array(picture.bitmap))
         assert np.array(picture.image).std() > 0.05
+
+
+def test_one_thread_puts_the_sums_of_workers_together(tmp_path):
+    """A film's reconstruction filter adds to pixels of others; the film is large enough for several threads."""
+    path = scene_in(tmp_path, "shading")
+    path.write_text(path.read_text().replace('value="32"', 'value="512"').replace('value="24"', 'value="384"'))
+    scene = mi.load_file(str(path))
+
+    def passes(scene, sensor, jobs):
+        for seed, spp in jobs:
+            with one_thread():
+                sums = scene.integrator().sums(scene, scene.sensors()[sensor], seed, spp)
+                dr.eval(sums)
+            yield sums
+
+    with one_thread():
+        expected = np.array(render(scene, spp=1).bitmap)
+    for _ in range(3):
+        assert np.array_equal(np.array(render(scene, spp=1, passes=passes).bitmap), expected)
 
 
 def test_a_scene_and_its_copy_are_found_from_any_folder(scene, tmp_path, monkeypatch):
