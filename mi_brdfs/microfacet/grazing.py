@@ -7,11 +7,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, choose, normalize_or, safe_sqrt, select
+from ..math import EPSILON, choose, safe_sqrt, select
 from .distributions import Distribution
 from .facet import Facet
 from .laws import versine
-from .sampling import AntitheticNormals, FacetLobe, Line, draw_linear, linear_density
+from .sampling import AntitheticNormals, FacetLobe, Line, Stretch, draw_linear, linear_density
 
 
 class AntitheticSteepNormals(AntitheticNormals):
@@ -70,7 +70,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     def _along(self, lobe: FacetLobe, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, Any]:
         """``(x, y, λ, δ)``, where (x, y) is the azimuth of ``wi`` in the stretched space."""
         distribution = lobe.distribution
-        x, y = normalize_or(distribution.alpha_u * wi.x, distribution.alpha_v * wi.y, (1, 0))
+        x, y = Stretch(distribution, wi).azimuth(wi.x, wi.y)
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
         slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0

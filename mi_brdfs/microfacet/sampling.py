@@ -57,12 +57,12 @@ class AntitheticNormals(Sampler):
     r"""Draws a half vector, clipped to what can reflect above the horizon, and then it or its mirror image on the other
     side of the normal, with probability ∝ what they reflect. Exact for any shadowing and Fresnel term.
 
-    The line through both has the azimuth ψ, which is uniform in the space stretched by the roughness. On it the
-    distribution's own density q has the mass C(R) within |tanθ_h| <= R(ψ), beyond which neither end of the line
-    reflects ``wi`` above the horizon; m is the part of that mass nearer to the normal. With W = f cosθ_o · 4 cosθ_d ·
-    C(R)/q of a half vector, and W' of its image, choosing ∝ W gives the density 2 f cosθ_o / (W + W') and the weight
-    (W + W')/2. (Unclipped, and with the visibility in place of W, it would be the V-cavity sampler of Heitz and d'Eon
-    2014, doi:10.1111/cgf.12417.)
+    The line through both has the azimuth ψ, which is uniform in the space stretched by about the roughness
+    (:class:`Stretch`). On it the distribution's own density q has the mass C(R) within |tanθ_h| <= R(ψ), beyond which
+    neither end of the line reflects ``wi`` above the horizon; m is the part of that mass nearer to the normal. With W =
+    f cosθ_o · 4 cosθ_d · C(R)/q of a half vector, and W' of its image, choosing ∝ W gives the density 2 f cosθ_o /
+    (W + W') and the weight (W + W')/2. (Unclipped, and with the visibility in place of W, it would be the V-cavity
+    sampler of Heitz and d'Eon 2014, doi:10.1111/cgf.12417.)
 
     Rough lobes are shadowed at the ends of the line, and the reflectance of dielectrics rises less than it seems at
     grazing: m has the density 1 + τ - 2 τ m.
@@ -99,7 +99,8 @@ class AntitheticNormals(Sampler):
     def _density(
         self, lobe: FacetLobe, line: Line, facet: Facet, cos: mi.Float, sin: mi.Float, q: mi.Float
     ) -> mi.Float:
-        """Of the half vectors drawn so, where ``q`` is that of the distribution."""
+        """Of the half vectors drawn so, where ``q`` is that of the distribution, and lines are drawn as often as it
+        does."""
         return q * linear_density(self._bias(lobe, facet.wi), line.part(facet)) / line.mass
 
     def complete(
@@ -107,7 +108,8 @@ class AntitheticNormals(Sampler):
     ) -> tuple[Facet, mi.Float]:
         distribution = lobe.distribution
         u, cos, sin, which = self._azimuth(lobe, wi, u, v.x)
-        x, y = normalize_or(distribution.alpha_u * cos, distribution.alpha_v * sin, (1, 0))
+        stretch = Stretch(distribution, wi)
+        x, y = stretch.azimuth(cos, sin)
         if given is not None:
             x, y = (select(drawn, *it) for it in zip((x, y), given.azimuth, strict=True))
         line = Line(distribution, wi, x, y)
@@ -120,19 +122,19 @@ class AntitheticNormals(Sampler):
         is_image = select(drawn, u * (weight + other) >= weight, False)
         # Anew, as narrow distributions, and the weights of grazing images, see the rounding of the direction.
         facet = Facet.between(wi, select(is_image, image.wo, facet.wo))
-        return facet, self._pdf(lobe, line.along(*facet.azimuth), facet)
+        return facet, self._pdf(lobe, stretch, line.along(*facet.azimuth), facet)
 
     def sample(self, lobe: FacetLobe, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.complete(lobe, wi, u, v, True, None)[0].wo
 
     def pdf(self, lobe: FacetLobe, facet: Facet) -> mi.Float:
-        return self._pdf(lobe, Line(lobe.distribution, facet.wi, *facet.azimuth), facet)
+        stretch = Stretch(lobe.distribution, facet.wi)
+        return self._pdf(lobe, stretch, Line(lobe.distribution, facet.wi, *facet.azimuth), facet)
 
-    def _pdf(self, lobe: FacetLobe, line: Line, facet: Facet) -> mi.Float:
+    def _pdf(self, lobe: FacetLobe, stretch: Stretch, line: Line, facet: Facet) -> mi.Float:
         """The density, where the facet is on the line."""
-        distribution, (x, y) = lobe.distribution, facet.azimuth
-        cos, sin = normalize_or(x / distribution.alpha_u, y / distribution.alpha_v, (1, 0))
-        density = self._density(lobe, line, facet, cos, sin, distribution.density(facet, line.g))
+        cos, sin, lines = stretch.inverse(*facet.azimuth)
+        density = lines * self._density(lobe, line, facet, cos, sin, lobe.distribution.density(facet, line.g))
         image = facet.image()
         # The facet is known to reflect above the horizon. Its F and G are those of the lobe's value: Dr.Jit computes
         # them once.
@@ -144,6 +146,39 @@ class AntitheticNormals(Sampler):
         """W of a facet that reflects F G, except for factors common to both of a pair. It is never zero: the derivative
         of W/(W + W') divides by the square of the sum."""
         return dr.maximum(reflected * facet.cos_d, EPSILON)
+
+
+class Stretch:
+    """The space in which the azimuth of lines is uniform. If all half vectors on them counted, it would be stretched by
+    α. As those beyond tanθ_h = R do not, rough axes are stretched less, by 1/√(1/α² + 1/R²). That is exact for GGX
+    where R is the same for all lines, 1, seen from above. Elsewhere R is 1 across the plane of incidence and larger
+    along it; for all lines,
+
+        1/R² = ρ + (1 - ρ) cosθ_i.
+    """
+
+    LOWEST = 0.2
+    """ρ, fitted by tests/calibration/half_vectors.py."""
+
+    def __init__(self, distribution: Distribution, wi: mi.Vector3f) -> None:
+        self.u = self.v = self.alpha_u = self.alpha_v = distribution.alpha_u
+        self.anisotropic = distribution.anisotropic
+        if self.anisotropic:
+            self.alpha_v = distribution.alpha_v
+            clip = dr.lerp(self.LOWEST, 1, wi.z)
+            self.u, self.v = (it * dr.rsqrt(1 + clip * it * it) for it in (self.alpha_u, self.alpha_v))
+
+    def azimuth(self, cos: mi.Float, sin: mi.Float) -> tuple[mi.Float, mi.Float]:
+        """The azimuth of a line, from that in this space."""
+        return normalize_or(self.u * cos, self.v * sin, (1, 0))
+
+    def inverse(self, x: mi.Float, y: mi.Float) -> tuple[mi.Float, mi.Float, Any]:
+        """The azimuth here of a line, and how often it is drawn relative to a stretch by α."""
+        cos, sin = normalize_or(x / self.u, y / self.v, (1, 0))
+        if not self.anisotropic:
+            return cos, sin, 1
+        unclipped = dr.square(cos * self.u / self.alpha_u) + dr.square(sin * self.v / self.alpha_v)
+        return cos, sin, unclipped * (self.alpha_u * self.alpha_v) / (self.u * self.v)
 
 
 class Line:

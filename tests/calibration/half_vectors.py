@@ -20,7 +20,7 @@ from mi_brdfs.microfacet.grazing import (
     AntitheticNormalsTowardViewer,
     AntitheticSteepNormals,
 )
-from mi_brdfs.microfacet.sampling import AntitheticNormals
+from mi_brdfs.microfacet.sampling import AntitheticNormals, Stretch
 from mi_brdfs.microfacet.tails import ABC, EPD, GTR
 from mi_brdfs.models.blinnphong import ResponseShadowing
 from mi_brdfs.models.brady import Exponential, Projected
@@ -30,6 +30,7 @@ ANGLES = 5, 30, 60, 80
 GRAZING = 60, 75, 85
 STEEPEST = 80, 85, 88
 ALPHAS = 0.1, 0.25, 0.5, 1
+ANISOTROPIC = (0.1, 0.5), (0.1, 1), (0.3, 1), (0.05, 2), (0.3, 2), (1, 2)
 
 
 def of_alpha(kind):
@@ -63,6 +64,12 @@ def fits() -> Iterator[Fit]:
 
     yield attributes(AntitheticNormals, "SHADOWED BROAD", variance_loss(lobes(everything, upright, unit), ANGLES))
     yield attributes(AntitheticNormals, "RISING", variance_loss(lobes(everything, upright, rising), ANGLES))
+
+    stretched = [kind(*map(number, it)) for kind in (Beckmann, GGX) for it in ANISOTROPIC]
+    terms = [*upright, smith, shadowing.KurtShadowing(number(0.25))]
+    yield attributes(
+        Stretch, "LOWEST", variance_loss(lobes(stretched, terms, [*unit, *rising]), [*ANGLES, 85], (0, 40, 90))
+    )
 
     short_tailed = [*of_alpha(Beckmann), *blinn()]
     leaning = [smith, shadowing.Implicit(), shadowing.Neumann(), shadowing.AshikhminPremoze()]
