@@ -11,7 +11,7 @@ from ..math import EPSILON, choose, safe_sqrt, select
 from .distributions import Distribution
 from .facet import Facet
 from .laws import versine
-from .sampling import AntitheticNormals, FacetLobe, Line, Stretch, draw_linear, linear_density
+from .sampling import AntitheticNormals, FacetLobe, Line, Stretch, draw_linear, linear_density, typical_cosine
 
 
 class AntitheticSteepNormals(AntitheticNormals):
@@ -49,8 +49,8 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
     """The pair for shadowing terms under which, at grazing, those facets count that lean towards ``wi``, along the
     plane of incidence: a part λ of the samples has lines ∝ |cosφ|, with φ from that plane, and τ = -0.75.
 
-    Smith's term leans by 1, the implicit one by 4; V-cavities do not, nor do dielectrics, which reflect less where it
-    leans to.
+    Smith's term leans by 1, the implicit one by 4; V-cavities do not. Dielectrics lean less, as they reflect less where
+    they would lean to.
 
     Of a distribution with a long tail, or under some shadowing terms, the few steep facets may reflect more at grazing
     than all others together. For a part δ of the samples the lines lean, too, and the half vectors on them are uniform,
@@ -72,7 +72,8 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         distribution = lobe.distribution
         x, y = Stretch(distribution, wi).azimuth(wi.x, wi.y)
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
-        slope2, brighter = distribution.mean_square_slope_along(wi), self._brighter(lobe, wi)
+        slope2 = distribution.mean_square_slope_along(wi)
+        brighter = self._brighter(lobe, wi, typical_cosine(wi, slope2))
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = lobe.shadowing.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), lobe.shadowing.most_leaning)
