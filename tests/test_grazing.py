@@ -121,6 +121,13 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
                          "int_ior": 1.333, "ext_ior": 1.514}),
     (83.1, -136.3, None, kit("hepd", "vcavity", kappa=76.84, gamma=0.01073, int_ior=0.2035, ext_ior=0.204)),
     (88.1, -100.3, None, kit("hepd", "implicit", kappa=5.0194, gamma=67.07, int_ior=1.016, ext_ior=3.454)),
+    (88.1, -136.9, None, kit("hepd", "implicit", kappa=7.5444, gamma=71.28, int_ior=8.333, ext_ior=11.19)),
+    (83.8, 69.3, None, kit("hepd", "implicit", kappa=5.1233, gamma=40.95, int_ior=43, ext_ior=80.73)),
+    (43.1, -27.5, None, kit("beckmann", "ashikhmin-premoze", alpha_u=1.6, alpha_v=0.0606, int_ior=46.17,
+                            ext_ior=88.51)),
+    (85.9, -92.2, None, kit("beckmann", "implicit", alpha_u=1.856, alpha_v=0.1317, int_ior=2.958, ext_ior=4.477)),
+    (36.4, -100.8, None, kit("beckmann", "ashikhmin-shirley", alpha_u=1.912, alpha_v=0.00059, int_ior=3.588,
+                             ext_ior=9.557)),
 ]  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from ..math import EPSILON, choose, safe_sqrt, select
 from .distributions import Distribution
 from .facet import Facet
 from .laws import versine
-from .sampling import AntitheticNormals, FacetLobe, Line, Stretch, draw_linear, linear_density, typical_cosine
+from .sampling import AntitheticNormals, FacetLobe, Line, Stretch, draw_linear, linear_density
 
 
 class AntitheticSteepNormals(AntitheticNormals):
@@ -59,6 +59,8 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
 
     # tests/calibration/half_vectors.py fits these, and how far shadowing terms lean.
     OUTWARD = -0.75
+    LEANING = 1.5
+    """How far those facets lean that count, in typical slopes."""
     STEEP = 1.2
     """How many of the steep facets δ counts: those whose slope is at least one."""
     LARGEST = 0.5
@@ -73,7 +75,7 @@ class AntitheticNormalsTowardViewer(AntitheticNormals):
         x, y = Stretch(distribution, wi).azimuth(wi.x, wi.y)
         # Facets are seen by n·wi and by the typical slope along wi: they lean as far as the second one counts.
         slope2 = distribution.mean_square_slope_along(wi)
-        brighter = self._brighter(lobe, wi, typical_cosine(wi, slope2))
+        brighter = self._brighter(lobe, wi, dr.minimum(wi.z + self.LEANING * safe_sqrt(slope2), 1))
         cos2 = dr.square(dr.maximum(wi.z, EPSILON))  # which is not 0
         seen = lobe.shadowing.lean * dr.inv_pi * slope2 * dr.square(brighter)
         leaning = dr.minimum(seen / (seen + cos2), lobe.shadowing.most_leaning)
@@ -136,7 +138,7 @@ class AntitheticImplicitNormals(AntitheticNormalsTowardViewer):
 
     STEEPEST = 0.7
     """The largest δ."""
-    FAR = 0.05
+    FAR = 0.1
     """The part of the lines that lean."""
     LEAST_ROOT = 1e-3
     """The least √(1 - C) of it."""

@@ -76,14 +76,13 @@ class AntitheticNormals(Sampler):
 
     def _bias(self, lobe: FacetLobe, wi: mi.Vector3f) -> mi.Float:
         """τ."""
-        slope2 = lobe.distribution.mean_square_slope()
-        shadowed = wi.z * dr.minimum(self.BROAD * slope2, 1)
-        bias = self.SHADOWED * shadowed + self.RISING * (1 - self._brighter(lobe, wi, typical_cosine(wi, slope2)))
+        shadowed = wi.z * dr.minimum(self.BROAD * lobe.distribution.mean_square_slope(), 1)
+        bias = self.SHADOWED * shadowed + self.RISING * (1 - self._brighter(lobe, wi))
         return dr.minimum(bias, 0.9)  # at 1 the ends of the line would have no samples
 
     @staticmethod
-    def _brighter(lobe: FacetLobe, wi: mi.Vector3f, cos: mi.Float) -> mi.Float:
-        """How much brighter the reflectance is at another cosine than that of ``wi``, at most 1."""
+    def _brighter(lobe: FacetLobe, wi: mi.Vector3f, cos: mi.Float = 1) -> mi.Float:
+        """How much brighter the reflectance is at a cosine, by default that of normal incidence."""
         return dr.minimum(lobe.fresnel.brightness(cos) / dr.maximum(lobe.fresnel.brightness(wi.z), SMALL), 1)
 
     def _azimuth(
@@ -224,11 +223,6 @@ class Line:
         """Of half vectors drawn so; the azimuth is uniform in ψ, not in that of the half vector."""
         stretch = self.distribution.alpha_u * self.distribution.alpha_v * self.g
         return dr.inv_two_pi / (stretch * (1 - self.lowest))
-
-
-def typical_cosine(wi: mi.Vector3f, slope2: mi.Float) -> mi.Float:
-    """The cosθ_d of facets that lean towards ``wi`` by the root of a mean square slope."""
-    return dr.minimum(wi.z + safe_sqrt(slope2), 1)
 
 
 def linear_density(bias: mi.Float, m: mi.Float) -> mi.Float:

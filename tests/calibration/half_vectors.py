@@ -76,6 +76,9 @@ def fits() -> Iterator[Fit]:
     yield attributes(
         AntitheticNormalsTowardViewer, "OUTWARD", variance_loss(lobes(short_tailed, leaning, unit), GRAZING)
     )
+    yield attributes(
+        AntitheticNormalsTowardViewer, "LEANING", variance_loss(lobes(everything, leaning, rising), GRAZING)
+    )
     long_tailed = [*of_alpha(GGX), *(GTR(alpha, number(1.5)) for alpha in map(number, ALPHAS))]
     yield attributes(
         AntitheticNormalsTowardViewer, "STEEP", variance_loss(lobes(long_tailed, leaning[1:], unit), GRAZING)
