@@ -3,10 +3,13 @@
 import json
 import re
 
+import drjit as dr
 import mitsuba as mi
 import pytest
 from support import ROOT
 from test_cli import interrupted, run
+
+from mi_brdfs.cli.interrupts import unwrapped_ctrl_c
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 
@@ -49,12 +52,36 @@ def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
     assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
 
 
+def test_more_starts_than_candidates_are_all_candidates(tmp_path):
+    done = run("fit", LOFT, "--model", "lambert", "--starts", 3000, "--json", "fits.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads((tmp_path / "fits.json").read_text())
+    assert 400 > row["starts"]["tried"] > 100
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_ctrl_c_that_a_kernel_wraps_is_no_failure():
+    """Dr.Jit makes a RuntimeError of all that Python functions raise while it records them."""
+
+    def pressed(error):
+        def body(i):
+            raise error
+
+        return lambda: dr.while_loop((mi.UInt(0),), lambda i: i < 3, body)
+
+    with pytest.raises(KeyboardInterrupt), unwrapped_ctrl_c():
+        pressed(KeyboardInterrupt())()
+    with pytest.raises(RuntimeError, match="while_loop"), unwrapped_ctrl_c():
+        pressed(ValueError("other"))()
+
+
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
-    options = "--model", "lambert,burley", "--starts", 400, "--json", "fits.json", "-o", "fits.html"
+    models = "lambert,burley,ashikhminshirley,brady,cooktorrance,kurt,low,nishino,schlick,walter"
+    options = "--model", models, "--starts", 400, "--json", "fits.json", "-o", "fits.html"
     status, out, err = interrupted(tmp_path, "fit", LOFT, *options, running="Fitting burley")
-    assert status == 130 and "Interrupted; 1 of 2 fits were finished." in err and "Traceback" not in err
-    assert "lambert" in out
-    assert [row["model"] for row in json.loads((tmp_path / "fits.json").read_text())] == ["lambert"]
-    page = (tmp_path / "fits.html").read_text(encoding="utf-8")
-    assert "Only lambert was fitted." in page and "Interrupted; 1 of 2 fits were finished." in page
+    said = re.search(r"Interrupted; (\d) of 10 fits were finished\.", err)
+    assert status == 130 and said and "Traceback" not in err, err
+    fitted = [row["model"] for row in json.loads((tmp_path / "fits.json").read_text())]
+    assert "lambert" in fitted and len(fitted) == int(said[1]) and all(name in out for name in fitted)
+    assert said[0] in (tmp_path / "fits.html").read_text(encoding="utf-8")

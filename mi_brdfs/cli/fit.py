@@ -17,6 +17,7 @@ from ..mitsuba.registry import all_models, find_models
 from ..model import Model
 from .app import command
 from .fit_tables import print_medians, print_ranking
+from .interrupts import unwrapped_ctrl_c
 from .options import check_output, parameters_of, write_json, write_text
 from .terminal import Exit, err, fail, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -198,9 +199,10 @@ def _fit_all(
                 try:
                     (each,) = find_models([name])
                     own = {key: value for key, value in given.items() if key in known_names(each)}
-                    found = fit(batch, name, metric=metric, given=own, starts=starts, seed=seed, progress=advance)
-                    for it in found:
-                        _ = it.albedo  # a kernel, whose time belongs to the progress
+                    with unwrapped_ctrl_c():
+                        found = fit(batch, name, metric=metric, given=own, starts=starts, seed=seed, progress=advance)
+                        for it in found:
+                            _ = it.albedo  # a kernel, whose time belongs to the progress
                     fits += found
                 except (ValueError, RuntimeError) as error:
                     if name not in failed:
@@ -223,7 +225,8 @@ def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: boo
             progress.update(task, description=Path(own[0].file).name)
             if complete:
                 try:
-                    shown = render(own if image else own[:MOST], lambda: progress.advance(task))
+                    with unwrapped_ctrl_c():
+                        shown = render(own if image else own[:MOST], lambda: progress.advance(task))
                     own, shown = by_flip(own, shown) if image else (own, shown)
                     if page:
                         page.add(own, shown)

@@ -18,10 +18,26 @@ from .terminal import Exit, err
 @contextmanager
 def interruptible() -> Iterator[None]:
     try:
-        yield
+        with unwrapped_ctrl_c():
+            yield
     except KeyboardInterrupt:
         err.print("Interrupted; nothing was written.")
         raise typer.Exit(Exit.INTERRUPTED) from None
+
+
+@contextmanager
+def unwrapped_ctrl_c() -> Iterator[None]:
+    """Raise the KeyboardInterrupt that Dr.Jit and Mitsuba make the cause of a RuntimeError, if it reaches the Python
+    functions that they call: it is no failure of these."""
+    try:
+        yield
+    except RuntimeError as error:
+        cause: BaseException | None = error
+        while cause and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__cause__ or cause.__context__
+        if cause:
+            raise KeyboardInterrupt from error
+        raise
 
 
 @contextmanager

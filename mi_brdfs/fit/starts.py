@@ -117,7 +117,8 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
             warm_points = np.array([_completed(problem, tried[order[0]], values) for values in known])
             chosen.append(warm_points[np.argmin(_scores(problem, m, warm_points))])
         best = -(-count // 2)
-        others = rng.choice(order[best:], min(count - best, len(order) - best), replace=False)
+        rest = order[best:]  # none, where more starts are asked for than there are candidates
+        others = rng.choice(rest, min(count - best, len(rest)), replace=False)
         chosen += [tried[k] for k in (*order[:best], *others)]
         owners += [m] * len(chosen)
         points += chosen
