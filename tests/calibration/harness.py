@@ -176,8 +176,10 @@ def relative_variance(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
     return 1 / sampling_efficiency(weights(lobes, wi)) - 1
 
 
-def variance_loss(lobes: Sequence[Lobe], angles: Sequence[float], azimuths: Sequence[float] = (0,)) -> Callable:
-    """The mean of 1/η - 1 over lobes and angles."""
+def variance_loss(
+    lobes: Sequence[Lobe], angles: Sequence[float], azimuths: Sequence[float] = (0,)
+) -> Callable[[], float]:
+    """The mean of 1/η - 1 over lobes and directions."""
     wi = directions(angles, azimuths)
     return lambda: float(np.mean(relative_variance(lobes, wi)))
 
