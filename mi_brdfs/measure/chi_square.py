@@ -1,4 +1,4 @@
-"""Pearson's chi² test."""
+"""Pearson's chi² test, and a test of the cell that deviates most."""
 
 from __future__ import annotations
 
@@ -41,6 +41,17 @@ def chi_square(observed: Array, expected: Array, least: float = 5) -> ChiSquare:
     degrees = max(len(e) - 1, 1)
     worst = int(np.argmax((observed - expected) ** 2 / np.maximum(expected, 1)))
     return ChiSquare(_survival(statistic, degrees), statistic, len(e) - 1, worst)
+
+
+def lone_cell(observed: Array, expected: Array) -> float:
+    """Return how probable it is that one of some counts is as far from what is expected as the farthest one.
+
+    By Chernoff's bound a Poisson count of mean e is at most exp(-(o ln(o/e) - o + e)) likely to be as far out as o;
+    Bonferroni's factor is that of the cells and of both sides. One wrong cell of a thousand is lost in the sum of chi².
+    """
+    o, e = np.asarray(observed, np.float64), np.maximum(expected, 1e-9)
+    farthest = np.max(o * np.log(np.where(o > 0, o, 1) / e) - o + e, initial=0)
+    return float(min(2 * len(o) * np.exp(-farthest), 1))
 
 
 def _survival(statistic: float, degrees: int) -> float:

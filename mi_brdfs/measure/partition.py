@@ -2,8 +2,9 @@
 
 Cells are squares in the plane of two angles, the latitude γ about an axis in the horizon and the longitude t around
 it: a pole at the normal would be a place of long cells where narrow lobes are, and horizon and plane of incidence are
-lines of the grid. A cell is quartered while it holds more than its share of samples, and while its integral by Gauss
-quadrature differs from that of its quarters; so no width of a lobe need be known, from a mirror to a diffuser.
+lines of the grid. A cell is quartered while it holds more than its share of samples, while its integral by Gauss
+quadrature differs from that of its quarters, from how many samples it holds, or misses a line so narrow that the
+density of a sample far exceeds that of all nodes; so no width of a lobe need be known, from a mirror to a diffuser.
 """
 
 from __future__ import annotations
@@ -107,19 +108,25 @@ def partitions(
 def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, Array, Partition]:
     """Return a partition; yield the directions whose density it needs."""
     axis = azimuth_axis(wi)
-    points = _to_square(pilot, axis)
+    points, heights = _to_square(pilot, axis), (yield pilot)
     side = 1 << FIRST_LEVEL
     x, y = (index.ravel() for index in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
-    integrals = yield from _integrals(axis, x, y, FIRST_LEVEL)
+    integrals, _ = yield from _integrals(axis, x, y, FIRST_LEVEL)
     done = []
     for level in range(FIRST_LEVEL, LAST_LEVEL + 1):
-        held, points = _count(points, x, y, level)
+        slots, inside = _slots(points, x, y, level)
+        points, heights = points[inside], heights[inside]
+        held, peaks = np.bincount(slots, minlength=len(x)), np.zeros(len(x))
+        np.maximum.at(peaks, slots, heights)
         quarters = [(2 * x + i, 2 * y + j) for i in (0, 1) for j in (0, 1)]
         qx, qy = (np.stack(index, axis=1) for index in zip(*quarters, strict=True))
-        parts = (yield from _integrals(axis, qx.ravel(), qy.ravel(), level + 1)).reshape(-1, 4)
+        found = yield from _integrals(axis, qx.ravel(), qy.ravel(), level + 1)
+        parts, highest = (each.reshape(-1, 4) for each in found)
         precise = parts.sum(axis=1)
         error = count * abs(precise - integrals)
         split = (held * cells > len(pilot)) | (error > 0.2 * np.sqrt(np.maximum(count * precise, 1)))
+        share = len(pilot) * precise
+        split |= (peaks > 2 * highest.max(axis=1)) | (abs(held - share) > 3 * np.sqrt(share + 1) + 2)
         if level == LAST_LEVEL:
             split[:] = False
         done.append((np.full((~split).sum(), level), x[~split], y[~split], precise[~split]))
@@ -133,26 +140,27 @@ def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, A
     return Partition(axis, starts[order], levels[order], x[order], y[order], integrals[order])
 
 
-def _count(points: Array, x: Array, y: Array, level: int) -> tuple[Array, Array]:
-    """Count the points in each of some cells of a level; return the counts, and the points that lie in one."""
+def _slots(points: Array, x: Array, y: Array, level: int) -> tuple[Array, Array]:
+    """Return ``(slots, inside)``: which points lie in one of some cells of a level, and in which."""
     indices = (points * (1 << level)).astype(np.int64).clip(0, (1 << level) - 1)
     keys, cells = indices[:, 0] << 32 | indices[:, 1], x.astype(np.int64) << 32 | y
     order = np.argsort(cells)
     slot = np.searchsorted(cells[order], keys).clip(0, len(cells) - 1)
     inside = cells[order][slot] == keys
-    held = np.zeros(len(cells), int)
-    held[order] = np.bincount(slot[inside], minlength=len(cells))
-    return held, points[inside]
+    return order[slot[inside]], inside
 
 
-def _integrals(axis: Array, x: Array, y: Array, level: int) -> Generator[Array, Array, Array]:
-    """Return the integrals of a density over cells; yield the directions whose density is needed."""
+def _integrals(axis: Array, x: Array, y: Array, level: int) -> Generator[Array, Array, tuple[Array, Array]]:
+    """Return the integrals of a density over cells, and its largest value at a node of each; yield the directions whose
+    density is needed."""
     size = 2.0**-level
     px = (x[:, None, None] + _NODES[:, None]) * size + np.zeros(NODES)
     py = (y[:, None, None] + _NODES[None, :]) * size + np.zeros((NODES, 1))
     w, jacobian = _to_sphere(np.stack([px.ravel(), py.ravel()], axis=-1), axis)
-    density = ((yield w.astype(np.float32)) * jacobian).reshape(-1, NODES, NODES)
-    return np.einsum("kij,i,j->k", density, _WEIGHTS, _WEIGHTS) * size * size
+    density = yield w.astype(np.float32)
+    integrand = (density * jacobian).reshape(-1, NODES, NODES)
+    integrals = np.einsum("kij,i,j->k", integrand, _WEIGHTS, _WEIGHTS) * size * size
+    return integrals, density.reshape(len(x), -1).max(axis=1, initial=0)
 
 
 def _to_sphere(points: Array, axis: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..measure.arrays import Array
-from ..measure.chi_square import ChiSquare, chi_square
+from ..measure.chi_square import ChiSquare, chi_square, lone_cell
 from ..measure.directions import angles_of, azimuth_axis
 from ..measure.partition import Partition, partitions
 from ..measure.probe import BSDFProbe, Part, Samples
@@ -24,6 +24,8 @@ PILOT = 1 / 8
 """Samples that the cells are made by, for each that is counted."""
 RANDOM_COUNT, RANDOM_CELLS = 1 << 14, 128
 """Those of a direction at random."""
+CONFIRMED = 2
+"""Directions that stay suspect before the others need no second look."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +64,16 @@ class Trial:
 
     @cached_property
     def test(self) -> ChiSquare:
-        """The graver of two tests: of the cells, which see what is wrong in few of them, and of groups of neighbours,
-        which see what is slightly wrong in many."""
+        """The gravest of three tests: of the cells, which sees what is wrong in few of them, of groups of neighbours,
+        which sees what is slightly wrong in many, and of the cell that deviates most."""
         fine = chi_square(self.counts, self.expected)
         share = np.cumsum(np.fmin(self.expected, self.count))  # a density may be infinite
         share = share / max(share[-1], 1e-30)
         groups = np.minimum(share * GROUPS, GROUPS - 1).astype(int)
         counts, expected = (np.bincount(groups, each, GROUPS) for each in (self.counts, self.expected))
         graver = min(fine, chi_square(counts, expected), key=lambda test: test.p_value)
-        return replace(graver, p_value=min(2 * graver.p_value, 1), worst=fine.worst)
+        least = min(graver.p_value, lone_cell(self.counts, self.expected))
+        return replace(graver, p_value=min(3 * least, 1), worst=fine.worst)
 
     @property
     def is_suspect(self) -> bool:
@@ -98,17 +101,26 @@ class Trials(NamedTuple):
 
 def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident]) -> Trials:
     """Make a trial of a part for each direction of incidence, those that were asked for and some at random."""
-    found = _trials(probe, part, random_incidents(part), RANDOM_COUNT, RANDOM_CELLS)
-    # They are many, and a jump of the density close to a line of their cells escapes the quadrature: a lone suspect
-    # gets as many samples and cells as the others, across that line.
-    suspects = [k for k, trial in enumerate(found) if trial.is_suspect]
-    for k in suspects if len(suspects) <= 2 else []:
-        (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, turn=0.6)
-    return Trials(_trials(probe, part, asked, COUNT, CELLS), found)
+    found = _trials(probe, part, asked, COUNT, CELLS)
+    found += _trials(probe, part, random_incidents(part), RANDOM_COUNT, RANDOM_CELLS)
+    # What is narrow, or jumps close to a line of the cells, may escape the quadrature: suspects get cells across that
+    # line, made by as many samples as are counted, until some stay suspect.
+    confirmed = 0
+    for k in [k for k, trial in enumerate(found) if trial.is_suspect]:
+        if confirmed < CONFIRMED:
+            (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, pilot=1, turn=0.6)
+            confirmed += found[k].is_suspect
+    return Trials(found[: len(asked)], found[len(asked) :])
 
 
 def _trials(
-    probe: BSDFProbe, part: Part, incidents: Sequence[Incident], count: int, cells: int, turn: float = 0
+    probe: BSDFProbe,
+    part: Part,
+    incidents: Sequence[Incident],
+    count: int,
+    cells: int,
+    pilot: float = PILOT,
+    turn: float = 0,
 ) -> list[Trial]:
     """Make the trials of several directions together: a kernel has the work of many of them. The cells are turned about
     the normal by an angle, in radians."""
@@ -125,7 +137,7 @@ def _trials(
     def density(of: Array, wo: Array) -> Array:
         return np.nan_to_num(probe.pdf(part, wis[of], wo))
 
-    pilots = [pilot.wo[pilot.drawn] for pilot in drawn(int(count * PILOT), 0)]
+    pilots = [samples.wo[samples.drawn] for samples in drawn(int(count * pilot), 0)]
     # The quadrature is as precise as for the larger count, for the sake of the sum.
     cos, sin = np.cos(turn), np.sin(turn)
     made = partitions(density, pilots, list(wis @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]), COUNT, cells)
