@@ -108,7 +108,7 @@ def partitions(
 def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, Array, Partition]:
     """Return a partition; yield the directions whose density it needs."""
     axis = azimuth_axis(wi)
-    points, heights = _to_square(pilot, axis), (yield pilot)
+    points, heights = _to_square(pilot, axis), (yield pilot) if len(pilot) else np.zeros(0)
     side = 1 << FIRST_LEVEL
     x, y = (index.ravel() for index in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
     integrals, _ = yield from _integrals(axis, x, y, FIRST_LEVEL)

@@ -192,7 +192,7 @@ class ModelBSDF:
         normal = mi.Vector3f(0, 0, 1)
         lobes = self._lobes(self.model.evaluate(si, active))
         albedo = sum(lobe.estimated_albedo(normal) for lobe in lobes if not lobe.transmits)
-        return mi.depolarizer(clamp(mi.UnpolarizedSpectrum(albedo), 0, 1))
+        return mi.depolarizer(select(active, clamp(mi.UnpolarizedSpectrum(albedo), 0, 1), mi.UnpolarizedSpectrum(0)))
 
     def mirror_reflectance(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> mi.UnpolarizedSpectrum:
         """Return the reflectance of the lobes as mirrors, for the mirror direction of si.wi: at most 1."""

@@ -18,10 +18,10 @@ COUNT = 2000
 
 
 def active(run: Run) -> Findings:
-    """Check that lanes that are not active get no light: ``eval`` and the weight of ``sample`` are zero there, for
-    masks as for ``False``, and so is the density of plugins of ours (Mitsuba's own rely on it that calls of a scene
-    mask it); others get what they get when all are active. And no derivative comes from them, whatever directions they
-    have."""
+    """Check that lanes that are not active get no light: what ``eval``, ``eval_pdf`` and ``eval_pdf_sample`` return and
+    the weights of samples are zero there, for masks as for ``False``, and so are the densities and
+    ``eval_diffuse_reflectance`` of plugins of ours (Mitsuba's own rely on it that calls of a scene mask them); others
+    get what they get when all are active. And no derivative comes from them, whatever directions they have."""
     probe, part = run.probe, run.probe.whole
     outcome = Outcome("active", part.name)
     wi, u = scattered(COUNT, 61, part.sides), random(COUNT, 62)
@@ -30,9 +30,16 @@ def active(run: Run) -> Findings:
     half = np.random.default_rng(64).random(COUNT) < 0.5
     bsdf, si, towards = probe.bsdf, interaction(wi), vectors(wo)
 
+    try:
+        bsdf.eval_diffuse_reflectance(si, True)
+        reflects = True
+    except RuntimeError:  # not implemented
+        reflects = False
+
     def called(mask: bool | mi.Bool) -> dict[str, Array]:
         bs, weight = bsdf.sample(part.context, si, *sample_arguments(u), mask)
         value, density = bsdf.eval_pdf(part.context, si, towards, mask)
+        also = bsdf.eval_pdf_sample(part.context, si, towards, *sample_arguments(u), mask)
         found = {
             "eval": bsdf.eval(part.context, si, towards, mask),
             "pdf": bsdf.pdf(part.context, si, towards, mask),
@@ -40,7 +47,13 @@ def active(run: Run) -> Findings:
             "eval_pdf's density": density,
             "the weight of sample": dr.select(probe.is_smooth(bs), weight, 0),
             "the density of sample": bs.pdf,
+            "eval_pdf_sample's value": also[0],
+            "eval_pdf_sample's density": also[1],
+            "the weight of eval_pdf_sample": dr.select(probe.is_smooth(also[2]), also[3], 0),
+            "the density of eval_pdf_sample": also[2].pdf,
         }
+        if reflects:
+            found["eval_diffuse_reflectance"] = bsdf.eval_diffuse_reflectance(si, mask)
         dr.eval(found)
         return {name: numbers(value, COUNT) for name, value in found.items()}
 
@@ -51,7 +64,7 @@ def active(run: Run) -> Findings:
         (False, np.zeros(COUNT, bool), "where active is False"),
     ):
         for name, value in called(mask).items():
-            if probe.is_ours or name not in ("pdf", "eval_pdf's density", "the density of sample"):
+            if probe.is_ours or not (name == "pdf" or "density" in name or "reflectance" in name):
                 stray = (value[~lit] != 0).any(axis=1)
                 if stray.any():
                     k = np.flatnonzero(~lit)[int(np.argmax(stray))]
@@ -78,21 +91,20 @@ def active(run: Run) -> Findings:
 
 
 def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Array) -> None:
-    """Check that reverse derivatives of all parameters, with inactive lanes, are those of the others alone. Some
-    inactive lanes have directions of length 0, as those of rays that hit nothing."""
+    """Check that reverse derivatives of all parameters are those of the values of active lanes alone. Some inactive
+    lanes have directions of length 0, as those of rays that hit nothing."""
     probe, part = run.probe, run.probe.whole
     params, keys, _ = traced_floats(run, "active")
     originals = {key: value_of(params, key) for key in keys}
     kept = (lit | (np.arange(len(lit)) % 4 > 0))[:, None]
     found = []
     try:
-        for directions, mask in (
-            ([w * kept for w in (wi, wo)], mi.Bool(lit)),
-            ([np.ascontiguousarray(w[lit]) for w in (wi, wo)], True),
-        ):
+        # Both have the same lanes in the same order: large terms of a sum that is 0 cancel alike.
+        for directions, mask, counted in (([w * kept for w in (wi, wo)], mi.Bool(lit), True), ([wi, wo], True, lit)):
             for key in keys:
                 attach(params, key)
             value = probe.bsdf.eval(part.context, interaction(directions[0]), vectors(directions[1]), mask)
+            value = dr.select(mi.Bool(counted), value, 0)
             if dr.grad_enabled(value):
                 dr.backward(dr.sum(value, axis=None))
             total = float(np.sum(np.array(dr.detach(value), np.float64)))

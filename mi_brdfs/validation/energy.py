@@ -13,6 +13,7 @@ from ..measure.arrays import Array, interaction, luminance, numbers
 from ..measure.directions import direction, on_side
 from ..measure.probe import Part
 from ..measure.variates import SHIFTS, lattice, sampling_efficiency
+from . import sampling
 from .incidents import Incident, named
 from .outcome import Findings, Outcome
 from .report import Finding
@@ -27,12 +28,13 @@ def albedo(run: Run) -> Findings:
     and the noise; or, where the page of the model states that it gains energy with these choices, no more than it
     states, which is noted. So is it if diffuse and specular reflectances add to more than 1. With its default
     parameters, a plugin of ours reflects what its page says. The mean of the weights is taken over points that fill the
-    space of the variates evenly; that of refracted light without the factor 1/η² of radiance."""
+    space of the variates evenly; that of refracted light without the factor 1/η² of radiance. Where the sampler is
+    wrong, too much light is its fault: see ``weight``, ``pdf`` and ``chi2``."""
     points = lattice(12, 5)
     limits = _limits(run)
     for part in run.probe.parts:
         outcome, largest = Outcome("albedo", part.name), Largest()
-        for name, wi in _white_furnace(run, part):
+        for name, wi, _ in _white_furnace(run, part):
             samples = run.probe.sample(part, wi, points)
             weights = samples.weight * np.where(samples.weight.any(axis=1), samples.eta, 1)[:, None] ** 2
             copies = weights.reshape(SHIFTS, -1, weights.shape[1]).mean(axis=1)
@@ -50,7 +52,21 @@ def albedo(run: Run) -> Findings:
             if limits.largest is not None and least[k] > limits.largest * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
+        if outcome.faults and _is_sampled_wrongly(run, part):
+            words = "Not judged, as the mean of the weights is the albedo only where pdf, chi2 and weight pass."
+            yield Finding("albedo", part.name, "skip", words, outcome.data)
+            continue
         yield _judged(part, outcome, largest, limits)
+
+
+def _is_sampled_wrongly(run: Run, part: Part) -> bool:
+    """Return whether a check of the sampler fails: then that is the fault, and not the energy."""
+    return any(
+        finding.verdict == "fail"
+        for check in (sampling.weight, sampling.pdf, sampling.chi2)
+        for finding in check(run)
+        if finding.subject == part.name
+    )
 
 
 TOLERANCE = 1e-3

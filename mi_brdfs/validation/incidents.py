@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array
+from ..measure.arrays import CENTRE, Array
 from ..measure.directions import STEEPEST, angles_of, direction, on_side, scattered
 from ..measure.probe import Part
 
@@ -23,6 +23,8 @@ class Incident(NamedTuple):
 
     name: str
     wi: Array
+    uv: tuple[float, float] = CENTRE
+    """Where on the surface statistical tests look."""
 
     def at(self, lanes: Array) -> Array:
         """Return the directions of some lanes, shape (3,) if they all have the same."""
@@ -53,13 +55,15 @@ def all_over(part: Part) -> Incident:
 
 
 def random_incidents(part: Part) -> list[Incident]:
-    """Draw directions, one in each of some intervals of angles, whose azimuths go around the normal."""
-    rng, drawn = np.random.default_rng(51), []
+    """Draw directions, one in each of some intervals of angles, whose azimuths go around the normal, each at a point of
+    its own, also outside the unit square of textures."""
+    rng, places, drawn = np.random.default_rng(51), np.random.default_rng(52), []
     for side in part.sides:
         turn = rng.permutation(RANDOM)
         for k in range(RANDOM):
             theta, phi = STEEPEST * (k + rng.random()) / RANDOM, 360 * (turn[k] + rng.random()) / RANDOM
-            drawn.append(Incident(angles_of(w := on_side(direction(theta, phi), side)), w))
+            u, v = places.uniform(-1, 2, 2).astype(np.float32).tolist()
+            drawn.append(Incident(angles_of(w := on_side(direction(theta, phi), side)), w, (u, v)))
     return drawn
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
+from numbers import Real
 from typing import Any
 
 import mitsuba as mi
 
 from ..measure.probe import BSDFProbe
-from ..measure.sources import name_of
+from ..measure.sources import find_sources, name_of
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, recompiles, sampling, spectral, textures, values
 from .against import against
@@ -54,12 +55,12 @@ DELTA = "A delta function, which cannot be evaluated or tested."
 
 
 def check(
-    bsdf: dict[str, Any] | mi.BSDF,
+    bsdf: str | dict[str, Any] | mi.BSDF,
     *,
     name: str | None = None,
-    angles: Iterable[float] = ANGLES,
+    angles: float | Iterable[float] = ANGLES,
     significance: float = SIGNIFICANCE,
-    only: Iterable[str] | None = None,
+    only: str | Iterable[str] | None = None,
     conserves: bool | None = None,
     on_progress: Callable[[], None] = lambda: None,
 ) -> Report:
@@ -70,27 +71,29 @@ def check(
     Random numbers are fixed: the same BSDF gives the same report.
 
     Args:
-        bsdf: a plugin dict, or a loaded BSDF, which must belong to the active variant.
+        bsdf: a plugin dict, the name of a plugin, the path of a measured file, or a loaded BSDF, which must belong to
+            the active variant.
         name: what the report calls it; by default its type.
-        angles: of incidence, in degrees, in [0, 90).
+        angles: of incidence, in degrees, in [0, 90): one or several.
         significance: the probability, in (0, 1), that a BSDF without faults fails one of the statistical tests of this
             call.
-        only: the names of the checks to run, by default all of :data:`CHECKS`.
+        only: the name of the check to run, or several; by default all of :data:`CHECKS`.
         conserves: whether to judge that at most what is received is reflected. By default a model may gain the energy
             that its manual page states, and nothing else may gain any.
         on_progress: called after each check.
 
     Raises:
-        ValueError: for an unknown name of a check, an angle or a significance out of range, or a loaded BSDF that
-            cannot be checked in the active variant.
+        ValueError: for what is no BSDF, an unknown name of a check, an angle or a significance out of range, or a
+            loaded BSDF that cannot be checked in the active variant.
     """
-    wanted = list(CHECKS) if only is None else list(only)
+    wanted = list(CHECKS) if only is None else _several(only)
     if unknown := [word for word in wanted if word not in CHECKS]:
         raise ValueError(f"There is no check {unknown[0]!r}; there are {', '.join(CHECKS)}.")
     angles = checked_angles(angles)
-    if not 0 < significance < 1:
-        raise ValueError(f"The significance must be in (0, 1), not {significance:g}.")
+    if not (isinstance(significance, (int, float)) and 0 < significance < 1):
+        raise ValueError(f"The significance must be a number in (0, 1), not {significance!r}.")
     with _measurable(bsdf):
+        bsdf = _described(bsdf)
         probe, given = _probe(bsdf), bsdf if isinstance(bsdf, dict) else None
         run = Run(probe, angles, significance, conserves, given)
         findings = [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
@@ -102,12 +105,12 @@ def check(
 
 
 def compare(
-    bsdf: dict[str, Any] | mi.BSDF,
-    other: dict[str, Any] | mi.BSDF,
+    bsdf: str | dict[str, Any] | mi.BSDF,
+    other: str | dict[str, Any] | mi.BSDF,
     *,
     name: str | None = None,
     other_name: str | None = None,
-    angles: Iterable[float] = ANGLES,
+    angles: float | Iterable[float] = ANGLES,
 ) -> Report:
     """Compare what ``eval`` returns for two BSDFs: at the angles of incidence and all over, towards directions all over
     and those that each draws. They are the same if the largest relative difference is at most what float32 rounds by:
@@ -121,37 +124,64 @@ def compare(
     """
     angles = checked_angles(angles)
     with _measurable(bsdf, other):
+        bsdf, other = _described(bsdf), _described(other)
         run = Run(_probe(bsdf), angles, SIGNIFICANCE, None, None)
         return Report(name or _name(bsdf), [against(run, _probe(other), other_name or _name(other))])
 
 
-def checked_angles(angles: Iterable[float]) -> tuple[float, ...]:
+def checked_angles(angles: float | Iterable[float]) -> tuple[float, ...]:
     """Return angles of incidence, in degrees.
 
     Raises:
         ValueError: if there are none, or one is not in [0, 90).
     """
-    checked = tuple(angles)
+    checked = _several(angles)
     if not checked:
         raise ValueError("There is no angle of incidence; give one or more, in degrees.")
     for angle in checked:
-        if not 0 <= angle < 90:
-            raise ValueError(f"An angle of incidence must be in [0, 90) degrees, not {angle:g}.")
-    return checked
+        if not (isinstance(angle, Real) and 0 <= angle < 90):
+            shown = f"{angle:g}" if isinstance(angle, Real) else repr(angle)
+            raise ValueError(f"An angle of incidence must be in [0, 90) degrees, not {shown}.")
+    return tuple(checked)
 
 
-def _measurable(*bsdfs: dict[str, Any] | mi.BSDF) -> AbstractContextManager:
+def _several(given: Any) -> list[Any]:
+    """Return what is given, one or several, as a list."""
+    return list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+
+
+def _measurable(*bsdfs: str | dict[str, Any] | mi.BSDF) -> AbstractContextManager:
     """Return a context in whose variant some BSDFs can be measured."""
+    for bsdf in bsdfs:
+        # Without a variant there is no mi.BSDF yet.
+        is_object = hasattr(bsdf, "eval_pdf")
+        if not (is_object or isinstance(bsdf, str) or (isinstance(bsdf, dict) and "type" in bsdf)):
+            raise ValueError(
+                f"{bsdf!r} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a loaded BSDF."
+            )
     if is_measurable(mi.variant()):
         return nullcontext()
-    if not all(isinstance(bsdf, dict) for bsdf in bsdfs):
+    if not all(isinstance(bsdf, (str, dict)) for bsdf in bsdfs):
         raise ValueError(f"A loaded BSDF of {mi.variant()} cannot be checked: load it in {VARIANT} or another "
                          "vectorized and unpolarized variant, or give its dict.")  # fmt: skip
     return activated(VARIANT)
 
 
+def _described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF:
+    """Return the only BSDF that a word stands for, and anything else as it is."""
+    if not isinstance(bsdf, str):
+        return bsdf
+    sources = list(find_sources(bsdf))
+    if len(sources) > 1:
+        raise ValueError(f"{bsdf} has {len(sources)} materials; name one of them, such as {sources[0].word}.")
+    return sources[0].load()
+
+
 def _probe(bsdf: dict[str, Any] | mi.BSDF) -> BSDFProbe:
-    return BSDFProbe(mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
+    loaded = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    if not isinstance(loaded, mi.BSDF):
+        raise ValueError(f"{bsdf['type'] if isinstance(bsdf, dict) else type(bsdf).__name__} is not a BSDF.")
+    return BSDFProbe(loaded)
 
 
 def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:

@@ -124,18 +124,18 @@ def _trials(
 ) -> list[Trial]:
     """Make the trials of several directions together: a kernel has the work of many of them. The cells are turned about
     the normal by an angle, in radians."""
-    wis = np.array([incident.wi for incident in incidents])
+    wis, uvs = (np.array([incident[field] for incident in incidents]) for field in (1, 2))
 
     def drawn(count: int, seed: int) -> Iterator[Samples]:
         at_once = max(1, COUNT // count)
         for first in range(0, len(wis), at_once):
-            some = wis[first : first + at_once]
-            samples = probe.sample(part, np.repeat(some, count, axis=0), random(count * len(some), seed + 2 * first))
-            for fields in zip(*(np.split(field, len(some)) for field in samples), strict=True):
+            some, uv = (np.repeat(each[first : first + at_once], count, axis=0) for each in (wis, uvs))
+            samples = probe.sample(part, some, random(len(some), seed + 2 * first), uv)
+            for fields in zip(*(np.split(field, len(some) // count) for field in samples), strict=True):
                 yield Samples(*fields)
 
     def density(of: Array, wo: Array) -> Array:
-        return np.nan_to_num(probe.pdf(part, wis[of], wo))
+        return np.nan_to_num(probe.pdf(part, wis[of], wo, uvs[of]))
 
     pilots = [samples.wo[samples.drawn] for samples in drawn(int(count * pilot), 0)]
     # The quadrature is as precise as for the larger count, for the sake of the sum.
