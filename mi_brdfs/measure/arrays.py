@@ -17,6 +17,8 @@ CENTRE = 0.4, 0.3
 """The texture coordinates of what is measured where no others are given."""
 WAVELENGTHS = 450, 520, 580, 640
 """Those of spectral variants, in nanometres."""
+VISIBLE = 360, 830
+"""The range of Mitsuba's wavelengths, in nanometres."""
 ALIGNMENT = 64
 """Of Dr.Jit's arrays, in bytes."""
 
@@ -31,9 +33,10 @@ def context(component: int | None = None, mask: int | None = None) -> mi.BSDFCon
     return result
 
 
-def interaction(wi: ArrayLike, uv: ArrayLike = CENTRE) -> mi.SurfaceInteraction3f:
+def interaction(wi: ArrayLike, uv: ArrayLike = CENTRE, wavelengths: ArrayLike = WAVELENGTHS) -> mi.SurfaceInteraction3f:
     """Return a surface interaction for directions ``wi`` of the local frame, shape (3,) or (N, 3), at texture
-    coordinates ``uv``, shape (2,) or (N, 2)."""
+    coordinates ``uv``, shape (2,) or (N, 2), and in spectral variants for four ``wavelengths``, shape (4,) or (N, 4).
+    """
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi = vectors(wi)
     si.n = mi.Normal3f(0, 0, 1)
@@ -41,7 +44,7 @@ def interaction(wi: ArrayLike, uv: ArrayLike = CENTRE) -> mi.SurfaceInteraction3
     si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
     si.uv = mi.Point2f(uv) if np.ndim(uv) == 1 else mi.Point2f(_columns(uv))
     if mi.is_spectral:
-        si.wavelengths = mi.UnpolarizedSpectrum(*WAVELENGTHS)
+        si.wavelengths = mi.UnpolarizedSpectrum(*_columns(wavelengths))
     return si
 
 
@@ -57,6 +60,13 @@ def sample_arguments(variates: Array) -> tuple[mi.Float, mi.Point2f]:
     """Return rows of three uniform variates, shape (N, 3), as the two arguments of ``sample``. Vectorized variants
     only."""
     return floats(variates[:, 0]), mi.Point2f(_columns(variates[:, 1:]))
+
+
+def hero_wavelengths(count: int) -> Array:
+    """Return four wavelengths for each lane that divide the visible range, all of which the lanes fill, as integrators
+    sample them; shape (count, 4)."""
+    first = np.arange(count)[:, None] * 0.6180339887498949  # the golden ratio spreads any part of the lanes
+    return (VISIBLE[0] + np.diff(VISIBLE) * ((first + np.arange(4) / 4) % 1)).astype(np.float32)
 
 
 def per_lane() -> mi.Texture:
@@ -75,6 +85,37 @@ def per_lane() -> mi.Texture:
             return self.value
 
     return Lanes()
+
+
+def pinned(texture: mi.Texture, si: mi.SurfaceInteraction3f, channel: int | None = None) -> mi.Texture:
+    """Return a texture that has, whatever it is asked for, the values of another one at ``si``, lane by lane; as a
+    colour, grey of one channel if that is given."""
+
+    class Pinned(mi.Texture):
+        def __init__(self) -> None:
+            super().__init__(mi.Properties())
+
+        def eval(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            value = texture.eval(si, active)
+            return value if channel is None else type(value)(value[channel])
+
+        def eval_1(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            return texture.eval_1(si, active)
+
+        def eval_3(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            value = texture.eval_3(si, active)
+            return value if channel is None else type(value)(value[channel])
+
+        def mean(self) -> Any:
+            return 0.5 * texture.mean()  # samplers may be guided by it, but values that follow it show
+
+        def max(self) -> float:
+            return texture.max()
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+    return Pinned()
 
 
 def numbers(value: Any, count: int | None = None) -> Array:

@@ -11,7 +11,17 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import CENTRE, Array, context, interaction, numbers, sample_arguments, vectors
+from .arrays import (
+    CENTRE,
+    WAVELENGTHS,
+    Array,
+    context,
+    hero_wavelengths,
+    interaction,
+    numbers,
+    sample_arguments,
+    vectors,
+)
 
 if TYPE_CHECKING:
     from ..model import Model
@@ -72,6 +82,8 @@ class BSDFProbe:
     """
 
     bsdf: mi.BSDF
+    every_wavelength: bool = False
+    """Whether lanes have wavelengths of their own in spectral variants, from the whole visible range."""
 
     @cached_property
     def components(self) -> list[Part]:
@@ -128,30 +140,34 @@ class BSDFProbe:
 
     # --- Calls ------------------------------------------------------------------------------------------------------
 
+    def _at(self, wi: Array, uv: ArrayLike, count: int) -> mi.SurfaceInteraction3f:
+        return interaction(wi, uv, hero_wavelengths(count) if self.every_wavelength else WAVELENGTHS)
+
     def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return f |cosθ_o|."""
-        return numbers(self.bsdf.eval(part.context, interaction(wi, uv), vectors(wo), True), len(wo))
+        return numbers(self.bsdf.eval(part.context, self._at(wi, uv, len(wo)), vectors(wo), True), len(wo))
 
     def pdf(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return the density of ``wo``."""
-        return numbers(self.bsdf.pdf(part.context, interaction(wi, uv), vectors(wo), True), len(wo))[:, 0]
+        return numbers(self.bsdf.pdf(part.context, self._at(wi, uv, len(wo)), vectors(wo), True), len(wo))[:, 0]
 
     def eval_pdf(self, part: Part, wi: Array, wo: Array) -> tuple[Array, Array]:
         """Return ``(value, pdf)``."""
-        value, pdf = self.bsdf.eval_pdf(part.context, interaction(wi), vectors(wo), True)
+        value, pdf = self.bsdf.eval_pdf(part.context, self._at(wi, CENTRE, len(wo)), vectors(wo), True)
         return numbers(value, len(wo)), numbers(pdf, len(wo))[:, 0]
 
     def eval_pdf_sample(self, part: Part, wi: Array, wo: Array, variates: Array) -> tuple[Array, ...]:
         """Return ``(value, pdf, wo, density, weight)``, the last three of the sample."""
         u, v = sample_arguments(variates)
-        value, pdf, bs, weight = self.bsdf.eval_pdf_sample(part.context, interaction(wi), vectors(wo), u, v, True)
-        count = len(variates)
+        count, si = len(variates), self._at(wi, CENTRE, len(variates))
+        value, pdf, bs, weight = self.bsdf.eval_pdf_sample(part.context, si, vectors(wo), u, v, True)
         value, pdf, sampled, density, weight = (numbers(x, count) for x in (value, pdf, bs.wo, bs.pdf, weight))
         return value, pdf[:, 0], sampled, density[:, 0], weight
 
     def sample(self, part: Part, wi: Array, variates: Array, uv: ArrayLike = CENTRE) -> Samples:
         """Draw samples, and evaluate the part for their directions."""
-        si, (u, v), count = interaction(wi, uv), sample_arguments(variates), len(variates)
+        (u, v), count = sample_arguments(variates), len(variates)
+        si = self._at(wi, uv, count)
         bs, weight = self.bsdf.sample(part.context, si, u, v, True)
         drawn = bs.pdf > 0
         wo = dr.select(drawn, bs.wo, mi.Vector3f(0, 0, 1))
