@@ -40,6 +40,7 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         contract.active,
         contract.mode,
         contract.reflectance,
+        spectral.colours,
         spectral.spectral,
     )
 }

@@ -1,4 +1,4 @@
-"""The check that rgb and spectral variants agree."""
+"""The checks of colours: channel by channel, and in rgb and spectral variants alike."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import numbers
+from ..measure.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
 from ..measure.directions import angles_of, hemisphere, on_side
 from ..measure.probe import BSDFProbe
 from ..measure.variates import random
+from . import sampling, values
 from .outcome import Findings, Outcome, told
 from .report import Finding
 from .run import Run
@@ -20,12 +21,37 @@ TOLERANCE = 5e-3
 """Mitsuba fits spectra to rgb colours to about a thousandth."""
 BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
+AGAIN = values.finite, sampling.weight, values.eval_pdf
+"""The checks to run again in a spectral variant, of what they pass in rgb."""
+HUE = 1, 0.7, 0.45
+"""The channels of a colour, as parts of the grey in its place."""
+
+
+def colours(run: Run) -> Findings:
+    """Check that no channels of colour are exchanged: with colours for parameters that are grey or coloured, each
+    channel of ``eval`` is what it is where all parameters are grey of their value in this channel, or at least nearer
+    to that than to what another channel makes: a tint may depend on the luminance. For this the BSDF must be given as a
+    dict."""
+    if run.given is None:
+        yield Finding("colours", "whole", "skip", "To give it other colours, its dict is needed.")
+        return
+    greys = _greys(run.probe, run.given)
+    if not greys:
+        yield Finding("colours", "whole", "skip", "It has no colours.")
+        return
+    outcome = Outcome("colours", "whole")
+    _check_channels(run, outcome, greys)
+    yield outcome.finding("Each channel follows its own.")
 
 
 def spectral(run: Run) -> Findings:
-    """Check that what is grey is the same in rgb and in spectral variants, to 0.5 %: all rgb colours become grey ones,
-    as bright as they are. Those of plugins of ours are also tried brighter than 1, where they may be; Mitsuba's own
-    plugins limit them to 1 in spectral variants. For this the BSDF must be given as a dict."""
+    """Check that what is grey is the same in rgb and in spectral variants, to 0.5 %, at all visible wavelengths: all rgb
+    colours become grey ones, as bright as they are. Those of plugins of ours are also tried brighter than 1, where they
+    may be; Mitsuba's own plugins limit them to 1 in spectral variants.
+
+    And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
+    and ``pdf`` say, and each wavelength follows the value that the colours have there, and not that of another lane's.
+    For this the BSDF must be given as a dict."""
     part = run.probe.whole
     if run.given is None:
         yield Finding("spectral", part.name, "skip", "To load it in two variants, its dict is needed.")
@@ -36,65 +62,150 @@ def spectral(run: Run) -> Findings:
         return
     wi = on_side(hemisphere(COUNT, 81), part.sides[0])
     with mi.variant_context(rgb):
-        tried = _greys(run.given)
+        probe = _load(run.given)
+        greys = _greys(probe, run.given)
+        tried = _tried(probe, run.given, greys)
         wo = _load(tried[""]).sample(part, wi, random(COUNT, 82)).wo
         wo[::2] = on_side(hemisphere(COUNT, 83), part.sides[0])[::2]
         expected = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
     if np.ptp(expected[""], axis=1).max() > 1e-4 * expected[""].max():
-        yield Finding("spectral", part.name, "skip", "It has colours, of which spectral variants make other ones.")
-        return
+        tried = {}  # it has colours that cannot be replaced, of which spectral variants make other ones
+    outcome, worst = Outcome("spectral", part.name), 0.0
     with mi.variant_context(other):
         try:
             got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
+            coloured = Run(_load(run.given | _coloured(greys)), (), run.significance, run.conserves, None)
+            failed = {check: [it for it in check(coloured) if it.verdict == "fail"] for check in AGAIN}
+            if greys:
+                _check_channels(run, outcome, greys)
         except (RuntimeError, TypeError) as failure:
             yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
             return
-    outcome, worst = Outcome("spectral", part.name), 0.0
+    for check, findings in failed.items():
+        if findings and all(finding.verdict != "fail" for finding in check(run)):
+            outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
     for words in tried:
         wanted = expected[words].mean(axis=1)
-        scale = np.maximum(wanted, 1e-6 * wanted.max() + 1e-12)[:, None]
-        error = np.nan_to_num(abs(got[words] - wanted[:, None]) / scale, nan=np.inf)
-        typical = float(np.quantile(error.max(axis=1), 0.99))
+        error, typical = _error(got[words], wanted[:, None])
         worst = max(worst, typical)
         if typical > TOLERANCE:
             k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
             outcome.fault(
                 f"in grey{words}, eval for light from {angles_of(wi[k])} towards {angles_of(wo[k])} is "
-                f"{got[words][k, channel]:.4g} in {other}, but {wanted[k]:.4g} in {rgb}",
+                f"{got[words][k, channel]:.4g} at {hero_wavelengths(COUNT)[k, channel]:.0f} nm in {other}, but "
+                f"{wanted[k]:.4g} in {rgb}",
                 typical,
                 wi=wi[k],
                 wo=wo[k],
             )
-    yield outcome.finding(f"Grey is the same in {rgb} and {other}, to {worst:.1g}.")
+    grey = f"Grey is the same in {rgb} and {other}, to {worst:.1g}. " if tried else ""
+    yield outcome.finding(f"{grey}Wavelengths follow their own.")
 
 
-def _greys(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the BSDF in grey, by what is special of it in words. The variant must be one of rgb."""
-    probe = _load(given)
-    params = mi.traverse(probe.bsdf)
-    bright: dict[str, Any] = {}
+def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None:
+    """Check that channels, or wavelengths, follow their own values of the colours."""
+    part, given = run.probe.whole, run.given or {}
+    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (84, 85))
+    wavelengths = hero_wavelengths(COUNT)
+    textures = {name: mi.load_dict(colour) for name, colour in _coloured(greys).items()}
+    coloured, si = mi.load_dict(given | textures), interaction(wi, wavelengths=wavelengths)
+    wo[::2] = BSDFProbe(coloured).sample(part, wi, random(COUNT, 86)).wo[::2]
+
+    def evaluated(bsdf: mi.BSDF, wavelengths: Array) -> Array:
+        return numbers(bsdf.eval(part.context, interaction(wi, wavelengths=wavelengths), vectors(wo), True), COUNT)
+
+    got = evaluated(coloured, wavelengths)
+    count = got.shape[1]
+    alike = [np.repeat(wavelengths[:, [k]], 4, axis=1) for k in range(4)]
+    grey = [
+        evaluated(mi.load_dict(given | {name: pinned(texture, si, k) for name, texture in textures.items()}), alike[k])
+        for k in range(count)
+    ]
+    errors = np.array([[_error(got[:, k], grey[other][:, k])[1] for other in range(count)] for k in range(count)])
+    for k in range(count):
+        channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
+        nearest = int(np.argmin(errors[k]))
+        lane = int(np.argmax(abs(got[:, k] - grey[k][:, k])))
+        where = f"eval in {channel} is {got[lane, k]:.4g} for light from {angles_of(wi[lane])}"
+        must = f"where grey of the colours' value there makes {grey[k][lane, k]:.4g}"
+        if errors[k, k] > TOLERANCE and errors[k, nearest] < 0.5 * errors[k, k]:
+            outcome.fault(f"{where}, {must}: it follows another channel", errors[k, k], wi=wi[lane], wo=wo[lane])
+        if mi.is_spectral:
+            # Of four equal wavelengths no tint can depend on the others.
+            alone = evaluated(coloured, alike[k])[:, k]
+            error, typical = _error(alone, grey[k][:, k])
+            if typical > TOLERANCE:
+                lane = int(np.argmax(error))
+                outcome.fault(
+                    f"eval at {wavelengths[lane, k]:.0f} nm is {alone[lane]:.4g} for light from {angles_of(wi[lane])}, "
+                    f"where grey of the colours' value there makes {grey[k][lane, k]:.4g}",
+                    typical,
+                    wi=wi[lane],
+                    wo=wo[lane],
+                )
+
+
+def _error(got: Array, expected: Array) -> tuple[Array, float]:
+    """Return the relative errors, and what 99 of 100 do not exceed."""
+    scale = np.maximum(abs(expected), 1e-6 * abs(expected).max() + 1e-12)
+    error = np.nan_to_num(abs(got - expected) / scale, nan=np.inf)
+    return error, float(np.quantile(error, 0.99))
+
+
+def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
+    """Return the colours among constant parameters, by name, and how bright they are: what is asked for a spectrum."""
+    params, asked = mi.traverse(probe.bsdf), set[str]()
+
+    class Asking(mi.Texture):
+        def __init__(self, name: str, value: Any) -> None:
+            super().__init__(mi.Properties())
+            self.name, self.value = name, value
+
+        def eval(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            asked.add(self.name)
+            return mi.UnpolarizedSpectrum(self.value)
+
+        def eval_1(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            return mi.Float(self.value)
+
+        def mean(self) -> Any:
+            return mi.Float(self.value)
+
+    greys = {}
     for key in params.keys():
         name, _, rest = key.partition(".")
-        if rest == "value" and (probe.is_ours or isinstance(params[key], mi.Color3f)):
-            try:
-                grey = given | {name: _rgb(float(numbers(params[key], 1).mean()))}
-                _load(grey)
-            except RuntimeError:  # it is a number
-                continue
-            given, bright = grey, bright | {name: _rgb(BRIGHT)}
+        if rest == "value" and not isinstance(given.get(name), (bool, str)):
+            greys[name] = float(numbers(params[key], 1).mean())
+    try:
+        asking = mi.load_dict(given | {name: Asking(name, grey) for name, grey in greys.items()})
+        wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
+        asking.eval(mi.BSDFContext(), interaction(wi), vectors(wi), True)
+    except (RuntimeError, TypeError):
+        return {}
+    return {name: grey for name, grey in greys.items() if name in asked and grey > 0}
+
+
+def _tried(probe: BSDFProbe, given: dict[str, Any], greys: dict[str, float]) -> dict[str, dict[str, Any]]:
+    """Return the BSDF in grey, by what is special of it in words. The variant must be one of rgb."""
+    given = given | {name: _rgb(grey, (1, 1, 1)) for name, grey in greys.items()}
     tried = {"": given}
-    for name, colour in bright.items() if probe.is_ours else ():
+    for name in greys if probe.is_ours else ():
+        bright = given | {name: _rgb(BRIGHT, (1, 1, 1))}
         try:
-            _load(given | {name: colour})
+            _load(bright)
         except RuntimeError:  # a reflectance
             continue
-        tried[f" with {name} = {BRIGHT:g}"] = given | {name: colour}
+        tried[f" with {name} = {BRIGHT:g}"] = bright
     return tried
 
 
+def _coloured(greys: dict[str, float]) -> dict[str, dict[str, Any]]:
+    return {name: _rgb(grey, HUE) for name, grey in greys.items()}
+
+
 def _load(given: dict[str, Any]) -> BSDFProbe:
-    return BSDFProbe(mi.load_dict(given))
+    return BSDFProbe(mi.load_dict(given), every_wavelength=True)
 
 
-def _rgb(grey: float) -> dict[str, Any]:
-    return {"type": "rgb", "value": (grey, grey, grey)}
+def _rgb(grey: float, hue: tuple[float, float, float]) -> dict[str, Any]:
+    return {"type": "rgb", "value": tuple(grey * part for part in hue)}
