@@ -162,6 +162,8 @@ class Model(Plugin):
     """With which models it is shown: one of ``FAMILIES`` or another word; those without one come last."""
     energy: ClassVar[Energy | None] = None
     """The largest albedos; None if they were not measured."""
+    signed = False
+    """Whether channels may be negative, of colours outside sRGB, as the page must then say."""
 
     def lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
         """Return the model's lobes at a surface point, where ``p`` holds the values of the declared parameters. Their

@@ -44,7 +44,8 @@ def interaction(wi: ArrayLike, uv: ArrayLike = CENTRE, wavelengths: ArrayLike = 
     si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
     si.uv = mi.Point2f(uv) if np.ndim(uv) == 1 else mi.Point2f(_columns(uv))
     if mi.is_spectral:
-        si.wavelengths = mi.UnpolarizedSpectrum(*_columns(wavelengths))
+        columns = list(wavelengths) if isinstance(wavelengths, tuple) else _columns(wavelengths)
+        si.wavelengths = mi.UnpolarizedSpectrum(*columns)
     return si
 
 

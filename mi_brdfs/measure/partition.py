@@ -20,6 +20,8 @@ from .directions import azimuth_axis
 
 FIRST_LEVEL, LAST_LEVEL = 3, 17
 """Cells at level L are 2^-L of the sphere's extent."""
+MOST = 1 << 11
+"""Cells of a level that are quartered, the most urgent ones; lines 1000 times as long as wide need less."""
 NODES = 5
 _NODES, _WEIGHTS = np.array(gauss_legendre(NODES)).T
 
@@ -125,8 +127,13 @@ def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, A
         precise = parts.sum(axis=1)
         error = count * abs(precise - integrals)
         split = (held * cells > len(pilot)) | (error > 0.2 * np.sqrt(np.maximum(count * precise, 1)))
+        missed = np.where(peaks > 2 * highest.max(axis=1), count * peaks * 2 * np.pi**2 * 4.0**-level, 0)
         share = len(pilot) * precise
-        split |= (peaks > 2 * highest.max(axis=1)) | (abs(held - share) > 3 * np.sqrt(share + 1) + 2)
+        surplus = abs(held - share)
+        split |= (missed > 1) | (surplus > 3 * np.sqrt(share + 1) + 2)
+        if split.sum() > MOST:  # singular along a line, or wrong everywhere
+            urgency = split * np.maximum(np.maximum(error, missed), surplus)
+            split &= urgency >= np.partition(urgency, -MOST)[-MOST]
         if level == LAST_LEVEL:
             split[:] = False
         done.append((np.full((~split).sum(), level), x[~split], y[~split], precise[~split]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -82,7 +82,7 @@ class BSDFProbe:
     """
 
     bsdf: mi.BSDF
-    every_wavelength: bool = False
+    every_wavelength: bool = field(default=False, kw_only=True)
     """Whether lanes have wavelengths of their own in spectral variants, from the whole visible range."""
 
     @cached_property

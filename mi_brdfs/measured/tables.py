@@ -43,6 +43,7 @@ class Tables:
         self.channels = Channels(measurement.wavelengths)
         self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal
         converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)
+        self.signed = converted.signed
         self.f = Table(converted, self.channels.spectrum, interpolation == "nearest", extrapolate == "hold")
         self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
         albedos = estimated_albedos(converted, NODES_I, interpolation, extrapolate)

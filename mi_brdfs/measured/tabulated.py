@@ -76,7 +76,7 @@ class Tabulated(Model):
         chosen: dict[str, Any] = self.parameters.chosen
         shared = not chosen["differentiable"]
         self.tables = Tables.of(chosen["filename"], chosen["interpolation"], chosen["extrapolate"], shared)
-        self.captured = self.tables.captured
+        self.captured, self.signed = self.tables.captured, self.tables.signed
         if not shared:
             self.arrays = {"values": self.tables.f.values}
 

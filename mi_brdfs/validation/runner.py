@@ -140,8 +140,8 @@ def checked_angles(angles: float | Iterable[float]) -> tuple[float, ...]:
     if not checked:
         raise ValueError("There is no angle of incidence; give one or more, in degrees.")
     for angle in checked:
-        if not (isinstance(angle, Real) and 0 <= angle < 90):
-            shown = f"{angle:g}" if isinstance(angle, Real) else repr(angle)
+        if not (isinstance(angle, Real) and 0 <= float(angle) < 90):
+            shown = f"{float(angle):g}" if isinstance(angle, Real) else repr(angle)
             raise ValueError(f"An angle of incidence must be in [0, 90) degrees, not {shown}.")
     return tuple(checked)
 

@@ -45,9 +45,9 @@ def colours(run: Run) -> Findings:
 
 
 def spectral(run: Run) -> Findings:
-    """Check that what is grey is the same in rgb and in spectral variants, to 0.5 %, at all visible wavelengths: all rgb
-    colours become grey ones, as bright as they are. Those of plugins of ours are also tried brighter than 1, where they
-    may be; Mitsuba's own plugins limit them to 1 in spectral variants.
+    """Check that what is grey is the same in rgb and in spectral variants, to 0.5 %, at all visible wavelengths: all
+    rgb colours become grey ones, as bright as they are. Those of plugins of ours are also tried brighter than 1, where
+    they may be; Mitsuba's own plugins limit them to 1 in spectral variants.
 
     And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
     and ``pdf`` say, and each wavelength follows the value that the colours have there, and not that of another lane's.

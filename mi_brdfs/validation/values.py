@@ -30,20 +30,22 @@ def _pairs(part: Part) -> tuple[Array, Array]:
     return np.ascontiguousarray(wi), np.ascontiguousarray(wo)
 
 
-def _bad(values: Array) -> Array:
-    """Return which rows have values that are negative or not finite."""
-    good = np.isfinite(values) & (values >= 0)
+def _bad(values: Array, signed: bool = False) -> Array:
+    """Return which rows have values that are not finite or, unless they are ``signed``, negative."""
+    good = np.isfinite(values) & (signed | (values >= 0))
     return np.logical_not(good.reshape(len(values), -1).all(axis=1))
 
 
 def finite(run: Run) -> Findings:
     """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing, at the
-    mirror direction, towards the light, and for samples with variates of 0 and just below 1."""
+    mirror direction, towards the light, and for samples with variates of 0 and just below 1. Channels of values and
+    weights may be negative where the page of a model says so, of colours outside sRGB."""
+    signed = any(model is not None and model.signed for model in run.probe.models)
     for part in run.probe.parts:
         outcome = Outcome("finite", part.name)
         wi, wo = _pairs(part)
         for name, values in (("eval", run.probe.eval(part, wi, wo)), ("pdf", run.probe.pdf(part, wi, wo))):
-            bad = _bad(values)
+            bad = _bad(values, signed and name == "eval")
             if bad.any():
                 k = int(np.argmax(bad))
                 outcome.fault(
@@ -61,7 +63,7 @@ def finite(run: Run) -> Findings:
                 w = on_side(direction(theta, 30), side)
                 samples = run.probe.sample(part, w, u)
                 length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
-                bad = _bad(samples.weight) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
+                bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
                 if bad.any():
                     k = int(np.argmax(bad))
                     outcome.fault(
@@ -71,7 +73,8 @@ def finite(run: Run) -> Findings:
                         bad.sum(),
                         wi=w,
                     )
-        yield outcome.finding(f"{len(wi)} pairs of directions, to 0.0001° above the horizon.")
+        remark = "Channels may be negative, as its page says." if signed else ""
+        yield outcome.finding(f"{len(wi)} pairs of directions, to 0.0001° above the horizon.", remark)
 
 
 def _shown(values: Array) -> str:
