@@ -224,7 +224,8 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
 
 def flags(run: Run) -> Findings:
     """Check that a component's flags fit its behaviour. One that gathers half of its light within 10° of the mirror
-    direction is not diffuse, and one that changes as the frame turns about the normal is anisotropic."""
+    direction is not diffuse, one that changes as the frame turns about the normal is anisotropic, and one that is for
+    reflection and transmission does both."""
     probe, kinds = run.probe, mi.BSDFFlags
     for part in probe.components:
         outcome = Outcome("flags", part.name)
@@ -245,6 +246,8 @@ def flags(run: Run) -> Findings:
                         wi=wi,
                         seed=2,
                     )
+        if part.has(kinds.Reflection) and part.has(kinds.Transmission):
+            _check_both_ways(run, outcome, part)
         varies = part.has(kinds.SpatiallyVarying)
         if not part.has(kinds.Anisotropic) and not varies:
             difference = _turned(run, part)
@@ -257,6 +260,15 @@ def flags(run: Run) -> Findings:
                     seed=5,
                 )
         yield outcome.finding("They fit what it does.")
+
+
+def _check_both_ways(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that a component that is flagged for both sends light to both sides."""
+    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (6, 7))
+    lit = [run.probe.eval(part, wi, on_side(wo, side)).any() for side in (1, -1)]
+    if lit[0] != lit[1]:
+        does, lacks = ("reflects", "transmits") if lit[0] else ("transmits", "reflects")
+        outcome.fault(f"it is flagged for reflection and transmission, but {does} and never {lacks}")
 
 
 def _turned(run: Run, part: Part) -> float:

@@ -200,12 +200,12 @@ def _check_way_back(
     """Check that an optimiser returns from a value beyond a limit; ``values`` are those of :func:`_beyond`."""
     limit, beyond, inside = values
     probe, part = run.probe, run.probe.whole
-    kind, few = type(value_of(params, key)), slice(0, 500)
+    original, few = value_of(params, key), slice(0, 500)  # a number, a colour, or the texels of a bitmap
     wi, wo = np.ascontiguousarray(wi[few]), np.ascontiguousarray(wo[few])
 
     def backward(value: float, signs: tuple[int, ...]) -> tuple[Array, list[Array]]:
         """Return the values there, and the derivatives of their sum with some signs."""
-        set_value(params, key, dr.full(kind, value, dr.width(params[key])))
+        set_value(params, key, original * 0 + value)
         attach(params, key)
         result = probe.bsdf.eval(part.context, interaction(wi), vectors(wo), True)
         found = []
@@ -220,7 +220,7 @@ def _check_way_back(
         return numbers(dr.detach(result), len(wi)), found
 
     value, ways = backward(beyond, (1, -1))
-    set_value(params, key, dr.full(kind, limit, dr.width(params[key])))
+    set_value(params, key, original * 0 + limit)
     error = relative(value, probe.eval(part, wi, wo)).max(initial=0)
     if error > 10 * run.rounding(part):
         outcome.fault(f"at {beyond:g}, beyond its limit of {limit:g}, eval is not that at the limit", error)

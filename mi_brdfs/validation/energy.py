@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 def albedo(run: Run) -> Findings:
     """Check that no more is reflected of light from one direction than is received, in each channel of colour, to 0.1 %
     and the noise; or, where the page of the model states that it gains energy with these choices, no more than it
-    states, which is noted. So is it if diffuse and specular reflectances add to more than 1. With its default
-    parameters, a plugin of ours reflects what its page says. The mean of the weights is taken over points that fill the
-    space of the variates evenly; that of refracted light without the factor 1/η² of radiance. Where the sampler is
-    wrong, too much light is its fault: see ``weight``, ``pdf`` and ``chi2``."""
+    states, which is noted, and a diffuse lobe beside others adds to that. So is it if diffuse and specular reflectances
+    add to more than 1. With its default parameters, a plugin of ours reflects what its page says. The mean of the
+    weights is taken over points that fill the space of the variates evenly; that of refracted light without the factor
+    1/η² of radiance. Where the sampler is wrong, too much light is its fault: see ``weight``, ``pdf`` and ``chi2``."""
     points = lattice(12, 5)
     limits = _limits(run)
     for part in run.probe.parts:
@@ -49,7 +49,8 @@ def albedo(run: Run) -> Findings:
                 largest = largest._replace(mean=mean, name=name)
             if least[k] > largest.least:
                 largest = largest._replace(least=float(least[k]), words=words)
-            if limits.largest is not None and least[k] > limits.largest * (1 + TOLERANCE):
+            added = limits.diffuse if part.component is None else 0
+            if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
         if outcome.faults and _is_sampled_wrongly(run, part):
@@ -97,7 +98,8 @@ def _judged(part: Part, outcome: Outcome, largest: Largest, limits: Limits) -> F
         return Finding("albedo", part.name, "info", message, outcome.data)
     gains = largest.least > 1 + TOLERANCE
     if gains and limits.largest is not None:
-        message = f"It gains energy, as {limits.page} ({_shown(limits.largest)}): {largest.words}."
+        why = f"{limits.page} ({_shown(limits.largest)})" if limits.largest > 1 else "its lobes add up"
+        message = f"It gains energy, as {why}: {largest.words}."
     found = outcome.finding(message, limits.sums if is_whole else "")
     noted = is_whole and (gains or limits.sums) and not outcome.faults
     return replace(found, verdict="note") if noted else found
@@ -134,6 +136,8 @@ class Limits(NamedTuple):
     """The largest albedo of the default parameters, if it has these and its page states it."""
     sums: str
     """What is wrong with reflectances that add to more than 1."""
+    diffuse: float
+    """What a diffuse lobe adds to the largest albedo that a page states for the others alone."""
 
 
 def _limits(run: Run) -> Limits:
@@ -143,14 +147,22 @@ def _limits(run: Run) -> Limits:
     default = own.energy.default if own and own.energy and is_default else None
     sums = " ".join(dict.fromkeys(filter(None, map(_excess, models))))
     if run.conserves is not None:
-        return Limits(1 if run.conserves else None, "it receives", "", default, sums)
+        return Limits(1 if run.conserves else None, "it receives", "", default, sums, 0)
     # Of several BSDFs, blended or on two sides, each may have its part.
     stated = {model: (model.stated_albedo() if model else None) or 1 for model in models}
     brightest = max(stated, key=lambda model: stated[model])
     largest = max(stated[brightest], 1)
     page = "its page says" if own or brightest is None else f"the page of {brightest.plugins[0]} says"
     reason = f"the {_shown(largest)} that {page}" if largest > 1 else "it receives"
-    return Limits(largest, reason, page, default, sums)
+    return Limits(largest, reason, page, default, sums, max(map(_diffuse, models)))
+
+
+def _diffuse(model: Model | None) -> float:
+    """Return the diffuse reflectance of a model whose page does not state what it adds up to."""
+    name = "diffuse_reflectance"
+    if model is None or name not in model.textures or not model.energy or ({name: 1.0}, 1) in model.energy.largest:
+        return 0
+    return float(numbers(model.textures[name].eval(interaction([0, 0, 1])), 1).max())
 
 
 def _excess(model: Model | None) -> str:

@@ -54,14 +54,14 @@ def all_over(part: Part) -> Incident:
     return Incident("all directions", scattered(SCATTERED, 41, part.sides))
 
 
-def random_incidents(part: Part) -> list[Incident]:
+def random_incidents(part: Part, count: int = RANDOM) -> list[Incident]:
     """Draw directions, one in each of some intervals of angles, whose azimuths go around the normal, each at a point of
     its own, also outside the unit square of textures."""
     rng, places, drawn = np.random.default_rng(51), np.random.default_rng(52), []
     for side in part.sides:
-        turn = rng.permutation(RANDOM)
-        for k in range(RANDOM):
-            theta, phi = STEEPEST * (k + rng.random()) / RANDOM, 360 * (turn[k] + rng.random()) / RANDOM
+        turn = rng.permutation(count)
+        for k in range(count):
+            theta, phi = STEEPEST * (k + rng.random()) / count, 360 * (turn[k] + rng.random()) / count
             u, v = places.uniform(-1, 2, 2).astype(np.float32).tolist()
             drawn.append(Incident(angles_of(w := on_side(direction(theta, phi), side)), w, (u, v)))
     return drawn

@@ -11,7 +11,7 @@ import numpy as np
 from ..measure.directions import direction, on_side
 from ..measure.probe import BSDFProbe, Part, Samples
 from ..measure.variates import random
-from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents
+from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
 from .trial import Trial, Trials, trials_of
 
 SEED = 11
@@ -31,9 +31,11 @@ class Run:
     """Whether the whole is judged to conserve energy; None if its manual page says so or not."""
     given: dict[str, Any] | None
     """The dict that the BSDF was given as, if it was."""
-    _samples: dict[tuple[str, str], Samples] = field(default_factory=dict)
-    _trials: dict[str, Trials] = field(default_factory=dict)
-    _spreads: dict[str, float] = field(default_factory=dict)
+    at_random: int = RANDOM
+    """Directions at random on each side, for statistical tests, beside those that were asked for."""
+    _samples: dict[tuple[str, str], Samples] = field(default_factory=dict, init=False)
+    _trials: dict[str, Trials] = field(default_factory=dict, init=False)
+    _spreads: dict[str, float] = field(default_factory=dict, init=False)
 
     def incidents(self, part: Part) -> list[Incident]:
         """Return the directions of incidence that were asked for."""
@@ -55,7 +57,8 @@ class Run:
     def trials(self, part: Part) -> list[Trial]:
         """Return the trials of a part, the same for every check."""
         if part.name not in self._trials:
-            self._trials[part.name] = trials_of(self.probe, part, self.incidents(part))
+            scattered = random_incidents(part, self.at_random)
+            self._trials[part.name] = trials_of(self.probe, part, self.incidents(part), scattered)
         asked, at_random = self._trials[part.name]
         return asked + at_random
 
@@ -71,7 +74,7 @@ class Run:
     @property
     def level(self) -> float:
         """The significance of each of the statistical tests, two for each trial, after Šidák."""
-        tests = 2 * sum((len(self.angles) + RANDOM) * len(part.sides) for part in self.probe.parts)
+        tests = 2 * sum((len(self.angles) + self.at_random) * len(part.sides) for part in self.probe.parts)
         return 1 - (1 - self.significance) ** (1 / max(tests, 1))
 
     # --- The width of a part ----------------------------------------------------------------------------------------

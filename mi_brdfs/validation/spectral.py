@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
@@ -11,6 +12,7 @@ from ..measure.arrays import Array, hero_wavelengths, interaction, numbers, pinn
 from ..measure.directions import angles_of, hemisphere, on_side
 from ..measure.probe import BSDFProbe
 from ..measure.variates import random
+from ..parameters.colours import rgb_texture
 from . import sampling, values
 from .outcome import Findings, Outcome, told
 from .report import Finding
@@ -50,8 +52,8 @@ def spectral(run: Run) -> Findings:
     they may be; Mitsuba's own plugins limit them to 1 in spectral variants.
 
     And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
-    and ``pdf`` say, and each wavelength follows the value that the colours have there, and not that of another lane's.
-    For this the BSDF must be given as a dict."""
+    and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
+    colours have there, and not that of another wavelength. For this the BSDF must be given as a dict."""
     part = run.probe.whole
     if run.given is None:
         yield Finding("spectral", part.name, "skip", "To load it in two variants, its dict is needed.")
@@ -74,8 +76,14 @@ def spectral(run: Run) -> Findings:
     with mi.variant_context(other):
         try:
             got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
-            coloured = Run(_load(run.given | _coloured(greys)), (), run.significance, run.conserves, None)
-            failed = {check: [it for it in check(coloured) if it.verdict == "fail"] for check in AGAIN}
+            coloured = _load(run.given | _coloured(greys))
+            every = replace(run, probe=coloured, angles=(), given=None)
+            one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, given=None)
+            failed = {
+                check: [it for it in check(again) if it.verdict == "fail"]
+                for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
+                for check in checks
+            }
             if greys:
                 _check_channels(run, outcome, greys)
         except (RuntimeError, TypeError) as failure:
@@ -107,7 +115,7 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     part, given = run.probe.whole, run.given or {}
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (84, 85))
     wavelengths = hero_wavelengths(COUNT)
-    textures = {name: mi.load_dict(colour) for name, colour in _coloured(greys).items()}
+    textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
     coloured, si = mi.load_dict(given | textures), interaction(wi, wavelengths=wavelengths)
     wo[::2] = BSDFProbe(coloured).sample(part, wi, random(COUNT, 86)).wo[::2]
 

@@ -15,7 +15,7 @@ from ..measure.directions import angles_of, azimuth_axis
 from ..measure.partition import Partition, partitions
 from ..measure.probe import BSDFProbe, Part, Samples
 from ..measure.variates import random
-from .incidents import Incident, random_incidents
+from .incidents import Incident
 
 COUNT = 1 << 18
 """Samples for a direction that was asked for."""
@@ -99,10 +99,10 @@ class Trials(NamedTuple):
     """Those for some at random."""
 
 
-def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident]) -> Trials:
+def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> Trials:
     """Make a trial of a part for each direction of incidence, those that were asked for and some at random."""
     found = _trials(probe, part, asked, COUNT, CELLS)
-    found += _trials(probe, part, random_incidents(part), RANDOM_COUNT, RANDOM_CELLS)
+    found += _trials(probe, part, at_random, RANDOM_COUNT, RANDOM_CELLS)
     # What is narrow, or jumps close to a line of the cells, may escape the quadrature: suspects get cells across that
     # line, made by as many samples as are counted, until some stay suspect.
     confirmed = 0
