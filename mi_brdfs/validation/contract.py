@@ -125,22 +125,25 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
 
 
 def mode(run: Run) -> Findings:
-    """Check the mode ``TransportMode.Importance``, in which light is traced from the emitters: reflection is what it is
-    the other way, f with its directions exchanged, times the cosine of ``wo``. That is the same unless the component is
-    flagged NonSymmetric. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
+    """Check the mode ``TransportMode.Importance``, in which light is traced from the emitters: light reflected, or
+    transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
+    cosine of ``wo``. That is the same unless the component is flagged NonSymmetric. And the weight of ``sample`` is
+    ``eval``/``pdf`` in this mode, too."""
     for part in run.probe.parts:
-        if not part.has(mi.BSDFFlags.Reflection):
-            yield Finding("mode", part.name, "skip", "Not checked, as it does not reflect.")
+        ways = [1] * part.has(mi.BSDFFlags.Reflection)
+        ways += [-1] * (part.has(mi.BSDFFlags.Transmission) and len(part.sides) > 1)
+        if not ways:
+            yield Finding("mode", part.name, "skip", "Not checked, as it transmits from one side only.")
             continue
         outcome, tolerance = Outcome("mode", part.name), 10 * run.rounding(part)
         traced = context(part.component)
         traced.mode = mi.TransportMode.Importance
         traced = part._replace(context=traced)
         symmetric = not part.has(mi.BSDFFlags.NonSymmetric)
-        for side in part.sides:
-            wi, wo = on_side(hemisphere(COUNT, 65), side), on_side(hemisphere(COUNT, 66), side)
+        for side, way in ((side, way) for side in part.sides for way in ways):
+            wi, wo = on_side(hemisphere(COUNT, 65), side), on_side(hemisphere(COUNT, 66), side * way)
             samples = run.probe.sample(traced, wi, random(COUNT, 67))
-            near = (np.arange(COUNT) % 2 == 0) & (samples.wo[:, 2] * side > 0.01)
+            near = (np.arange(COUNT) % 2 == 0) & (samples.wo[:, 2] * side * way > 0.01)
             wo[near] = samples.wo[near]
             got = run.probe.eval(traced, wi, wo)
             if symmetric:

@@ -12,7 +12,7 @@ import mitsuba as mi
 from ..measure.probe import BSDFProbe
 from ..measure.sources import find_sources, name_of
 from ..variants import activated, is_measurable
-from . import components, contract, derivatives, energy, recompiles, sampling, spectral, textures, values
+from . import components, contract, derivatives, energy, sampling, spectral, textures, updates, values
 from .against import against
 from .outcome import Findings, told
 from .report import Finding, Report
@@ -36,7 +36,8 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         components.flags,
         textures.textures,
         derivatives.gradients,
-        recompiles.recompiles,
+        updates.updates,
+        updates.recompiles,
         contract.active,
         contract.mode,
         contract.reflectance,

@@ -208,12 +208,13 @@ def _tried(probe: BSDFProbe, given: dict[str, Any], greys: dict[str, float]) -> 
 
 
 def _coloured(greys: dict[str, float]) -> dict[str, dict[str, Any]]:
-    return {name: _rgb(grey, HUE) for name, grey in greys.items()}
+    """Return colours of as many hues as channels, so that their ratios differ."""
+    return {name: _rgb(grey, HUE[k % 3 :] + HUE[: k % 3]) for k, (name, grey) in enumerate(greys.items())}
 
 
 def _load(given: dict[str, Any]) -> BSDFProbe:
     return BSDFProbe(mi.load_dict(given), every_wavelength=True)
 
 
-def _rgb(grey: float, hue: tuple[float, float, float]) -> dict[str, Any]:
+def _rgb(grey: float, hue: tuple[float, ...]) -> dict[str, Any]:
     return {"type": "rgb", "value": tuple(grey * part for part in hue)}

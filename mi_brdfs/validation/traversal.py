@@ -20,7 +20,7 @@ def traced_floats(run: Run, check: str) -> tuple[mi.SceneParameters, list[str], 
     for key in params.keys():
         if not _is_traced(params, key):
             findings.append(Finding(check, key, "skip", "Not a number of floating point that Dr.Jit traces."))
-        elif int(params.flags(key)) & int(mi.ParamFlags.NonDifferentiable):
+        elif check in ("gradients", "active") and int(params.flags(key)) & int(mi.ParamFlags.NonDifferentiable):
             findings.append(Finding(check, key, "skip", "Declared not differentiable."))
         else:
             keys.append(key)

@@ -102,7 +102,8 @@ class Trials(NamedTuple):
 def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> Trials:
     """Make a trial of a part for each direction of incidence, those that were asked for and some at random."""
     found = _trials(probe, part, asked, COUNT, CELLS)
-    found += _trials(probe, part, at_random, RANDOM_COUNT, RANDOM_CELLS)
+    if at_random:
+        found += _trials(probe, part, at_random, RANDOM_COUNT, RANDOM_CELLS)
     # What is narrow, or jumps close to a line of the cells, may escape the quadrature: suspects get cells across that
     # line, made by as many samples as are counted, until some stay suspect.
     confirmed = 0

@@ -187,6 +187,7 @@ def eval_pdf(run: Run) -> Findings:
             wi, u = incident.at(lanes), random(len(lanes), 6)
             samples = run.probe.sample(part, wi, u)
             wo = np.where(np.arange(len(u))[:, None] % 2, samples.wo, hemisphere(len(u), 7)).astype(np.float32)
+            wo[::4, 2] *= -1  # where nothing is, the sample must still be drawn
             value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
             pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
             drawn, every = np.flatnonzero(samples.drawn), np.arange(len(u))
