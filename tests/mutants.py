@@ -388,6 +388,28 @@ class BrighterSpectrum(Lambert):
         return SimpleNamespace(reflectance=p.reflectance * (1.02 if mi.is_spectral else 1))
 
 
+class BrighterInTheBlue(Lambert):
+    """Scales what is below 420 nm."""
+
+    def evaluate(self, si, active):
+        p = super().evaluate(si, active)
+        return SimpleNamespace(
+            reflectance=p.reflectance * (dr.select(si.wavelengths < 420, 1.3, 1) if mi.is_spectral else 1)
+        )
+
+
+class WavelengthsExchanged(Lambert):
+    def evaluate(self, si, active):
+        r = super().evaluate(si, active).reflectance
+        return SimpleNamespace(reflectance=mi.UnpolarizedSpectrum(r[1], r[0], r[2], r[3]) if mi.is_spectral else r)
+
+
+class RedAndBlueExchanged(Lambert):
+    def evaluate(self, si, active):
+        r = super().evaluate(si, active).reflectance
+        return SimpleNamespace(reflectance=mi.Color3f(r.z, r.y, r.x) if mi.is_rgb else r)
+
+
 class TexturePoint(Lambert):
     """Looks its texture up elsewhere."""
 
@@ -400,6 +422,11 @@ class TexturePoint(Lambert):
 class IgnoresV(TexturePoint):
     def moved(self, uv):
         return mi.Point2f(uv.x, 0.5)
+
+
+class ClampsUV(TexturePoint):
+    def moved(self, uv):
+        return dr.clip(uv, 0, 1)
 
 
 class ExchangesUV(TexturePoint):
@@ -556,6 +583,13 @@ class WeightOverAttachedDensity(Sampled):
         return bs, weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
 
 
+class WeightOffInTheYellow(Sampled):
+    def altered(self, bs, weight, si):
+        if not mi.is_spectral:
+            return bs, weight
+        return bs, weight * dr.select((si.wavelengths > 560) & (si.wavelengths < 590), 0.9, 1)
+
+
 class SampleDensityAtGrazing(Sampled):
     """The density that ``sample`` says is another where no angle is asked for."""
 
@@ -609,6 +643,32 @@ class AllVariatesTwice(adapter.ModelBSDF):
 class NeverInactive(adapter.ModelBSDF):
     def eval_pdf(self, ctx, si, wo, active=True):
         return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, True)
+
+
+class AllMethodsInOneInactive(adapter.ModelBSDF):
+    def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
+        return adapter.ModelBSDF.eval_pdf_sample(self, ctx, si, wo, sample1, sample2, True)
+
+
+class ReflectanceInactive(adapter.ModelBSDF):
+    def eval_diffuse_reflectance(self, si, active=True):
+        return adapter.ModelBSDF.eval_diffuse_reflectance(self, si, True)
+
+
+class ExchangedKeys(adapter.ModelBSDF):
+    """Shows its parameters under each other's names."""
+
+    def traverse(self, callback):
+        names = list(self.textures)
+        for name, other in zip(names, reversed(names), strict=True):
+            callback.put(name, self.textures[other], mi.ParamFlags.Differentiable)
+
+
+class FlaggedForBothSides(adapter.ModelBSDF):
+    def __init__(self, props):
+        adapter.ModelBSDF.__init__(self, props)
+        self.m_components = [int(component | mi.BSDFFlags.DiffuseTransmission) for component in self.m_components]
+        self.m_flags = self.m_components[0]
 
 
 class SamplesInactive(adapter.ModelBSDF):
@@ -808,6 +868,11 @@ MUTANTS = [
         "reciprocity",
         lambert(changed(LambertLobe, value=where(lambda wi, wo: third_quadrant(wi), 1.02))),
     ),
+    mutant(
+        "density off for two directions of a thousand",
+        "chi2",
+        lambert(changed(LambertLobe, density=where(lambda wi, wo: dr.square(wo.z) > 0.998, 1.5))),
+    ),
     mutant("energy gained in blue", "albedo", lambert(changed(LambertLobe, value=blue)), reflectance=0.9),
     mutant(
         "energy gained at grazing",
@@ -840,6 +905,8 @@ MUTANTS = [
     mutant("eval_pdf_sample exchanges variates", "eval_pdf", Ward, AllVariatesTwice),
     mutant("v ignored", "textures", IgnoresV),
     mutant("u and v exchanged", "textures", ExchangesUV),
+    mutant("clamped to the unit square", "textures", ClampsUV),
+    mutant("given texture at a fixed point", "textures", FixedPoint, reflectance={"type": "checkerboard"}),
     mutant("half a texel off", "textures", HalfATexel),
     mutant("reflectance at a fixed point", "textures", Lambert, ReflectanceAtOnePoint),
     mutant("derivative twice as large", "gradients", lambert(DoubleDerivative)),
@@ -849,6 +916,8 @@ MUTANTS = [
     mutant("weight over an attached density", "gradients", Phong, WeightOverAttachedDensity),
     mutant("inactive lanes evaluated", "active", Ward, NeverInactive),
     mutant("inactive lanes sampled", "active", Lambert, SamplesInactive),
+    mutant("inactive lanes evaluated and sampled at once", "active", Lambert, AllMethodsInOneInactive),
+    mutant("reflectance of inactive lanes", "active", Lambert, ReflectanceInactive),
     mutant("active lanes dropped", "active", Lambert, AllOrNone),
     mutant("derivatives of inactive lanes", "active", Lambert, LeaksDerivative),
     mutant("stuck beyond a limit", "gradients", Stuck),
@@ -856,6 +925,12 @@ MUTANTS = [
     mutant("led out of its range", "gradients", Outwards),
     mutant("colours clipped in spectral variants", "spectral", ClippedSpectrum),
     mutant("brighter in spectral variants", "spectral", BrighterSpectrum),
+    mutant("brighter below 420 nm", "spectral", BrighterInTheBlue),
+    mutant("weight off from 560 to 590 nm", "spectral", Lambert, WeightOffInTheYellow),
+    mutant("wavelengths exchanged", "spectral", WavelengthsExchanged),
+    mutant("red and blue exchanged", "colours", RedAndBlueExchanged),
+    mutant("keys exchanged", "updates", Phong, ExchangedKeys, diffuse_reflectance=0.4, specular_reflectance=0.5),
+    mutant("flagged for both sides", "flags", Lambert, FlaggedForBothSides),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), IgnoresMode),
     mutant("cosines in light tracing", "mode", Lambert, CosinesInLightTracing),
     mutant("twice the reflectance", "reflectance", Ward, DoubleReflectance),

@@ -10,9 +10,12 @@ import time
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 import pytest
-from mutants import MUTANTS, Mutant
+from mutants import MUTANTS, Mutant, changed, lambert
+from support import shared
 
+from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.validation import CHECKS, check
 
@@ -69,6 +72,65 @@ def test_what_is_right_passes(name):
     judged = {finding.check for finding in report.findings if finding.verdict == "pass"}
     skipped = {"reciprocity", "albedo", "efficiency", "textures", "gradients", "recompiles", "reflectance", "spectral"}
     assert judged >= set(CHECKS) - skipped
+
+
+NARROW = ["pdf", "chi2", "continuity"]
+FALSE_ALARMS = {
+    "derivatives that cancel": ({"type": "ward", "rotation": 0.3}, ["active"]),
+    "line of ward": ({"type": "ward", "alpha_u": 0.906, "alpha_v": 0.0003}, NARROW),
+    "line of walter": ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.001}, NARROW),
+    "narrow along and across": ({"type": "walter", "alpha_u": 0.0041, "alpha_v": 0.00035}, NARROW),
+    "diffuse lobe beside facets": ({"type": "walter", "diffuse_reflectance": 0.9, "f0": 0.9}, ["albedo"]),
+    "texels beyond a limit": (
+        {"type": "phong", "specular_reflectance": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True}},
+        ["gradients"],
+    ),
+    "index above one as a colour": (
+        {"type": "low", "variant": "microfacet", "int_ior": 1.006},
+        ["colours", "spectral"],
+    ),
+    "tints": (
+        {"type": "burley", "sheen": 1.0, "sheen_tint": 1.0, "spec_tint": 1.0, "base_color": 0.5},
+        ["colours", "spectral"],
+    ),
+}
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("name", FALSE_ALARMS)
+def test_no_false_alarm(name):
+    given, only = FALSE_ALARMS[name]
+    if name == "texels beyond a limit":
+        texels = np.random.default_rng(1).random((2, 2, 3)).astype(np.float32)
+        given = given | {"specular_reflectance": given["specular_reflectance"] | {"bitmap": mi.Bitmap(texels)}}
+    report = check(given, only=only)
+    assert not report.failures and report.judged, report
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_negative_channels_that_a_page_announces():
+    """Those of RGL's colours outside sRGB, which ``measured`` renders, too."""
+    (finding,) = check(str(shared("rgl", "chm_mint_rgb.bsdf")), only="finite").findings
+    assert finding.verdict == "pass" and finding.message.endswith("Channels may be negative, as its page says.")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_one_fault_is_one_sentence():
+    """A density that is too low makes weights too large: that is no gain of energy."""
+    low = changed(LambertLobe, density=lambda wi, wo: mi.Float(0.8))
+    report = check(Mutant("low", (), lambert(low), given=(("reflectance", 0.95),)).register(), only=["pdf", "albedo"])
+    assert {finding.check for finding in report.failures} == {"pdf"}
+    assert report.verdict("albedo") == "skip"
+
+
+def test_arguments_that_are_wrong_or_short(llvm_rgb):
+    assert check("lambert", only="finite", angles=30).passed
+    for bsdf in (["ward"], {}, [], None, 3, {"type": "sphere"}, "scenes/first_light.xml"):
+        with pytest.raises(ValueError, match=r"no BSDF|not a BSDF|materials; name one"):
+            check(bsdf, only="finite")
+    for wrong in ({"angles": "30"}, {"angles": [None]}, {"significance": "x"}, {"only": 3}, {"only": "finit"}):
+        with pytest.raises(ValueError, match=r"\.$|there are finite"):
+            check("lambert", **wrong)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

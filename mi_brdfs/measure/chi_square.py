@@ -44,7 +44,8 @@ def chi_square(observed: Array, expected: Array, least: float = 5) -> ChiSquare:
 
 
 def lone_cell(observed: Array, expected: Array) -> float:
-    """Return how probable it is that one of some counts is as far from what is expected as the farthest one.
+    """Return how probable it is that one of some counts is as far from what is expected as the farthest one. They may
+    overlap.
 
     By Chernoff's bound a Poisson count of mean e is at most exp(-(o ln(o/e) - o + e)) likely to be as far out as o;
     Bonferroni's factor is that of the cells and of both sides. One wrong cell of a thousand is lost in the sum of chi².

@@ -24,6 +24,8 @@ PILOT = 1 / 8
 """Samples that the cells are made by, for each that is counted."""
 RANDOM_COUNT, RANDOM_CELLS = 1 << 14, 128
 """Those of a direction at random."""
+CAPS = 2, 4, 8
+"""The radii of caps that are tested, in degrees."""
 CONFIRMED = 2
 """Directions that stay suspect before the others need no second look."""
 
@@ -65,15 +67,25 @@ class Trial:
     @cached_property
     def test(self) -> ChiSquare:
         """The gravest of three tests: of the cells, which sees what is wrong in few of them, of groups of neighbours,
-        which sees what is slightly wrong in many, and of the cell that deviates most."""
+        which sees what is slightly wrong in many, and of the cell or the cap that deviates most."""
         fine = chi_square(self.counts, self.expected)
         share = np.cumsum(np.fmin(self.expected, self.count))  # a density may be infinite
         share = share / max(share[-1], 1e-30)
         groups = np.minimum(share * GROUPS, GROUPS - 1).astype(int)
         counts, expected = (np.bincount(groups, each, GROUPS) for each in (self.counts, self.expected))
         graver = min(fine, chi_square(counts, expected), key=lambda test: test.p_value)
-        least = min(graver.p_value, lone_cell(self.counts, self.expected))
+        least = min(graver.p_value, lone_cell(*self._caps()))
         return replace(graver, p_value=min(3 * least, 1), worst=fine.worst)
+
+    def _caps(self) -> tuple[Array, Array]:
+        """Return the counts and what is expected of each cell, and of all cells about each of some of them, within caps
+        of several sizes: one wrong place may lie in many cells."""
+        own, centres = [self.counts, self.expected], self.partition.centres
+        middles = centres[:: max(len(centres) // 1000, 1)]
+        cosines = middles @ centres.T
+        caps = [(cosines > np.cos(radius)) @ np.stack(own, axis=1) for radius in np.radians(CAPS)]
+        counts, expected = (np.concatenate([each, *(cap[:, k] for cap in caps)]) for k, each in enumerate(own))
+        return counts, expected
 
     @property
     def is_suspect(self) -> bool:

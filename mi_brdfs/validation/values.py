@@ -121,7 +121,7 @@ def horizon(run: Run) -> Findings:
                         seed=SEED,
                     )
         for side in (1, -1):
-            if side not in part.sides:
+            if side not in run.probe.whole.sides:
                 _check_blind(run, outcome, part, side)
         yield outcome.finding("Nothing on the sides that the flags exclude.")
 
