@@ -6,12 +6,16 @@ shows a material. :func:`presets` names published materials, :func:`preset` retu
 :func:`project` keep optimised parameters valid. ``explore`` opens a page with sliders, lobes and pictures.
 """
 
-import importlib
-import re
-import warnings
-from typing import Any
+from .starting import end_on_ctrl_c
 
-from .mitsuba import llvm
+end_on_ctrl_c()  # before what takes time
+
+import importlib  # noqa: E402
+import re  # noqa: E402
+import warnings  # noqa: E402
+from typing import Any  # noqa: E402
+
+from .mitsuba import llvm  # noqa: E402
 
 llvm.point_to_extra()  # before Mitsuba is imported, which loads LLVM
 

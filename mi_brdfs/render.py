@@ -30,8 +30,13 @@ import mitsuba as mi
 import numpy as np
 
 from .variants import is_scalar
+from .writing import replacing
 
 SHOULDER = 0.8
+IMAGES = {
+    ".exr": "OpenEXR", ".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".hdr": "RGBE", ".pfm": "PFM", ".ppm": "PPM",
+}  # fmt: skip
+"""Mitsuba's formats by the endings of file names."""
 
 Passes = Callable[["mi.Scene", int, Iterable[tuple[int, int]]], Generator[Any, None, None]]
 
@@ -249,14 +254,20 @@ def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
 
 
 def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
-    """Write ``bitmap`` in the format of the file name, all or nothing: ``path`` never holds half an image."""
-    path = Path(path)
-    partial = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
-    try:
-        bitmap.write(str(partial))
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    """Write ``bitmap`` in the format of the file name, all or nothing: ``path`` never holds half an image.
+
+    Raises:
+        ValueError: if the name ends in no format.
+        OSError: if it cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in IMAGES:
+        raise ValueError(f"{path}: unknown image format; use {', '.join(IMAGES)}")
+    # Mitsuba takes only file names in UTF-8, and does not notice if the last 8 KB find no room on the disk.
+    stream = mi.MemoryStream()
+    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, IMAGES[suffix]))
+    with replacing(path) as part:
+        part.write_bytes(stream.raw_buffer())
 
 
 def _samples_per_pass(threads: int) -> int:

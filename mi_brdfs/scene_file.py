@@ -12,6 +12,8 @@ from typing import Any
 
 import mitsuba as mi
 
+from .mitsuba.names import check_name
+
 RESERVED = ("config", "filename")
 """Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""
 
@@ -57,6 +59,7 @@ class SceneFile:
         return SceneFile(_rootless(self.path), self.parameters, self.box_filter, contents, names, _rootless("."))
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
+        check_name(str(path))
         config = mi.parser.ParserConfig(mi.variant())
         with _looking_in(path.parent, *folders):
             state = mi.parser.parse_file(config, str(path), **self.parameters)

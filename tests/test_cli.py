@@ -12,8 +12,11 @@ import time
 import mitsuba as mi
 import numpy as np
 import pytest
+from support import ROOT
+from typer.testing import CliRunner
 
 import mi_brdfs
+from mi_brdfs.cli import app
 from mi_brdfs.mitsuba import llvm
 from mi_brdfs.mitsuba.errors import one_line
 
@@ -208,6 +211,7 @@ def test_without_a_choice_a_bad_llvm_is_avoided(folder):
         assert f"unset {llvm.VARIABLE}" in done.stderr and "scalar_rgb." in done.stderr
 
 
+NOTHING = "Interrupted; nothing was written."
 HOURS = "render", "scenes/box.xml", "--spp", 10**6
 
 
@@ -268,6 +272,52 @@ def test_ctrl_c_ends_a_measurement(folder):
     status, out, err = interrupted(folder, "energy", "--variant", "llvm_ad_rgb", running="Measuring blinnphong")
     assert status == 130 and out == ""
     assert "Interrupted; nothing was written." in err and "Traceback" not in err
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_the_start_in_a_sentence():
+    """In the midst of the imports, of which some would make another error of it."""
+    python, *words = command("sweep", "gone.bsdf")
+    with subprocess.Popen([python, "-X", "importtime", *words], stderr=subprocess.PIPE, text=True) as process:
+        next(line for line in process.stderr if "mi_brdfs.mitsuba.llvm" in line)
+        process.send_signal(signal.SIGINT)
+        told = [line for line in process.stderr if "import time:" not in line]
+    assert (process.returncode, told) == (130, ["Interrupted; nothing was written.\n"])
+
+
+def interrupted_in_a_kernel(*_, **__):
+    """As where Dr.Jit records a Python function."""
+    raise RuntimeError("dr.while_loop(): …") from KeyboardInterrupt()
+
+
+MEASURED = str(ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf")
+RESUMED = "Interrupted; 0 of 1 fits are finished: the same command goes on from there."
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "where, arguments, sentence",
+    [
+        ("mi_brdfs.scene_file.SceneFile.load", ["render", "box.xml"], NOTHING),
+        ("mi_brdfs.render.render", ["render", "box.xml"], NOTHING),
+        ("mi_brdfs.measure.sources.find_sources", ["show", "lambert"], NOTHING),
+        ("mi_brdfs.measure.sources.find_sources", ["check", "lambert"], NOTHING),
+        ("mi_brdfs.measured.convert", ["convert", MEASURED, "it.csv"], NOTHING),
+        ("mi_brdfs.measure.albedo.default_albedo", ["energy", "lambert"], NOTHING),
+        ("mi_brdfs.gallery.gallery", ["gallery"], "Interrupted; nothing is finished, nothing was written."),
+        ("mi_brdfs.explorer.materials.Materials.loaded", ["explore", "lambert"], NOTHING),
+        ("mi_brdfs.explorer.running.serve", ["explore", "lambert", "--port", "0"], "Ended."),
+        ("mi_brdfs.explorer.export.page", ["explore", "lambert", "--export", "it.html"], NOTHING),
+        ("mi_brdfs.sweep.plan.checked", ["sweep", MEASURED], NOTHING),
+        ("mi_brdfs.sweep.plan.observe", ["sweep", MEASURED, "--model", "ward", "--workers", "0"], RESUMED),
+        ("mi_brdfs.sweep.plan.fit", ["sweep", MEASURED, "--model", "ward", "--workers", "0"], RESUMED),
+    ],
+)
+def test_ctrl_c_that_a_kernel_wraps_is_no_error(where, arguments, sentence, folder, monkeypatch):
+    monkeypatch.chdir(folder / "scenes")
+    monkeypatch.setattr(where, interrupted_in_a_kernel)
+    done = CliRunner().invoke(app, arguments)
+    assert (done.exit_code, done.stderr) == (130, f"{sentence}\n")
 
 
 def test_errors_of_mitsuba_in_one_line():

@@ -6,8 +6,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from socketserver import BaseRequestHandler
 
 import dask
 import drjit as dr
@@ -44,6 +47,7 @@ SCENE = """<scene version="3.0.0">
     </sensor>
     <shape type="sphere"><float name="radius" value="$radius"/><ref id="checked"/></shape>
 </scene>"""
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 MATERIAL = """<scene version="3.0.0"><bsdf type="MODEL" id="checked">
     <texture type="bitmap" name="reflectance"><string name="filename" value="textures/checks.png"/></texture>
 </bsdf></scene>"""
@@ -260,10 +264,16 @@ def test_the_command_renders_on_a_scheduler(scene, address, tmp_path, monkeypatc
     assert {"scene.exr", "scene.png"} <= {path.name for path in (tmp_path / "parts").iterdir()}
 
 
+NO_SCHEDULER = (
+    "No Dask scheduler of a similar version answers at {}; "
+    "give the address that `dask scheduler` prints when it starts."
+)
+
+
 @pytest.mark.parametrize(
     "scheduler, sentence",
     [
-        ("tcp://127.0.0.1:1", "The scheduler at tcp://127.0.0.1:1 does not answer."),
+        ("tcp://127.0.0.1:1", NO_SCHEDULER.format("tcp://127.0.0.1:1")),
         ("nonsense", "nonsense is not the address of a scheduler; write tcp://HOST:PORT."),
         ("http://127.0.0.1:80", "http://127.0.0.1:80 is not the address of a scheduler; write tcp://HOST:PORT."),
     ],
@@ -272,6 +282,38 @@ def test_a_wrong_address_is_one_sentence(scheduler, sentence, scene, tmp_path, m
     monkeypatch.setattr(client, "CONNECTING", 1)
     done = CliRunner().invoke(app, ["render", str(scene), "--scheduler", scheduler, "-o", str(tmp_path / "x.exr")])
     assert done.exit_code == 1 and done.stderr == f"mi-brdfs: {sentence}\n"
+
+
+class Silent(BaseRequestHandler):
+    def handle(self):
+        time.sleep(8)
+
+
+class HTTP(BaseHTTPRequestHandler):
+    timeout = 8
+
+    def log_message(self, *_):
+        """Nothing."""
+
+
+@pytest.fixture(params=[Silent, HTTP])
+def other_server(request):
+    """The address of a server that is no scheduler, and ends a connection after some seconds."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), request.param) as server:
+        threading.Thread(target=server.serve_forever).start()
+        yield f"tcp://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.mark.parametrize("command", ["render", "sweep"])
+def test_what_is_no_scheduler_is_not_waited_for(command, other_server, scene, tmp_path, monkeypatch):
+    assert client.CONNECTING <= 3
+    monkeypatch.setattr(client, "CONNECTING", 0.5)
+    given = {"render": [scene, "-o", tmp_path / "x.exr"], "sweep": [LOFT, "--model", "lambert", "-o", tmp_path]}
+    begun = time.perf_counter()
+    done = CliRunner().invoke(app, [command, *map(str, given[command]), "--scheduler", other_server])
+    assert done.exit_code == 1 and done.stderr.splitlines()[0] == f"mi-brdfs: {NO_SCHEDULER.format(other_server)}"
+    assert time.perf_counter() - begun < 5
 
 
 def test_other_versions_are_refused(address, monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 from support import ROOT
 from test_cli import interrupted, run
 
-from mi_brdfs.cli.interrupts import unwrapped_ctrl_c
+from mi_brdfs.mitsuba.errors import unwrapped_ctrl_c
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 

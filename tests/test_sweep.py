@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -174,6 +175,26 @@ def test_files_that_hold_no_fits_are_told_and_made_anew(tmp_path):
     assert {path.name for path in (tmp_path / "results").iterdir()} == {first.name, second.name, "foreign.parquet"}
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_results_of_what_a_file_became_are_not_kept_as_those_of_what_it_was(serial, tmp_path, monkeypatch):
+    """Its size and its time are as before."""
+    file = tmp_path / "a.bsdf"
+    file.write_bytes(LOFT[0].read_bytes())
+    sweep, pictures = swept(tmp_path, [file]), wall.Wall(swept(serial, [file]))
+    pictures.folder = tmp_path
+    before = file.stat()
+    file.write_bytes(LOFT[1].read_bytes())
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert file.stat().st_size == before.st_size
+    sentence = f"{file} has changed since the sweep began; give the same command again."
+    assert {outcome.error for outcome in sweep.fit()} == {sentence} and sweep.finished() == 0
+    monkeypatch.setattr(wall, "SIZE", 32)
+    monkeypatch.setattr(wall, "SPP", 4)
+    measured = pictures.cells["log"][next(iter(sweep.files))][0]
+    pictures.cells = {"log": {"": [measured]}}
+    assert [outcome.error for outcome in pictures.render()] == [sentence] and pictures.finished() == 0
+
+
 def test_nothing_is_left_of_a_file_that_cannot_be_written(tmp_path):
     store = Store(tmp_path)
     with pytest.raises(ValueError):
@@ -271,9 +292,3 @@ def test_wrong_usage_gets_a_sentence(arguments, status, sentence, tmp_path):
     assert done.returncode == status and done.stdout == ""
     assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_a_scheduler_that_is_not_there_gets_a_sentence(tmp_path):
-    done = run("sweep", LOFT[0], "--model", "lambert", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path)
-    assert done.returncode == 1 and "Traceback" not in done.stderr
-    assert "mi-brdfs: The scheduler at tcp://127.0.0.1:9 does not answer." in done.stderr

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import inspect
+import os
+import sys
 import warnings
 from collections.abc import Callable
-from typing import Annotated, Any
+from io import TextIOWrapper
+from typing import Annotated, Any, cast
 
 import mitsuba as mi
 import typer
 
 from .. import __version__
 from ..mitsuba import guests
-from .terminal import Exit, fail, out
+from ..starting import raise_on_ctrl_c
+from .interrupts import interruptible
+from .terminal import Exit, err, fail, out
 
 app = typer.Typer(
     no_args_is_help=True, pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
@@ -26,7 +32,15 @@ imported: list[str] = []
 def main() -> None:
     """Run the command ``mi-brdfs``."""
     warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
-    app(prog_name="mi-brdfs")
+    cast(TextIOWrapper, sys.stdout).reconfigure(errors="surrogateescape")  # names of files need not be UTF-8
+    try:
+        app(prog_name="mi-brdfs")
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        err.print(f"mi-brdfs: cannot write {error.filename or 'to the standard output'}: {error.strerror}")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is left in the buffer
+        sys.exit(Exit.ERROR)
 
 
 def _print_version(wanted: bool) -> None:
@@ -69,8 +83,10 @@ def command(name: str | None = None) -> Callable:
     def add(function: Callable) -> Callable:
         @functools.wraps(function)
         def importing(*args: Any, imports: Imports = None, **kwargs: Any) -> Any:
-            _import(imports)
-            return function(*args, **kwargs)
+            with interruptible():
+                raise_on_ctrl_c()
+                _import(imports)
+                return function(*args, **kwargs)
 
         signature = inspect.signature(function, eval_str=True)
         option = inspect.Parameter("imports", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Imports)

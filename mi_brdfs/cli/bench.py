@@ -12,7 +12,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from ..bench import SECTIONS
 from ..bench import bench as measure
 from .app import command
-from .interrupts import interruptible
 from .options import check_names, check_output, write_json
 from .terminal import err, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -37,9 +36,8 @@ def bench(
     columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
     with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
         task = progress.add_task("")
-        with interruptible():
-            results = measure(only or None, lambda section, done, of: progress.update(
-                task, description=section, completed=done, total=of))  # fmt: skip
+        results = measure(only or None, lambda section, done, of: progress.update(
+            task, description=section, completed=done, total=of))  # fmt: skip
     write_json(json_file, results.to_dict())
     for table in results.tables():
         print_table(table)

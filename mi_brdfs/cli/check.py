@@ -17,13 +17,13 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..mitsuba import guests
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
 from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
-from .interrupts import ending_processes, interruptible
+from .interrupts import ending_processes
 from .options import Parameters, check_names, check_output, parameters_of, write_json, write_text
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -104,8 +104,7 @@ def check(
         words = targets or [model.plugins[0] for model in all_models()]
         sources = [source for word in words for source in _found(word, given)]
         settings = Settings(options, None if against is None else _other(against))
-        with interruptible():
-            reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
+        reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
         from ..validation.html import page
@@ -150,7 +149,8 @@ def _found(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
     from ..measure.sources import find_sources
 
     try:
-        return list(find_sources(word, parameters))
+        with unwrapped_ctrl_c():
+            return list(find_sources(word, parameters))
     except Exception as error:
         text = one_line(error)
         fail(text if text.startswith((word, "-D")) else f"{word}: {text}", Exit.USAGE)

@@ -8,9 +8,8 @@ from typing import Annotated, Any
 import mitsuba as mi
 import typer
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .interrupts import interruptible
 from .options import Parameters, check_output, parameters_of
 from .terminal import Exit, err, fail, print_paragraph, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -45,9 +44,10 @@ def convert(
         set_tracing_variant(variant)
     elif parts:
         fail(f"-D {next(iter(parts))}: {given} is a measured file, and has no parameters", Exit.USAGE)
-    with stdout_to_stderr(), interruptible(), err.status(f"Writing {output.name}"):
+    with stdout_to_stderr(), err.status(f"Writing {output.name}"):
         try:
-            result = converted(_bsdf(given, parts) if is_bsdf else given, output, format)
+            with unwrapped_ctrl_c():
+                result = converted(_bsdf(given, parts) if is_bsdf else given, output, format)
         except OSError as error:
             fail(f"cannot write {output}: {error.strerror or error}")
         except (ValueError, RuntimeError) as error:  # Mitsuba raises both

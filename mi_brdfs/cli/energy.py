@@ -13,11 +13,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import find_models
 from ..model import Energy, Model
 from .app import command
-from .interrupts import interruptible
 from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
@@ -61,7 +60,7 @@ def energy(
         models = [model for model in models if model.energy is not None]
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
-    with stdout_to_stderr(), interruptible():
+    with stdout_to_stderr():
         measured = _measure_all(models)
     wrong = check and _print_comparison(measured)
     if not check:
@@ -94,7 +93,8 @@ def _measure_all(models: list[type[Model]]) -> list[Measured]:
 def _of(model: type[Model], measure: Callable[..., T], *given: Any) -> T:
     """Return what a function measures of a model, or fail with a sentence about the model."""
     try:
-        return measure(model, *given)
+        with unwrapped_ctrl_c():
+            return measure(model, *given)
     except Exception as error:
         name, text = model.plugins[0], one_line(error)
         fail(text if text.startswith(f"{name}: ") else f"{name}: {text}")

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
 from .options import Parameters, check_output, parameters_of, write_text
 from .terminal import Exit, err, fail, out, stdout_to_stderr
@@ -84,10 +84,12 @@ def explore(
                 webbrowser.open(address)
 
     try:
-        serve(on, host, chosen, user, sources, state, ready)
+        with unwrapped_ctrl_c():
+            serve(on, host, chosen, user, sources, state, ready)
+        return
     except KeyboardInterrupt:
         err.print("Ended.")
-        raise typer.Exit(Exit.INTERRUPTED) from None
+    raise typer.Exit(Exit.INTERRUPTED)
 
 
 def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], list[dict[str, Any]]]:
@@ -104,22 +106,23 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     known = set(presets())
     for target in targets:
         try:
-            if target in known:
-                subject = {**Materials().expanded({"type": PRESET, "name": target}), **values}
-            elif ".xml" in target or target.startswith("<") or (is_measured(target) and Path(target).exists()):
-                found = list(find_sources(target, given if not is_measured(target) else {}))
-                if len(found) > 1:
-                    words = ", ".join(it.word for it in found)
-                    raise ValueError(f"{target} has several materials; name one of {words}")
-                sources += found
-                kind = MEASURED if is_measured(target) else GIVEN
-                subject = {"type": kind, "file": found[0].word, **(values if kind == MEASURED else {})}
-            else:
-                subject = {"type": target, **values}
-            materials = Materials({it.word: it for it in sources})
-            with materials.loaded(materials.expanded(checked(subject))):
-                pass
-            subjects.append({"bsdf": subject, "name": Path(target).name if Path(target).exists() else target})
+            with unwrapped_ctrl_c():
+                if target in known:
+                    subject = {**Materials().expanded({"type": PRESET, "name": target}), **values}
+                elif ".xml" in target or target.startswith("<") or (is_measured(target) and Path(target).exists()):
+                    found = list(find_sources(target, given if not is_measured(target) else {}))
+                    if len(found) > 1:
+                        words = ", ".join(it.word for it in found)
+                        raise ValueError(f"{target} has several materials; name one of {words}")
+                    sources += found
+                    kind = MEASURED if is_measured(target) else GIVEN
+                    subject = {"type": kind, "file": found[0].word, **(values if kind == MEASURED else {})}
+                else:
+                    subject = {"type": target, **values}
+                materials = Materials({it.word: it for it in sources})
+                with materials.loaded(materials.expanded(checked(subject))):
+                    pass
+                subjects.append({"bsdf": subject, "name": Path(target).name if Path(target).exists() else target})
         except (ValueError, RuntimeError) as error:
             fail(one_line(error), Exit.USAGE)
     return sources, subjects
@@ -132,7 +135,7 @@ def _export(file: Path, user: Any, sources: list[Any], data: dict[str, Any]) -> 
     from ..explorer.state import parse
 
     try:
-        with stdout_to_stderr():
+        with stdout_to_stderr(), unwrapped_ctrl_c():
             scenes = Stages(user)
             state = parse(data, scenes.names)
             text = page(state, Materials({it.word: it for it in sources}), scenes, data)

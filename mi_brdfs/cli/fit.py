@@ -12,12 +12,11 @@ import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from ..measure.sources import value_of
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models, find_models
 from ..model import Model
 from .app import command
 from .fit_tables import print_medians, print_ranking
-from .interrupts import unwrapped_ctrl_c
 from .options import check_output, parameters_of, write_json, write_text
 from .terminal import Exit, err, fail, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import AnyVariant, set_variant
@@ -51,7 +51,8 @@ def gallery(
             progress.update(task, description=type, completed=done, total=of)
 
         try:
-            render_gallery(types or (), output, spp, size, advance, presets)
+            with unwrapped_ctrl_c():
+                render_gallery(types or (), output, spp, size, advance, presets)
         except ValueError as error:
             fail(one_line(error), Exit.USAGE)
         except OSError as error:

@@ -12,6 +12,7 @@ from multiprocessing import active_children
 
 import typer
 
+from ..mitsuba.errors import unwrapped_ctrl_c
 from .terminal import Exit, err
 
 
@@ -23,21 +24,6 @@ def interruptible() -> Iterator[None]:
     except KeyboardInterrupt:
         err.print("Interrupted; nothing was written.")
         raise typer.Exit(Exit.INTERRUPTED) from None
-
-
-@contextmanager
-def unwrapped_ctrl_c() -> Iterator[None]:
-    """Raise the KeyboardInterrupt that Dr.Jit and Mitsuba make the cause of a RuntimeError, if it reaches the Python
-    functions that they call: it is no failure of these."""
-    try:
-        yield
-    except RuntimeError as error:
-        cause: BaseException | None = error
-        while cause and not isinstance(cause, KeyboardInterrupt):
-            cause = cause.__cause__ or cause.__context__
-        if cause:
-            raise KeyboardInterrupt from error
-        raise
 
 
 @contextmanager

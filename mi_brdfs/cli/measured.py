@@ -10,7 +10,6 @@ from rich.table import Table
 
 from ..mitsuba.errors import one_line
 from .app import command
-from .interrupts import interruptible
 from .options import check_output, write_json
 from .terminal import Exit, err, fail, out, print_table
 
@@ -40,28 +39,27 @@ def measured(
         _check_picture(plot_file)
     check_output("--json", json_file)
     drawn, findings, failed = [], [], 0
-    with interruptible():
-        for file in files:
-            try:
-                measurement = read(file)
-                summary = summarize(measurement)
-            except ValueError as error:
-                err.print(f"mi-brdfs: {one_line(error)}")
-                failed += 1
-                continue
-            if len(files) > 1:
-                out.print(summary.file, style="bold")
-            table = Table(box=None, pad_edge=False, show_header=False)
-            for row in summary.rows():
-                table.add_row(*row)
-            print_table(table)
-            if len(files) > 1:
-                out.print()
-            findings.append(summary.to_dict())
-            drawn += [measurement] if plot_file is not None else []
-        write_json(json_file, findings)
-        if plot_file is not None and drawn:
-            _draw(drawn, plot_file)
+    for file in files:
+        try:
+            measurement = read(file)
+            summary = summarize(measurement)
+        except ValueError as error:
+            err.print(f"mi-brdfs: {one_line(error)}")
+            failed += 1
+            continue
+        if len(files) > 1:
+            out.print(summary.file, style="bold")
+        table = Table(box=None, pad_edge=False, show_header=False)
+        for row in summary.rows():
+            table.add_row(*row)
+        print_table(table)
+        if len(files) > 1:
+            out.print()
+        findings.append(summary.to_dict())
+        drawn += [measurement] if plot_file is not None else []
+    write_json(json_file, findings)
+    if plot_file is not None and drawn:
+        _draw(drawn, plot_file)
     if failed:
         raise typer.Exit(Exit.ERROR)
 

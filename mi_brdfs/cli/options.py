@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 from collections.abc import Collection
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from .. import writing
 from .terminal import Exit, fail
 
 Parameters = Annotated[
@@ -45,16 +47,15 @@ def check_output(option: str, file: Path | None) -> None:
     """Fail if a file cannot be written: before the work whose result it is to hold."""
     if file is None:
         return
-    folder = file.absolute().parent
-    if not folder.is_dir():
+    if not file.absolute().parent.is_dir():
         fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
     if file.is_dir():
         fail(f"{option} {file}: it is a folder", Exit.USAGE)
     try:
-        if not file.exists():
-            tempfile.TemporaryFile(dir=folder).close()
-        elif file.is_file():
+        if file.is_file():
             file.open("ab").close()
+        if file.is_file() or not file.exists():
+            tempfile.TemporaryFile(dir=os.path.dirname(os.path.realpath(file))).close()
     except OSError as error:
         fail(f"{option} {file}: it cannot be written: {error.strerror}", Exit.USAGE)
 
@@ -62,7 +63,7 @@ def check_output(option: str, file: Path | None) -> None:
 def write_text(file: Path | None, text: str) -> None:
     if file is not None:
         try:
-            file.write_text(text, encoding="utf-8")
+            writing.write_text(file, text)
         except OSError as error:
             fail(f"cannot write {file}: {error.strerror}")
 

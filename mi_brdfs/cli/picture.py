@@ -11,7 +11,7 @@ import mitsuba as mi
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .interrupts import answer_ctrl_c
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 
@@ -69,9 +69,6 @@ def render_to(
         written = _write(picture, *files)
     except (ImportError, ValueError) as error:
         fail(f"--denoise: {error}")
-    except KeyboardInterrupt:
-        err.print("Interrupted; nothing is finished, nothing was written.")
-        raise typer.Exit(Exit.INTERRUPTED) from None
     for path in written:
         out.print(str(path))
     if picture.interrupted:
@@ -99,7 +96,8 @@ def _render(scene: mi.Scene, sensor: int, options: dict[str, Any]) -> Picture:
 
         with answer_ctrl_c(lambda: err.print("Stopping; Ctrl-C again aborts at once.")):
             try:
-                return render(scene, sensor=sensor, on_pass=advance, **options)
+                with unwrapped_ctrl_c():
+                    return render(scene, sensor=sensor, on_pass=advance, **options)
             except Exception as error:
                 fail(one_line(error))
 
@@ -115,6 +113,8 @@ def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
     try:
         for bitmap, path in files:
             write(bitmap, path)
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
     except Exception as error:
         fail(f"cannot write {path}: {one_line(error)}")
     return [path for _, path in files]

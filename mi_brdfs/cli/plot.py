@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .interrupts import interruptible
 from .options import check_output
 from .terminal import Exit, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -76,9 +75,10 @@ def plot(
         fail(str(error), Exit.USAGE)
     check_output("-o", output)
     set_tracing_variant(variant)
-    with stdout_to_stderr(), interruptible():
+    with stdout_to_stderr():
         try:
-            figure = asked.KINDS[kind](*bsdfs, **options)
+            with unwrapped_ctrl_c():
+                figure = asked.KINDS[kind](*bsdfs, **options)
         except ImportError as error:
             fail(str(error))
         except (ValueError, RuntimeError) as error:  # Mitsuba raises both

@@ -8,7 +8,7 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..scene_file import RESERVED, SceneFile
 from .app import command
 from .options import parameters_of
@@ -108,7 +108,8 @@ def _load(file: SceneFile) -> mi.Scene:
     if not path.is_file():
         fail(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     try:
-        scene = file.load()
+        with unwrapped_ctrl_c():
+            scene = file.load()
     except Exception as error:
         fail(one_line(error))
     if not isinstance(scene, mi.Scene):

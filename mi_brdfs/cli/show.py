@@ -9,7 +9,7 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..preview import STAGES, preview_scene
 from .app import command
 from .options import Parameters, parameters_of
@@ -49,8 +49,9 @@ def show(
         from ..measure.sources import find_sources  # imports numpy
 
         try:
-            found = list(find_sources(material, given))
-            scene = preview_scene(found[0].load(), stage)
+            with unwrapped_ctrl_c():
+                found = list(find_sources(material, given))
+                scene = preview_scene(found[0].load(), stage)
         except (ValueError, RuntimeError) as error:  # Mitsuba raises both
             fail(one_line(error), Exit.USAGE)
         if len(found) > 1:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from ..mitsuba.errors import one_line
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -87,15 +87,17 @@ def sweep(
     complete, errors, wall = True, list[str](), None
     with stdout_to_stderr():
         try:
-            _follow(plan.fit(workers, scheduler), "fits", plan.total, plan.finished(), errors)
-            if render:
-                wall = Wall(plan)
-                _follow(wall.render(workers, scheduler), "pictures", wall.total, wall.finished(), errors)
-                for path in wall.write():
-                    err.print(str(path))
-        except ClusterError as error:
-            errors.append(one_line(error))
-            err.print(f"mi-brdfs: {one_line(error)}")
+            with unwrapped_ctrl_c():
+                _follow(plan.fit(workers, scheduler), "fits", plan.total, plan.finished(), errors)
+                if render:
+                    wall = Wall(plan)
+                    _follow(wall.render(workers, scheduler), "pictures", wall.total, wall.finished(), errors)
+                    for path in wall.write():
+                        err.print(str(path))
+        except (ClusterError, OSError) as error:
+            full = f"cannot write to {output}: {error.strerror}" if isinstance(error, OSError) else None
+            errors.append(full or one_line(error))
+            err.print(f"mi-brdfs: {errors[-1]}")
         except KeyboardInterrupt:
             complete = False
     if table == "csv":

@@ -14,13 +14,15 @@ from typing import Any
 
 import dask
 from distributed import CancelledError, Client, Future, LocalCluster, futures_of
+from distributed.comm import connect
 from distributed.scheduler import KilledWorker
+from distributed.utils import LoopRunner, sync
 
 from . import ClusterError
 from .processes import Processes
 from .worker import Failed, Setup, call_as, problem, setup, versions
 
-CONNECTING = 5
+CONNECTING = 3
 """Seconds to wait for a scheduler."""
 JOINING = 10
 """Seconds to wait for a first worker."""
@@ -160,16 +162,27 @@ class _Run:
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
+    runner = LoopRunner()
+    runner.start()
     try:
+        # A client waits for ever for the greeting of what accepts connections and is no scheduler.
+        sync(runner.loop, _greet, address, callback_timeout=CONNECTING)
         client = Client(address, timeout=CONNECTING)
-    except OSError:
-        raise ClusterError(f"The scheduler at {address} does not answer.") from None
     except ValueError:
         raise ClusterError(f"{address} is not the address of a scheduler; write tcp://HOST:PORT.") from None
-    except Exception:  # whatever the bytes of another protocol are taken for
-        raise ClusterError(f"What answers at {address} is not a Dask scheduler of a similar version.") from None
+    except Exception:  # none, or whatever the bytes of another protocol are taken for
+        raise ClusterError(
+            f"No Dask scheduler of a similar version answers at {address}; give the address that `dask scheduler` "
+            "prints when it starts."
+        ) from None
+    finally:
+        runner.stop()
     with client:
         yield client
+
+
+async def _greet(address: str) -> None:
+    (await connect(address)).abort()
 
 
 def _check_workers(client: Client, address: str, here: Setup) -> None:

@@ -16,6 +16,7 @@ import mitsuba as mi
 
 from .. import __version__
 from ..mitsuba import guests
+from ..mitsuba.errors import unwrapped_ctrl_c
 
 
 class Failed(NamedTuple):
@@ -61,7 +62,8 @@ def setup(threads: int | None) -> Setup:
 def call(function: Callable, arguments: tuple) -> Any:
     """Return what a function returns, or how it failed."""
     try:
-        return function(*arguments)
+        with unwrapped_ctrl_c():
+            return function(*arguments)
     except Exception as error:
         while error.__cause__ is not None and isinstance(error.__cause__, Exception):
             error = error.__cause__

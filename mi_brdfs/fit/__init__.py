@@ -8,6 +8,7 @@ from typing import Any
 
 from ..measured import FileError
 from ..mitsuba.registry import find_model
+from ..writing import write_text
 from .engine import fit_configuration
 from .image_fit import ImageFit
 from .isotropy import isotropic
@@ -170,5 +171,5 @@ def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[F
             ranked, shown = by_flip(ranked, shown)
         page.add(ranked, shown)
         found += ranked
-    Path(path).write_text(page.text(), encoding="utf-8")
+    write_text(path, page.text())
     return found

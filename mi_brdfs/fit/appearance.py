@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..measure.arrays import Array, luminance
+from ..mitsuba.names import tabulated
 from ..model import EnergyWarning
 from ..preview import preview_scene
 from .lanes import rgb_variant
@@ -46,7 +47,7 @@ def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> A
     with rgb_variant(), warnings.catch_warnings():
         warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
         pictures = []
-        for bsdf in ({"type": "tabulated", "filename": os.path.abspath(file)}, *(it.bsdf for it in fits)):
+        for bsdf in (tabulated(os.path.abspath(file)), *(it.bsdf for it in fits)):
             pictures.append(_picture(bsdf))
             advance()
         stops = _stops(pictures[0])

@@ -31,6 +31,7 @@ from ..model import Model
 from ..parameters.published import preset
 from ..preview import preview_scene
 from ..render import ctrl_c, display_image, write
+from ..writing import write_text
 from .families import by_family, portrait, stage_of, year
 from .html import Section, page
 from .sheet import Row, sheet
@@ -93,7 +94,7 @@ def gallery(
             begun[-1].write(folder)
             _save(overview([(entry.model, entry.shots[0].picture) for entry in begun]), folder / "overview.png")
             text = page([entry.section() for entry in begun], f"{power_of_4(spp)} samples per pixel, denoised")
-            (folder / "index.html").write_text(text, encoding="utf-8")
+            write_text(folder / "index.html", text)
     return folder / "index.html"
 
 

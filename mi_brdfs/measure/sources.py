@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import mitsuba as mi
 
+from ..mitsuba.names import check_name, tabulated
 from .directions import direction, on_side
 from .probe import BSDFProbe, contained
 from .variates import random
@@ -34,6 +35,7 @@ class BSDFSource(NamedTuple):
     def load(self) -> dict[str, Any] | mi.BSDF:
         """Return the dict of a plugin that is given by its type, and else the BSDF, loaded in the active variant."""
         if self.source.endswith(".xml"):
+            check_name(self.source)
             loaded = mi.load_file(self.source, **self.parameters)
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
@@ -41,7 +43,7 @@ class BSDFSource(NamedTuple):
         values = {name: value_of(text) for name, text in self.parameters.items()}
         if is_measured(self.source):
             path = Path(self.source)  # or a name that the plugin looks for elsewhere
-            return {"type": "tabulated", "filename": str(path.resolve() if path.exists() else path)} | values
+            return tabulated(str(path.resolve() if path.exists() else path)) | values
         return {"type": self.source} | values
 
 

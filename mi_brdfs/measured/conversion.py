@@ -15,7 +15,9 @@ import numpy as np
 from ..measure.arrays import CENTRE, Array
 from ..measure.probe import BSDFProbe
 from ..measure.sources import name_of
+from ..parameters.messages import printable
 from ..variants import is_measurable
+from ..writing import replacing
 from .arrays import NUMPY, components
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
@@ -78,15 +80,9 @@ def convert(
         raise ValueError(f"{path} is not a regular file; give the name of one")
     writer = _writer(path, format)
     source, losses = _source(given)
-    target = path.resolve()
-    # Under another name until it is complete, but with the same ending.
-    part = target.with_name(f".{os.getpid()}-{target.name}")
-    try:
+    with replacing(path) as part:
         writer.write(part, source)
         rms, largest, more = _compared(source, read(part))
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
     return Conversion(path, writer.NAME, rms, largest, (*losses, *more))
 
 
@@ -145,7 +141,7 @@ def _of_measurement(measurement: Measurement) -> Source:
     grid = as_grid(measurement.data)
     if not grid.usable.any():
         raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
-    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
+    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, printable(measurement.material))
     stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
     return source if stated else source.rgb()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from pathlib import Path
@@ -40,6 +41,18 @@ def checked(path: str | Path) -> Path:
     if not status.st_size:
         raise FileError(f"{path} is empty.")
     return path
+
+
+def content_hash(path: str | Path) -> str:
+    """Return the SHA-256 of a file: another content may have the same size and time.
+
+    Raises:
+        FileError: if it cannot be read.
+    """
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError as error:
+        raise FileError(f"{path}: {reason(error)}.") from None
 
 
 def reason(error: Exception) -> str:

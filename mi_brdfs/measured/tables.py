@@ -9,7 +9,7 @@ import numpy as np
 
 from .colour import Channels
 from .coordinates import PolarAngle
-from .files import checked
+from .files import checked, content_hash
 from .formats import read
 from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
 from .proposal import NODES_I, Proposal, estimated_albedos
@@ -28,8 +28,7 @@ class Tables:
         path = checked(filename)
         if not shared:
             return cls(read(path), interpolation, extrapolate)
-        state = path.stat()
-        key = mi.variant(), path.resolve(), state.st_mtime_ns, state.st_size, interpolation, extrapolate
+        key = mi.variant(), path.resolve(), content_hash(path), interpolation, extrapolate
         found = cls._shared.get(key)
         if found is None:
             found = cls._shared[key] = cls(read(path), interpolation, extrapolate)

@@ -1,11 +1,28 @@
-"""Exceptions, reduced to one line each."""
+"""Exceptions, reduced to one line each, and those that are none of Mitsuba's."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from ..parameters.messages import brief, meant
+from ..parameters.messages import brief, meant, printable
 from .registry import plugin_names
+
+
+@contextmanager
+def unwrapped_ctrl_c() -> Iterator[None]:
+    """Raise the KeyboardInterrupt that is the cause of another exception: of a RuntimeError if it reaches the Python
+    functions that Dr.Jit and Mitsuba call, of others if it reaches the import of a compiled module."""
+    try:
+        yield
+    except Exception as error:
+        cause: BaseException | None = error
+        while cause and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__cause__ or cause.__context__
+        if cause:
+            raise KeyboardInterrupt from error
+        raise
 
 
 def one_line(error: BaseException) -> str:
@@ -50,4 +67,4 @@ def _last_of_traceback(text: str) -> str:
     if traceback:
         text = re.split(r"^[\w.]+(?:Error|Exception|Warning): ", tail, flags=re.MULTILINE)[-1]
     # Text from a scene file must not control the terminal.
-    return "".join(character for character in " ".join(text.split()) if character.isprintable())
+    return printable(" ".join(text.split()))

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..measure.sources import degrees_of, value_of
 from ..parameters.messages import listed
+from ..writing import replacing
 from . import albedo, cartesian, hemisphere, page, polar, sphere
 
 KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo, sphere)}
@@ -91,4 +92,5 @@ def write(figure: Any, path: Path) -> None:
     if path.suffix.lower() in PAGES:
         page.write(figure, path)
     else:
-        figure.savefig(path, dpi=DPI)
+        with replacing(path) as part:
+            figure.savefig(part, dpi=DPI)

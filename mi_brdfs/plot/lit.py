@@ -14,6 +14,7 @@ from ..measured.counts import batches, census
 from ..measured.measurement import usable
 from ..measured.observer import to_srgb
 from ..measured.summary import azimuths, ends, table
+from ..parameters.messages import printable
 from .lobes import Curve, refined
 
 ANGLES = 10, 40, 70
@@ -29,7 +30,7 @@ class LitTable:
     def __init__(self, measurement: Measurement, phi: float | None = None) -> None:
         self.measurement, self.grid = measurement, table(measurement.data)
         path, material = measurement.path, measurement.material
-        self.name = path.name if material in ("", path.stem) else f"{material} ({path.name})"
+        self.name = printable(path.name if material in ("", path.stem) else f"{material} ({path.name})")
         self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
         self.phi = float(azimuths(self.grid)[0]) if phi is None else phi
         self.coloured = self.grid.values.shape[-1] > 1

@@ -6,6 +6,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from ..writing import write_text
+
 # Bodies go below each other where the window is too narrow for them, and turn together.
 SCRIPT = """
 const plot = document.getElementById('{plot_id}');
@@ -48,11 +50,12 @@ def write(figure: Any, path: Path) -> None:
 
     library = path.with_name(f"plotly-{__version__}.min.js")
     if not library.exists():
-        library.write_text(get_plotlyjs(), encoding="utf-8")
+        write_text(library, get_plotlyjs())
     body = figure.to_html(full_html=False, include_plotlyjs=False, post_script=SCRIPT, default_height="100vh",
                           config={"displayModeBar": False})  # fmt: skip
     title = ", ".join(dict.fromkeys(trace.name for trace in figure.data if trace.type == "surface"))
-    path.write_text(
+    write_text(
+        path,
         f"""<!doctype html>
 <html lang="en">
 <head>
@@ -67,5 +70,4 @@ def write(figure: Any, path: Path) -> None:
 </body>
 </html>
 """,
-        encoding="utf-8",
     )

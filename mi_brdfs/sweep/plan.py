@@ -16,7 +16,8 @@ from .. import __version__
 from ..cluster import Failed, run
 from ..fit import STARTS, Observations, find_metric, fit, observe
 from ..fit.observations import CUT
-from ..measured.files import checked
+from ..measured.files import checked, content_hash
+from ..measured.measurement import FileError
 from ..mitsuba.registry import find_models, is_own
 from ..model import Model
 from .store import Store, row_of
@@ -74,7 +75,7 @@ class Sweep:
         """By the SHA-256 of their content."""
         for file in files:
             path = checked(file)
-            self.files.setdefault(hashlib.sha256(path.read_bytes()).hexdigest(), str(path))
+            self.files.setdefault(content_hash(path), str(path))
         self._versions = {model.plugins[0]: versions(model) for model in found}
 
     def wanted(self) -> Iterator[dict[str, Any]]:
@@ -109,6 +110,9 @@ class Sweep:
 
         Args:
             workers: as :func:`mi_brdfs.cluster.run` has it; ``scheduler``, too.
+
+        Raises:
+            OSError: if the folder cannot be written to.
         """
         left: dict[tuple[str, str], list[dict[str, Any]]] = {}
         done = self._done()
@@ -118,6 +122,7 @@ class Sweep:
         named = {f"{model}-{digest([it['key'] for it in own])}": own for (_, model), own in left.items()}
         if not named:
             return
+        self.store.prepare()
         for name, result in run(fit_material, self._tasks(named), workers=workers, scheduler=scheduler):
             if isinstance(result, Failed):
                 yield Outcome(len(named[name]), result.error)
@@ -143,7 +148,9 @@ class Sweep:
     def _observed(self, identity: dict[str, Any]) -> Observations | str:
         """Return what a fit sees of a file, or why it cannot."""
         try:
-            return observe(identity["file"], self.cut, seed=identity["seed"])
+            seen = observe(identity["file"], self.cut, seed=identity["seed"])
+            check_content(identity["file"], identity["content"])
+            return seen
         except ValueError as error:
             return str(error)
 
@@ -158,6 +165,13 @@ def fit_material(model: str, jobs: list[tuple[Observations | str, str, int]], st
         (best,) = fit(material, model, metric=metric, starts=starts, seed=seed)
         found.append(best.to_dict() | {"seconds": perf_counter() - begun})
     return found
+
+
+def check_content(file: str, expected: str) -> None:
+    """Raise a FileError if a file that was read has another content than when the sweep began, under which its results
+    would be kept."""
+    if content_hash(file) != expected:
+        raise FileError(f"{file} has changed since the sweep began; give the same command again.")
 
 
 def digest(data: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -16,6 +16,7 @@ except ImportError:
     raise ImportError("a sweep needs PyArrow: pip install 'mi_brdfs[sweep]'") from None
 
 from ..fit import METRICS
+from ..writing import replacing
 
 PARTS = "fitted", "held_out"
 IDENTITY = {
@@ -56,22 +57,25 @@ class Store:
     def __init__(self, folder: Path):
         self.folder = folder
 
-    def add(self, name: str, rows: Iterable[Mapping[str, Any]]) -> None:
-        """Write a file: all of it or nothing."""
+    def prepare(self) -> None:
+        """Make the folder, and see that it can be written to: before the work whose results it is to hold.
+
+        Raises:
+            OSError: if not.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / f"{name}.parquet"
-        partial = path.with_name(f".{name}-{os.getpid()}")
-        try:
-            parquet.write_table(pa.Table.from_pylist(list(rows), schema=SCHEMA), partial)
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+        tempfile.TemporaryFile(dir=self.folder).close()
+
+    def add(self, name: str, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Write a file into the folder that :meth:`prepare` made: all of it or nothing."""
+        with replacing(self.folder / f"{name}.parquet") as part, part.open("wb") as file:
+            parquet.write_table(pa.Table.from_pylist(list(rows), schema=SCHEMA), file)
 
     def rows(self, columns: Iterable[str] | None = None) -> Iterator[dict[str, Any]]:
         """Yield the rows of all files, one file at a time; warn of each that holds no such rows."""
         for path in sorted(self.folder.glob("*.parquet")):
             try:
-                with parquet.ParquetFile(path) as file:
+                with path.open("rb") as opened, parquet.ParquetFile(opened) as file:
                     if missing := set(SCHEMA.names) - set(file.schema_arrow.names):
                         raise ValueError(f"it has no column {min(missing)}")
                     found = file.read(list(columns) if columns else SCHEMA.names).to_pylist()
@@ -88,4 +92,5 @@ def row_of(identity: Mapping[str, Any], fit: Mapping[str, Any]) -> dict[str, Any
     nested = {name: json.dumps(fit[name]) for name in JSON}
     starts = {"tried": fit["starts"]["tried"], "agree": fit["starts"]["agree"]}
     plain = {name: fit[name] for name in ("albedo", "bic", "pairs", "resolved", "seconds")}
-    return {**identity, **errors, **starts, **plain, **nested}
+    file = identity["file"].encode(errors="backslashreplace").decode()  # names need not be UTF-8, what is here has to
+    return {**identity, "file": file, **errors, **starts, **plain, **nested}

@@ -15,8 +15,10 @@ from PIL import Image
 from ..cluster import Failed, run
 from ..gallery import shot
 from ..gallery.sheet import Row, sheet
+from ..mitsuba.names import check_name
+from ..parameters.messages import printable
 from ..render import write
-from .plan import Outcome, Sweep, digest, versions
+from .plan import Outcome, Sweep, check_content, digest, versions
 
 SIZE, SPP = 144, 16
 ROWS = 64
@@ -29,6 +31,8 @@ class Cell(NamedTuple):
     key: str
     bsdf: dict[str, Any]
     caption: str
+    content: str | None = None
+    """Of the file, if it shows one."""
 
 
 class Wall:
@@ -82,7 +86,7 @@ class Wall:
         Args:
             workers: as :func:`mi_brdfs.cluster.run` has it; ``scheduler``, too. Its workers need the files.
         """
-        tasks = {key: (cell.bsdf,) for key, cell in self._cells().items() if not self._path(cell).exists()}
+        tasks = {key: (cell.bsdf, cell.content) for key, cell in self._cells().items() if not self._path(cell).exists()}
         if not tasks:
             return
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -108,7 +112,7 @@ class Wall:
         return found
 
     def _row(self, content: str, cells: list[Cell]) -> Row:
-        name = Path(self.sweep.files[content]).name
+        name = printable(Path(self.sweep.files[content]).name)
         return Row({0: name}, [self._picture(cell) for cell in cells], [cell.caption for cell in cells])
 
     def _picture(self, cell: Cell) -> Image.Image:
@@ -128,7 +132,7 @@ def _cell(bsdf: dict[str, Any], caption: str, identity: str) -> Cell:
 
 def _measured(file: str, content: str) -> Cell:
     bsdf = {"type": "tabulated", "filename": str(Path(file).absolute())}
-    return _cell(bsdf, "measured", f"{versions()} {content}")
+    return _cell(bsdf, "measured", f"{versions()} {content}")._replace(content=content)
 
 
 def _fit(model: str, row: dict[str, Any], least: float) -> Cell:
@@ -136,6 +140,11 @@ def _fit(model: str, row: dict[str, Any], least: float) -> Cell:
     return _cell(json.loads(row["bsdf"]), f"{model}\n{row['error']:.3g}{best}", f"{row['versions']} {row['bsdf']}")
 
 
-def picture(bsdf: dict[str, Any]) -> np.ndarray:
-    """Return a material as 8-bit sRGB; a worker's task."""
-    return np.array(shot(bsdf, size=SIZE, spp=SPP).picture)
+def picture(bsdf: dict[str, Any], content: str | None) -> np.ndarray:
+    """Return a material as 8-bit sRGB; a worker's task. If it is a file, this has to have a content."""
+    if content:
+        check_name(bsdf["filename"])
+    found = np.array(shot(bsdf, size=SIZE, spp=SPP).picture)
+    if content:
+        check_content(bsdf["filename"], content)
+    return found

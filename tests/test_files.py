@@ -1,0 +1,180 @@
+"""Files that the commands read and write: on disks that are full or cannot be written to, under names of any bytes."""
+
+import csv
+import errno
+import json
+import os
+import re
+import subprocess
+import sys
+import warnings
+from contextlib import contextmanager
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from support import ROOT
+from test_cli import SCENE, command
+from typer.testing import CliRunner
+
+from mi_brdfs.cli import app, main, options
+from mi_brdfs.render import write
+from mi_brdfs.sweep import Sweep, plan, store
+
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
+FITTED = "--model", "lambert", "--starts", "1"
+
+
+# --- Full disks -----------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def full_disk():
+    """Files end after 100 bytes."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def noise(kind):
+    return mi.Bitmap(np.random.default_rng(1).integers(0, 255, (9, 9, 3)).astype(kind))
+
+
+@pytest.mark.parametrize(
+    "name, write",
+    [
+        ("fits.json", lambda path: options.write_json(path, ["long"] * 100)),
+        ("page.html", lambda path: options.write_text(path, "long" * 100)),
+        # Smaller than the buffer that a file is written from.
+        ("picture.exr", lambda path: write(noise(np.float32), path)),
+        ("picture.png", lambda path: write(noise(np.uint8), path)),
+    ],
+)
+def test_a_full_disk_leaves_what_was_there(name, write, tmp_path, capsys):
+    (tmp_path / name).write_text("before")
+    with pytest.raises((OSError, RuntimeError)), full_disk():
+        write(tmp_path / name)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
+
+
+def test_a_link_stays_when_its_file_is_replaced(tmp_path):
+    (tmp_path / "link.png").symlink_to(tmp_path / "picture.png")
+    write(noise(np.uint8), tmp_path / "link.png")
+    assert (tmp_path / "link.png").is_symlink()
+    assert np.array_equal(mi.Bitmap(str(tmp_path / "picture.png")), noise(np.uint8))
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
+def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command("--version"), stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
+
+
+def swept(folder):
+    return CliRunner().invoke(app, ["sweep", str(LOFT), *FITTED, "--workers", "0", "-o", str(folder)])
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_sweep_tells_of_a_full_disk(tmp_path, monkeypatch):
+    def write_table(table, file):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(store.parquet, "write_table", write_table)
+    done = swept(tmp_path / "made")
+    assert done.exit_code == 1 and done.stderr.splitlines() == [
+        f"mi-brdfs: cannot write to {tmp_path / 'made'}: No space left on device",
+        "0 of 1 fits are finished; the same command tries the others again.",
+    ]
+    assert not list((tmp_path / "made" / "results").iterdir())
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_sweep_sees_that_its_folder_cannot_be_written_to_before_it_fits(tmp_path, monkeypatch):
+    monkeypatch.setattr(plan, "fit_material", lambda *_: pytest.fail("it fits"))
+    (tmp_path / "results").touch()
+    done = swept(tmp_path)
+    assert done.exit_code == 1 and f"mi-brdfs: cannot write to {tmp_path}: File exists\n" in done.stderr
+
+
+# --- Names that are not UTF-8 ---------------------------------------------------------------------------------------
+
+BAD = os.fsdecode(b"coat\xff")
+COLUMNS = "theta_i_deg,theta_o_deg,delta_phi_deg,f\n"
+GRID = [f"{i},{o},{d},{0.2 + i / 900}\n" for i in (0, 40, 80) for o in (0, 40, 80) for d in (0, 90, 180)]
+REFUSED = r"Mitsuba takes only names in UTF-8; rename \S*coat�"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with files of such names, and the working directory."""
+    monkeypatch.chdir(tmp_path)
+    try:
+        (tmp_path / f"{BAD}.csv").write_text(COLUMNS + "".join(GRID))  # its material has the file's name
+    except (OSError, UnicodeEncodeError):
+        pytest.skip("the file system has only names in UTF-8")
+    for name in (BAD, "scene"):
+        (tmp_path / f"{name}.xml").write_text(SCENE.replace("triangle.obj", str(tmp_path / "triangle.obj")))
+    (tmp_path / "triangle.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")
+    return tmp_path
+
+
+@pytest.fixture
+def called(monkeypatch, capfdbinary):
+    """Run the command, and return its exit status, its output in bytes, and its messages."""
+
+    def called(*words):
+        monkeypatch.setattr(sys, "argv", ["mi-brdfs", *words])
+        monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfdbinary.readouterr()
+        return ended.value.code or 0, out, err.decode()
+
+    return called
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "words, status, sentence",
+    [
+        (["measured", f"{BAD}.csv", "--plot", f"{BAD}.png", "--json", f"{BAD}.json"], 0, ""),
+        (["check", f"{BAD}.csv", "--only", "finite"], 2, REFUSED),
+        (["check", f"{BAD}.xml", "--only", "finite"], 2, REFUSED),
+        (["convert", f"{BAD}.csv", f"{BAD}.bsdf"], 0, ""),
+        (["render", f"{BAD}.xml", "--spp", "1"], 1, REFUSED),
+        (["render", "scene.xml", "--spp", "1", "-o", f"{BAD}.exr"], 0, "1 samples per pixel"),
+        (["explore", f"{BAD}.csv", "--export", "page.html"], 2, REFUSED),
+        (["fit", f"{BAD}.csv", *FITTED, "--json", f"{BAD}.json", "-o", f"{BAD}.html"], 0, f"no pictures: {REFUSED}"),
+        (["sweep", f"{BAD}.csv", *FITTED, "-o", BAD, "--workers", "0", "--render"], 1, REFUSED),
+        (["sweep", "gone\udcff.csv"], 1, "gone�.csv: No such file"),
+    ],
+)
+def test_names_that_are_not_utf_8_work_or_get_a_sentence(words, status, sentence, folder, called):
+    found, out, err = called(*words)
+    assert found == status, err
+    assert re.search(sentence, err) and "Traceback" not in err and "nanobind" not in err
+    for name in words:
+        path = folder / name
+        assert status or BAD not in name or path.exists()
+        if path.suffix in (".json", ".html") and path.exists():
+            text = path.read_text(encoding="utf-8")
+            assert "coat" not in text or r"coat\udcff" in text
+    if words[0] in ("convert", "render") and not status:
+        assert b"coat\xff" in out
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_sweep_keeps_and_prints_such_names(folder, called):
+    for _ in range(2):  # fitted, and from the store
+        status, out, _ = called("sweep", f"{BAD}.csv", *FITTED, "-o", BAD, "--workers", "0", "--table", "csv")
+        (row,) = csv.DictReader(os.fsdecode(out).splitlines())
+        assert (status, row["file"], row["model"]) == (0, f"{BAD}.csv", "lambert")
+    (kept,) = Sweep([f"{BAD}.csv"], ["lambert"], BAD, starts=1).store.rows(["file"])
+    assert kept == {"file": r"coat\udcff.csv"}
+    assert json.loads(row["bsdf"])["type"] == "lambert"
