@@ -1,9 +1,10 @@
 """Scattered samples as a grid: weights, symmetries, what lies beyond, and how well samples that were left out come
 back."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
-from support import direction, hemisphere, shared
+from support import call, context, direction, efficiencies, hemisphere, shared
 
 from mi_brdfs.measured import Samples, read, scattered
 from mi_brdfs.measured.scattered import embedded, gridded, nearest, weights
@@ -115,3 +116,29 @@ def test_left_out_samples(parts):
         return np.sqrt(np.mean(np.log((found + 1e-3) / (f[left] + 1e-3)) ** 2))
 
     assert error(grid.evaluate(wi[left], wo[left])) < 0.9 * error(neighbour)
+
+
+@pytest.mark.parametrize("bsdf", [{"type": "walter", "alpha": 0.02}, {"type": "ward", "alpha": 0.02}])
+def test_noise_of_a_goniometers_samples_is_next_to_none(llvm_rgb, tmp_path, bsdf):
+    """θi every 10°, as in Cornell's files, and half vectors that fill no grid."""
+    rng = np.random.default_rng(1)
+    h = np.stack([direction(*it) for it in zip(10 * rng.random(800), 360 * rng.random(800), strict=True)])
+    wi = np.repeat([direction(theta) for theta in range(10, 90, 10)], 100, axis=0)
+    wo = 2 * np.sum(wi * h, axis=1, keepdims=True) * h - wi
+    above = wo[:, 2] > 0.05
+    wi, wo = (w[above].astype(np.float32) for w in (wi, wo))
+    (value,) = call(mi.load_dict(bsdf).eval, context(), wi, wo)
+    angles = [np.arccos(wi[:, 2]), np.arccos(wo[:, 2]), np.arctan2(wo[:, 1], wo[:, 0])]
+    rows = np.column_stack([*angles, value / wo[:, 2:]])
+    np.savetxt(
+        path := tmp_path / "g.csv", rows, "%.7g", ",", header="theta_i_rad,theta_o_rad,phi_o_rad,r,g,b", comments=""
+    )
+    assert (efficiencies({"type": "tabulated", "filename": str(path)}, (5, 30, 43, 60, 70, 74, 80)) > 0.94).all()
+
+
+@pytest.mark.parametrize(
+    "parts, least", [(("cornell", "krylon_blue.brdf"), 0.99), (("retro", "retro-3M-jaune.dat"), 0.96)]
+)
+def test_noise_of_measured_samples_is_next_to_none(llvm_rgb, parts, least):
+    bsdf = {"type": "tabulated", "filename": str(shared(*parts))}
+    assert (efficiencies(bsdf, (5, 30, 60, 70, 74, 80)) > least).all()

@@ -13,10 +13,11 @@ from .measurement import Extrapolation, Grid, Interpolation
 
 COSINE_SHARE = 0.02
 """The share of directions drawn in proportion to the cosine, wherever the table is zero or coarser than its nodes."""
-NODES_I = np.radians([*np.linspace(0, 80, 21), 82, 84, 86, 87, 88, 89])
-"""The angles θi at which the density is tabulated, and between which it is interpolated."""
+NODES_I = np.radians([*np.linspace(0, 80, 49), *range(81, 90)])
+"""The angles θi at which the density is tabulated, and between which it is interpolated: all multiples of 5°, to which
+goniometers are set, and close enough in between, because highlights from scattered samples are sharp at these alone."""
 AZIMUTHS_I = np.linspace(0, TWO_PI, 37)
-NODES_I_ANISOTROPIC = NODES_I[::2]
+NODES_I_ANISOTROPIC = NODES_I[::3]
 """The azimuths φi and the angles θi at which that of an anisotropic table is."""
 NODES_U, NODES_V = 129, 65
 
@@ -29,7 +30,8 @@ class Proposal:
         f cosθo |∂ωo/∂(u, v)| ∝ f cosθo 4 (wi·h) sinθh u
 
     at the nodes, with f the mean of the channels' values or their luminance; between nodes it is bilinear, and linear
-    in θi and φi. Mitsuba's ``MarginalContinuous2D`` draws from it exactly and returns its density.
+    in θi and φi. An isotropic one is the mean of both sides of the plane of incidence, |φh - φi| = π v: half of the
+    memory pays for the many θi. Mitsuba's ``MarginalContinuous2D`` draws from it exactly and returns its density.
     """
 
     def __init__(self, brightness: Grid, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
@@ -40,7 +42,8 @@ class Proposal:
         if self.anisotropic:
             self.warp = mi.MarginalContinuous2D2(np.concatenate([density, density[:1]]), [AZIMUTHS_I, thetas])
         else:
-            self.warp = mi.MarginalContinuous2D1(density[0], [thetas])
+            folded = (density + density[..., ::-1])[0, ..., : NODES_V // 2 + 1]
+            self.warp = mi.MarginalContinuous2D1(folded, [thetas])
 
     def pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
         """Return the density of :meth:`sample` per solid angle of wo."""
@@ -49,7 +52,7 @@ class Proposal:
         u = DRJIT.sqrt(DRJIT.atan2(across, z) * (2 / dr.pi))
         cos_phi, sin_phi = normalize_or(wi.x, wi.y, (1, 0))
         turn = DRJIT.atan2(y * cos_phi - x * sin_phi, x * cos_phi + y * sin_phi) * dr.inv_two_pi
-        v = turn - dr.floor(turn)
+        v = turn - dr.floor(turn) if self.anisotropic else 2 * abs(turn)
         # As in half_vectors, where 4 (wi·h) sinθh = 2 |(x, y)|.
         solid_angle = 4 * dr.square(dr.pi) * u * across
         table = self.warp.eval(mi.Point2f(v, u), self._given(wi)) / dr.maximum(solid_angle, 1e-12)
@@ -57,10 +60,11 @@ class Proposal:
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         """Draw a direction wo."""
-        cosine, _ = choose(u, COSINE_SHARE)
+        cosine, side = choose(u, COSINE_SHARE)
         disk = mi.warp.square_to_cosine_hemisphere(v)
         place, _ = self.warp.sample(v, self._given(wi))
-        (sin, cos), (y, x) = dr.sincos(dr.square(place.y) * (dr.pi / 2)), dr.sincos(place.x * dr.two_pi)
+        turn = place.x if self.anisotropic else place.x * dr.select(side < 0.5, 0.5, -0.5)
+        (sin, cos), (y, x) = dr.sincos(dr.square(place.y) * (dr.pi / 2)), dr.sincos(turn * dr.two_pi)
         cos_phi, sin_phi = normalize_or(wi.x, wi.y, (1, 0))
         h = mi.Vector3f(sin * (x * cos_phi - y * sin_phi), sin * (y * cos_phi + x * sin_phi), cos)
         return select(cosine, disk, 2 * dr.dot(wi, h) * h - wi)

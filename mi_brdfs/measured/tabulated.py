@@ -45,7 +45,7 @@ class Tabulated(Model):
     ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last. Directions
     are then drawn as the file says, whatever the values become.
 
-    Sampling: from a table over the half vector for 27 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
+    Sampling: from a table over the half vector for 58 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
     ``MarginalContinuous2D``, and 2 % by the cosine (mi_brdfs.measured.proposal).
 
     W. Matusik, H. Pfister, M. Brand and L. McMillan, A data-driven reflectance model, ACM Transactions on Graphics
