@@ -576,9 +576,11 @@ def hosted(tmp_path):
         running.shutdown()
 
 
-def test_only_a_notebook_may_frame_its_page(tab, address, hosted):
+def test_only_a_notebook_may_frame_its_page(tab, address, hosted, monkeypatch):
     folder, port = hosted
-    page = explore("lambert")
+    monkeypatch.chdir(folder)
+    shutil.copy(LOFT, "-x.bsdf")
+    page = explore("-x.bsdf")
     (folder / "notebook.html").write_text(page._repr_html_())
     (folder / "other.html").write_text(page._repr_html_().replace(page.address, address))
     for host, file, shown in (
