@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 import time
+from typing import IO
 
 import numpy as np
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType
@@ -18,10 +19,17 @@ SIZE = 256
 PICTURE, CURVES = ["picture"], ["lobe", "polar", "albedo"]
 
 
-def serving(*arguments: str) -> tuple[subprocess.Popen, str]:
+def alone(*arguments: str) -> list[str]:
+    """The command of the explorer where no other extra is installed."""
+    others = ["matplotlib", "plotly", "PIL", "jinja2", "flip_evaluator", "distributed", "pyarrow", "scipy"]
+    code = f"import sys; sys.modules.update(dict.fromkeys({others})); from mi_brdfs.cli import main; main()"
+    return [sys.executable, "-c", code, "explore", *arguments]
+
+
+def serving(*arguments: str, stderr: int | IO = subprocess.DEVNULL) -> tuple[subprocess.Popen, str]:
     """Start the explorer on a free port, and return its process and address."""
-    command = [sys.executable, "-m", "mi_brdfs", "explore", "--no-browser", "--port", "0", *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    command = alone("--no-browser", "--port", "0", *arguments)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
     return process, process.stdout.readline().strip()
 
 

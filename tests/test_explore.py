@@ -2,7 +2,10 @@
 
 import gc
 import json
+import os
 import re
+import shutil
+import subprocess
 
 import drjit as dr
 import mitsuba as mi
@@ -96,6 +99,8 @@ def client(llvm_rgb):
         ({"subjects": [{"bsdf": {"type": "ward"}}], "theta": "steep"}, "theta is a number"),
         ({"subjects": [{"bsdf": {"type": "ward"}}], "stage": "moon"}, "stage = 'moon' is unknown"),
         ({"subjects": [{"bsdf": {"type": "ward"}}], "views": ["xray"]}, "views are picture"),
+        ({"subjects": [{"bsdf": {"type": "ward", "alpha": 10**400}}]}, "alpha must be a number"),
+        ({"subjects": [{"bsdf": {"type": "ward"}}], "stage": {}}, "stage is unknown"),
     ],
 )
 def test_a_state_that_is_none_is_refused_in_a_sentence(state, sentence):
@@ -320,6 +325,12 @@ def test_channels_and_components(client):
     assert max(max(it["y"]) for it in parts) < max(whole)
 
 
+def test_a_request_about_no_subject_is_answered(client):
+    client.show({"type": "lambert"}, views=[])
+    client.session.ask({"type": "chi2", "subject": 1})
+    assert [it["error"] for it in of(client.work(), "chi2", 1)] == ["There is no subject 1."]
+
+
 def test_chi_square_on_request(client):
     client.show({"type": "walter", "alpha": 0.2}, views=[])
     client.session.ask({"type": "chi2", "subject": 0})
@@ -344,6 +355,37 @@ def test_a_measured_file_opens_and_is_fitted(with_file):
     assert progress and progress[-1]["done"] <= progress[-1]["total"]
     assert last["bsdf"]["type"] == "lambert" and "Error" in last["text"]
     assert of(with_file.show(subject, last["bsdf"], views=["polar"]), "polar", 1)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        b"paint (1).bsdf",
+        b'it\'s "gold" & 100%25;.bsdf',
+        b"<b>.bsdf",
+        b"-$5 \\$(x)`.bsdf",
+        b"line\n\t\x1b[1m--.bsdf",
+        "漆é.bsdf".encode(),
+        b"x.xml.bsdf",
+        b"\xff'\xe4.bsdf",
+    ],
+    ids=ascii,
+)
+def test_what_is_copied_names_a_file_of_any_name(llvm_rgb, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(LOFT, name)
+    (source,) = find_sources(os.fsdecode(name))
+    subject = checked({"type": "tabulated", "file": source.word, "interpolation": "nearest"})
+    told = Materials({source.word: source}).written(subject)
+    *words, _ = subprocess.run(["bash", "-c", f"printf '%s\\0' {told['command']}"], capture_output=True).stdout.split(
+        b"\0"
+    )
+    assert words == [b"mi-brdfs", b"show", os.fsencode(tmp_path / source.word), b"-D", b"interpolation=nearest"]
+    if b"\xff" in name:
+        assert "only names in UTF-8" in told["xml"] and "only names in UTF-8" in told["dict"]
+    else:
+        assert isinstance(mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.BSDF)
+        assert isinstance(mi.load_dict(eval(told["dict"])), mi.BSDF)
 
 
 def test_a_fit_is_cancelled(with_file):

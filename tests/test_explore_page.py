@@ -9,12 +9,16 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from latency import Page, edited, serving
+from latency import Page, alone, edited, serving
 from support import ROOT
 
 from mi_brdfs.explorer import explore
@@ -25,11 +29,22 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 
 
 @pytest.fixture(scope="module")
-def address():
-    process, address = serving("ward", "walter", "-D", "alpha=0.2")
-    yield address
+def server(tmp_path_factory):
+    """The address of a server, and the file with what it tells on its terminal."""
+    told = tmp_path_factory.mktemp("server") / "stderr"
+    with told.open("w") as stderr:
+        process, address = serving("ward", "walter", "-D", "alpha=0.2", stderr=stderr)
+    yield address, told
     process.terminate()
     process.wait(20)
+
+
+@pytest.fixture
+def address(server):
+    address, told = server
+    before = len(told.read_text())
+    yield address
+    assert "Traceback" not in told.read_text()[before:], told.read_text()[before:]
 
 
 # --- The server -------------------------------------------------------------------------------------------------------
@@ -71,16 +86,121 @@ def test_the_server_greets_and_answers(address):
             '{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "filename": "/etc/passwd"}}]}}',
             "filename",
         ),
+        ('{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "alpha": 1e39}}]}}', "must be a number"),
+        (f'{{"type": "state", "state": {{"theta": {10**400}}}}}', "This is no message"),
+        ('{"type": "state", "state": {"theta": NaN}}', "This is no message"),
+        ('{"type": "state", "state": {"theta": 1e999}}', "This is no message"),
+        ("[" * 60_000, "This is no message"),
+        (f'{{"type": {"[" * 900}{"]" * 900}}}', "This is no message"),
+        (b'{"type": "cancel"}', "This is no message"),
+        ("x" * 65_537, "A message has 65536 letters at most"),
+        ('{"type": "chi2", "subject": 0}', "Nothing is shown yet"),
+        ('{"type": "chi2", "subject": 9}', "subject is a number from 0 to 3"),
+        ('{"type": "chi2", "subject": true}', "subject is a number from 0 to 3"),
+        ('{"type": "fit", "subject": 0, "model": 3}', "A fit needs a model and a metric"),
+        ('{"type": "save", "what": "everything"}', "What can be saved is exr or page"),
+        ('{"type": "save", "what": "page", "state": []}', "The state of a page is an object"),
     ],
+    ids=lambda it: ascii(it[:60]),
 )
 def test_a_malformed_message_is_answered_in_a_sentence(address, message, sentence):
     async def conversation(page, hello, client):
-        await page.socket.send_str(message)
+        await (page.socket.send_str(message) if isinstance(message, str) else page.socket.send_bytes(message))
         assert sentence in (await page.frame())["text"]
         await page.send({"type": "lambert"}, views=["polar"])
         await page.until("polar")
 
     connected(address, conversation)
+
+
+def test_a_hundred_megabytes_are_answered_in_a_sentence(address):
+    test_a_malformed_message_is_answered_in_a_sentence(address, b"x" * 100_000_000, "A message has 65536 letters")
+
+
+STATE = {
+    "type": "state", "serial": 1,
+    "state": {"subjects": [{"bsdf": {"type": "ward", "alpha": 0.2}, "hidden": False}], "views": ["polar"], "theta": 30},
+}  # fmt: skip
+MESSAGES = [
+    STATE, STATE, STATE, {"type": "chi2", "subject": 0}, {"type": "save", "what": "exr", "subject": 0},
+    {"type": "fit", "subject": 0, "model": "lambert", "metric": "log"},
+]  # fmt: skip
+WRONG = [
+    None, True, -1, 0, 3, 99, 1e38, 1e308, float("nan"), float("-inf"), 10**30, 10**400, "", "x", "\ud800", "a" * 5000,
+    [], {}, [[]], [1, 2], [1e30] * 3, ["xray"], "ward", "tabulated", "given", {"type": "given", "file": "x"},
+    {"type": "dielectric", "eta": 0}, {"type": "roughplastic", "alpha": "x"}, {"type": "diffuse", "reflectance": 5},
+]  # fmt: skip
+
+
+def corrupted(value, rng):
+    """A message with something in it replaced, removed or added."""
+    if isinstance(value, (dict, list)) and value and rng.random() < 0.8:
+        value = value.copy()
+        key = list(value)[rng.integers(len(value))] if isinstance(value, dict) else rng.integers(len(value))
+        if rng.random() < 0.15:
+            del value[key]
+        else:
+            value[key] = corrupted(value[key], rng)
+        return value
+    return WRONG[rng.integers(len(WRONG))]
+
+
+def test_two_hundred_corrupted_messages_leave_the_session_alive(address):
+    rng = np.random.default_rng(5)
+
+    async def conversation(page, hello, client):
+        await page.send({"type": "lambert"}, views=["polar"])
+        for k in range(200):
+            message = json.dumps(corrupted(MESSAGES[rng.integers(len(MESSAGES))], rng))
+            cut = rng.integers(len(message)) if k % 20 == 0 else None
+            await (page.socket.send_bytes(message.encode()) if k % 20 == 1 else page.socket.send_str(message[:cut]))
+        page.serial = 10**6
+        await page.send({"type": "lambert", "reflectance": 0.3}, views=["polar"])
+        told = set()
+        while (frame := await page.frame()).get("serial") != page.serial or frame["name"] != "polar":
+            told |= {frame[it] for it in ("error", "text") if isinstance(frame.get(it), str)}
+        assert len(told) > 10 and all(it.isprintable() and "Traceback" not in it for it in told), told
+
+    connected(address, conversation)
+
+
+@pytest.mark.parametrize(
+    ("path", "options", "status", "sentence"),
+    [
+        ("upload?name=x.bsdf", {"data": b""}, 422, "x.bsdf is empty"),
+        ("upload", {"data": b"\0" * 99}, 422, "unnamed is of no known format"),
+        ("upload?name=%00%ff%zz.%00", {"data": b"\0" * 99}, 422, "is of no known format"),
+        ("upload?name=x", {"data": {"file": "x"}}, 422, "An upload is the bytes of a file"),
+        ("upload?name=x", {"json": {}}, 422, "An upload is the bytes of a file"),
+        ("upload?name=x", {"data": b"x", "headers": {"Content-Type": "multipart/form-data"}}, 422, "An upload is"),
+        ("upload?name=x", {"data": b"x", "headers": {"Content-Encoding": "gzip"}}, 422, "x is of no known format"),
+        (f"client/{'x' * 300}.js", {}, 404, "Not Found"),
+    ],
+)
+def test_a_malformed_request_is_answered_in_a_sentence(address, path, options, status, sentence):
+    from aiohttp import ClientSession
+
+    async def talk():
+        method = "POST" if "upload" in path else "GET"
+        async with ClientSession() as client, client.request(method, address + path, **options) as answer:
+            assert answer.status == status and sentence in await answer.text()
+
+    asyncio.run(talk())
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        b"GET / HTTP/1.1\r\nno header\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + b"x" * 9000 + b"\r\n\r\n",
+        b"POST /upload?name=x HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nno chunk\r\n",
+    ],
+    ids=lambda it: it[:20].decode(),
+)
+def test_what_is_no_request_is_refused(address, request_):
+    with socket.create_connection(("127.0.0.1", int(address.rstrip("/").rpartition(":")[2]))) as connection:
+        connection.sendall(request_)
+        assert connection.recv(1000).startswith(b"HTTP/1.0 400 ")
 
 
 def test_other_pages_of_the_browser_are_refused(address):
@@ -103,21 +223,32 @@ def test_other_pages_of_the_browser_are_refused(address):
 
 
 def uploaded(address, name, payload):
-    from aiohttp import ClientSession, FormData
+    from aiohttp import ClientSession
 
     async def talk():
-        async with ClientSession() as client:
-            form = FormData(quote_fields=False)
-            form.add_field("file", payload, filename=name)
-            async with client.post(f"{address}upload", data=form) as answer:
-                return answer.status, await answer.json()
+        async with (
+            ClientSession() as client,
+            client.post(f"{address}upload", params={"name": name}, data=payload) as answer,
+        ):
+            return answer.status, await answer.json()
 
     return asyncio.run(talk())
 
 
-def test_an_uploaded_file_is_a_subject(address):
-    status, answer = uploaded(address, "../../black.bsdf", LOFT.read_bytes())
-    assert status == 200 and answer["name"] == "black.bsdf"
+@pytest.mark.parametrize(
+    "name",
+    [
+        "paint (1).bsdf",
+        "it's \"gold\"; 100%25 'a'.bsdf",
+        "<b>&amp;$5.bsdf",
+        f"{'é' * 296}.bsdf",
+        f"x.{'b' * 298}",
+        "漆\n\\\u202e\0.xml",
+    ],
+)
+def test_an_uploaded_file_of_any_name_is_a_subject(address, name):
+    status, answer = uploaded(address, f"../../{name}", LOFT.read_bytes())
+    assert status == 200 and answer["name"] == name
 
     async def conversation(page, hello, client):
         await page.send({"type": "tabulated", "file": answer["file"]}, views=["picture", "polar"])
@@ -177,19 +308,34 @@ def test_a_port_in_use_is_said_in_a_sentence():
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_it():
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_leaves_nothing(tmp_path, monkeypatch, sent):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     process, address = serving("lambert")
-    connected(address, lambda page, hello, client: page.send({"type": "lambert"}))
-    process.send_signal(signal.SIGINT)
-    assert process.wait(20) == 130
+    uploaded(address, "x.bsdf", LOFT.read_bytes())
+    assert len(list(tmp_path.glob("*/1.bsdf"))) == 1
+    process.send_signal(sent)
+    assert process.wait(20) == 128 + sent and not list(tmp_path.iterdir())
 
 
-def test_a_notebook_gets_its_page_and_ends_it():
+def frame_ancestors(address):
+    with urlopen(address) as answer:
+        return re.search("frame-ancestors ([^;]*)", answer.headers["Content-Security-Policy"])[1]
+
+
+def test_a_notebook_gets_its_page_and_ends_it(address, tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     page = explore(
         {"type": "ward", "alpha": 0.3, "specular_reflectance": {"type": "rgb", "value": [1, 0, 0]}}, "lambert"
     )
     assert "<iframe" in page._repr_html_() and "alpha" in page.address
     connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
+    assert {"http://localhost:*", "vscode-webview:"} <= set(frame_ancestors(page.address).split())
+    assert frame_ancestors(address) == "'none'"
+    assert list(tmp_path.iterdir())
+    page._process.stdin.close()  # as the notebook's end does
+    page._process.wait(20)
+    assert not list(tmp_path.iterdir())
     page.close()
     with pytest.raises(OSError):
         connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
@@ -255,12 +401,16 @@ def test_random_edits_leave_the_memory_as_it_is():
 # --- Exported pages ---------------------------------------------------------------------------------------------------
 
 
+NAME = "<!--<script> '1' (1) \udcff.bsdf"
+
+
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
-    file = tmp_path_factory.mktemp("exported") / "page.html"
-    command = [sys.executable, "-m", "mi_brdfs", "explore", "ward", "lambert", "--export", str(file)]
-    subprocess.run(command, check=True, timeout=200)
-    return file
+    folder = tmp_path_factory.mktemp("exported")
+    shutil.copy(LOFT, folder / NAME)
+    command = alone("lambert", NAME, "--export", "page.html")
+    subprocess.run(command, check=True, timeout=200, cwd=folder)
+    return folder / "page.html"
 
 
 def test_the_exported_page_needs_no_network_and_is_small(exported):
@@ -397,15 +547,54 @@ def test_two_are_compared(tab, address):
     tab.wait_for_selector(".pictures canvas")
 
 
-def test_a_measured_file_is_loaded_and_copied(tab, address):
+def test_measured_files_of_any_name_are_loaded_and_copied(tab, address):
     opened(tab, address, {"subjects": [{"bsdf": {"type": "lambert"}, "name": "lambert"}], **STILL})
-    tab.locator("#add").click()
-    tab.locator("#file").set_input_files(str(LOFT))
-    tab.wait_for_function("() => document.querySelectorAll('.pictures canvas').length === 2")
-    assert "AnoBlack" in tab.locator("#chips").inner_text()
+    names = ['it\'s "gold" (1).bsdf', f"<b>%25;a;'b\\{'é' * 280}.bsdf"]
+    for count, name in enumerate(names, 2):
+        tab.locator("#add").click()
+        tab.locator("#file").set_input_files({"name": name, "mimeType": "", "buffer": LOFT.read_bytes()})
+        tab.wait_for_function(f"() => document.querySelectorAll('.pictures canvas').length === {count}")
+    assert tab.locator(".chip").all_inner_texts() == ["lambert", *names]
     tab.locator("#share").click()
     tab.locator("#copy-xml").click()
     tab.wait_for_function("async () => (await navigator.clipboard.readText()).includes('<bsdf type=\"tabulated\"')")
+    tab.locator("#copy-link").click()
+    tab.wait_for_function("async () => (await navigator.clipboard.readText()).startsWith('http')")
+    link = tab.evaluate("() => navigator.clipboard.readText()")
+    opened(tab, link)
+    assert tab.locator(".chip").all_inner_texts() == ["lambert", *names]
+    assert tab.locator(".chip .warning").count() == 0 and tab.locator(".pictures canvas").count() == 3
+
+
+@pytest.fixture
+def hosted(tmp_path):
+    """A folder that a server of another origin shows, and its port."""
+    handler = partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as running:
+        threading.Thread(target=running.serve_forever, daemon=True).start()
+        yield tmp_path, running.server_port
+        running.shutdown()
+
+
+def test_only_a_notebook_may_frame_its_page(tab, address, hosted, monkeypatch):
+    folder, port = hosted
+    monkeypatch.chdir(folder)
+    shutil.copy(LOFT, "-x.bsdf")
+    page = explore("-x.bsdf")
+    (folder / "notebook.html").write_text(page._repr_html_())
+    (folder / "other.html").write_text(page._repr_html_().replace(page.address, address))
+    for host, file, shown in (
+        ("localhost", "notebook", True),
+        ("localhost", "other", False),
+        ("other.localhost", "notebook", False),
+    ):
+        tab.goto(f"http://{host}:{port}/{file}.html")
+        tab.wait_for_function("() => frames.length === 1")
+        if shown:
+            tab.frames[1].wait_for_selector(".chip")
+        else:
+            assert tab.frames[1].url == "chrome-error://chromewebdata/"
+    page.close()
 
 
 def test_a_tour_runs(tab, address):
@@ -428,7 +617,8 @@ def test_nothing_is_wider_than_the_screen(tab, address, width, scheme):
     tab.set_viewport_size({"width": width, "height": 844})
     tab.emulate_media(color_scheme=scheme)
     opened(tab, address, {
-        "subjects": [{"bsdf": {"type": "kurt"}, "name": "a rather long name of a material"}],
+        "subjects": [{"bsdf": {"type": it}, "name": "W" * 300} for it in ("kurt", "lambert")],
+        "compare": "wipe",
         "views": ["picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"],
     })  # fmt: skip
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
@@ -445,6 +635,7 @@ def test_the_exported_page_works_from_the_disk(tab, exported):
     tab.goto(exported.as_uri())
     drawn(tab)
     assert tab.locator("#view-polar svg path").count() > 1
+    assert tab.locator(".chip").all_inner_texts() == ["lambert", NAME]
     assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [exported.as_uri()]
     canvas = tab.locator("#view-lobe canvas")
     changes(tab, lambda: canvas.press("ArrowLeft"), "#view-lobe canvas")

@@ -91,6 +91,16 @@ def test_one_process_fits_where_there_is_no_dask(tmp_path):
     assert 'one process fits; pip install "mi_brdfs[cluster]"' in " ".join(done.stderr.split())
 
 
+@pytest.mark.parametrize(
+    ("library", "option", "extra"), [("distributed", "--workers=2", "cluster"), ("PIL", "--render", "gallery")]
+)
+def test_a_missing_extra_is_named(tmp_path, library, option, extra):
+    code = f"import sys; sys.modules['{library}'] = None; from mi_brdfs.cli import main; main()"
+    command = [sys.executable, "-c", code, "sweep", str(LOFT[0]), option, "-o", str(tmp_path / "sweep")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and f"mi_brdfs[{extra}]" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 def test_what_is_finished_is_not_made_again(serial, tmp_path, monkeypatch):
     calls = []

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import _thread
 import os
+import signal
 import sys
 import threading
 import webbrowser
@@ -40,7 +42,7 @@ def explore(
     host: Annotated[str, typer.Option(help="Who may connect: by default only this machine.")] = "127.0.0.1",
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Default: 8490, or any free one.")] = None,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
-    until_eof: Annotated[bool, typer.Option("--until-eof", hidden=True)] = False,
+    notebook: Annotated[bool, typer.Option("--notebook", hidden=True)] = False,
     variant: TracingVariant = None,
 ) -> None:
     """Open a page with sliders, lobes and pictures of BSDFs; Ctrl-C ends it."""
@@ -76,8 +78,8 @@ def explore(
 
     def ready(address: str) -> None:
         out.print(address)
-        if until_eof:  # of the process that started this one
-            threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+        if notebook:
+            threading.Thread(target=_end_with_input, daemon=True).start()
         err.print("Ctrl-C ends the explorer.")
         if browser:
             with stdout_to_stderr():
@@ -85,17 +87,23 @@ def explore(
 
     try:
         with unwrapped_ctrl_c():
-            serve(on, host, chosen, user, sources, state, ready)
+            serve(on, host, chosen, user, sources, state, ready, notebook)
         return
     except KeyboardInterrupt:
         err.print("Ended.")
     raise typer.Exit(Exit.INTERRUPTED)
 
 
+def _end_with_input() -> None:
+    """End this process with the one that started it."""
+    sys.stdin.read()
+    _thread.interrupt_main(signal.SIGTERM)
+
+
 def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], list[dict[str, Any]]]:
     """Return the files among the targets, and the subjects of the page."""
-    from ..explorer.materials import GIVEN, MEASURED, PRESET, Materials, plain
-    from ..explorer.state import SUBJECTS, checked
+    from ..explorer.materials import Materials, plain
+    from ..explorer.state import GIVEN, MEASURED, PRESET, SUBJECTS, checked
     from ..measure.sources import find_sources, is_measured, value_of
     from ..mitsuba.registry import presets
 
@@ -109,7 +117,7 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
             with unwrapped_ctrl_c():
                 if target in known:
                     subject = {**Materials().expanded({"type": PRESET, "name": target}), **values}
-                elif ".xml" in target or target.startswith("<") or (is_measured(target) and Path(target).exists()):
+                elif ".xml" in target or target.startswith("<") or (is_measured(target) and os.path.exists(target)):
                     found = list(find_sources(target, given if not is_measured(target) else {}))
                     if len(found) > 1:
                         words = ", ".join(it.word for it in found)
@@ -122,7 +130,7 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
                 materials = Materials({it.word: it for it in sources})
                 with materials.loaded(materials.expanded(checked(subject))):
                     pass
-                subjects.append({"bsdf": subject, "name": Path(target).name if Path(target).exists() else target})
+                subjects.append({"bsdf": subject, "name": Path(target).name if os.path.exists(target) else target})
         except (ValueError, RuntimeError) as error:
             fail(one_line(error), Exit.USAGE)
     return sources, subjects

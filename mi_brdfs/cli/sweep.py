@@ -58,6 +58,7 @@ def sweep(
         from ..sweep import MEDIANS, ClusterError, FileError, Sweep, csv, medians
 
         if render:
+            from .. import gallery  # noqa: F401 -- it says what pictures need
             from ..sweep.wall import Wall
     except ImportError as error:
         fail(str(error))
@@ -65,6 +66,8 @@ def sweep(
         fail(f"--table {table}: there is no such table; there are {', '.join(TABLES)}", Exit.USAGE)
     if workers and scheduler:
         fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
+    if (workers or scheduler) and find_spec("distributed") is None:
+        fail('workers need the extra "cluster": pip install "mi_brdfs[cluster]"')
     seeds = _numbers(seed)
     chosen = set_tracing_variant(variant)
     if not chosen.endswith("_ad_rgb"):

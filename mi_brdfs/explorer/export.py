@@ -28,7 +28,7 @@ def page(state: State, materials: Materials, scenes: stages.Stages, page_state: 
     """
     state = replace(state, size=min(state.size, SIZE))
     sent = [{"text": frame} if isinstance(frame, str) else _split(frame) for frame in _frames(state, materials, scenes)]
-    data = json.dumps({"state": page_state, "frames": sent}).replace("</", "<\\/")
+    data = json.dumps({"state": page_state, "frames": sent}).replace("<", "\\u003c")
     return _inlined(f'<script type="application/json" id="exported">{data}</script>')
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shlex
 import warnings
 from collections.abc import Iterator, Mapping
@@ -14,22 +16,21 @@ import mitsuba as mi
 from ..measure.probe import BSDFProbe
 from ..measure.sources import BSDFSource
 from ..mitsuba.errors import one_line
+from ..mitsuba.names import check_name
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
 from ..model import EnergyWarning
-from ..parameters.messages import brief, listed, meant
+from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
 from . import controls
 from .controls import Control
-from .state import Bsdf, StateError
+from .state import GIVEN, MEASURED, PRESET, Bsdf, StateError
 
 BUILT_IN = (
     "conductor", "dielectric", "diffuse", "plastic", "principled", "principledthin", "roughconductor",
     "roughdielectric", "roughplastic", "thindielectric",
 )  # fmt: skip
 """Mitsuba's BSDFs that need nothing but numbers and colours."""
-MEASURED, GIVEN, PRESET = "tabulated", "given", "preset"
-"""The types of subjects that are files, materials of the command line, and published materials."""
 
 
 @dataclass
@@ -126,18 +127,18 @@ class Materials:
         values = properties({name: value for name, value in bsdf.items() if name not in ("type", "file")})
         if kind == GIVEN:
             word = self._source(bsdf).word
-            return {"xml": f"<!-- {word} -->", "dict": f"# {word}", "command": shlex.join(["mi-brdfs", "show", word])}
-        named = {"type": kind, **values}
-        word = kind
+            return {**_remark(word), "command": _command(word)}
+        word, named = kind, {"type": kind, **values}
         if kind == MEASURED:
-            named = {**_source_dict(self._source(bsdf)), **values}
-            word = named["filename"]
+            word = self._source(bsdf).path
+            named = {"type": kind, "filename": word, **values}
         options = [text for name, value in values.items() for text in ("-D", f"{name}={_option(value)}")]
-        return {
-            "xml": to_xml(named),
-            "dict": repr(named),
-            "command": shlex.join(["mi-brdfs", "show", word, *options]),
-        }
+        try:
+            check_name(word)
+            told = {"xml": to_xml(named), "dict": repr(named)}
+        except ValueError as error:
+            told = _remark(str(error))
+        return {**told, "command": _command(word, *options)}
 
 
 def kinds() -> list[dict[str, str]]:
@@ -159,6 +160,24 @@ def properties(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: {"type": "rgb", "value": it} if isinstance(it, list) else it for name, it in values.items()}
 
 
+def _remark(text: str) -> dict[str, str]:
+    """Return a comment in place of XML and of a dict."""
+    text = printable(text)
+    return {"xml": f"<!-- {re.sub('-(?=-)', '- ', text)} -->", "dict": f"# {text}"}
+
+
+def _command(*words: str) -> str:
+    return " ".join(map(_quoted, ["mi-brdfs", "show", *words]))
+
+
+def _quoted(word: str) -> str:
+    """Return a word as a shell takes it, with the bytes of what cannot be printed."""
+    if word.isprintable():
+        return shlex.quote(word)
+    escaped = {it: "".join(f"\\x{byte:02x}" for byte in os.fsencode(it)) for it in word}
+    return "$'" + "".join(it if it.isprintable() and it not in "'\\" else escaped[it] for it in word) + "'"
+
+
 def _option(value: Any) -> str:
     """Return a value as -D takes it."""
     if isinstance(value, dict):
@@ -178,10 +197,11 @@ def _built_in(kind: str, values: Bsdf) -> mi.BSDF:
     """Return one of Mitsuba's BSDFs with some values of what ``mitsuba.traverse`` shows: not all are parameters."""
     try:
         return mi.load_dict({"type": kind, **properties(values)})
-    except RuntimeError:
-        if not values:
-            raise
-    return _with_values(mi.load_dict({"type": kind}), values)
+    except RuntimeError as error:
+        try:
+            return _with_values(mi.load_dict({"type": kind}), values)
+        except TypeError:  # a parameter, with a value that is none of its
+            raise error from None
 
 
 def _with_values(bsdf: mi.BSDF, values: Bsdf) -> mi.BSDF:

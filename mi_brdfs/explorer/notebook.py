@@ -47,7 +47,7 @@ def explore(*subjects: str | dict[str, Any]) -> Page:
         RuntimeError: if it cannot start, with what it said.
     """
     words = [it for it in subjects if isinstance(it, str) and is_measured(it) and it not in presets()]
-    command = [sys.executable, "-m", "mi_brdfs", "explore", *words, "--port", "0", "--no-browser", "--until-eof"]
+    command = [sys.executable, "-m", "mi_brdfs", "explore", "--port", "0", "--no-browser", "--notebook", "--", *words]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

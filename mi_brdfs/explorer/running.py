@@ -1,10 +1,13 @@
-"""The server's life: from a free port to Ctrl-C."""
+"""The server's life: from a free port to Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
 import asyncio
 import errno
+import logging
+import signal
 import socket
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +15,7 @@ from aiohttp import web
 
 from ..measure.sources import BSDFSource
 from .engine import Engine
-from .server import LOCAL, Explorer
+from .server import LOCAL, MALFORMED, Explorer
 from .stages import UserScene
 
 PORT = 8490
@@ -45,6 +48,13 @@ def listening(host: str, port: int | None) -> socket.socket:
     raise PortError(f"{host} port {port}: {problem.strerror or problem}")
 
 
+def _logger() -> logging.Logger:
+    """Return what tells of the server's own failures, not of malformed requests, which have their answer."""
+    logger = logging.getLogger(__name__)
+    logger.addFilter(lambda record: not (record.exc_info and isinstance(record.exc_info[1], MALFORMED)))
+    return logger
+
+
 def serve(
     on: socket.socket,
     host: str,
@@ -53,14 +63,16 @@ def serve(
     sources: list[BSDFSource],
     initial: dict[str, Any],
     ready: Callable[[str], None],
+    notebook: bool,
 ) -> None:
-    """Serve pages until Ctrl-C; ``ready`` is called with their address."""
+    """Serve pages, to a notebook if that asks for them, until Ctrl-C; ``ready`` is called with their address."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     engine = Engine(variant, user)
     port = on.getsockname()[1]
-    explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])))
+    explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])), notebook)
 
     async def run() -> None:
-        runner = web.AppRunner(explorer.application(), access_log=None, handle_signals=False)
+        runner = web.AppRunner(explorer.application(), access_log=None, logger=_logger(), auto_decompress=False)
         await runner.setup()
         await web.SockSite(runner, on, shutdown_timeout=1).start()
         ready(f"http://{f'[{host}]' if ':' in host else host}:{port}/")

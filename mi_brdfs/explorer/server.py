@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
+import re
 import tempfile
 from collections import ChainMap
 from importlib.resources import files
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 from aiohttp import WSMsgType, web
+from aiohttp.http_exceptions import HttpProcessingError
 
 from .. import __version__
 from ..measure.sources import BSDFSource, is_measured
@@ -21,15 +23,27 @@ from ..parameters.messages import brief, printable
 from .engine import Engine
 from .materials import Materials, kinds
 from .session import Session
-from .state import SUBJECTS, StateError, parse
+from .state import SUBJECTS, StateError, checked_request, decoded, parse
 from .tours import tours
 from .views import Frame, text
 
-LARGEST_UPLOAD, LARGEST_MESSAGE = 64 << 20, 1 << 16
+LARGEST_UPLOAD = 64 << 20
+LARGEST_FRAME = 128 << 20
+"""The bytes of a message, too long or not, that are waited for: more end the connection."""
 UPLOADS = 16
 """The most files that a session may hold."""
 CLIENT = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
-POLICY = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'"
+POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
+    "frame-ancestors "
+)
+NOTEBOOKS = (
+    "http://localhost:* https://localhost:* http://127.0.0.1:* https://127.0.0.1:* vscode-file: vscode-webview: "
+    "https://colab.research.google.com https://*.googleusercontent.com"
+)
+"""Who may frame the page that a notebook asks for: Jupyter, VS Code and Colab, with a kernel on this machine."""
+MALFORMED = HttpProcessingError, web.RequestPayloadError
+"""What aiohttp says of requests that are none."""
 LOCAL = "127.0.0.1", "localhost", "[::1]"
 ANY = {"0.0.0.0", "::"}
 """The addresses of all networks, which a machine has other names in."""
@@ -38,14 +52,18 @@ ANY = {"0.0.0.0", "::"}
 class Explorer:
     """What all pages of a server share."""
 
-    def __init__(self, engine: Engine, sources: list[BSDFSource], initial: dict[str, Any], hosts: list[str]) -> None:
+    def __init__(
+        self, engine: Engine, sources: list[BSDFSource], initial: dict[str, Any], hosts: list[str], notebook: bool
+    ) -> None:
         self.engine, self.initial, self.hosts = engine, initial, hosts
+        self.policy = POLICY + (NOTEBOOKS if notebook else "'none'")
         self.named = {it.word: it for it in sources}
         self.folder = tempfile.TemporaryDirectory(prefix="mi-brdfs-explore-")
         self.uploads: dict[str, BSDFSource] = {}
+        self.numbers = count(1)
 
     def application(self) -> web.Application:
-        app = web.Application(client_max_size=LARGEST_UPLOAD + (1 << 16), middlewares=[self._guard])
+        app = web.Application(client_max_size=LARGEST_UPLOAD, middlewares=[self._guard])
         app.router.add_get("/", self._index)
         app.router.add_get("/client/{name}", self._client)
         app.router.add_get("/socket", self._socket)
@@ -61,7 +79,7 @@ class Explorer:
             raise web.HTTPForbidden(text="This server answers only its own page.")
         response = await handler(request)
         if not response.prepared:
-            response.headers["Content-Security-Policy"] = POLICY
+            response.headers["Content-Security-Policy"] = self.policy
             response.headers["Cache-Control"] = "no-store"
         return response
 
@@ -75,38 +93,40 @@ class Explorer:
     async def _client(self, request: web.Request) -> web.Response:
         name = request.match_info["name"]
         kind = CLIENT.get(name.rpartition(".")[2])
-        if kind is None or not (files(__package__) / "client" / name).is_file():
+        if kind is None or name not in {it.name for it in (files(__package__) / "client").iterdir()}:
             raise web.HTTPNotFound
         return web.Response(text=_read(name), content_type=kind)
 
     async def _upload(self, request: web.Request) -> web.Response:
-        """Keep a measured file that can be read."""
+        """Keep a measured file that can be read: its bytes are the body, its name is in the address."""
+        name = Path(request.query.get("name", "")).name or "unnamed"
+        ending = re.search(r"\.(?!xml$)[a-z]{1,9}$", name, re.IGNORECASE)
         try:
+            if request.content_type != "application/octet-stream":
+                raise FileError("An upload is the bytes of a file, sent as application/octet-stream.")
             if len(self.uploads) >= UPLOADS:
                 raise FileError(f"There are {UPLOADS} uploaded files already; start the explorer anew.")
-            form = await request.post()
-            field = form.get("file")
-            if not isinstance(field, web.FileField):
-                raise FileError("Nothing was uploaded.")
-            name = Path(field.filename.replace("\\", "/")).name
-            key = f"upload-{len(self.uploads) + 1}/{name}"
-            path = Path(self.folder.name) / f"{len(self.uploads) + 1}{''.join(Path(name).suffixes[-2:])}"
-            path.write_bytes(field.file.read())
+            payload, number = await request.read(), next(self.numbers)
+            path = Path(self.folder.name) / f"{number}{ending[0] if ending else ''}"
+            path.write_bytes(payload)
             try:
                 await asyncio.wrap_future(self.engine.call(lambda: read(path)))
             except ValueError as error:
                 path.unlink()
                 raise FileError(str(error).replace(str(path), name)) from None
+        except MALFORMED:
+            return _refusal(400, "This upload is malformed.")
         except web.HTTPRequestEntityTooLarge:
             return _refusal(413, f"A file may have {LARGEST_UPLOAD >> 20} MiB at most.")
         except (FileError, OSError) as error:
             told = printable(str(error)) if isinstance(error, FileError) else f"It cannot be kept: {error.strerror}."
             return _refusal(422, told)
+        key = f"upload-{number}/{brief(name)}"
         self.uploads[key] = BSDFSource(name, key, str(path))
         return web.json_response({"file": key, "name": name})
 
     async def _socket(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(max_msg_size=LARGEST_MESSAGE, heartbeat=20, compress=False)
+        socket = web.WebSocketResponse(max_msg_size=LARGEST_FRAME, heartbeat=20, compress=False)
         await socket.prepare(request)
         loop, outbox = asyncio.get_running_loop(), asyncio.Queue[Frame]()
 
@@ -120,7 +140,7 @@ class Explorer:
         await outbox.put(self._hello())
         try:
             async for message in socket:
-                if message.type == WSMsgType.TEXT:
+                if message.type in (WSMsgType.TEXT, WSMsgType.BINARY):
                     self._take(session, message.data)
         finally:
             session.close()
@@ -128,22 +148,17 @@ class Explorer:
             self.engine.wake()
         return socket
 
-    def _take(self, session: Session, data: str) -> None:
+    def _take(self, session: Session, data: str | bytes) -> None:
         """Hand a message to the session; what is wrong with it is its answer."""
         try:
-            message = json.loads(data)
-            kind = message["type"]
-            if kind == "state":
-                state = parse(message["state"], self.engine.stages.names, self.engine.stages.shapes)
-                session.show(state, int(message.get("serial", 0)))
-            elif kind in ("chi2", "fit", "cancel", "save"):
-                session.ask(message)
+            message = decoded(data)
+            if message["type"] == "state":
+                state = parse(message.get("state"), self.engine.stages.names, self.engine.stages.shapes)
+                session.show(state, message.get("serial", 0))
             else:
-                raise StateError(f"There is no message {brief(str(kind))!r}.")
+                session.ask(checked_request(message))
         except StateError as error:
             session.send(text(type="error", text=str(error)))
-        except (ValueError, KeyError, TypeError):
-            session.send(text(type="error", text="This is no message of the explorer."))
         self.engine.wake()
 
     def _hello(self) -> str:

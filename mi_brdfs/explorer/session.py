@@ -9,15 +9,15 @@ from __future__ import annotations
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..mitsuba.errors import one_line
 from . import stages
 from .export import page
-from .materials import MEASURED, Materials, plain
-from .state import Bsdf, State, StateError, key_of
+from .materials import Materials, plain
+from .state import MEASURED, Bsdf, State, StateError, key_of
 from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
 
 PAUSE = 0.15
@@ -50,7 +50,7 @@ class Session:
         self._lock = threading.Lock()
         self._latest: tuple[State, int] | None = None
         self._edited = 0.0
-        self._requests: list[dict[str, Any]] = []
+        self._requests: list[Mapping[str, Any]] = []
         self._cancelled = False
         self._told: dict[int, str] = {}
         self._broken: set[str] = set()
@@ -65,11 +65,17 @@ class Session:
         with self._lock:
             self._latest, self._edited = (state, serial), time.perf_counter()
 
-    def ask(self, request: dict[str, Any]) -> None:
-        """Take a request of another kind, or cancel the one at work."""
+    def ask(self, request: Mapping[str, Any]) -> None:
+        """Take a request, or cancel the one at work.
+
+        Raises:
+            StateError: if the page has not said what it shows.
+        """
         with self._lock:
             if request["type"] == "cancel":
                 self._cancelled = True
+            elif self._latest is None:
+                raise StateError("Nothing is shown yet.")
             else:
                 self._requests.append(request)
 
@@ -197,18 +203,18 @@ class Session:
 
     # --- Requests -----------------------------------------------------------------------------------------------------
 
-    def _answer(self, request: dict[str, Any], state: State) -> None:
+    def _answer(self, request: Mapping[str, Any], state: State) -> None:
         kind, k = request["type"], request.get("subject", 0)
-        if not isinstance(k, int) or not 0 <= k < len(state.subjects):
-            return
         try:
+            if k >= len(state.subjects):
+                raise StateError(f"There is no subject {k}.")
             if kind == "chi2":
                 self._test(k, state)
             elif kind == "fit":
                 self._fit(k, request, state)
-            elif kind == "save" and request.get("what") == "exr":
+            elif request["what"] == "exr":
                 self._save_exr(k, state)
-            elif kind == "save" and request.get("what") == "page":
+            else:
                 self._save_page(state, request)
         except Cancelled:
             self.send(text(type="fit", subject=k, error="Cancelled."))
@@ -224,7 +230,7 @@ class Session:
         told = " ".join(dict.fromkeys(f"{it.subject}: {it.sentence}" for it in report.findings))
         self.send(text(type="chi2", subject=k, passed=report.passed, text=told))
 
-    def _fit(self, k: int, request: dict[str, Any], state: State) -> None:
+    def _fit(self, k: int, request: Mapping[str, Any], state: State) -> None:
         from ..fit import fit
 
         bsdf = state.subjects[k]
@@ -239,8 +245,7 @@ class Session:
                 raise Cancelled
             self.send(text(type="fit", subject=k, done=done, total=total, bsdf=None))
 
-        best = fit(source.source, str(request.get("model")), metric=str(request.get("metric")), starts=4,
-                   progress=progress)[0]  # fmt: skip
+        best = fit(source.source, request["model"], metric=request["metric"], starts=4, progress=progress)[0]
         told = f"Error {best.held_out:.3g} on directions that were not fitted. " + " ".join(best.remarks())
         self.send(text(type="fit", subject=k, done=1, total=1, bsdf=plain(best.bsdf), text=told.strip()))
 
@@ -253,6 +258,6 @@ class Session:
             payload = file.read_bytes()
         self.send(packed(payload, type="file", name=f"{state.subjects[k]['type']}.exr", mime="image/x-exr"))
 
-    def _save_page(self, state: State, request: dict[str, Any]) -> None:
+    def _save_page(self, state: State, request: Mapping[str, Any]) -> None:
         payload = page(state, self.materials, self.scenes, request.get("state") or {}).encode()
         self.send(packed(payload, type="file", name="explorer.html", mime="text/html"))

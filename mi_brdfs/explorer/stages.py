@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..mitsuba.names import check_name, linked
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
 from ..render import pass_source, tonemap
@@ -102,7 +103,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
     own = setting.stage == ENVIRONMENT
     scene = preview_scene(mi.load_dict({"type": "diffuse"}), "studio" if own else setting.stage)
     if own:
-        scene["studio"] |= {"filename": str(user.environment)}
+        scene["studio"] |= {"filename": linked(str(user.environment))}
         del scene["studio"]["bitmap"]
     scene["sensor"]["film"] |= {"width": setting.size, "height": setting.size, "rfilter": {"type": "box"}}
     if setting.shape == "sphere":
@@ -117,6 +118,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
+    check_name(str(user.scene))
     scene = mi.load_file(str(user.scene))
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")

@@ -1,4 +1,5 @@
-"""The state of a page: what it shows. It comes from a browser, as data, and is checked before anything is done."""
+"""What a page sends: its state, which is what it shows, and requests. It comes from a browser, as data, and is checked
+before anything is done."""
 
 from __future__ import annotations
 
@@ -21,6 +22,13 @@ STEEPEST = 89.0
 VIEWS = "picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"
 CHANNELS = "luminance", "rgb", "red", "green", "blue"
 SHAPES = "body", "sphere", "scene"
+MEASURED, GIVEN, PRESET = "tabulated", "given", "preset"
+"""The types of subjects that are files, materials of the command line, and published materials."""
+REQUESTS, SAVED = ("chi2", "fit", "cancel", "save"), ("exr", "page")
+LONGEST = 1 << 16
+"""The most letters of a message."""
+LARGEST = 3.4e38
+"""The largest number of float32, about."""
 NAME, WORD = re.compile(r"[A-Za-z]\w{0,63}(\.\w{1,64}){0,3}"), re.compile(r"[\w .+/-]{0,100}")
 
 Bsdf = dict[str, Any]
@@ -56,6 +64,44 @@ class State:
         return [(self.channel, dict(colours).get(self.channel))]
 
 
+def decoded(data: str | bytes) -> dict[str, Any]:
+    """Return a message: an object with a type, and with no numbers but finite ones.
+
+    Raises:
+        StateError: if it is none.
+    """
+    if len(data) > LONGEST:
+        raise StateError(f"A message has {LONGEST} letters at most.")
+    try:
+        found = json.loads(data, parse_int=_integer, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError):
+        found = None
+    is_message = isinstance(data, str) and isinstance(found, dict) and isinstance(found.get("type"), str)
+    if not is_message or not _is_number(found.get("serial", 0)):
+        raise StateError("This is no message of the explorer.")
+    return found
+
+
+def checked_request(message: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a message that asks for something.
+
+    Raises:
+        StateError: if nothing can be asked for like this.
+    """
+    kind, subject = message["type"], message.get("subject", 0)
+    if kind not in REQUESTS:
+        raise StateError(f"There is no message {brief(kind)!r}.")
+    if type(subject) is not int or not 0 <= subject < SUBJECTS:
+        raise StateError(f"subject is a number from 0 to {SUBJECTS - 1}.")
+    if kind == "fit" and not (isinstance(message.get("model"), str) and isinstance(message.get("metric"), str)):
+        raise StateError("A fit needs a model and a metric, which are words.")
+    if kind == "save" and message.get("what") not in SAVED:
+        raise StateError(f"What can be saved is {listed(SAVED)}.")
+    if kind == "save" and not isinstance(message.get("state", {}), Mapping):
+        raise StateError("The state of a page is an object.")
+    return message
+
+
 def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> State:
     """Return the state that a page sent, with the defaults for what it does not say.
 
@@ -70,7 +116,7 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
     if not all(isinstance(it, Mapping) for it in subjects):
         raise StateError("A subject is an object with a bsdf.")
     views = data.get("views", State.views)
-    if not isinstance(views, (list, tuple)) or not set(map(str, views)) <= set(VIEWS):
+    if not isinstance(views, (list, tuple)) or any(it not in VIEWS for it in views):
         raise StateError(f"views are {listed(VIEWS)}.")
     component = data.get("component")
     return State(
@@ -101,7 +147,8 @@ def checked(bsdf: Any) -> Bsdf:
     for name, value in bsdf.items():
         if not isinstance(name, str) or not NAME.fullmatch(name) or name == "filename":
             raise StateError(f"{brief(str(name))} cannot be a parameter here.")
-        if not _is_plain(value):
+        is_file = name == "file" and bsdf["type"] in (MEASURED, GIVEN) and isinstance(value, str)
+        if not is_file and not _is_plain(value):
             raise StateError(f"{name} must be a number, a word, true, false or a colour [r, g, b].")
     return dict(bsdf)
 
@@ -118,7 +165,18 @@ def _is_plain(value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def _integer(text: str) -> float:
+    return int(text) if len(text) < 16 else _finite(text)
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(text)
+    return number
 
 
 def _number(data: Mapping[str, Any], name: str, low: float, high: float) -> float:
@@ -130,6 +188,7 @@ def _number(data: Mapping[str, Any], name: str, low: float, high: float) -> floa
 
 def _word(data: Mapping[str, Any], name: str, words: Sequence[str]) -> str:
     value = data.get(name, getattr(State, name))
-    if value not in words:
-        raise StateError(f"{name} = {brief(str(value))!r} is unknown; it is {listed(words)}.")
-    return str(value)
+    if not isinstance(value, str) or value not in words:
+        told = f"{name} = {brief(value)!r}" if isinstance(value, str) else name
+        raise StateError(f"{told} is unknown; it is {listed(words)}.")
+    return value

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ..measure import lobes
 from ..measure.arrays import luminance
 from ..measure.directions import direction
 from ..measure.probe import BSDFProbe, Part
 from ..measure.variates import lattice, sampling_efficiency
 from ..measured.coordinates import HalfDifference
-from ..plot import lobes
 from .state import State
 
 Frame = str | bytes
@@ -116,7 +116,7 @@ def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     wi, points = direction(state.theta, state.phi), lattice(8, 3)
     samples = probe.sample(probe.whole, wi, points)
     weight = luminance(samples.weight)
-    mean = weight.mean()
+    mean, efficiency = weight.mean(), sampling_efficiency(weight)
     counts, edges = np.histogram(np.minimum(weight / (mean or 1), HEAVIEST), BINS, (0, HEAVIEST))
     angles = np.array([direction(theta, state.phi) for theta in ANGLES])
     eta = sampling_efficiency(luminance(probe.weights(probe.whole, angles, lattice(7, 5))))
@@ -124,7 +124,7 @@ def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
         "eta": {"x": np.array(ANGLES, float), "y": eta},
         "histogram": {"edges": edges, "count": counts.tolist()},
         "dots": [[round(float(it), 4) for it in w] for w in samples.wo[samples.lit][:DOTS]],
-        "efficiency": float(sampling_efficiency(weight)),
+        "efficiency": float(efficiency) if np.isfinite(efficiency) else None,
     }
 
 

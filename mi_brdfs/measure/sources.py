@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -32,18 +33,22 @@ class BSDFSource(NamedTuple):
     parameters: Mapping[str, str] = {}
     """Those of the plugin, or of the XML, with their values as text."""
 
+    @property
+    def path(self) -> str:
+        """The path of a measured file, or a name that the plugin looks for elsewhere."""
+        return os.path.realpath(self.source) if os.path.exists(self.source) else self.source
+
     def load(self) -> dict[str, Any] | mi.BSDF:
         """Return the dict of a plugin that is given by its type, and else the BSDF, loaded in the active variant."""
+        values = {name: value_of(text) for name, text in self.parameters.items()}
+        if is_measured(self.source):
+            return tabulated(self.path) | values
         if self.source.endswith(".xml"):
             check_name(self.source)
             loaded = mi.load_file(self.source, **self.parameters)
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
             return mi.load_string(_versioned(self.source), **self.parameters)
-        values = {name: value_of(text) for name, text in self.parameters.items()}
-        if is_measured(self.source):
-            path = Path(self.source)  # or a name that the plugin looks for elsewhere
-            return tabulated(str(path.resolve() if path.exists() else path)) | values
         return {"type": self.source} | values
 
 
@@ -58,11 +63,12 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
         Exception: what Mitsuba raises where it cannot be loaded.
     """
     parameters = parameters or {}
-    is_text = word.startswith("<")
-    file, _, wanted = ("", "", "") if is_text else word.partition(".xml:")
-    path = Path(f"{file}.xml" if wanted else word)
-    is_file = path.suffix == ".xml" and not is_text
     is_data = is_measured(word)
+    file, _, wanted = ("", "", "") if is_data else word.partition(".xml:")
+    path = Path(f"{file}.xml" if wanted else word)
+    is_text = word.startswith("<") and not is_data and not os.path.isfile(path)
+    is_file = path.suffix == ".xml" and not is_text
+    wanted = wanted if is_file else ""
     if is_file and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
@@ -90,7 +96,9 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
 def is_measured(word: str) -> bool:
     """Return whether a word is the path of a measured file: no XML, and not the type of a plugin."""
     path = Path(word)
-    return not word.startswith("<") and ".xml" not in word and (bool(path.suffix) or path.name != word)
+    if word.startswith("<") or ".xml" in word:  # XML, unless it is the name of another file
+        return os.path.isfile(word) and path.suffix != ".xml"
+    return bool(path.suffix) or path.name != word
 
 
 def name_of(bsdf: mi.BSDF) -> str:

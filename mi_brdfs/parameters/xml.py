@@ -19,7 +19,7 @@ def _element(name: str, value: Any) -> str:
     elif isinstance(value, bool):
         kind, text = "boolean", str(value).lower()
     elif isinstance(value, str):
-        kind, text = "string", value
+        kind, text = "string", value.replace("$", "\\$")  # what follows a bare one is the name of a parameter
     else:
         kind, text = "float", f"{value:.7g}"
     return f"<{kind} name={quoteattr(name)} value={quoteattr(text)}/>"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..measure.arrays import luminance
+from ..measure.lobes import Curve, refined
 from ..measured import Measurement, Samples
 from ..measured.arrays import components, stacked
 from ..measured.coordinates import polar_angle, spherical
@@ -15,7 +16,6 @@ from ..measured.measurement import usable
 from ..measured.observer import to_srgb
 from ..measured.summary import azimuths, ends, table
 from ..parameters.messages import printable
-from .lobes import Curve, refined
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""

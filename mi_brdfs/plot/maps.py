@@ -15,9 +15,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from . import lobes
+from ..measure import lobes
+from ..measure.lobes import largest
 from .given import channels_of, check_angles, constants, named, quantity, with_smooth_part
-from .lobes import largest
 from .style import (
     CHANNELS,
     FAINT,

@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from ..measure.lobes import largest
 from ..measured import Measurement, read
 from ..measured.albedo import albedos
 from ..measured.arrays import stacked
 from ..measured.coordinates import HalfDifference
 from .lit import LitTable
-from .lobes import largest
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
 from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from . import lobes
+from ..measure import lobes
+from ..measure.lobes import Curve, decades, largest
 from .given import channels_of, check_angles, constants, named, quantity, scales_of, with_smooth_part
-from .lobes import Curve, decades, largest
 from .style import (
     CHANNELS,
     FAINT,

@@ -15,7 +15,7 @@ from PIL import Image
 from ..cluster import Failed, run
 from ..gallery import shot
 from ..gallery.sheet import Row, sheet
-from ..mitsuba.names import check_name
+from ..mitsuba.names import tabulated
 from ..parameters.messages import printable
 from ..render import write
 from .plan import Outcome, Sweep, check_content, digest, versions
@@ -142,9 +142,8 @@ def _fit(model: str, row: dict[str, Any], least: float) -> Cell:
 
 def picture(bsdf: dict[str, Any], content: str | None) -> np.ndarray:
     """Return a material as 8-bit sRGB; a worker's task. If it is a file, this has to have a content."""
-    if content:
-        check_name(bsdf["filename"])
-    found = np.array(shot(bsdf, size=SIZE, spp=SPP).picture)
+    shown = bsdf | tabulated(bsdf["filename"]) if content else bsdf
+    found = np.array(shot(shown, size=SIZE, spp=SPP).picture)
     if content:
         check_content(bsdf["filename"], content)
     return found

@@ -179,7 +179,7 @@ export function clean(given) {
 /** Return the state without what is the page's own. */
 export function stateForServer() {
   const sent = Object.fromEntries(Object.entries(session.state).filter(([name]) => !OWN.includes(name)));
-  return { ...sent, subjects: sent.subjects.map(({ bsdf, name, hidden }) => ({ bsdf, name, hidden })) };
+  return { ...sent, subjects: sent.subjects.map(({ bsdf, hidden }) => ({ bsdf, hidden })) };
 }
 
 // --- The address ----------------------------------------------------------------------------------------------------

@@ -189,9 +189,11 @@ async function uploadAll(files) {
       return emit("error", "There is room for four subjects: remove one first.");
     emit("busy", { text: `Uploading ${file.name} …` });
     try {
-      const form = new FormData();
-      form.append("file", file);
-      const response = await fetch("upload", { method: "POST", body: form });
+      const response = await fetch(`upload?${new URLSearchParams({ name: file.name })}`, {
+        method: "POST",
+        headers: { "Content-Type": "application/octet-stream" },
+        body: file,
+      });
       const answer = await response
         .json()
         .catch(() => ({ error: `The server refused ${file.name} (${response.status}).` }));

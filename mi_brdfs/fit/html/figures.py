@@ -16,11 +16,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from ...measure.directions import direction
+from ...measure.lobes import GRAZING, Curve, in_plane, value
 from ...measure.probe import BSDFProbe
 from ...measured.measurement import Measurement
 from ...measured.summary import azimuths
 from ...plot.lit import LitTable
-from ...plot.lobes import GRAZING, Curve, in_plane, value
 from ...plot.planar import THIN
 from ...plot.style import FAINT, GRID, INK, STYLES, calm
 from ..metrics import METRICS

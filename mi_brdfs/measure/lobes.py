@@ -14,10 +14,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..measure.arrays import Array, context, luminance
-from ..measure.directions import direction, from_plane, on_side, to_plane
-from ..measure.probe import BSDFProbe, Part
-from ..measure.variates import lattice, random
+from .arrays import Array, context, luminance
+from .directions import direction, from_plane, on_side, to_plane
+from .probe import BSDFProbe, Part
+from .variates import lattice, random
 
 GRAZING = 89.99
 """The last angle drawn above the horizon."""
