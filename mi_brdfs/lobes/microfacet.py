@@ -30,7 +30,7 @@ class MicrofacetLobe(Lobe):
     the typical facet."""
     NEARER = 0.25
     """How much nearer to the normal than the mirror's cosine facets are visible at grazing angles,"""
-    NEARER_LONG_TAILED = 0.43
+    NEARER_LONG_TAILED = 0.4
     """for a long tail under an energy-conserving shadowing term,"""
     NEARER_UPRIGHT = 0.08
     """and for a shadowing term that does not lean."""

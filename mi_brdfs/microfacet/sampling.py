@@ -34,7 +34,7 @@ MOST = 0.9
 """The largest τ, and share of the lines that lean: the rest bounds weights."""
 OUTWARD = -0.75
 """τ of lines that lean."""
-LEANING = 1.5
+LEANING = 1.25
 """How far those facets lean that count, in typical slopes."""
 
 
