@@ -19,7 +19,6 @@ from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
 from mi_brdfs.microfacet.fresnel import Unit
 from mi_brdfs.microfacet.shadowing import Kelemen, Shadowing, SmithGGX
-from mi_brdfs.microfacet.visible import BoundedVisibleNormals
 from mi_brdfs.mitsuba import bsdf as adapter
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.models.phong import Phong
@@ -311,12 +310,11 @@ def phong(lobe):
     return Mutant
 
 
-def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None, sampler=BoundedVisibleNormals):
+def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None):
     class Mutant(Walter):
         def lobes(self, p):
             smith = shadowing or SmithGGX(*p.alpha, correlated=False)
             specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, p.fresnel)
-            specular.sampler = sampler()
             return over_diffuse(p.diffuse_reflectance, specular)
 
     return Mutant
@@ -491,8 +489,8 @@ class SumOfDensities(adapter.ModelBSDF):
     """The mixture's density leaves out the lobes' probabilities."""
 
     @staticmethod
-    def _eval_pdf(valid, mixture, frame, wo, handed=None):
-        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo, handed)
+    def _eval_pdf(valid, mixture, frame, wo):
+        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
         return value, pdf * len(mixture.lobes)
 
 
@@ -615,8 +613,8 @@ class OtherSharesDrawn(adapter.ModelBSDF):
         valid, mixture, components, frame = evaluated
         alike = Mixture(mixture.lobes, mixture.wi)
         alike.probabilities = [mi.Float(1 / len(mixture.lobes)) for _ in mixture.lobes]
-        wo, index, _ = alike.sample(sample1, sample2)
-        mixture.sample = lambda u, v: (wo, index, {})
+        drawn = alike.sample(sample1, sample2)
+        mixture.sample = lambda u, v: drawn
         return self._sample(valid, mixture, components, frame, sample1, sample2)
 
 
@@ -624,8 +622,8 @@ class ShareForgottenInOne(adapter.ModelBSDF):
     """The probability of the second lobe is left out of the density."""
 
     @staticmethod
-    def _eval_pdf(valid, mixture, frame, wo, handed=None):
-        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo, handed)
+    def _eval_pdf(valid, mixture, frame, wo):
+        value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
         if len(mixture.lobes) < 2:
             return value, pdf
         second = mixture.lobes[1].eval_pdf(mixture.wi, frame.to_local(wo))[1] * (1 - mixture.probabilities[1])

@@ -13,7 +13,7 @@ from mi_brdfs.math import luminance
 from mi_brdfs.measure.variates import lattice, sampling_efficiency
 
 SETTINGS = 48
-LARGEST_WEIGHT = 20
+LARGEST_WEIGHT = 30
 """Of a sample, over the mean."""
 LEAST_ETA = 0.15
 """η = E[w]²/E[w²] of any setting …"""

@@ -10,6 +10,12 @@ from catalogue import OTHER_VARIANTS, ROWS, mostly_slow
 from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 from support import call, direction, hemisphere, interaction, is_scalar
 
+from mi_brdfs.lobes import MicrofacetLobe
+from mi_brdfs.microfacet.distributions import GGX, Beckmann
+from mi_brdfs.microfacet.fresnel import Unit
+from mi_brdfs.microfacet.sampling import UniformDirections
+from mi_brdfs.microfacet.shadowing import SmithGGX, VCavity
+from mi_brdfs.microfacet.visible import VisibleNormals
 from mi_brdfs.validation import check
 
 EXACT = "finite", "horizon", "support", "eval_pdf", "reciprocity", "weight", "components", "flags", "active", "mode"
@@ -140,3 +146,24 @@ def test_density_integrates_to_one_at_most(row):
             wo, solid_angle = mirror_grid((0, 0), *grid, power=1) if row.transmits else mirror_grid(angles, *grid)
             pdf = call(bsdf.pdf, context, direction(*angles), wo)[0]
             assert 0.2 < (pdf[:, 0] * solid_angle).sum() < 1 + 1e-3
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_terms_bring_their_samplers():
+    """A shadowing term the whole sampler, and a distribution its visible normals."""
+
+    class Anywhere(VCavity):
+        def sampler(self, distribution, fresnel, wi, reflect):
+            return UniformDirections()
+
+    class Seen(Beckmann):
+        def visible_normals(self, wi):
+            return VisibleNormals(GGX(self.alpha_u, self.alpha_v), wi)
+
+    alpha = mi.Float(0.3), mi.Float(0.6)
+    wi, wo = (mi.Vector3f(hemisphere(1000, seed).T) for seed in (1, 2))
+    uniform = MicrofacetLobe(1, Beckmann(*alpha), Anywhere(), Unit())
+    np.testing.assert_allclose(uniform.eval_pdf(wi, wo)[1], 1 / (2 * np.pi), rtol=1e-6)
+    smith = SmithGGX(*alpha, correlated=False)
+    brought, own = (MicrofacetLobe(1, d(*alpha), smith, Unit()).eval_pdf(wi, wo)[1] for d in (Seen, GGX))
+    np.testing.assert_allclose(brought, own, rtol=1e-5)

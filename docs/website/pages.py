@@ -37,6 +37,7 @@ FILES = {
     "docs/folklore.md": "folklore",
     "docs/bench.md": "bench",
     "docs/extending.md": "extending",
+    "docs/sampling.md": "sampling",
     "scenes/README.md": "scenes",
     "scenes/shading": "shading",
     "scenes/shading/README.md": "shading",
@@ -119,7 +120,7 @@ def _contents() -> Iterator[str]:
         "Gallery": ["gallery", "scenes", "shading"],
         "Notebooks": ["notebooks/index"],
         "Reference": ["reference/index", "folklore"],
-        "More": ["extending", "bench", "development"],
+        "More": ["extending", "sampling", "bench", "development"],
     }.items():
         yield CONTENTS.format(caption=caption, pages="\n".join(pages))
 

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, select
+from ..math import EPSILON
 
 
 class Lobe:
@@ -32,9 +32,6 @@ class Lobe:
     transmits = False
     """Whether the light comes from the other side of the surface."""
 
-    seldom = False
-    """Whether it is drawn from so rarely, beside others, that branching is faster than always drawing from it."""
-
     def estimated_albedo(self, wi: mi.Vector3f) -> Any:
         """Return an estimate of ∫ f |cosθ_o| dω_o. It decides the choice among lobes and the albedo AOV, so it need not
         be exact, but it must be positive wherever the lobe reflects anything."""
@@ -48,26 +45,6 @@ class Lobe:
         """Draw a direction ``wo`` from three uniform variates, ``u`` and ``v = (v.x, v.y)``. It may lie beyond the
         horizon, where the lobe is zero."""
         raise NotImplementedError(f"{type(self).__name__} does not define sample.")
-
-    def complete(
-        self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, wo: mi.Vector3f | None
-    ) -> tuple[mi.Vector3f, tuple[Any, mi.Float] | None]:
-        """Return ``(wo, (value, pdf))``: a direction drawn as by :meth:`sample` in the lanes of the mask ``drawn``, or
-        True, and the given one elsewhere; and what :meth:`eval_pdf` returns for it, where that is cheaper together, or
-        None. The latter may be anything for directions beyond the horizon."""
-        drawn_wo = self.sample(wi, u, v)
-        return drawn_wo if wo is None else select(drawn, drawn_wo, wo), None
-
-    def __init_subclass__(cls) -> None:
-        """Give a class that changes one of them, but not all, the default again."""
-        super().__init_subclass__()
-        if {"sample", "eval_pdf"} & vars(cls).keys() and "complete" not in vars(cls):
-            cls.complete = Lobe.complete  # type: ignore[method-assign]
-
-    @property
-    def hands_on(self) -> bool:
-        """Whether :meth:`complete` returns value and density."""
-        return type(self).complete is not Lobe.complete
 
     def adjoint(self) -> Lobe:
         """Return the lobe for light tracing (``TransportMode.Importance``), where ``wi`` leads to the light and ``wo``

@@ -8,11 +8,10 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, safe_sqrt
-from ..microfacet.choice import sampler_of
 from ..microfacet.distributions import Distribution
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Fresnel
-from ..microfacet.sampling import Sampler
+from ..microfacet.sampling import Directions, Mixture
 from ..microfacet.shadowing import Shadowing
 from .lobe import Lobe
 
@@ -20,7 +19,7 @@ from .lobe import Lobe
 class MicrofacetLobe(Lobe):
     """f = ρ·F(cosθ_d)·D(h)·G / (4 cosθ_i cosθ_o), for any distribution, shadowing and Fresnel term of
     :mod:`mi_brdfs.microfacet`. ρ is a ``colour`` times a ``scale``. The three terms determine the sampler
-    (:mod:`mi_brdfs.microfacet.choice`).
+    (:mod:`mi_brdfs.microfacet.sampling`).
     """
 
     # Constants of the estimated albedo, fitted by tests/calibration/estimated_albedo.py.
@@ -31,7 +30,7 @@ class MicrofacetLobe(Lobe):
     the typical facet."""
     NEARER = 0.25
     """How much nearer to the normal than the mirror's cosine facets are visible at grazing angles,"""
-    NEARER_LONG_TAILED = 0.43
+    NEARER_LONG_TAILED = 0.4
     """for a long tail under an energy-conserving shadowing term,"""
     NEARER_UPRIGHT = 0.08
     """and for a shadowing term that does not lean."""
@@ -41,7 +40,6 @@ class MicrofacetLobe(Lobe):
     ) -> None:
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
-        self.sampler = sampler_of(distribution, shadowing, fresnel)
         self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Any:
@@ -73,28 +71,21 @@ class MicrofacetLobe(Lobe):
         nearer = nearer * versine * safe_sqrt(versine * slope2)
         # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
         fresnel = self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9))
-        fresnel += self.sampler.forward_reflectance(self, wi)
+        if (forward := self.fresnel.forward(self.distribution, wi)) is not None:
+            fresnel += forward.reflectance
         return self.reflectance * (fresnel * seen)
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
         facet = Facet.between(wi, wo)
-        return self._eval(facet), self.sampler.pdf(self, facet)
+        return self._eval(facet), self._sampler(wi).pdf(facet)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        return self.sampler.sample(self, wi, u, v)
+        return self._sampler(wi).draw(u, v)
 
-    def complete(
-        self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f, drawn: mi.Bool, wo: mi.Vector3f | None
-    ) -> tuple[mi.Vector3f, tuple[Any, mi.Float] | None]:
-        given = None if wo is None else Facet.between(wi, wo)
-        facet, pdf = self.sampler.complete(self, wi, u, v, drawn, given)
-        if (facet.cos_o > 0) is False:  # in scalar variants, where a division by zero is an error
-            return facet.wo, None
-        return facet.wo, (self._eval(facet), pdf)
-
-    @property
-    def hands_on(self) -> bool:
-        return super().hands_on and type(self.sampler).complete is not Sampler.complete
+    def _sampler(self, wi: mi.Vector3f) -> Directions:
+        sampler = self.shadowing.sampler(self.distribution, self.fresnel, wi, self._reflect)
+        forward = self.fresnel.forward(self.distribution, wi)
+        return sampler if forward is None else Mixture(sampler, forward, forward.share)
 
     def _eval(self, facet: Facet) -> Any:
         """Return f cosθ_o."""
@@ -105,7 +96,6 @@ class MicrofacetLobe(Lobe):
     def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
         return self.colour * self.fresnel(wi.z)
 
-    def shadowed(self, facet: Facet) -> mi.Float:
-        """Return F G, as the one number that samplers use: times cosθ_d/cosθ_i·D/q it is the weight of a half vector
-        drawn with the density q, for ρ = 1."""
+    def _reflect(self, facet: Facet) -> mi.Float:
+        """Return F G, as the one number that samplers use."""
         return self.fresnel.brightness(facet.cos_d) * self.shadowing(facet)

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
 from ..math import ONE_MINUS_EPSILON, SMALL, TINY, clamp, luminance, select
 from .lobe import Lobe
-
-Handed = dict[int, tuple[Any, Any] | None]
-"""The value and density of a direction for lobes by their index, where they are known."""
 
 
 class Mixture:
@@ -36,27 +31,19 @@ class Mixture:
             dr.select(black, count, energy) * scale for count, energy in zip(counts, energies, strict=True)
         ]
 
-    def eval_pdf(
-        self, wo: mi.Vector3f, transmitted: bool, handed: Handed | None = None
-    ) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
-        """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k. Those of single lobes may
-        be ``handed`` on by :meth:`sample`."""
+    def eval_pdf(self, wo: mi.Vector3f, transmitted: bool) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
+        """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
         total, density = 0, 0
-        for k, (probability, lobe) in enumerate(zip(self.probabilities, self.lobes, strict=True)):
+        for probability, lobe in zip(self.probabilities, self.lobes, strict=True):
             if lobe.transmits == transmitted:
-                value, pdf = (handed or {}).get(k) or lobe.eval_pdf(self.wi, wo)
+                value, pdf = lobe.eval_pdf(self.wi, wo)
                 total, density = total + value, density + probability * pdf
         return mi.UnpolarizedSpectrum(total), density
 
-    def sample(self, u: mi.Float, v: mi.Point2f) -> tuple[mi.Vector3f, mi.UInt32, Handed]:
-        """Return ``(wo, k, handed)``: a direction, the index of the lobe that it was drawn from, and for lobes of some
-        indices the value and density of the direction, except beyond the horizon."""
+    def sample(self, u: mi.Float, v: mi.Point2f) -> tuple[mi.Vector3f, mi.UInt32]:
+        """Return ``(wo, k)``: a direction and the index of the lobe that it was drawn from."""
         if len(self.lobes) == 1:
-            lobe = self.lobes[0]
-            if not lobe.hands_on:
-                return lobe.sample(self.wi, u, v), 0, {}
-            wo, evaluated = lobe.complete(self.wi, u, v, True, None)
-            return wo, 0, {0: evaluated}
+            return self.lobes[0].sample(self.wi, u, v), 0
         index, start, share = mi.UInt32(0), mi.Float(0), self.probabilities[0]
         end = share
         for k, probability in enumerate(self.probabilities[1:], start=1):
@@ -65,18 +52,10 @@ class Mixture:
             start, share = dr.select(passed, end, start), dr.select(passed, probability, share)
             end = end + probability
         u = clamp((u - start) / dr.maximum(share, TINY), 0, ONE_MINUS_EPSILON)
-
-        # Only one lobe can evaluate the direction as it draws it: the one that comes after the others have.
-        last = max((k for k, lobe in enumerate(self.lobes) if lobe.hands_on and not lobe.seldom), default=None)
-        drawn = [k for k in range(len(self.lobes)) if k != last]
-        wo = self.lobes[drawn[0]].sample(self.wi, u, v)
-        for k in drawn[1:]:
-            lobe = self.lobes[k]
-            if lobe.seldom:
+        wo = self.lobes[0].sample(self.wi, u, v)
+        for k, lobe in enumerate(self.lobes[1:], start=1):
+            if len(self.lobes) > 2:  # then most lanes do not draw from it, and branching is faster
                 wo = dr.if_stmt((wo,), index == k, lambda wo, lobe=lobe: lobe.sample(self.wi, u, v), lambda wo: wo)
             else:
                 wo = dr.select(index == k, lobe.sample(self.wi, u, v), wo)
-        if last is None:
-            return wo, index, {}
-        wo, evaluated = self.lobes[last].complete(self.wi, u, v, index == last, wo)
-        return wo, index, {last: evaluated}
+        return wo, index

@@ -4,7 +4,6 @@ of their product."""
 from .distributions import Distribution, Isotropic
 from .facet import Facet
 from .fresnel import Fresnel
-from .sampling import Sampler
 from .shadowing import Shadowing
 
-__all__ = ["Distribution", "Facet", "Fresnel", "Isotropic", "Sampler", "Shadowing"]
+__all__ = ["Distribution", "Facet", "Fresnel", "Isotropic", "Shadowing"]

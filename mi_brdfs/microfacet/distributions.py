@@ -16,8 +16,10 @@ import mitsuba as mi
 from ..math import TINY
 from .facet import Facet
 from .laws import LARGEST_TAN2, cosine_power, cosine_power_cdf, inverse_cosine_power_cdf, log_complement
+from .sampling import HalfVectors
 from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
 from .term import Term
+from .visible import VisibleNormals
 
 
 class Distribution(Term):
@@ -61,6 +63,10 @@ class Distribution(Term):
 
     def smith(self, correlated: bool) -> Smith | None:
         """Smith's shadowing term that belongs to this distribution, or None if that is not known."""
+        return None
+
+    def visible_normals(self, wi: mi.Vector3f) -> HalfVectors | None:
+        """Return the half vectors that ``wi`` sees under Smith's masking, or None if there is no sampler of them."""
         return None
 
     def eval(self, facet: Facet) -> mi.Float:
@@ -135,6 +141,9 @@ class GGX(Distribution):
 
     def smith(self, correlated: bool) -> Smith:
         return SmithGGX(self.alpha_u, self.alpha_v, correlated)
+
+    def visible_normals(self, wi: mi.Vector3f) -> HalfVectors:
+        return VisibleNormals(self, wi)
 
 
 class Blinn(Isotropic):

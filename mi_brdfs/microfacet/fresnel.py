@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import luminance, safe_sqrt, square
+from .forward import ForwardDirections
 from .term import Term
+
+if TYPE_CHECKING:
+    from .distributions import Distribution
 
 
 class Fresnel(Term):
@@ -20,6 +24,10 @@ class Fresnel(Term):
     def brightness(self, cos: Any) -> Any:
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
+
+    def forward(self, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections | None:
+        """Return the forward directions to draw besides half vectors, if there are such."""
+        return None
 
 
 class Unit(Fresnel):
@@ -65,6 +73,9 @@ class Dielectric(Fresnel):
         return dr.select(total, 1, 0.5 * s * (1 + p))
 
     brightness = __call__
+
+    def forward(self, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections:
+        return ForwardDirections.of_facets(self, distribution, wi)
 
 
 class Conductor(Fresnel):

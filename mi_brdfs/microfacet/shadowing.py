@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import TINY
 from .facet import Cosines, Facet
+from .sampling import Directions, Mixture, Pair, UniformDirections, clipped_normals
 from .term import Term
+
+if TYPE_CHECKING:
+    from .distributions import Distribution
+    from .fresnel import Fresnel
 
 
 class Shadowing(Term):
     """A masking-shadowing term, which returns G when called with a facet. Its attributes determine the lobe's sampler
-    and estimated albedo (:mod:`.choice`, :class:`mi_brdfs.lobes.MicrofacetLobe`)."""
+    and estimated albedo (:class:`mi_brdfs.lobes.MicrofacetLobe`)."""
 
+    UNIFORM = 0.05
+    """The share of uniform directions at grazing, which tests/calibration/half_vectors.py fits."""
     lean: ClassVar[float] = 0
-    """How far the facets visible at grazing angles lean towards the viewer, fitted by
-    tests/calibration/half_vectors.py."""
-    most_leaning: ClassVar[float] = 0.95
-    """The largest part of the samples that lean so, and of those of steep facets. The rest bounds the weights of facets
-    across the plane of incidence."""
+    """How far the facets visible at grazing angles lean towards the viewer: 0 as for V-cavities, 1 as for Smith's term,
+    4 for one without end."""
+    smithian: ClassVar[bool] = False
+    """Whether facets are seen about as under Smith's masking, so that a distribution's visible normals suit."""
     favours_steep: ClassVar[bool] = False
     """Whether G cosθ_d/(cosθ_i cosθ_h) has no bound, so that at grazing few steep facets may reflect most of all,
     whatever the distribution."""
@@ -36,6 +43,18 @@ class Shadowing(Term):
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
+    def sampler(
+        self, distribution: Distribution, fresnel: Fresnel, wi: mi.Vector3f, reflect: Callable[[Facet], mi.Float]
+    ) -> Directions:
+        """Return what to draw directions from, for facets that ``reflect`` F G, as one number. Override it to bring
+        another sampler."""
+        visible = distribution.visible_normals(wi) if self.smithian else None
+        pair = Pair(visible or clipped_normals(distribution, fresnel, wi, self.lean), reflect)
+        # Few steep facets may reflect more than all others: uniform directions bound their weights.
+        if visible is None and (self.favours_steep or (self.lean and distribution.long_tailed)):
+            return Mixture(pair, UniformDirections(), self.UNIFORM * dr.square(dr.square(1 - wi.z)))
+        return pair
+
 
 class Smith(Shadowing):
     """Smith's term, with Λ defined by the ``stretched`` cosines,
@@ -46,6 +65,7 @@ class Smith(Shadowing):
     """
 
     lean = 1
+    smithian = True
     conserving = True
 
     def __init__(self, alpha_u: mi.Float, alpha_v: mi.Float, correlated: bool) -> None:
@@ -111,6 +131,7 @@ class SchlickSmith(Shadowing):
     doi:10.1111/1467-8659.1330233), with k = α √(2/π) for Beckmann facets and k = α/2 for GGX (Karis 2013)."""
 
     lean = 2
+    smithian = True
 
     def __init__(self, k: mi.Float) -> None:
         self.k = k
@@ -163,7 +184,7 @@ class Neumann(Shadowing):
 class AshikhminPremoze(Shadowing):
     """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premoze, Distribution-based BRDFs, 2007)."""
 
-    lean = 2
+    lean = 1
     favours_steep = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
@@ -184,7 +205,7 @@ class AshikhminShirleyShadowing(Shadowing):
 class KurtShadowing(Shadowing):
     """(cosθ_i cosθ_o)^(1-κ) / cosθ_d (Kurt, Szirmay-Kalos and Křivánek 2010, doi:10.1145/1722991.1722996)."""
 
-    lean = 0.4
+    lean = 1
 
     def __init__(self, kurt_exponent: mi.Float) -> None:
         self.exponent = kurt_exponent

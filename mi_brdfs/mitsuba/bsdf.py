@@ -9,7 +9,6 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, Mixture
-from ..lobes.mixture import Handed
 from ..math import clamp, select
 from ..model import Model, warn_once
 from ..parameters.colours import evaluate_colour
@@ -105,7 +104,7 @@ class ModelBSDF:
 
     @staticmethod
     def _eval_pdf(
-        valid: mi.Bool, mixture: Mixture, frame: LobeFrame, wo: mi.Vector3f, handed: Handed | None = None
+        valid: mi.Bool, mixture: Mixture, frame: LobeFrame, wo: mi.Vector3f
     ) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
         value, pdf, z = mi.UnpolarizedSpectrum(0), mi.Float(0), frame.mirror(wo).z
         for transmitted in sorted({lobe.transmits for lobe in mixture.lobes}):
@@ -115,7 +114,7 @@ class ModelBSDF:
             if here is False:
                 continue
             harmless = frame.mirror(mi.Vector3f(0, 0, -1 if transmitted else 1))
-            side = mixture.eval_pdf(frame.to_local(select(here, wo, harmless)), transmitted, handed)
+            side = mixture.eval_pdf(frame.to_local(select(here, wo, harmless)), transmitted)
             value, pdf = value + select(here, side[0], 0), pdf + select(here, side[1], 0)
         return value, pdf
 
@@ -123,15 +122,13 @@ class ModelBSDF:
         self, valid: mi.Bool, mixture: Mixture, components: list[int], frame: LobeFrame, sample1: Any, sample2: Any
     ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
         bs = mi.BSDFSample3f()
-        wo, index, handed = mixture.sample(sample1, sample2)
+        wo, index = mixture.sample(sample1, sample2)
         wo = frame.to_world(wo)
-        if frame.cos_sin is not None:
-            handed = {}  # rounded, it is another direction to a narrow lobe
-        if dr.is_diff_v(mi.Float) and dr.grad_enabled(wo, handed):
+        if dr.is_diff_v(mi.Float) and dr.grad_enabled(wo):
             # Differentiate the estimator f/pdf of a fixed direction, not the direction: then an unbiased gradient needs
             # no derivative of the choice among lobes, nor of what the direction hits.
-            wo, handed = dr.detach(wo), {}
-        value, pdf = self._eval_pdf(valid, mixture, frame, wo, handed)
+            wo = dr.detach(wo)
+        value, pdf = self._eval_pdf(valid, mixture, frame, wo)
         # Drop samples that are hardly ever drawn: the derivatives of their weights would overflow.
         drawn, density = pdf > 1e-15, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
         weight = value / select(drawn, density, 1)

@@ -27,7 +27,7 @@ class AshikhminShirley(Model):
     n+2. One-sided.
 
     Sampling: for fs an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.AntitheticNormals), so that no sample falls below the horizon; for fd the cosine.
+    (mi_brdfs.microfacet.sampling.Pair), so that no sample falls below the horizon; for fd the cosine.
 
     Example
     -------

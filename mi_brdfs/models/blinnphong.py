@@ -33,8 +33,8 @@ class BlinnPhong(Model):
     Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.grazing.AntitheticImplicitNormals, for the original normalization
-    AntitheticNormalsTowardViewer); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair), with a few uniform directions at grazing for the original normalization; no
+    sample falls below the horizon.
 
     Example
     -------
@@ -85,7 +85,7 @@ class BlinnPhong(Model):
 class ResponseShadowing(Shadowing):
     """The shadowing term for which f cosθ_o is D/4."""
 
-    lean = 0.7
+    lean = 1
     favours_steep = True
     reciprocal = False
 

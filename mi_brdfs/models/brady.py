@@ -31,7 +31,7 @@ class Brady(Model):
     lobes falls like cosθ_i towards grazing angles. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.grazing.AntitheticNormalsTowardViewer); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------
@@ -64,8 +64,7 @@ class Brady(Model):
 class Projected(Shadowing):
     """The shadowing term that turns 1/(cosθ_i cosθ_o) into 1/(wi·h)."""
 
-    lean = 1.6
-    most_leaning = 0.8  # without 1/cosθ_d, steep facets would lean more
+    lean = 1
 
     def __call__(self, facet):
         return facet.cos_i * facet.cos_o / facet.cos_d

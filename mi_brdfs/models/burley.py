@@ -49,8 +49,8 @@ class Burley(Model):
 
     Sampling: for the base lobe the cosine with a few uniform directions, for the sheen a density of its own, for the
     clear coat an antithetic pair of half vectors and for the specular lobe one of visible normals, one of the pair
-    chosen by how much each reflects (mi_brdfs.microfacet.sampling.AntitheticNormals,
-    mi_brdfs.microfacet.visible.AntitheticVisibleNormals). No sample falls below the horizon.
+    chosen by how much each reflects (mi_brdfs.microfacet.sampling.Pair,
+    mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
 
     Example
     -------
@@ -122,8 +122,6 @@ class CoatShadowing(Shadowing):
 class CoatLobe(MicrofacetLobe):
     """A lobe so narrow that its albedo is about that of a mirror."""
 
-    seldom = True
-
     def estimated_albedo(self, wi):
         mirror = Cosines(wi.z, wi.z, 1, wi.z)
         return self.reflectance * (self.fresnel(dr.minimum(wi.z, 0.9)) * self.shadowing(mirror))
@@ -190,7 +188,7 @@ class SheenLobe(Lobe):
     density ¾ (1-s²) of s = sin(ψ/2)/sin(ψ₀/2), with ψ₀ where the circle meets the horizon.
     """
 
-    glossy, seldom = False, True
+    glossy = False
     ALBEDO = 3e-4, 0.06, 0.02
     """a, b and c of the albedo, about a + b x² + c x³ with x = 1 - cosθ_i; fitted, too."""
 

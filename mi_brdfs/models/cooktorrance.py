@@ -35,7 +35,7 @@ class CookTorrance(Model):
     roughness, use ``blendbsdf``. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.AntitheticNormals); no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------

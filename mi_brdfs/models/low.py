@@ -3,7 +3,8 @@ import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import EPSILON, SMALL, choose, clamp, luminance, normalize_or, safe_sqrt
-from ..microfacet.forward import ForwardDirections, ForwardShare, lowest_cosine
+from ..microfacet.facet import Facet
+from ..microfacet.forward import ForwardDirections
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
@@ -35,7 +36,7 @@ class Low(Model):
     above 1. The factor 1/π was inferred from the fits. One-sided.
 
     Sampling: for microfacet an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.AntitheticNormals); for smooth exactly S, clipped to the disc of projected directions.
+    (mi_brdfs.microfacet.sampling.Pair); for smooth exactly S, clipped to the disc of projected directions.
     No sample falls below the horizon.
 
     Example
@@ -99,12 +100,12 @@ class SmoothLobe(Lobe):
         return self.reflectance * ((self.fresnel(wi.z) + self._forward(wi).reflectance) * self.law.norm * dr.pi)
 
     def _forward(self, wi):
-        """Return how much lies about the horizon opposite to ``wi``."""
-        d = dr.sqrt(self.law.inverse(0.75 * self.law.norm))
-        z2 = dr.square(lowest_cosine(wi)) + 0.3 * abs(dr.square(self.fresnel.eta) - 1)
+        """Return the directions about the horizon opposite to ``wi``."""
+        d, z = dr.sqrt(self.law.inverse(0.75 * self.law.norm)), dr.maximum(wi.z, 1e-3)
+        z2 = z * z + 0.3 * abs(dr.square(self.fresnel.eta) - 1)
         cos2 = z2 + d * (1 - 0.25 * d)
         low = z2 / cos2
-        return ForwardShare.of(self.fresnel, wi, low * dr.sqrt(low) * (1 - low), cos2)
+        return ForwardDirections(self.fresnel, wi, low * dr.sqrt(low) * (1 - low), cos2)
 
     def mirror_reflectance(self, wi):
         return self.reflectance * self.fresnel(wi.z)
@@ -141,14 +142,15 @@ class SmoothLobe(Lobe):
         _, other = self._end(wi, -x, -y, clamp(self.law.mass(d2) / mass, 0, 1))
         own = self._brightness(wi, wo.x, wo.y)
         pdf = 2 * dr.inv_pi * own * shape / (mass * own + other)
-        forward = ForwardDirections(self.fresnel, wi).pdf(wo)
-        return self.reflectance * value, dr.lerp(pdf, forward, self._forward(wi).probability)
+        forward = self._forward(wi)
+        return self.reflectance * value, dr.lerp(pdf, forward.pdf(Facet.between(wi, wo)), forward.share)
 
     def sample(self, wi, u, v):
-        is_forward, u = choose(u, self._forward(wi).probability)
+        forward = self._forward(wi)
+        is_forward, u = choose(u, forward.share)
         y, x = dr.sincos(dr.two_pi * v.x)
         (first, weight), (second, other) = self._end(wi, x, y, v.y), self._end(wi, -x, -y, v.y)
         take_first = u * (weight + other) < weight
         px, py = (dr.select(take_first, a, b) for a, b in zip(first, second, strict=True))
         wo = mi.Vector3f(px, py, safe_sqrt(1 - px * px - py * py))
-        return dr.select(is_forward, ForwardDirections(self.fresnel, wi).draw(v), wo)
+        return dr.select(is_forward, forward.draw(u, v), wo)

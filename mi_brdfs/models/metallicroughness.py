@@ -35,7 +35,7 @@ class MetallicRoughness(Model):
     (ibl), 1.12 or 1.72 (smith). One-sided.
 
     Sampling: for the diffuse lobe the cosine, for the specular lobe an antithetic pair of visible normals, one chosen
-    by how much each reflects (mi_brdfs.microfacet.visible.AntitheticVisibleNormals). No sample falls below the horizon.
+    by how much each reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
 
     Example
     -------

@@ -136,9 +136,9 @@ class Microfacet(Model):
     ggx; for the others see the table below. The more αu and αv differ, the less schlick shadows. For Ashikhmin and
     Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later papers and public code. One-sided.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling and
-    mi_brdfs.microfacet.grazing), so that no sample falls below the horizon; for ggx with smith, smith-correlated or
-    schlick, visible normals (mi_brdfs.microfacet.choice).
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
+    so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and
+    otherwise those of D, with a few uniform directions at grazing if steep facets may reflect most there.
 
     Example
     -------

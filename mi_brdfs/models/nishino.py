@@ -33,8 +33,7 @@ class Nishino(Model):
     angles, like cos²θ_i for narrow lobes. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.AntitheticNormals, for dsbrdf mi_brdfs.microfacet.grazing.AntitheticImplicitNormals);
-    no sample falls below the horizon.
+    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 
     Example
     -------

@@ -44,8 +44,8 @@ class Schlick94(Model):
     do, and the other two variants have no limit, as they divide by cosθ_i. One-sided.
 
     Sampling: for Z A an antithetic pair of half vectors, with azimuths from an ellipse near A, one chosen by how much
-    each reflects (mi_brdfs.microfacet.grazing.AntitheticNormalsTowardViewer); for the interreflection its cosθ_o,
-    nearly exact except for S(u); for the lower layer the cosine.
+    each reflects (mi_brdfs.microfacet.sampling.Pair); for the interreflection its cosθ_o, nearly exact except for S(u);
+    for the lower layer the cosine.
 
     Example
     -------
@@ -106,7 +106,7 @@ class Schlick94(Model):
 class Unshadowed(Shadowing):
     """G = 1."""
 
-    lean = 0.7
+    lean = 1
     favours_steep = True
 
     def __call__(self, facet):

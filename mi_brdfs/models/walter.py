@@ -25,8 +25,8 @@ class Walter(Model):
     as light is reflected only once (α = 1, F = 1: 0.31 ρs at normal incidence). Same as Mitsuba's ``roughconductor``
     with ``distribution="ggx"`` (separable), except that polarized variants depolarise the light. One-sided.
 
-    Sampling: bounded visible normals, tilted towards the normal; for dielectrics an antithetic pair, one chosen by how
-    much each reflects (mi_brdfs.microfacet.visible.BoundedVisibleNormals and AntitheticVisibleNormals).
+    Sampling: an antithetic pair of visible normals, bounded and tilted towards the normal, one chosen by how much each
+    reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
 
     Example
     -------
