@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..parameters.messages import printable
 from .measurement import FileError
 
 
@@ -40,6 +41,11 @@ def checked(path: str | Path) -> Path:
     if not status.st_size:
         raise FileError(f"{path} is empty.")
     return path
+
+
+def named(path: str | Path) -> str:
+    """Return a path as it can be shown, without what would control a terminal or is not in UTF-8."""
+    return printable(str(path))
 
 
 def reason(error: Exception) -> str:
