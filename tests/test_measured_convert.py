@@ -119,6 +119,8 @@ def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
         ({"type": "ward"}, "x", "no way to write"),
         ({"type": "ward"}, "folder.binary", "not a regular file"),
         (measurement(lambda i, o, d: -1 + 0 * i, 3), "x.binary", "no positive value"),
+        (measurement(lambda i, o, d: 1 + 0 * i, 1025, np.arange(1025.0)), "x.bsdf", "1,025 wave.* at most 1,024 of"),
+        (measurement(lambda i, o, d: 1 + 0 * i, 1540, np.arange(1540.0)), "x.csv", "1,540 wave.* at most 1,539 of"),
         ("nowhere.binary", "x.binary", "No such file"),
     ],
     ids=lambda given: "negative" if isinstance(given, Measurement) else str(given),
@@ -147,6 +149,11 @@ def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(
     assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
 
 
+def test_a_baked_bsdf_takes_unit_vectors():
+    with pytest.raises(ValueError, match="directions must have the length 1, not 2"):
+        bake({"type": "diffuse"}).evaluate(np.array([[0, 0, 1.0]]), np.array([[0, 0, 2.0]]))
+
+
 def test_baking_needs_rgb():
     with mi.variant_context("llvm_ad_spectral"), pytest.raises(ValueError, match="vectorized rgb variant"):
         bake({"type": "ward"})
@@ -171,7 +178,7 @@ def test_the_command(tmp_path):
     assert run(path, tmp_path / "z.binary")[0] == 0
     for words, answer in (
         ((path, path), "onto itself"),
-        ((path, tmp_path / "y.binary", "-D", "alpha=1"), "no parameters"),
+        ((path, tmp_path / "y.binary", "-D", "alpha=1"), "no parameter but quantity"),
         (("wardd", path), 'did you mean "ward"?'),
         (("nowhere.bsdf", path), "No such file or directory"),
         (("ward", tmp_path), "it is a folder"),

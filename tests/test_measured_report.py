@@ -6,6 +6,7 @@ import os
 import struct
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,14 @@ import pytest
 from mi_brdfs import plot
 from mi_brdfs.cli import measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
-from mi_brdfs.measured.albedo import albedos
+from mi_brdfs.measured.albedo import albedos, coverage, hemisphere
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
+from mi_brdfs.measured.observer import to_srgb
 from mi_brdfs.measured.reciprocity import reciprocity_error
+from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.parameters.messages import listed
+from mi_brdfs.plot.lit import LitTable
 
 SCALE = np.array([1, 1.15, 1.66]) / 1500
 DIMENSIONS = 30, 30, 60
@@ -77,10 +81,10 @@ class Lobe(Grid):
 
     exponent, retro = 20_000, False
 
-    def evaluate(self, wi, wo, interpolation="trilinear", extrapolate="hold"):
+    def integrated(self, wi, wo, weight, extrapolate="hold"):
         centre = wi if self.retro else wi * [-1, -1, 1]
         cos = np.maximum(np.sum(centre * wo, axis=-1), 0)
-        return ((self.exponent + 2) / (2 * np.pi) * cos**self.exponent)[..., None]
+        return weight @ ((self.exponent + 2) / (2 * np.pi) * cos**self.exponent)[..., None]
 
 
 @pytest.mark.parametrize("retro", [False, True])
@@ -92,6 +96,52 @@ def test_the_albedo_of_a_lobe_of_any_width(exponent, retro):
     angles = np.radians({2: [0], 200: [0, 7, 30, 45]}.get(exponent, [0, 0.1, 3, 30, 60, 75, 80, 82]))
     found = albedos(lobe, angles, phi_i=0.7)
     np.testing.assert_allclose(found[:, 0], np.cos(angles), rtol=2e-3)
+
+
+@pytest.mark.parametrize("extrapolate", ["hold", "zero"])
+@pytest.mark.parametrize("anisotropic", [False, True])
+def test_a_table_is_integrated_as_it_is_evaluated(anisotropic, extrapolate):
+    grid = goniometer(np.random.default_rng(1).random((3, 24 if anisotropic else 13, 13, *[4] * anisotropic, 2)),
+                      anisotropic=anisotropic, channels=2).data  # fmt: skip
+    grid.values[1, 2:5] = np.nan
+    wi, (wo, solid_angle) = directions(0.6, 0.4), hemisphere(0.6, 0.4)
+    expected = solid_angle @ grid.evaluate(wi, wo, extrapolate=extrapolate)
+    np.testing.assert_allclose(grid.integrated(wi, wo, solid_angle, extrapolate), expected, rtol=1e-9)
+
+
+CHANNELS = 1000
+FEW = Grid(Spherical(False), tuple(Axis(np.arange(1.0, n)) for n in (2, 3, 3)), np.ones((1, 2, 2, CHANNELS)))
+SCATTERED = Samples(*(directions(*np.random.default_rng(k).random((2, 20))) for k in (1, 2)), np.ones((20, CHANNELS)),
+                    False)  # fmt: skip
+WAVELENGTHS = np.linspace(300, 1300, CHANNELS)
+
+
+@pytest.mark.parametrize(
+    "function, megabytes",
+    [
+        (lambda: albedos(FEW, np.array([0.5])), 30),
+        (lambda: coverage(FEW, np.array([0.5])), 30),
+        (lambda: as_grid(SCATTERED), 400),
+        (lambda: LitTable(Measurement(Path("x"), "test", SCATTERED, WAVELENGTHS)), 30),
+        (lambda: to_srgb(np.linspace(300, 4300, 4001)), 10),
+    ],
+    ids=["albedo", "coverage", "scattered", "picture", "colours"],
+)
+def test_many_wavelengths_take_little_memory(function, megabytes):
+    tracemalloc.start()
+    function()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < megabytes * 1e6
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 0), (0, np.nan, 1), (0, 0, 2), (0, 0, np.inf), (0, 0, 1.01), (0, 1)])
+def test_directions_that_are_none_are_refused(direction):
+    grid, up = goniometer().data, np.array([[0, 0, 1.0]])
+    for function in (grid.evaluate, grid.measured):
+        for pair in ((up, np.array([direction])), (np.array([direction]), up)):
+            with pytest.raises(ValueError, match=r"^directions must (have the length 1, not|be arrays of shape)"):
+                function(*pair)
 
 
 def test_lamberts_albedo_is_its_reflectance(lambert):
@@ -247,6 +297,12 @@ def test_each_rotation_has_its_stated_albedo():
     assert (found.largest_albedo.value, found.largest_albedo.phi_i) == (pytest.approx(0.4, rel=1e-3), 270)
 
 
+def test_of_many_stated_albedos_some_are_looked_at(monkeypatch):
+    monkeypatch.setattr("mi_brdfs.measured.summary.FIGURES", 16)
+    measurement = goniometer(0.3 / np.pi, radial=150, anisotropic=True, stated={0.0: [0.3] * 40}, turns=40)
+    assert [it.phi_i for it in summarize(measurement).scatter] == pytest.approx(np.arange(0, 360, 27))
+
+
 def test_the_largest_albedo_may_be_at_any_azimuth():
     """Also at one of 36 that the first look leaves out."""
     phi = np.arange(36)
@@ -255,8 +311,9 @@ def test_the_largest_albedo_may_be_at_any_azimuth():
     assert (found.value, found.phi_i) == (pytest.approx(0.15, rel=1e-3), 130)
 
 
-def test_a_file_without_numbers(tmp_path):
-    path = merl(tmp_path / "empty.binary", np.nan)
+def test_a_file_without_numbers_above_the_horizon(tmp_path):
+    below = np.minimum(*heights(*cell_centres(DIMENSIONS))) < 0
+    path = merl(tmp_path / "empty.binary", np.where(below, 1, np.nan)[..., None])
     with pytest.raises(FileError, match=r"empty\.binary: no value above the horizon is a number"):
         summarize(read(path))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import hemisphere, shared
 
-from mi_brdfs.measured import Grid, Samples, read
+from mi_brdfs.measured import FileError, Grid, Samples, read
 from mi_brdfs.measured.formats import csv, zemax
 from mi_brdfs.measured.source import Source
 
@@ -119,6 +119,53 @@ def test_alta_values(tmp_path):
     assert rgb.wavelengths is None
     with_deltas = alta("ISOTROPIC_TV_TL_DPHI", [(0.1, 0.2, 0.3, 1, 0.1)]).replace("#DIM 4 1", "#DIM 3 1\n#VS 1")
     np.testing.assert_array_equal(written(tmp_path, with_deltas, "z.dat").data.values.ravel(), [1])
+
+
+def test_alta_vectors_have_any_length_but_none(tmp_path):
+    rows = [(*(3 * V), *(1e-200 * L), 0.5), (*V, *V, 0.1)]
+    samples = written(tmp_path, alta("CARTESIAN", rows), "x.dat").data
+    np.testing.assert_allclose([samples.wi[0], samples.wo[0]], [L, V], atol=1e-9)
+    with pytest.raises(FileError, match="in line 5, a direction is the zero vector"):
+        written(tmp_path, alta("CARTESIAN", [*rows[:1], (0, 0, 0, *L, 0.5)]), "x.dat")
+
+
+UNSTATED = {
+    "alta": alta("ISOTROPIC_TV_TL_DPHI", [(0.5, 0.2, 0.3, 1.0), (0.7, 0.1, 0.2, 1.0)]).replace("#PARAM_OUT", "#PARAM"),
+    "alta, unknown": alta("ISOTROPIC_TV_TL_DPHI", [(0.5, 0.2, 0.3, 1.0), (0.7, 0.1, 0.2, 1.0)], 1, "UNKNOWN_OUTPUT"),
+    "alta, rgb": alta("ISOTROPIC_TV_TL_DPHI", [(0.5, 0.2, 0.3, 1, 1, 1), (0.7, 0.1, 0.2, 1, 1, 1)], 3, "RGB_COLOR"),
+    "csv": "theta_o_rad theta_i_rad phi_o_rad r g b\n0.5 0.2 0.3 1 1 1\n0.7 0.1 0.2 1 1 1\n",
+}
+
+
+@pytest.mark.parametrize("name", [*UNSTATED, "utia"])
+def test_what_a_file_does_not_state_can_be_said(tmp_path, name):
+    path = tmp_path / ("x.bin" if name == "utia" else "x.dat")
+    if name == "utia":
+        path.write_bytes(np.full(3 * (2 * 16) ** 2, 1.0).tobytes())
+    else:
+        path.write_text(UNSTATED[name])
+    f, f_cos = read(path, "f"), read(path, "f cos")
+    assert (f.quantity, f_cos.quantity) == ("f", "f cos")
+    _, wo, values = f_cos.data.pairs()
+    assert np.ptp(wo[:, 2]) > 0.1
+    np.testing.assert_allclose(values, np.ones_like(values) / wo[:, 2:], rtol=1e-6)
+    np.testing.assert_array_equal(f.data.values, 1)
+    if name in ("alta", "alta, unknown"):
+        with pytest.raises(FileError, match='does not say what it holds: give the quantity, "f" or "f cos", or add a'):
+            read(path)
+    else:
+        assert read(path).quantity == "f"
+
+
+@pytest.mark.parametrize("held, asked", [("f", "f cos"), ("f cos", "f")])
+def test_what_a_file_states_counts(tmp_path, held, asked):
+    path = tmp_path / "x.csv"
+    path.write_text(f"# quantity: {held}\n" + UNSTATED["csv"])
+    assert read(path, held).quantity == read(path).quantity == held
+    with pytest.raises(FileError, match=f"x.csv holds {held}, as it or its format states, and not {asked}; leave"):
+        read(path, asked)
+    with pytest.raises(ValueError, match="the quantity 'cosine' is none of stated, f, f cos"):
+        read(path, "cosine")
 
 
 def test_retroreflection_of_the_tape():

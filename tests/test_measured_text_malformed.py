@@ -1,13 +1,15 @@
 """Text files that are damaged, or written in another way: one sentence with the file's name and the place, or the same
 values."""
 
+import os
 import re
+import struct
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from mi_brdfs.measured import FileError, read
+from mi_brdfs.measured import FileError, convert, read, summarize
 
 ZEMAX = """# Made for a test
 Source  Measured
@@ -110,12 +112,19 @@ def any_table(text, counted=True):
     yield "a line without end", "".join([*rows[:last], "1" * (1 << 20) + "\n", *rows[last + 1 :]]), True
 
 
+def wide(count):
+    """A CSV of one direction and many wavelengths."""
+    names = ",".join(map(str, range(1, count + 1)))
+    return f"theta_i_deg,theta_o_deg,phi_o_deg,{names}\n10,20,30{count * ',1'}\n"
+
+
 ZEMAX_DAMAGE = [
     *any_table(ZEMAX),
     ("a transmission", replaced(ZEMAX, "BRDF", "BTDF"), False),
     ("an unknown symmetry", replaced(ZEMAX, "PlaneSymmetrical", "Spherical"), False),
     ("an unknown spectrum", replaced(ZEMAX, "Monochrome", "Hyperspectral"), False),
     ("no radial angles", replaced(ZEMAX, "ScatterRadial 2\n0 30\n", ""), True),
+    ("a count of many digits", replaced(ZEMAX, "ScatterRadial 2", "ScatterRadial " + "9" * 5000), True),
     ("a count that is no number", replaced(ZEMAX, "ScatterRadial 2", "ScatterRadial two"), True),
     ("a negative count", replaced(ZEMAX, "ScatterRadial 2", "ScatterRadial -2"), True),
     ("a count of 10 GB", replaced(ZEMAX, "ScatterRadial 2", "ScatterRadial 1250000000"), True),
@@ -156,6 +165,7 @@ CORNELL_DAMAGE = [
     ("half a row", CORNELL[: CORNELL.index("0.6 -1")], True),
     ("rows of other columns", replaced(CORNELL, "0.3 0 0.2", "0.3 0.2"), True),
     ("a count of 10 GB", replaced(CORNELL, "\n3\n", "\n1250000000\n"), True),
+    ("a count of many digits", replaced(CORNELL, "\n3\n", f"\n{'9' * 5000}\n"), True),
     ("a count of none", replaced(CORNELL, "\n3\n", "\n0\n"), True),
     ("more wavelengths than the file can have", replaced(CORNELL, "\n3\n", "\n4000\n"), True),
     ("a wavelength too many", replaced(CORNELL, "\n600", "\n600 700"), True),
@@ -175,6 +185,7 @@ ALTA_DAMAGE = [
     ("no parametrisation", replaced(ALTA, "#PARAM_IN", "#PARAM"), False),
     ("an unknown output", replaced(ALTA, "INV_STERADIAN", "ENERGY"), False),
     ("no output", replaced(ALTA, "#PARAM_OUT", "#PARAM"), False),
+    ("a count of many digits", replaced(ALTA, "3 1", "3 " + "9" * 5000), False),
     ("no dimensions", replaced(ALTA, "#DIM 3 1", "#DIM"), False),
     ("dimensions that are no numbers", replaced(ALTA, "3 1", "three one"), False),
     ("a dimension of 10 GB", replaced(ALTA, "3 1", "3 1250000000"), False),
@@ -195,6 +206,10 @@ CSV_DAMAGE = [
     ("of no direction", replaced(CSV, "theta_o_deg", "theta_deg"), True),
     ("an unknown column", replaced(CSV, ",b", ",temperature"), True),
     ("two of the same", replaced(CSV, ",b", ",r"), True),
+    ("two wavelengths of the same", replaced(CSV, "r,g,b", "450,450.0,500"), False),
+    ("an infinite wavelength", replaced(CSV, "r,g,b", "450,500," + "9" * 400), False),
+    ("more wavelengths than can be read", wide(4097), False),
+    ("f among many wavelengths", replaced(wide(4097), "4096,", "f,"), True),
     ("rgb and wavelengths", replaced(CSV, ",b", ",450"), True),
     ("f and f cos", replaced(CSV, ",b", ",b_cos"), True),
     ("an unknown quantity", "# quantity: reflectance\n" + CSV, True),
@@ -264,9 +279,65 @@ def test_spellings_read_the_same(tmp_path, text, change):
 def test_missing_and_negative_values_are_kept(tmp_path, text, ending):
     mark = "," if ending == "csv" else " "
     head, _, _ = text.removesuffix("DataEnd\n").rstrip().rpartition(mark)
-    for number in (np.nan, np.inf, -0.3):
+    for number, kept in [("nan", np.nan), ("inf", np.nan), ("1e39", np.nan), ("-1e300", np.nan), ("-0.3", -0.3)]:
         values = written(tmp_path, f"{head}{mark}{number}\n", ending).data.values
-        np.testing.assert_array_equal(values[~np.isfinite(values) | (values < 0)], [number])
+        np.testing.assert_array_equal(values[~(abs(values) < 1e9) | (values < 0)], [kept])
+
+
+HOSTILE = "\x1b]0;a title\x07\x9b31m\u202e\u2066Ø\u2028"
+NOTED = {
+    "zemax": ("bsdf", f"# Sample: {HOSTILE}\n# Remark {HOSTILE}\n# Made by: {HOSTILE}\n" + ZEMAX),
+    "lighttools": ("bsdf", f"# Material: {HOSTILE}\n# Made by: {HOSTILE}\n" + LIGHTTOOLS),
+    "cornell": ("brdf", replaced(CORNELL, "A test", HOSTILE)),
+    "alta": ("dat", replaced(ALTA, "A test", HOSTILE).replace("#VS", f"#MADE {HOSTILE}\n#VS")),
+    "csv": ("csv", replaced(CSV, "a test", HOSTILE)),
+    "mbsdf": ("mbsdf", f'NVIDIA ARC MBSDF V1\nname="{HOSTILE}"\n{HOSTILE}="{HOSTILE}"\nMBSDF_DATA=\n'),
+}
+
+
+@pytest.mark.parametrize("format", NOTED)
+def test_no_text_of_a_file_controls_a_terminal(tmp_path, format):
+    """Its notes and its name, where they are told and where errors quote them."""
+    ending, text = NOTED[format]
+    path = tmp_path / f"{HOSTILE}\n.{ending}"
+    path.write_bytes(text.encode() + (struct.pack("<3I4f", 0, 1, 1, 1, 1, 1, 1)[:16] if format == "mbsdf" else b""))
+    measurement = read(path)
+    summary = summarize(measurement)
+    told = [measurement.material, *measurement.notes, *measurement.notes.values(), summary.file]
+    assert "Ø" in measurement.material
+    assert all(text.isprintable() for text in [*told, *(cell for row in summary.rows() for cell in row)])
+    path.write_bytes(text.replace("DATA", HOSTILE).replace("0.1", HOSTILE).encode())
+    with pytest.raises(FileError) as caught:
+        read(path)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("header", ["theta_i_{}_deg", "{}", "theta_i_deg,theta_o_deg,phi_o_deg,{}nm", "theta_i [{}]"])
+def test_no_column_controls_a_terminal(tmp_path, header):
+    with pytest.raises(FileError) as caught:
+        written(tmp_path, header.format(HOSTILE) + "\n1\n", "csv")
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("text, ending", [(CSV, "csv"), (struct.pack("<3i3d", 1, 1, 1, 1, 1, 1), "binary")])
+def test_names_need_not_be_utf_8(tmp_path, text, ending):
+    path = tmp_path / os.fsdecode(b"caf\xe9." + ending.encode())
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    measurement = read(path)
+    assert measurement.path == path
+    assert summarize(measurement).file.endswith(f"/caf�.{ending}")
+    assert measurement.material == ("a test" if ending == "csv" else "caf�")
+    assert str(convert(measurement, path.with_suffix(".csv.csv"))).startswith(f"{tmp_path}/caf�.csv.csv: CSV.")
+    path.write_bytes(path.read_bytes()[:10])
+    with pytest.raises(FileError, match=f"/caf�.{ending}: "):
+        read(path)
+
+
+def test_latin_1_is_read(tmp_path):
+    text = "# material: Blåbærgrød\n# angles: °\n" + CSV[CSV.index("theta") :].replace("_deg", "")
+    assert written(tmp_path, text.encode("latin-1"), "csv").material == "Blåbærgrød"
+    micrometres = ZEMAX.replace("Made for a test", "Wavelength 0.65 µm").encode("latin-1")
+    assert written(tmp_path, micrometres).wavelengths == [650]
 
 
 @pytest.mark.parametrize(

@@ -345,8 +345,23 @@ def test_what_is_wrong_is_said_in_a_sentence(llvm_rgb, glossy, given, sentence):
 
 def test_a_table_without_light_is_refused(llvm_rgb, tmp_path):
     file = write_merl(tmp_path / "black.binary", lambda h, d, p: np.full(3, -0.5), (9, 9, 18))
-    with pytest.raises(RuntimeError, match="no value is positive; there is nothing to render"):
+    with pytest.raises(RuntimeError, match=r"no value is positive and at most 1e\+36; there is nothing to render"):
         mi.load_dict({"type": "merl", "filename": str(file)})
+
+
+def test_the_quantity_of_a_file_that_does_not_state_it(llvm_rgb, tmp_path):
+    """And large values, the density of which is finite."""
+    file, wi, wo = tmp_path / "x.csv", direction(0)[None], direction(60)[None]
+    rows = [f"{i},{o},{p},4e35,1,1" for i in (0, 80) for o in (0, 60, 80) for p in (0, 120, 240)]
+    file.write_text("\n".join(["theta_i_deg,theta_o_deg,phi_o_deg,r,g,b", *rows]))
+    f, f_cos = (
+        call(
+            mi.load_dict({"type": "tabulated", "filename": str(file), "quantity": quantity}).eval_pdf, context(), wi, wo
+        )
+        for quantity in ("f", "f cos")
+    )
+    np.testing.assert_allclose(f_cos[0], f[0] / 0.5, rtol=1e-5)
+    assert np.isfinite(f[1]).all() and (f[1] > 0).all()
 
 
 def test_commands_take_the_file_itself(llvm_rgb, glossy):

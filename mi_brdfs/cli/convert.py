@@ -10,7 +10,7 @@ import typer
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .options import Parameters, check_output, parameters_of
+from .options import Parameters, check_output, parameters_of, quantity_of
 from .terminal import Exit, err, fail, print_paragraph, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
@@ -34,20 +34,20 @@ def convert(
     variant: TracingVariant = None,
 ) -> None:
     """Write a measured file in another format, or any BSDF as a table, and say how far the two differ."""
-    parts = parameters_of(parameters)
     check_output("OUT", output)
     from ..measure.sources import is_measured  # imports numpy
     from ..measured import convert as converted
+    from ..measured import read
 
     is_bsdf = not is_measured(given)
+    parts = parameters_of(parameters) if is_bsdf else {}
+    quantity: Any = None if is_bsdf else quantity_of(parameters)
     if is_bsdf:
         set_tracing_variant(variant)
-    elif parts:
-        fail(f"-D {next(iter(parts))}: {given} is a measured file, and has no parameters", Exit.USAGE)
     with stdout_to_stderr(), err.status(f"Writing {output.name}"):
         try:
             with unwrapped_ctrl_c():
-                result = converted(_bsdf(given, parts) if is_bsdf else given, output, format)
+                result = converted(_bsdf(given, parts) if is_bsdf else read(given, quantity), output, format)
         except OSError as error:
             fail(f"cannot write {output}: {error.strerror or error}")
         except (ValueError, RuntimeError) as error:  # Mitsuba raises both

@@ -47,7 +47,7 @@ def fit_(
             "--param",
             metavar="name=value",
             help="Fix a parameter of the models that have it to a number, a word, true, false, #rrggbb or 'r;g;b'; of "
-            "a choice, name=a,b fits each; may be repeated.",
+            "a choice, name=a,b fits each; or set the quantity of files that do not state it; may be repeated.",
         ),
     ] = None,
     cut: Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")] = 80,
@@ -74,7 +74,9 @@ def fit_(
     try:
         find_metric(metric)
         models = all_models() if model == "all" else find_models(model.split(","))
-        given = _given(parameters, models)
+        words = parameters_of(parameters)
+        quantity = words.pop("quantity", "stated")
+        given = _given(words, models)
         page = _page(image, output)
     except ValueError as error:
         fail(one_line(error), Exit.USAGE)
@@ -88,7 +90,7 @@ def fit_(
     complete, seen, failed = True, True, 0
     with stdout_to_stderr():
         try:
-            materials, failed = _read(files, cut, seed)
+            materials, failed = _read(files, quantity, cut, seed)
             failed += _fit_all(materials, names, metric, starts, seed, given, fits)
         except KeyboardInterrupt:
             complete = False
@@ -131,7 +133,7 @@ def _page(image: bool, output: Path | None) -> Page | None:
     return Page()
 
 
-def _given(definitions: list[str] | None, models: list[type[Model]]) -> dict[str, Any]:
+def _given(parameters: dict[str, str], models: list[type[Model]]) -> dict[str, Any]:
     """Return what -D options fix, a tuple where they give several words of a choice.
 
     Raises:
@@ -140,7 +142,7 @@ def _given(definitions: list[str] | None, models: list[type[Model]]) -> dict[str
     from ..fit.unknowns import check_names, default_words
 
     given: dict[str, Any] = {}
-    for name, text in parameters_of(definitions).items():
+    for name, text in parameters.items():
         check_names(models, [name])
         several = tuple(value_of(part) for part in text.split(","))
         if len(several) > 1 and not any(name in default_words(it) for it in models):
@@ -149,14 +151,15 @@ def _given(definitions: list[str] | None, models: list[type[Model]]) -> dict[str
     return given
 
 
-def _read(files: list[Path], cut: float, seed: int) -> tuple[list[Observations], int]:
+def _read(files: list[Path], quantity: Any, cut: float, seed: int) -> tuple[list[Observations], int]:
     """Return what is fitted, and how many files cannot be, of which it prints why."""
     from ..fit import observe
+    from ..measured import read
 
     materials = []
     for file in files:
         try:
-            materials.append(observe(file, cut, seed=seed))
+            materials.append(observe(read(file, quantity), cut, seed=seed))
         except ValueError as error:
             err.print(f"mi-brdfs: {one_line(error)}")
     return materials, len(files) - len(materials)

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ..mitsuba.errors import one_line
 from .app import command
-from .options import check_output, write_json
+from .options import check_output, quantity_of, write_json
 from .terminal import Exit, err, fail, out, print_table
 
 if TYPE_CHECKING:
@@ -27,6 +27,12 @@ def measured(
         Path | None,
         typer.Option("--plot", metavar="FILE", help="Also draw slices, lobes and albedos: .png, .svg, .pdf or .jpg."),
     ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "-D", "--param", metavar="quantity=NAME", help="What files hold that do not state it: f or f cos."
+        ),
+    ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
     ] = None,
@@ -38,10 +44,11 @@ def measured(
     if plot_file is not None:
         _check_picture(plot_file)
     check_output("--json", json_file)
+    held = quantity_of(parameters)
     drawn, findings, failed = [], [], 0
     for file in files:
         try:
-            measurement = read(file)
+            measurement = read(file, held)
             summary = summarize(measurement)
         except ValueError as error:
             err.print(f"mi-brdfs: {one_line(error)}")

@@ -7,7 +7,7 @@ import os
 import tempfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -35,6 +35,14 @@ def parameters_of(definitions: list[str] | None) -> dict[str, str]:
             fail(f"-D {definition}: write -D name=value", Exit.USAGE)
         parameters[name] = value
     return parameters
+
+
+def quantity_of(definitions: list[str] | None) -> Any:
+    """Return what ``-D quantity=…`` says that a measured file holds, which has no other parameters."""
+    parameters = {"quantity": "stated"} | parameters_of(definitions)
+    for name in parameters.keys() - {"quantity"}:
+        fail(f"-D {name}: a measured file has no parameter but quantity", Exit.USAGE)
+    return parameters["quantity"]
 
 
 def check_names(names: list[str] | None, known: Collection[str], kind: str) -> None:

@@ -47,12 +47,13 @@ def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> A
     with rgb_variant(), warnings.catch_warnings():
         warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
         pictures = []
-        for bsdf in (tabulated(os.path.abspath(file)), *(it.bsdf for it in fits)):
+        data = tabulated(os.path.abspath(file)) | {"quantity": fits[0].quantity}
+        for bsdf in (data, *(it.bsdf for it in fits)):
             pictures.append(_picture(bsdf))
             advance()
         stops = _stops(pictures[0])
-        data, *others = (_encoded(2.0**stops * picture) for picture in pictures)
-    return Appearance(data, others, stops)
+        measured, *others = (_encoded(2.0**stops * picture) for picture in pictures)
+    return Appearance(measured, others, stops)
 
 
 def check_file(fits: Sequence[Fit]) -> str:

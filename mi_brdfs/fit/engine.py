@@ -66,6 +66,7 @@ def fit_configuration(
             pairs=material.fitted,
             negative=material.negative,
             missing=material.missing,
+            quantity=material.quantity,
             scatter=list(material.scatter),
             in_highlight=_in_highlight(problem, material, x),
             anisotropic=material.anisotropic,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..measured import Axis, Grid, Measurement, read
 from ..measured.albedo import albedos
 from ..measured.arrays import stacked
+from ..measured.measurement import Quantity
 from ..measured.observer import to_srgb
 
 Arrays: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike]
@@ -55,6 +56,8 @@ class Observations:
     """Values within the cut that are no numbers, which get none either."""
     cut: float
     """The largest angle of wi and wo to the normal, in degrees."""
+    quantity: Quantity = "stated"
+    """What the file holds, by itself or because that was asked for."""
     scatter: tuple[tuple[float, float, float], ...] = ()
     """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, at the first azimuth."""
 
@@ -115,6 +118,7 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
         negative=int(negative.sum()),
         missing=int(missing.sum()),
         cut=cut,
+        quantity=source.quantity if isinstance(source, Measurement) else "stated",
         scatter=_scatter(source) if isinstance(source, Measurement) and isinstance(source.data, Grid) else (),
     )
 

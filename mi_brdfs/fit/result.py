@@ -13,6 +13,7 @@ import numpy as np
 from ..measure.directions import direction
 from ..measure.probe import BSDFProbe
 from ..measure.variates import sobol
+from ..measured.measurement import Quantity
 from ..model import EnergyWarning
 from ..parameters.xml import to_xml
 from .lanes import rgb_variant
@@ -74,6 +75,8 @@ class Fit:
     in_highlight: int
     """The pairs whose value exceeds half of that of the mirror direction."""
     anisotropic: bool
+    quantity: Quantity = "stated"
+    """What the file holds, by itself or because that was asked for."""
     scatter: list[tuple[float, float, float]] = field(default_factory=list)
     """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, where it states any."""
     fixed: list[str] = field(default_factory=list)

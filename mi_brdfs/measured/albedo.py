@@ -31,7 +31,7 @@ def albedos(grid: Grid, theta_i: np.ndarray, phi_i: float = 0, extrapolate: Extr
     ends before f does.
     """
     return np.array([
-        (solid_angle * wo[:, 2]) @ grid.evaluate(wi, wo, extrapolate=extrapolate)
+        grid.integrated(wi, wo, solid_angle * wo[:, 2], extrapolate)
         for wi, wo, solid_angle in _nodes(theta_i, phi_i)
     ])  # fmt: skip
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from ..math import EPSILON, TINY
 
+UNIT = 1e-3
+"""By how much the length of a unit vector may be off."""
 NUMPY = SimpleNamespace(
     sqrt=lambda x: np.sqrt(np.maximum(x, 0)),
     atan2=np.arctan2,
@@ -41,9 +43,20 @@ def vector(x: Any, y: Any, z: Any) -> SimpleNamespace:
 
 
 def components(w: np.ndarray) -> SimpleNamespace:
-    """Return an array of vectors, shape (…, 3), by component."""
+    """Return unit vectors, shape (…, 3), by component.
+
+    Raises:
+        ValueError: if they are of another shape, or one has another length: near grazing, half vectors would turn.
+    """
     w = np.asarray(w, dtype=np.float64)
-    return vector(w[..., 0], w[..., 1], w[..., 2])
+    if w.shape[-1:] != (3,):
+        raise ValueError(f"directions must be arrays of shape (…, 3), not {w.shape}")
+    x, y, z = w[..., 0], w[..., 1], w[..., 2]
+    length = np.hypot(np.hypot(x, y), z)
+    unit = abs(length - 1) <= UNIT
+    if not np.all(unit):
+        raise ValueError(f"directions must have the length 1, not {length[~unit][0]:.4g}")
+    return vector(x, y, z)
 
 
 def stacked(w: SimpleNamespace) -> np.ndarray:

@@ -15,14 +15,14 @@ import numpy as np
 from ..measure.arrays import CENTRE, Array
 from ..measure.probe import BSDFProbe
 from ..measure.sources import name_of
-from ..parameters.messages import printable
 from ..variants import is_measurable
 from ..writing import replacing
-from .arrays import NUMPY, components
+from .arrays import NUMPY, components, stacked
+from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
 from .scattered import as_grid
-from .source import Source
+from .source import Source, batches
 
 LANES = 1 << 20
 """Pairs of directions that a BSDF is evaluated for at once."""
@@ -54,7 +54,7 @@ class Conversion:
             f"{_percent(self.rms)} of its peak (root mean square), and by at most {_percent(self.largest)} farther "
             "than a cell from the peak."
         )
-        return "\n".join([f"{self.path}: {self.format}.", error, *self.losses])
+        return "\n".join([f"{named(self.path)}: {self.format}.", error, *self.losses])
 
 
 def convert(
@@ -74,10 +74,11 @@ def convert(
         OSError: if the file cannot be written.
     """
     path = Path(path)
-    if isinstance(given, (str, Path)) and Path(given).exists() and path.exists() and os.path.samefile(given, path):
-        raise ValueError(f"{path} cannot be converted onto itself; give another name")
+    file = given.path if isinstance(given, Measurement) else given
+    if isinstance(file, (str, Path)) and Path(file).exists() and path.exists() and os.path.samefile(file, path):
+        raise ValueError(f"{named(path)} cannot be converted onto itself; give another name")
     if path.exists() and not path.is_file():
-        raise ValueError(f"{path} is not a regular file; give the name of one")
+        raise ValueError(f"{named(path)} is not a regular file; give the name of one")
     writer = _writer(path, format)
     source, losses = _source(given)
     with replacing(path) as part:
@@ -113,7 +114,7 @@ def _baked(probe: BSDFProbe) -> Source:
         raise ValueError("the BSDF reflects and transmits in single directions only: there is no value to write")
 
     def evaluate(wi: Array, wo: Array) -> Array:
-        wi, wo = np.asarray(wi, np.float32), np.asarray(wo, np.float32)
+        wi, wo = (stacked(components(w)).astype(np.float32) for w in (wi, wo))
         batches = [slice(k, k + LANES) for k in range(0, len(wi), LANES)]
         f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in batches]
         return usable(np.concatenate(f))
@@ -140,8 +141,8 @@ def _source(given: Any) -> tuple[Source, list[str]]:
 def _of_measurement(measurement: Measurement) -> Source:
     grid = as_grid(measurement.data)
     if not grid.usable.any():
-        raise ValueError(f"{measurement.path} has no positive value: there is nothing to write")
-    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, printable(measurement.material))
+        raise ValueError(f"{named(measurement.path)} has no positive value: there is nothing to write")
+    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
     stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
     return source if stated else source.rgb()
 
@@ -172,7 +173,7 @@ def _writer(path: Path, format: str | None) -> ModuleType:
     fitting = [name for name in ENDINGS.get(path.suffix.lower(), []) if name in writable]
     chosen = [name for name in fitting if format is None or name.lower() == format.lower()]
     if not chosen:
-        wanted = f"{path} as {format}" if fitting else str(path)
+        wanted = f"{named(path)} as {format}" if fitting else named(path)
         known = [f"{ending} ({name})" for ending, names in ENDINGS.items() for name in names if name in writable]
         raise ValueError(f"there is no way to write {wanted}; files that can be written are {', '.join(known)}")
     return writable[chosen[0]]
@@ -190,19 +191,28 @@ def _compared(source: Source, written: Measurement) -> tuple[float, float, list[
     else:
         written_as = Source(grid.evaluate)
     wi, wo = _pairs(PAIRS)
-    cosine = wo[:, 2:]
-    f, found = source.evaluate(wi, wo) * cosine, written_as.evaluate(wi, wo) * cosine
-    error, peak = abs(found - f).max(axis=-1), f.max() or 1.0
+    found = [_differences(source, written_as, wi[k], wo[k]) for k in batches(PAIRS, grid.values.shape[-1])]
+    error, brightest, changes = np.concatenate(found, axis=1)
+    peak = brightest.max() or 1.0
     if grid.coordinates.reciprocal:
-        change = abs(source.evaluate(wo, wi) * cosine - f).max() / peak
+        change = changes.max() / peak
         if change > ALIKE:
             losses.append(
                 f"{written.format} is reciprocal: f is the mean over both orders of the directions, between which f "
                 f"cosθ differs by up to {_percent(change)} of its peak."
             )
     cells = _cells(grid, wi, wo)
-    far = (abs(cells - cells[:, [f.max(axis=-1).argmax()]]) > 1).any(axis=0)
+    far = (abs(cells - cells[:, [brightest.argmax()]]) > 1).any(axis=0)
     return float(np.sqrt(np.mean(error**2)) / peak), float(error[far].max(initial=0) / peak), losses
+
+
+def _differences(source: Source, other: Source, wi: Array, wo: Array) -> Array:
+    """Return by how much f cosθo differs, what it is, and by how much it differs from that with the directions
+    exchanged, where that is the most of all channels: shape (3, N)."""
+    cosine = wo[:, 2:]
+    f = source.evaluate(wi, wo) * cosine
+    error, change = other.evaluate(wi, wo) * cosine - f, source.evaluate(wo, wi) * cosine - f
+    return np.stack([abs(error).max(axis=-1), f.max(axis=-1), abs(change).max(axis=-1)])
 
 
 def _percent(part: float) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..parameters.messages import printable
 from .measurement import FileError
 
 
@@ -52,7 +53,12 @@ def content_hash(path: str | Path) -> str:
     try:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
-        raise FileError(f"{path}: {reason(error)}.") from None
+        raise FileError(f"{named(path)}: {reason(error)}.") from None
+
+
+def named(path: str | Path) -> str:
+    """Return a path as it can be shown, without what would control a terminal or is not in UTF-8."""
+    return printable(str(path))
 
 
 def reason(error: Exception) -> str:

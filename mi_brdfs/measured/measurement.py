@@ -10,16 +10,24 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..parameters.messages import brief, printable
 from .arrays import NUMPY, components, stacked
 from .coordinates import Coordinates
 
 Interpolation = Literal["trilinear", "nearest"]
 Extrapolation = Literal["hold", "zero"]
+Quantity = Literal["stated", "f", "f cos"]
+"""What a file holds: what it states, or f or f cosθo where it states nothing."""
+MOST = 1e36
+"""The largest value: float32 holds it times a solid angle."""
 
 
 class FileError(ValueError):
     """A file that cannot be read. The message is one sentence that names the file and, where there is one, the offset
-    or the line."""
+    or the line, without what would control a terminal in the file's name or its text."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,9 @@ class Axis:
         return (x >= self.low - MARGIN) & (x <= self.high + MARGIN)
 
 
+MOST_CHANNELS = 4096
+AT_ONCE = 1 << 20
+"""The most values that are filled in together."""
 MARGIN = 1e-5
 """By how much a float32 angle may miss the end of an axis."""
 
@@ -104,14 +115,24 @@ class Grid:
         return stacked(wi), stacked(wo), np.reshape(scale, (-1, 1)) * values
 
     def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        """Return whether directions of shape (…, 3), or (3,) for one wi and many wo, are above the horizon, on all axes
-        in the range that was measured, and nearest to a node with values in all channels: shape (…)."""
-        places, _ = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
-        inside, nearest = (wi[..., 2] > 0) & (wo[..., 2] > 0), []
+        """Return whether unit vectors of shape (…, 3), or (3,) for one wi and many wo, are above the horizon, on all
+        axes in the range that was measured, and nearest to a node with values in all channels: shape (…).
+
+        Raises:
+            ValueError: if a direction is no unit vector.
+        """
+        light, view = components(wi), components(wo)
+        places, _ = self.coordinates.locate_scaled(light, view, NUMPY)
+        inside, nearest = (light.z > 0) & (view.z > 0), []
         for axis, place in zip(self.axes, places, strict=True):
             inside = inside & axis.measured(place)
             nearest.append(axis.steps(place, "nearest")[0][0])
-        return inside & np.isfinite(self.values[tuple(nearest)]).all(axis=-1)
+        return inside & self._known[tuple(nearest)]
+
+    @cached_property
+    def _known(self) -> np.ndarray:
+        """Which nodes have values in all channels."""
+        return np.isfinite(self.values).all(axis=-1)
 
     @cached_property
     def usable(self) -> np.ndarray:
@@ -140,22 +161,29 @@ class Grid:
     def _filled(self) -> np.ndarray:
         """Return the values, with the mean of the measured neighbours along an axis in place of missing ones: one axis
         after the other, which also reaches the corners of cells."""
-        missing = np.flatnonzero(np.isnan(self.values))
-        if not len(missing):
+        if not np.isnan(self.values).any():
             return self.values
-        values, stride = self.values.flatten(), self.values.size
-        for axis in self.axes:
-            count = len(axis.nodes)
-            stride //= count
-            k = missing // stride % count
-            near = []
-            for step in (-1, 1):
-                other = (k + step) % count
-                value = values[missing + (other - k) * stride]
-                near.append(np.where((axis.period is not None) | (other == k + step), value, np.nan))
-            lower, upper = near
-            values[missing] = np.where(np.isnan(lower), upper, np.where(np.isnan(upper), lower, lower / 2 + upper / 2))
-        return values.reshape(self.values.shape)
+        filled = self.values.copy()
+        channels = filled.shape[-1]
+        together = max(1, AT_ONCE * channels // filled.size)
+        for first in range(0, channels, together):
+            part = filled[..., first : first + together]
+            values, stride = part.flatten(), part.size
+            missing = np.flatnonzero(np.isnan(values))
+            for axis in self.axes:
+                count = len(axis.nodes)
+                stride //= count
+                k = missing // stride % count
+                near = []
+                for step in (-1, 1):
+                    other = (k + step) % count
+                    value = values[missing + (other - k) * stride]
+                    near.append(np.where((axis.period is not None) | (other == k + step), value, np.nan))
+                lower, upper = near
+                mean = np.where(np.isnan(upper), lower, lower / 2 + upper / 2)
+                values[missing] = np.where(np.isnan(lower), upper, mean)
+            part[...] = values.reshape(part.shape)
+        return filled
 
     def evaluate(
         self,
@@ -164,8 +192,31 @@ class Grid:
         interpolation: Interpolation = "trilinear",
         extrapolate: Extrapolation = "hold",
     ) -> np.ndarray:
-        """Return f, with values that mean nothing as 0, for directions of shape (…, 3), or (3,) for one wi and many wo:
-        shape (…, channels)."""
+        """Return f, with values that mean nothing as 0, for unit vectors of shape (…, 3), or (3,) for one wi and many
+        wo: shape (…, channels).
+
+        Raises:
+            ValueError: if a direction is no unit vector.
+        """
+        values, corners = self._corners(wi, wo, interpolation, extrapolate)
+        return sum(weight[..., None] * values.take(index, axis=0) for index, weight in corners)
+
+    def integrated(
+        self, wi: np.ndarray, wo: np.ndarray, weight: np.ndarray, extrapolate: Extrapolation = "hold"
+    ) -> np.ndarray:
+        """Return the sum of :meth:`evaluate` over directions, each times a weight, shape (channels,): the nodes are
+        weighed first, so that memory and time for many channels are those of the table, not of the directions."""
+        values, corners = self._corners(wi, wo, "trilinear", extrapolate)
+        index = np.concatenate([np.broadcast_to(k, weight.shape) for k, _ in corners])
+        total = np.bincount(index, np.concatenate([share * weight for _, share in corners]), len(values))
+        lit = np.flatnonzero(total)
+        return total[lit] @ values[lit]
+
+    def _corners(
+        self, wi: np.ndarray, wo: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation
+    ) -> tuple[np.ndarray, list[tuple[Any, np.ndarray]]]:
+        """Return ``(values, corners)``: nodes' values, shape (nodes, channels), and the ``(index, weight)`` of those
+        that f is the sum of."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
         grid = self if interpolation == "nearest" else self.closed
         values, inside = grid.usable, np.ones((), dtype=bool)
@@ -179,11 +230,9 @@ class Grid:
                 continue
             kept += 1
             corners = [(index * len(axis.nodes) + k, weight * share) for index, weight in corners for k, share in steps]
-        values = values.reshape(-1, values.shape[-1])
-        result = sum(np.asarray(weight)[..., None] * values.take(index, axis=0) for index, weight in corners)
         if extrapolate == "zero":
-            result = np.where(inside[..., None], result, 0)
-        return result * np.asarray(scale)[..., None]
+            scale = np.where(inside, scale, 0)
+        return values.reshape(-1, values.shape[-1]), [(index, np.asarray(weight * scale)) for index, weight in corners]
 
 
 @dataclass(frozen=True)
@@ -224,7 +273,35 @@ class Measurement:
     notes: dict[str, str] = field(default_factory=dict)
     """What else the file says of itself."""
 
+    def __post_init__(self) -> None:
+        # What a file calls itself must not control a terminal.
+        object.__setattr__(self, "material", brief(self.material))
+        lines = {name: " ".join(text.split()) for name, text in self.notes.items()}
+        object.__setattr__(self, "notes", {printable(name): printable(text) for name, text in lines.items()})
+
 
 def usable(values: np.ndarray) -> np.ndarray:
     """Return values with 0 in place of negative, infinite and missing ones."""
     return np.where(np.isfinite(values) & (values > 0), values, 0)
+
+
+def representable(measurement: Measurement) -> Measurement:
+    """Return a measurement that can be rendered, with NaN in place of values beyond ``MOST``, infinite ones among them.
+
+    Raises:
+        FileError: if no value is left that is positive, or wavelengths are too many, no numbers or the same.
+    """
+    values, nm = measurement.data.values, measurement.wavelengths
+    if values.shape[-1] > MOST_CHANNELS:
+        raise FileError(
+            f"{measurement.path} has {values.shape[-1]:,} wavelengths, of which at most {MOST_CHANNELS:,} can be read; "
+            "keep every second one, or fewer."
+        )
+    if nm is not None and len(nm) > 1 and not np.all((np.diff(nm) > 0) & np.isfinite(nm[1:])):
+        raise FileError(f"{measurement.path}: its wavelengths must be numbers that differ.")
+    values[~((values >= -MOST) & (values <= MOST))] = np.nan
+    # Samples with a missing channel are left out where others are interpolated.
+    kept = values if isinstance(measurement.data, Grid) else values[np.isfinite(values).all(axis=1)]
+    if not np.any(kept > np.finfo(np.float32).tiny):
+        raise FileError(f"{measurement.path}: no value is positive and at most {MOST:g}; there is nothing to render.")
+    return measurement

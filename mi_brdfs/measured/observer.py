@@ -12,8 +12,13 @@ def to_srgb(wavelengths: np.ndarray) -> np.ndarray:
     """Return the weights, shape (wavelengths, 3), that turn a reflectance at some wavelengths in nm, linear between
     them and constant beyond, into linear sRGB under D65."""
     fine, weights = observer()
-    hats = np.stack([np.interp(fine, wavelengths, hat) for hat in np.eye(len(wavelengths))])
-    return hats @ weights
+    position = np.interp(fine, wavelengths, np.arange(len(wavelengths)))
+    below = position.astype(np.int64)
+    share = (position - below)[:, None]
+    result = np.zeros((len(wavelengths) + 1, 3))
+    np.add.at(result, below, (1 - share) * weights)
+    np.add.at(result, below + 1, share * weights)
+    return result[:-1]
 
 
 @functools.cache

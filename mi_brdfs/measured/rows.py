@@ -120,4 +120,5 @@ def around(nodes: np.ndarray) -> Axis:
 def without_cosine(values: np.ndarray, cosine: np.ndarray) -> np.ndarray:
     """Return f for f cosθo, and NaN where the cosine is next to 0."""
     seen = cosine >= LEAST_COSINE
-    return np.where(seen[:, None], values / np.where(seen, cosine, 1)[:, None], np.nan)
+    with np.errstate(over="ignore"):
+        return np.where(seen[:, None], values / np.where(seen, cosine, 1)[:, None], np.nan)

@@ -11,10 +11,12 @@ from .measurement import Axis, Extrapolation, Grid, Samples
 NEIGHBOURS = 10
 """How many samples a value is interpolated between."""
 NODES_PER_SAMPLE, LEAST_NODES, MOST_NODES = 100, 20_000, 120_000
+MOST_VALUES = 1 << 23
+"""The most nodes times channels: spectra with many wavelengths get fewer nodes."""
 SHARES = {False: np.array([4.0, 4.0, 1.0]), True: np.array([2.0, 1.5, 1.5, 2.0])}
 """How finely √θh, θd, φd (of isotropic materials, only up to π/2) and φh are divided, compared with each other."""
-PAIRS, CHUNK = 4096, 8192
-"""How many distances are computed at once, and how many nodes are interpolated at once."""
+PAIRS, CHUNK, CHUNK_VALUES = 4096, 8192, 1 << 18
+"""How many distances are computed at once, and how many nodes and values are interpolated at once."""
 RIDGE = 1e-2
 """How much the weights prefer their start to balancing, in units of the neighbourhood: the samples around a node at the
 rim of what was measured cannot balance."""
@@ -49,7 +51,8 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     points, values = merged(embedded(wi, wo, anisotropic), samples.values[known])
     coordinates = HalfDifference(reciprocal=True, anisotropic=anisotropic)
     places = coordinates.locate(components(wi), components(wo), NUMPY)
-    axes = spaced(places, np.maximum(samples.values[known], 0).sum(axis=1), len(points))
+    size = min(np.clip(NODES_PER_SAMPLE * len(points), LEAST_NODES, MOST_NODES), MOST_VALUES // values.shape[1])
+    axes = spaced(places, np.maximum(samples.values[known], 0).sum(axis=1), size)
     half = len(axes[2].nodes) // 2 + 1
     # Isotropic tables are symmetric about φd = π/2.
     counted = [axis.nodes if k != 2 or anisotropic else axis.nodes[:half] for k, axis in enumerate(axes)]
@@ -90,10 +93,9 @@ def merged(points: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return points[first], total / np.bincount(group)[:, None]
 
 
-def spaced(places: tuple[np.ndarray, ...], brightness: np.ndarray, count: int) -> tuple[Axis, ...]:
-    """Return axes for samples at some places of some brightness, ``count`` of which differ."""
+def spaced(places: tuple[np.ndarray, ...], brightness: np.ndarray, size: int) -> tuple[Axis, ...]:
+    """Return axes for samples at some places of some brightness, with about ``size`` nodes to interpolate at."""
     shares = SHARES[len(places) > 3]
-    size = np.clip(NODES_PER_SAMPLE * count, LEAST_NODES, MOST_NODES)
     root, theta_d, *azimuths = np.maximum(shares * (size / np.prod(shares)) ** (1 / len(shares)), 4).astype(int)
     halves = [(azimuths[0], np.pi), (azimuths[1], 2 * np.pi)] if len(azimuths) > 1 else [(2 * azimuths[0], np.pi)]
     return (
@@ -134,8 +136,9 @@ def interpolated(points: np.ndarray, values: np.ndarray, nodes: np.ndarray) -> n
         return np.repeat(values, len(nodes), axis=0)
     index = nearest(points, nodes, min(NEIGHBOURS + 1, len(points)))
     result = np.empty((len(nodes), values.shape[1]))
-    for start in range(0, len(nodes), CHUNK):
-        chunk = slice(start, start + CHUNK)
+    step = max(1, min(CHUNK, CHUNK_VALUES // values.shape[1]))
+    for start in range(0, len(nodes), step):
+        chunk = slice(start, start + step)
         weight = weights(points[index[chunk]] - nodes[chunk, None])
         result[chunk] = np.einsum("nk,nkc->nc", weight, values[index[chunk]])
     return result

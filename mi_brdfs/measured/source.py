@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .observer import to_srgb
+
+AT_ONCE = 1 << 22
+"""The most values that are evaluated together."""
 
 
 @dataclass(frozen=True)
@@ -15,8 +18,8 @@ class Source:
     """A BRDF as a function, from a measurement or a BSDF."""
 
     evaluate: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    """Returns f in 1/sr, float64 of shape (N, channels), for ``wi`` and ``wo`` of shape (N, 3); both are above the
-    horizon."""
+    """Returns f in 1/sr, float64 of shape (N, channels), for ``wi`` and ``wo`` of shape (N, 3); both are unit
+    vectors above the horizon."""
     wavelengths: np.ndarray | None = None
     """In nm, one a channel; None where the channels are linear sRGB."""
     anisotropic: bool = False
@@ -27,4 +30,27 @@ class Source:
         if self.wavelengths is None:
             return self
         weights = to_srgb(self.wavelengths) if len(self.wavelengths) > 1 else np.ones((1, 3))
-        return replace(self, evaluate=lambda wi, wo: np.maximum(self.evaluate(wi, wo) @ weights, 0), wavelengths=None)
+
+        def evaluate(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+            parts = [self.evaluate(wi[k], wo[k]) @ weights for k in batches(len(wi), len(weights))]
+            return np.maximum(np.concatenate(parts), 0)
+
+        return replace(self, evaluate=evaluate, wavelengths=None)
+
+    def check_size(self, pairs: int, most: int) -> None:
+        """Refuse to be written at so many pairs of directions.
+
+        Raises:
+            ValueError: if there are more values than ``most``.
+        """
+        if self.wavelengths is not None and pairs * len(self.wavelengths) > most:
+            raise ValueError(
+                f"{len(self.wavelengths):,} wavelengths at {pairs:,} pairs of directions would be more values than the "
+                f"{most:,} that are written; keep at most {most // pairs:,} of them"
+            )
+
+
+def batches(pairs: int, channels: int) -> Iterator[slice]:
+    """Yield parts of pairs of directions whose values are in memory together."""
+    step = max(1, AT_ONCE // channels)
+    return (slice(k, k + step) for k in range(0, max(pairs, 1), step))

@@ -9,6 +9,7 @@ import numpy as np
 
 from .albedo import albedos, coverage
 from .counts import Counts, Range, census
+from .files import named
 from .measurement import FileError, Grid, Measurement, Samples
 from .reciprocity import ReciprocityError, reciprocity_error
 from .scattered import as_grid
@@ -17,6 +18,9 @@ ANGLES = np.arange(0, 86, 5)
 """The angles of incidence at which albedos are integrated, in degrees, where they were measured."""
 AZIMUTHS = 8
 """The most azimuths of incidence at which those of anisotropic materials are."""
+FIGURES = 256
+"""The most azimuths at the angle with the largest albedo, and the most stated albedos, that are looked at: evenly
+chosen among all."""
 AXES = {
     "sqrt_theta_h": "θh", "theta_d": "θd", "phi_d": "φd", "phi_h": "φh",
     "theta_i": "θi", "theta_o": "θo", "delta_phi": "Δφ", "phi_i": "φi",
@@ -160,10 +164,10 @@ def summarize(measurement: Measurement) -> Summary:
                         (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
     angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
     turns = azimuths(grid)
-    turns = turns[:: -(-len(turns) // AZIMUTHS)]
+    turns = thinned(turns, AZIMUTHS)
     covered = np.array([coverage(grid, np.radians(angles), phi) for phi in turns])
     return Summary(
-        file=str(measurement.path),
+        file=named(measurement.path),
         format=measurement.format,
         material=measurement.material,
         symmetry=_symmetry(data),
@@ -252,7 +256,7 @@ def _largest(measurement: Measurement, grid: Grid, angles: np.ndarray, turns: np
     def found(theta: np.ndarray, phis: np.ndarray) -> np.ndarray:
         return np.array([albedos(grid, np.radians(theta), phi, extrapolate="zero") for phi in phis])
 
-    values, every = found(angles, turns), azimuths(grid)
+    values, every = found(angles, turns), thinned(azimuths(grid), FIGURES)
     angle = values.max(axis=(0, 2)).argmax()
     values = found(angles[[angle]], every)[:, 0]
     turn, channel = np.unravel_index(values.argmax(), values.shape)
@@ -262,13 +266,21 @@ def _largest(measurement: Measurement, grid: Grid, angles: np.ndarray, turns: np
 
 def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
     turns, found = azimuths(grid), []
-    for theta, stated in measurement.stated_albedos.items():
-        for phi, one in zip(turns, stated, strict=False):
-            if not np.isfinite(one):
-                continue
-            (integrated,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
-            found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
+    given = [
+        (theta, phi, one)
+        for theta, stated in measurement.stated_albedos.items()
+        for phi, one in zip(turns, stated, strict=False)
+        if np.isfinite(one)
+    ]
+    for theta, phi, one in thinned(given, FIGURES):
+        (integrated,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
+        found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
     return found
+
+
+def thinned(items: Any, most: int) -> Any:
+    """Return at most so many of an array or a list, evenly chosen."""
+    return items[:: max(1, -(-len(items) // most))]
 
 
 def _share(count: int, of: int) -> str:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from weakref import WeakValueDictionary
 
 import mitsuba as mi
-import numpy as np
 
 from .colour import Channels
 from .coordinates import PolarAngle
 from .files import checked, content_hash
 from .formats import read
-from .measurement import Axis, Extrapolation, FileError, Grid, Interpolation, Measurement
+from .measurement import Axis, Extrapolation, Grid, Interpolation, Measurement, Quantity
 from .proposal import NODES_I, Proposal, estimated_albedos
 from .scattered import as_grid
 from .table import Table
@@ -23,21 +22,26 @@ class Tables:
     _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
 
     @classmethod
-    def of(cls, filename: str, interpolation: Interpolation, extrapolate: Extrapolation, shared: bool) -> Tables:
+    def of(
+        cls,
+        filename: str,
+        interpolation: Interpolation,
+        extrapolate: Extrapolation,
+        quantity: Quantity,
+        shared: bool,
+    ) -> Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
         path = checked(filename)
         if not shared:
-            return cls(read(path), interpolation, extrapolate)
-        key = mi.variant(), path.resolve(), content_hash(path), interpolation, extrapolate
+            return cls(read(path, quantity), interpolation, extrapolate)
+        key = mi.variant(), path.resolve(), content_hash(path), interpolation, extrapolate, quantity
         found = cls._shared.get(key)
         if found is None:
-            found = cls._shared[key] = cls(read(path), interpolation, extrapolate)
+            found = cls._shared[key] = cls(read(path, quantity), interpolation, extrapolate)
         return found
 
     def __init__(self, measurement: Measurement, interpolation: Interpolation, extrapolate: Extrapolation) -> None:
         data = measurement.data
-        if not np.any(data.values > 0):
-            raise FileError(f"{measurement.path}: no value is positive; there is nothing to render.")
         grid = as_grid(data, extrapolate)
         self.channels = Channels(measurement.wavelengths)
         self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal

@@ -31,7 +31,8 @@ class Tabulated(Model):
     where the file is anisotropic. ``nearest`` takes the nearest node's value: MERL's own look-up. Negative values and
     missing ones count as 0, except for the channels of RGL's colours outside sRGB. What lies outside the measured range
     has the value at its border with ``hold``, and is 0 with ``zero``. What a file calls the incident direction is wi,
-    as in Mitsuba's ``measured``.
+    as in Mitsuba's ``measured``. Files of f cosθo are divided by the cosine; ``quantity`` is for those that do not
+    state what they hold: ALTA's without #PARAM_OUT must be told, others are ``f`` by default.
 
     Linear sRGB values are rgb. In spectral variants they weigh three spectra that sum to 1, so that white stays white.
     Values at several wavelengths are interpolated between them in spectral variants; rgb variants show them under
@@ -66,6 +67,7 @@ class Tabulated(Model):
     scale = Colour(1, (0, np.inf), "factor on all values")
     interpolation = Choice(("trilinear", "nearest"), "between the nodes of the file's grid")
     extrapolate = Choice(("hold", "zero"), "beyond the measured range: the value at its border, or nothing")
+    quantity = Choice(("stated", "f", "f cos"), "what a file holds that does not state it: f, or f cosθo")
     differentiable = Flag(False, "give this BSDF a table of its own, with derivatives, as the parameter values")
     rotation = Rotation()
 
@@ -75,7 +77,8 @@ class Tabulated(Model):
         super().__init__(props)
         chosen: dict[str, Any] = self.parameters.chosen
         shared = not chosen["differentiable"]
-        self.tables = Tables.of(chosen["filename"], chosen["interpolation"], chosen["extrapolate"], shared)
+        words = chosen["interpolation"], chosen["extrapolate"], chosen["quantity"]
+        self.tables = Tables.of(chosen["filename"], *words, shared)
         self.captured, self.signed = self.tables.captured, self.tables.signed
         if not shared:
             self.arrays = {"values": self.tables.f.values}

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .files import BinaryFile
+from .text import decoded, shortened
 
 MAGIC = b"tensor_file\0"
 VERSION = 1, 0
@@ -53,29 +54,30 @@ def contents(file: BinaryFile) -> dict[str, Tensor]:
     for _ in range(count):
         start = file.offset
         length = int(file.take("u2", 1, "the length of a field's name")[0])
-        name = file.take("u1", length, "a field's name").tobytes().decode(errors="replace")
-        dimensions = int(file.take("u2", 1, f"the number of dimensions of {name!r}")[0])
-        type = int(file.take("u1", 1, f"the type of {name!r}")[0])
-        offset = int(file.take("u8", 1, f"the offset of {name!r}")[0])
+        name = decoded(file.take("u1", length, "a field's name").tobytes())
+        shown = shortened(name)
+        dimensions = int(file.take("u2", 1, f"the number of dimensions of {shown}")[0])
+        type = int(file.take("u1", 1, f"the type of {shown}")[0])
+        offset = int(file.take("u8", 1, f"the offset of {shown}")[0])
         if name in tensors:
-            raise file.error(f"a second field {name!r} follows", start)
+            raise file.error(f"a second field {shown} follows", start)
         if type not in TYPES:
-            raise file.error(f"field {name!r} is of the unknown type {type}", start)
+            raise file.error(f"field {shown} is of the unknown type {type}", start)
         if dimensions > MOST_DIMENSIONS:
-            raise file.error(f"field {name!r} has {dimensions:,} dimensions", start)
-        shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {name!r}"))
+            raise file.error(f"field {shown} has {dimensions:,} dimensions", start)
+        shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {shown}"))
         tensor = tensors[name] = Tensor(TYPES[type], offset, shape)
         if tensor.end > file.size:
             raise file.error(
-                f"field {name!r} should lie from byte {offset:,} to {tensor.end:,}, but the file ends at {file.size:,}",
+                f"field {shown} should lie from byte {offset:,} to {tensor.end:,}, but the file ends at {file.size:,}",
                 start,
             )
-    by_place = sorted((tensor.offset, tensor.end, name) for name, tensor in tensors.items() if tensor.count)
+    by_place = sorted((tensor.offset, tensor.end, shortened(name)) for name, tensor in tensors.items() if tensor.count)
     end, before = file.offset, "the table of contents"
     for start, stop, name in by_place:
         if start < end:
-            raise file.error(f"field {name!r} starts, but {before} reaches to byte {end:,}", start)
-        end, before = stop, f"field {name!r}"
+            raise file.error(f"field {name} starts, but {before} reaches to byte {end:,}", start)
+        end, before = stop, f"field {name}"
     return tensors
 
 

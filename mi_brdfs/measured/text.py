@@ -17,9 +17,18 @@ OPENING = 1 << 16
 """The bytes in which the first line that is no comment is looked for, and the words that tell formats apart."""
 
 
+def _foreign(error: UnicodeError) -> tuple[str, int]:
+    """Take bytes that are not in UTF-8 as Windows' Western letters, which contain those of Latin-1."""
+    assert isinstance(error, UnicodeDecodeError)
+    return error.object[error.start : error.end].decode("cp1252", errors="replace"), error.end
+
+
+FOREIGN = "mi_brdfs.foreign"
+codecs.register_error(FOREIGN, _foreign)
+
+
 class TextFile:
-    """Reads a text file line by line, in UTF-8, UTF-16 with its mark, or ASCII with a few foreign letters, with any
-    line ends."""
+    """Reads a text file line by line, in UTF-8, UTF-16 with its mark, or Latin-1, with any line ends."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.size, self.line = path, path.stat().st_size, 0
@@ -30,7 +39,7 @@ class TextFile:
 
     def lines(self) -> Iterator[str]:
         """Yield the lines, without the white space around them; ``line`` is the number of the last one, from 1."""
-        with self.path.open(encoding=self._encoding, errors="replace") as file:
+        with self.path.open(encoding=self._encoding, errors=FOREIGN) as file:
             while text := file.readline(LONGEST):
                 self.line += 1
                 if len(text) == LONGEST:
@@ -100,6 +109,11 @@ def encoding(head: bytes) -> str:
     return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
 
 
+def decoded(data: bytes) -> str:
+    """Return the text of bytes, those of a text file from its start on or a name in a binary one."""
+    return data.decode(encoding(data[:4]), errors=FOREIGN)
+
+
 def is_number(word: str) -> bool:
     try:
         float(word)
@@ -108,15 +122,20 @@ def is_number(word: str) -> bool:
     return True
 
 
+def whole(word: str) -> int:
+    """Return a count, 0 if a word is none or has more than nine digits."""
+    return int(word) if word.isdecimal() and len(word) < 10 else 0
+
+
 def shortened(word: str) -> str:
     """Return a word as it can be quoted in a sentence."""
     return repr(word if len(word) <= 24 else word[:20] + "…")
 
 
-def opening(path: Path, head: bytes) -> list[str]:
+def opening(path: Path) -> list[str]:
     """Return the first lines of a text file, in small letters, as many as a long comment may take."""
     with path.open("rb") as file:
-        text = file.read(OPENING).decode(encoding(head), errors="replace")
+        text = decoded(file.read(OPENING))
     return [line.strip().lower() for line in text.splitlines()]
 
 

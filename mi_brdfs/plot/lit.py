@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..measured.counts import batches, census
 from ..measured.measurement import usable
 from ..measured.observer import to_srgb
 from ..measured.summary import azimuths, ends, table
-from ..parameters.messages import printable
+from ..parameters.messages import brief, printable
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -28,19 +29,18 @@ class LitTable:
     """A measurement as a table with a luminance, lit from an azimuth in radians, by default the table's first."""
 
     def __init__(self, measurement: Measurement, phi: float | None = None) -> None:
+        measurement = in_colour(measurement)
         self.measurement, self.grid = measurement, table(measurement.data)
-        path, material = measurement.path, measurement.material
-        self.name = printable(path.name if material in ("", path.stem) else f"{material} ({path.name})")
+        name, material = printable(measurement.path.name), measurement.material
+        name = name if material in ("", brief(measurement.path.stem)) else f"{material} ({name})"
+        self.name = name.replace("$", r"\$")  # no formula, to Matplotlib
         self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
         self.phi = float(azimuths(self.grid)[0]) if phi is None else phi
         self.coloured = self.grid.values.shape[-1] > 1
         self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")
 
     def colour(self, f: np.ndarray) -> np.ndarray:
-        """Return values as linear sRGB, limited to its gamut, or as they are if they have one channel."""
-        wavelengths = self.measurement.wavelengths
-        if wavelengths is not None and len(wavelengths) > 1:
-            f = f @ to_srgb(wavelengths)
+        """Return values in the gamut of sRGB, or as they are if they have one channel."""
         return np.maximum(f, 0)
 
     def luminance(self, f: np.ndarray) -> np.ndarray:
@@ -91,3 +91,12 @@ class LitTable:
                 shifted = theta_o[mine] + wanted - theta_i[mine]
                 found[k].append(np.stack([shifted, self.luminance(usable(f[mine]))]))
         return [Curve(*np.concatenate(parts, axis=1)) for parts in found]
+
+
+def in_colour(measurement: Measurement) -> Measurement:
+    """Return a measurement with linear sRGB in place of several wavelengths: less to look up in."""
+    f, nm = measurement.data.values, measurement.wavelengths
+    if nm is None or len(nm) == 1:
+        return measurement
+    values = np.where(np.isfinite(f).all(axis=-1, keepdims=True), usable(f) @ to_srgb(nm), np.nan)
+    return replace(measurement, data=replace(measurement.data, values=values), wavelengths=None)

@@ -139,7 +139,7 @@ class Page:
 
 def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
-    cards, measurement = section.cards[:MOST], read(section.file)
+    cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
     section.data = _data_uri(shown.data)
     at = lightness(shown.data)

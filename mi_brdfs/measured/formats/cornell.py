@@ -8,16 +8,14 @@ import numpy as np
 
 from ..measurement import Measurement
 from ..rows import arranged, checked_angles
-from ..text import TextFile, first_words, is_number, opening
+from ..text import TextFile, first_words, is_number, opening, whole
 
 NAME = "Cornell"
 DESCRIPTION = "text: the number of wavelengths, these in nm, then rows of θi, φi, θo, φo and a spectrum"
-MOST_WAVELENGTHS = 4096
-"""The most wavelengths that a file is believed to have."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path, head)
+    lines = opening(path)
     words = first_words(lines)
     named = path.suffix.lower() == ".brdf" or any("num wls" in line for line in lines)
     return named and len(words) == 1 and is_number(words[0])
@@ -34,9 +32,9 @@ def read(path: Path) -> Measurement:
     file = TextFile(path)
     rows = file.rows()
     first = next(rows, [""])
-    if len(first) != 1 or not first[0].isdecimal() or not 0 < int(first[0]) <= MOST_WAVELENGTHS:
-        raise file.error(f"the number of wavelengths should stand alone, from 1 to {MOST_WAVELENGTHS}")
-    count = int(first[0])
+    count = whole(first[0])
+    if len(first) != 1 or not count:
+        raise file.error("the number of wavelengths should stand alone")
     file.expect(count, "wavelengths")
     wavelengths: list[float] = []
     while len(wavelengths) < count:

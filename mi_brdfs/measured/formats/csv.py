@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import Literal
 
 import numpy as np
 
+from ...parameters.messages import brief
 from ..arrays import stacked
 from ..coordinates import spherical
-from ..measurement import Measurement
+from ..measurement import Measurement, Quantity
 from ..rows import arranged, checked_angles, without_cosine
 from ..source import Source
 from ..text import TextFile, opening, shortened
@@ -29,14 +31,16 @@ VALUE = re.compile(
 )
 UNITS = {"d": np.pi / 180, "°": np.pi / 180, "r": 1.0}
 """Radians in a unit, by its first letter."""
+MOST_VALUES = 1 << 25
+"""Those of a file of 400 MB."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    first = next((line for line in opening(path, head) if line and not line.startswith("#")), "")
+    first = next((line for line in opening(path) if line and not line.startswith("#")), "")
     return path.suffix.lower() == ".csv" or any(ANGLE.fullmatch(name) for name in split(first, separator(first)))
 
 
-def read(path: Path) -> Measurement:
+def read(path: Path, quantity: Quantity) -> Measurement:
     """Read rows of angles and values below a header line.
 
     The columns are ``theta_i``, ``phi_i`` (0 if missing), ``theta_o`` and ``phi_o``, or ``delta_phi`` for φo - φi, in
@@ -44,8 +48,9 @@ def read(path: Path) -> Measurement:
     ``# angles: degrees``. ``in``, ``l`` and ``light`` mean ``i``, and ``out``, ``r``, ``s``, ``v`` and ``view`` ``o``.
     The other columns are ``r``, ``g``, ``b`` in linear sRGB, wavelengths in nm (``450``, ``450nm``), or a single ``f``,
     whose wavelength a comment can give: ``# wavelength: 650``. Names with ``_cos`` behind them, or a comment
-    ``# quantity: f cos``, mean f cosθo. An empty field is a missing value. Commas, semicolons (with decimal points or
-    commas), tabs or white space separate.
+    ``# quantity: f cos``, mean f cosθo, and ``# quantity: f`` means f; without these the ``quantity`` asked for counts,
+    which is f by default. An empty field is a missing value. Commas, semicolons (with decimal points or commas), tabs
+    or white space separate.
 
     Rows that cross all angles become a grid, others samples: see :func:`mi_brdfs.measured.rows.arranged`.
 
@@ -54,7 +59,7 @@ def read(path: Path) -> Measurement:
     """
     file = TextFile(path)
     rows = fields(file)
-    columns = Columns(file, next(rows, []))
+    columns = Columns(file, next(rows, []), quantity)
     table = file.table(rows, columns.count, "as many as the header has")
     angles = {name: table[:, k] * unit for name, (k, unit) in columns.angles.items()}
     phi_i = angles.get("phi_i", np.zeros(len(table)))
@@ -81,6 +86,7 @@ def write(path: Path, source: Source) -> None:
     wavelengths in nm.
 
     Raises:
+        ValueError: if there are more values than ``MOST_VALUES``.
         OSError: if the file cannot be written.
     """
     theta = np.append(np.arange(0, 90, 5.0), 89)
@@ -89,9 +95,11 @@ def write(path: Path, source: Source) -> None:
     else:
         fine = np.append(np.arange(0, 90, 2.5), 89)
         angles = theta, fine, np.append(np.arange(0, 140, 10.0), np.arange(140, 181, 2.5)), np.zeros(1)
+    source.check_size(math.prod(map(len, angles)), MOST_VALUES)
     known = source.wavelengths is None or np.all(np.isfinite(source.wavelengths))
     names = ["f"] if not known else "rgb" if source.wavelengths is None else [f"{w:.10g}nm" for w in source.wavelengths]
     with path.open("w", encoding="utf-8") as file:
+        file.write("# quantity: f\n")
         if source.material:
             file.write(f"# material: {' '.join(source.material.split())}\n")
         file.write(",".join(["theta_i_deg", "theta_o_deg", "delta_phi_deg", "phi_i_deg", *names]) + "\n")
@@ -106,7 +114,7 @@ def write(path: Path, source: Source) -> None:
 class Columns:
     """What a header and the comments above it say of the columns."""
 
-    def __init__(self, file: TextFile, names: list[str]) -> None:
+    def __init__(self, file: TextFile, names: list[str], quantity: Quantity) -> None:
         self.file, self.count = file, len(names)
         self.angles: dict[str, tuple[int, float]] = {}
         """The column of an angle, and its unit in radians, by ``theta_i``, ``phi_i``, ``theta_o``, ``phi_o`` or
@@ -139,9 +147,9 @@ class Columns:
             found.sort(key=lambda each: float(each[0]))
             self.wavelengths = np.array([float(kind) for kind, _, _ in found])
         else:
-            raise file.error(f"the values {', '.join(kinds)} should be f, or r, g and b, or wavelengths in nm")
+            raise file.error(f"the values {brief(', '.join(kinds))} should be f, or r, g and b, or wavelengths in nm")
         self.values = [k for _, k, _ in found]
-        self.quantity = self._quantity({cos for _, _, cos in found})
+        self.quantity = self._quantity({cos for _, _, cos in found}, quantity)
 
     def _add_angle(self, k: int, name: str, kind: str, of: str | None, unit: str | None) -> None:
         unit = unit or self.stated("angles") or self.stated("units")
@@ -163,13 +171,13 @@ class Columns:
         match = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", self.stated(name))
         return float(match.group(1)) if match else np.nan
 
-    def _quantity(self, cosines: set[bool]) -> Literal["f", "f cos"]:
+    def _quantity(self, cosines: set[bool], unstated: Quantity) -> Literal["f", "f cos"]:
         stated = re.sub(r"[\s_*·]+", " ", self.stated("quantity").lower())
         if stated not in ("", "f", "brdf", "f cos", "brdf cos"):
             raise self.file.error(f"the quantity {shortened(stated)} is neither f nor f cos")
         if len(cosines) > 1 or (True in cosines and stated in ("f", "brdf")):
             raise self.file.error("some values are f cos, and others are f")
-        return "f cos" if True in cosines or stated.endswith("cos") else "f"
+        return "f cos" if True in cosines or (stated or unstated).endswith("cos") else "f"
 
 
 def fields(file: TextFile) -> Iterator[list[str]]:

@@ -19,7 +19,7 @@ TRISTIMULUS = ("trisx", "trisy", "trisz")
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path, head)
+    lines = opening(path)
     return is_table(lines) and has_incidence_lines(lines)
 
 
@@ -109,7 +109,7 @@ def blocks(file: TextFile, rows: Iterator[list[str]], size: int) -> Iterator[Blo
             continue
         if word[0].isalpha() and not is_number(word):
             if filled:
-                raise file.error(f"{words[0]} stands after {filled} values of a block, which has {size}")
+                raise file.error(f"{shortened(words[0])} stands after {filled} values of a block, which has {size}")
             if word not in KEYWORDS or len(words) < 2:
                 raise file.error(f"{shortened(' '.join(words))} is no keyword of a block with its value")
             head[word] = words[1].lower()

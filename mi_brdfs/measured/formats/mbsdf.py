@@ -21,6 +21,7 @@ import numpy as np
 from ..coordinates import Spherical
 from ..files import BinaryFile
 from ..measurement import Axis, Grid, Measurement
+from ..text import decoded
 from .merl import centres
 
 NAME = "MBSDF"
@@ -59,7 +60,7 @@ def read(path: Path) -> Measurement:
         else:
             key, equals, text = line.partition("=")
             if equals:
-                metadata[_printable(key)] = _printable(_unquoted(text))
+                metadata[key.strip()] = _unquoted(text)
             continue
         blocks += 1
     if values is None:
@@ -90,13 +91,9 @@ def _line(file: BinaryFile) -> str:
     if not end:
         raise file.error("a line of text should follow, or a block of data", start)
     file.offset = start + len(line) + 1
-    return line.decode("latin-1").rstrip("\r")
+    return decoded(line).rstrip("\r")
 
 
 def _unquoted(text: str) -> str:
     """Return the text between quotes, with what its escape sequences stand for."""
     return re.sub(r"\\([\\\"n])", lambda found: {"n": "\n"}.get(found[1], found[1]), text.strip().strip('"'))
-
-
-def _printable(text: str) -> str:
-    return "".join(c for c in " ".join(text.split()) if c.isprintable())

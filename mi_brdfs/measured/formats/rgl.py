@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...parameters.messages import brief
 from ..adaptation import LAST, adapted, brightness, turned
 from ..adaptive import Adaptive
 from ..arrays import NUMPY, components, stacked
@@ -14,6 +15,7 @@ from ..measurement import Axis, FileError, Grid, Measurement
 from ..source import Source
 from ..tensors import MAGIC, Tensor, array, contents
 from ..tensors import write as write_tensors
+from ..text import decoded
 
 NAME = "RGL"
 DESCRIPTION = "the words 'tensor_file', then named arrays"
@@ -21,6 +23,8 @@ THETA_I = np.radians([*np.linspace(0, 80, 25), 82, 84, 86, 87, 88, 89, 90])
 """The angles that are written. RGL's own files have 8, and 32 x 32 values at each."""
 STEP_PHI_I = np.radians(10)
 RESOLUTION, RESOLUTION_ANISOTROPIC = 64, 48
+MOST_VALUES = 1 << 27
+"""Those of a file of 512 MiB."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -40,6 +44,7 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     wrong slice up for a wi with exactly y = 0; ``tabulated`` does not.
 
     Raises:
+        ValueError: if there are more than 512 MiB.
         OSError: if the file cannot be written.
     """
     if source.wavelengths is not None and np.isnan(source.wavelengths).any():
@@ -48,15 +53,18 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     resolution = resolution or (RESOLUTION_ANISOTROPIC if span else RESOLUTION)
     # As Mitsuba has it, the whole turn, the lower half and the third quadrant.
     phi_i = np.linspace(-np.pi, span - np.pi, round(span / STEP_PHI_I) + 1) if span else np.zeros(1)
+    source.check_size(len(phi_i) * len(THETA_I) * resolution**2, MOST_VALUES)
     maps = adapted(source, phi_i, THETA_I, resolution)
     coordinates = maps.coordinates
     u = np.linspace(0, 1, resolution)
     slices: list[tuple[np.ndarray, ...]] = []
     for azimuth in phi_i:
-        axes = [np.minimum(THETA_I, LAST), u, u]
-        places = np.meshgrid(*([azimuth, *axes] if span else axes), indexing="ij")
-        slices.append(_slices(source, coordinates, [place.reshape(place.shape[-3:]) for place in places]))
-    values, luminance, valid = (np.stack(fields) for fields in zip(*slices, strict=True))
+        for theta in np.minimum(THETA_I, LAST):
+            places = np.meshgrid(*([azimuth, theta, u, u] if span else [theta, u, u]), indexing="ij")
+            slices.append(_slices(source, coordinates, [place.reshape(1, *place.shape[-2:]) for place in places]))
+    values, luminance, valid = (
+        np.concatenate(fields).reshape(len(phi_i), -1, *fields[0].shape[1:]) for fields in zip(*slices, strict=True)
+    )
     dark = ~luminance.any(axis=(-2, -1), keepdims=True)
     channels = {"rgb": values}
     if source.wavelengths is not None:
@@ -137,7 +145,9 @@ class _File:
     def field(self, name: str, dtype: str, dimensions: int) -> Tensor:
         """Return a field that must be there, with so many dimensions."""
         if name not in self.tensors:
-            raise self.file.error(f"the table of contents ends without {name!r}; it has {', '.join(self.tensors)}")
+            raise self.file.error(
+                f"the table of contents ends without {name!r}; it has {brief(', '.join(self.tensors))}"
+            )
         tensor = self.tensors[name]
         if tensor.dtype != dtype:
             raise self.problem(name, f"is of type {np.dtype(tensor.dtype)}; it must be {np.dtype(dtype)}")
@@ -187,5 +197,4 @@ class _File:
         tensor = self.tensors.get("description")
         if tensor is None or tensor.dtype != "u1":
             return ""
-        text = array(self.file, tensor, "description").tobytes().decode("utf-8", errors="replace")
-        return " ".join(text.replace("\0", " ").split())
+        return decoded(array(self.file, tensor, "description").tobytes()).replace("\0", " ").strip()

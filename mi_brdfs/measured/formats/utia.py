@@ -6,8 +6,8 @@ Both azimuths go round, and both polar angles start at 0 and end one step before
 is held. In between, values are interpolated in Δφ = φv - φi and φi, which leaves a highlight in its place; nodes stay
 nodes.
 
-The file does not say what its values are. They are taken as f in linear sRGB (D65), as by most published readers; two
-decode them as non-linear sRGB, at scales that differ by 140.
+The file does not say what its values are. They are taken as linear sRGB (D65), as by most published readers; two decode
+them as non-linear sRGB, at scales that differ by 140. They are f unless the ``quantity`` asked for is f cosθv.
 
 J. Filip, R. Vávra, Template-based sampling of anisotropic BRDFs, Computer Graphics Forum 33(7), 2014,
 doi:10.1111/cgf.12477.
@@ -17,12 +17,13 @@ from __future__ import annotations
 
 from math import isqrt
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from ..coordinates import TWO_PI, Spherical
 from ..files import BinaryFile
-from ..measurement import Axis, Grid, Measurement
+from ..measurement import Axis, Grid, Measurement, Quantity
 
 NAME = "UTIA"
 DESCRIPTION = "a .bin of three planes of 288 × 288 float64"
@@ -36,19 +37,19 @@ def recognizes(path: Path, head: bytes) -> bool:
     return path.suffix.lower() == ".bin"
 
 
-def read(path: Path) -> Measurement:
+def read(path: Path, quantity: Quantity) -> Measurement:
     file = BinaryFile(path)
     for dtype in (np.dtype("f8"), np.dtype("f4")):
         theta = isqrt(isqrt(file.left // (3 * dtype.itemsize)) // RATIO)
         if theta and 3 * (theta * RATIO * theta) ** 2 * dtype.itemsize == file.left:
-            return _read(file, dtype, theta, RATIO * theta)
+            return _read(file, dtype, theta, RATIO * theta, quantity)
     raise file.error(
         f"the {file.left:,} bytes are not three planes of n × n numbers, where n is 288, 6 polar angles times 48 "
         "azimuths, or another number of polar angles times 8 times as many azimuths"
     )
 
 
-def _read(file: BinaryFile, dtype: np.dtype, theta: int, phi: int) -> Measurement:
+def _read(file: BinaryFile, dtype: np.dtype, theta: int, phi: int, quantity: Quantity) -> Measurement:
     planes = file.take(dtype, 3 * (theta * phi) ** 2, "values").reshape(3, theta, phi, theta, phi)
     if np.max(np.abs(planes), where=np.isfinite(planes), initial=0) > LARGEST:
         raise file.error(
@@ -61,7 +62,10 @@ def _read(file: BinaryFile, dtype: np.dtype, theta: int, phi: int) -> Measuremen
             # Two arrays of indices with a slice between them put their axis first.
             values[:, :, delta] = planes[:, :, k, :, (k + delta) % phi].transpose(2, 3, 0, 1).astype(np.float32)
     polar = Axis(np.arange(theta) * (np.pi / 2 / theta))
+    if quantity == "f cos":
+        values /= np.cos(polar.nodes, dtype=np.float32)[:, None, None, None]
     azimuth = Axis(np.arange(phi) * (TWO_PI / phi), period=TWO_PI)
     grid = Grid(Spherical(mirrored=False, anisotropic=True), (polar, polar, azimuth, azimuth), values)
-    notes = {"scale": "taken as f in linear sRGB, which the file does not say"}
-    return Measurement(file.path, NAME, grid, material=file.path.stem, notes=notes)
+    held: Literal["f", "f cos"] = "f" if quantity == "stated" else quantity
+    notes = {"scale": f"taken as {held} in linear sRGB, which the file does not say"}
+    return Measurement(file.path, NAME, grid, material=file.path.stem, quantity=held, notes=notes)

@@ -14,7 +14,7 @@ from ..arrays import stacked
 from ..coordinates import Coordinates, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
 from ..source import Source
-from ..text import TextFile, first_words, is_number, opening, shortened
+from ..text import TextFile, first_words, is_number, opening, shortened, whole
 
 NAME = "Zemax"
 DESCRIPTION = "text with the lines Symmetry, AngleOfIncidence, ScatterAzimuth, ScatterRadial, DataBegin"
@@ -36,7 +36,7 @@ MOST_ANGLES = 4096
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path, head)
+    lines = opening(path)
     return is_table(lines) and not has_incidence_lines(lines)
 
 
@@ -270,9 +270,9 @@ class Round:
 def announced(file: TextFile, rows: Iterator[list[str]], words: list[str]) -> np.ndarray:
     """Read ``name count`` and as many angles, from this line and those that follow."""
     name, line = words[0], file.line
-    if len(words) < 2 or not words[1].isdecimal() or not 0 < int(words[1]) <= MOST_ANGLES:
+    count = whole(words[1]) if len(words) > 1 else 0
+    if not 0 < count <= MOST_ANGLES:
         raise file.error(f"{name} must be followed by the number of its angles, from 1 to {MOST_ANGLES}")
-    count = int(words[1])
     file.expect(count, "angles")
     found = list(file.numbers(words[2:], "an angle"))
     while len(found) < count:
