@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -66,12 +67,28 @@ class _Clamp(dr.CustomOp):
         return "clamp"
 
 
+def leaving(
+    limit: float, inside: float, function: Callable[..., Any], *parameters: Any, lead: Callable[..., Any] | None = None
+) -> Any:
+    """Return a function of parameters of at least ``limit``, where its derivatives for them vanish. They are replaced
+    there by those at ``inside``, of the function or of another one: otherwise an optimisation that comes to the limit,
+    or goes beyond, would stay there."""
+    if not any(dr.is_diff_v(x) and dr.grad_enabled(x) for x in parameters):
+        return function(*parameters)
+    moved, kept = [], []
+    for x in parameters:
+        value = dr.detach(x)
+        there = value <= limit
+        moved.append(dr.select(there, dr.replace_grad(type(x)(inside), x), value))
+        kept.append(dr.select(there, value, x))
+    with dr.suspend_grad(), dr.resume_grad(*moved):
+        slope = (lead or function)(*moved)
+    return function(*kept) + dr.replace_grad(type(slope)(0), slope)
+
+
 def square(x: Any) -> Any:
-    """Return x² of a parameter limited to x >= 0. Its derivative at exactly 0, which is 0, is replaced by that at 0.03:
-    otherwise an optimisation that reaches this limit by a long step would stay there."""
-    if dr.is_diff_v(x) and dr.grad_enabled(x):
-        return dr.replace_grad(dr.square(x), 2 * dr.select(x == 0, 0.03, dr.detach(x)) * x)
-    return dr.square(x)
+    """Return x² of a parameter limited to x >= 0."""
+    return leaving(0, 0.3, dr.square, x)
 
 
 def log1p(x: Any) -> Any:

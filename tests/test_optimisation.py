@@ -173,6 +173,52 @@ def test_derivatives_beyond_the_ranges_lead_back(model):
     assert led > STARTS / 2
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "given, name, start, target",
+    [
+        ({"type": "orennayar"}, "sigma", 0.8, 0.05),
+        ({"type": "orennayar", "model": "full"}, "alpha", 0.8, 0.05),
+        ({"type": "roughdiffuse"}, "alpha", 0.8, 0.05),
+        ({"type": "low"}, "int_ior", 2, 1.05),
+        ({"type": "low", "variant": "smooth"}, "int_ior", 2, 1.05),
+        ({"type": "toon"}, "diffuse_smooth", 0.8, 0.05),
+        ({"type": "toon"}, "specular_smooth", 0.8, 0.05),
+        ({"type": "nishino", "variant": "microfacet"}, "int_ior", -0.5, 1.3),
+    ],
+)
+def test_a_limit_without_a_derivative_is_left(given, name, start, target):
+    """From where σ², the reflectance of a dielectric or an edge do not change with it, and from beyond: with and
+    without projection."""
+    bsdf, key = mi.load_dict(given | {name: target}), f"{name}.value"
+    params = mi.traverse(bsdf)
+    low, _ = mi_brdfs.ranges(bsdf)[key]
+    wi, wide = hemisphere(400, 1, 0.1), hemisphere(400, 2, 0.1)
+    near = wi * [-1, -1, 1] + np.random.default_rng(3).normal(0, 0.2, wi.shape)
+    near[:, 2] = np.maximum(near[:, 2], 0.1)
+    wo = np.concatenate([wide[:200], (near / np.linalg.norm(near, axis=1, keepdims=True))[200:]])
+    si, wo = interaction(wi), mi.Vector3f(wo.T.astype(np.float32))
+
+    def values():
+        return mi.luminance(bsdf.eval(mi.BSDFContext(), si, wo, True))
+
+    expected = dr.detach(values())
+    dr.eval(expected)
+    for projected in (False, True):
+        optimizer = mi.ad.Adam(lr=0.1)
+        optimizer[key] = mi.Float(start)
+        lowest = start
+        for _ in range(200):
+            params.update(optimizer)
+            dr.backward(dr.mean(dr.square(dr.asinh(values()) - dr.asinh(expected))))
+            optimizer.step()
+            lowest = min(lowest, optimizer[key][0])
+            if projected:
+                mi_brdfs.project(params, optimizer)
+        assert lowest < low
+        assert optimizer[key][0] == pytest.approx(target, abs=0.02), projected
+
+
 CONDUCTOR = {"eta": (0.1, 4), "k": (0, 6), "specular_reflectance": (0, 1)}
 COUNTERPARTS = {
     "lambert": ({"type": "lambert"}, {"type": "diffuse"}, {"reflectance": (0, 1)}),

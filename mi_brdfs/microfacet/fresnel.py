@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import luminance, safe_sqrt, square
+from ..math import leaving, luminance, safe_sqrt, square
 from .forward import ForwardDirections
 from .term import Term
 
@@ -58,11 +58,18 @@ class Dielectric(Fresnel):
     """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
     Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
+    LEAST, INSIDE = 0.01, 0.9
+    """The least index, which reflects all light, and one that has a derivative."""
+
     def __init__(self, eta: Any) -> None:
         self.eta = eta
 
     def __call__(self, cos: mi.Float) -> Any:
-        step = self.eta * self.eta - 1
+        return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
+
+    @staticmethod
+    def _reflectance(eta: Any, cos: mi.Float) -> Any:
+        step = eta * eta - 1
         g2 = step + cos * cos
         total = g2 <= 0
         g = dr.sqrt(dr.select(total, 1, g2))

@@ -57,7 +57,7 @@ class Low(Model):
     a = Colour(1, (0, float("inf")), "scale A")
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
     c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
-    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum; 1 reflects nothing, without a derivative")
+    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum; 1 reflects nothing")
     variant = OneOf(
         {"microfacet": {"normalization": Choice(("fit", "paper", "unit"), "scale of the lobe")}, "smooth": {}},
         "which of the paper's two models",
@@ -75,13 +75,19 @@ class Low(Model):
     )
 
     def lobes(self, p):
-        fresnel = Dielectric(p.int_ior)
+        fresnel = Denser(p.int_ior)
         if self.variant == "smooth":
             specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
             scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[self.normalization]
             specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), VCavity(), fresnel)
         return over_diffuse(p.diffuse_reflectance, specular)
+
+
+class Denser(Dielectric):
+    """A dielectric of index 1, which reflects nothing, or higher."""
+
+    LEAST, INSIDE = 1, 1.5
 
 
 class SmoothLobe(Lobe):

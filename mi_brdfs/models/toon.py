@@ -4,7 +4,7 @@ import mitsuba as mi
 from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
 from ..lobes.mirror import AxisFrame
-from ..math import EPSILON, TINY, choose, safe_sqrt
+from ..math import EPSILON, TINY, choose, leaving, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance
 
@@ -52,11 +52,11 @@ class Toon(Model):
 
     diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy")
     diffuse_threshold = Number(0.5, (0, 1), "cosine td at which the lit band ends")
-    diffuse_smooth = Number(0.05, (0, 1), "half width sd of its edge, in the cosine; 0 is hard, with no derivative")
+    diffuse_smooth = Number(0.05, (0, 1), "half width sd of its edge, in the cosine; 0 is hard")
     diffuse_shadow = Number(0, (0, 1), "brightness b of the dark band, relative to the lit one")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe; its largest albedo for energy")
     specular_threshold = Number(0.9, (0, 1), "cosine ts at which the highlight ends")
-    specular_smooth = Number(0.02, (0, 1), "half width ss of its edge, in the cosine; 0 is hard, with no derivative")
+    specular_smooth = Number(0.02, (0, 1), "half width ss of its edge, in the cosine; 0 is hard")
     normalization = Choice(("energy", "none"), "scale Z")
 
     energy = Energy(
@@ -100,19 +100,23 @@ class Step:
         self.start = self._integral(-threshold)
         self.mass = self._integral(1 - threshold) - self.start
 
-    def _x(self, excess):
+    @staticmethod
+    def _x(smooth, excess):
         # The floor turns an edge of width 0 into a jump.
-        smooth = dr.maximum(self.smooth, EPSILON)
+        smooth = dr.maximum(smooth, EPSILON)
         return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
 
     def _integral(self, excess):
         """Return the integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""
-        x = self._x(excess)
+        x = self._x(self.smooth, excess)
         return 2 * self.smooth * x * x * x * (1 - 0.5 * x) + dr.maximum(excess - self.smooth, 0)
 
     def eval(self, excess):
-        x = self._x(excess)
-        return x * x * (3 - 2 * x)
+        def height(smooth):
+            x = self._x(smooth, excess)
+            return x * x * (3 - 2 * x)
+
+        return leaving(0, 0.1, height, self.smooth)
 
     def sample(self, u):
         """Return the excess of the cosine below which the fraction ``u`` of the density lies."""
