@@ -4,6 +4,7 @@ values."""
 import os
 import re
 import struct
+import time
 import tracemalloc
 
 import numpy as np
@@ -207,7 +208,8 @@ CSV_DAMAGE = [
     ("an unknown column", replaced(CSV, ",b", ",temperature"), True),
     ("two of the same", replaced(CSV, ",b", ",r"), True),
     ("two wavelengths of the same", replaced(CSV, "r,g,b", "450,450.0,500"), False),
-    ("an infinite wavelength", replaced(CSV, "r,g,b", "450,500," + "9" * 400), False),
+    ("an infinite wavelength", replaced(CSV, "r,g,b", "450,500," + "9" * 400), True),
+    ("a wavelength of 0", replaced(CSV, "r,g,b", "0nm,500,550"), True),
     ("more wavelengths than can be read", wide(4097), False),
     ("f among many wavelengths", replaced(wide(4097), "4096,", "f,"), True),
     ("rgb and wavelengths", replaced(CSV, ",b", ",450"), True),
@@ -355,3 +357,26 @@ def test_memory(tmp_path, text, ending):
     tracemalloc.stop()
     assert len(measurement.data.values) > 40_000
     assert peak - left < 2 * path.stat().st_size
+
+
+@pytest.mark.parametrize(
+    "text, ending, sentence",
+    [
+        ("# light " + "1" * 50_000 + "\n" + ZEMAX, "bsdf", ""),
+        ("# A" + " " * 50_000 + "b\n" + ZEMAX, "bsdf", ""),
+        ("theta_i_deg,theta_o_deg,phi_o_deg,450" + " " * 50_000 + "x\n0,0,0,1\n", "csv", "is no angle, no wavelength"),
+        ("NVIDIA ARC MBSDF V1\n" + "\n" * 1_000_000, "mbsdf", "more than 10,000 lines of text"),
+    ],
+    ids=["digits", "spaces", "spaces in a name", "lines"],
+)
+def test_time(tmp_path, text, ending, sentence):
+    """Long words take no time that grows with their square: half a minute and more, or for ever."""
+    path = tmp_path / f"long.{ending}"
+    path.write_text(text)
+    start = time.process_time()
+    if sentence:
+        with pytest.raises(FileError, match=sentence):
+            read(path)
+    else:
+        read(path)
+    assert time.process_time() - start < 2

@@ -13,6 +13,8 @@ from .measurement import FileError
 
 LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""
+NOTED = 1000
+"""The characters of a comment that are looked at."""
 OPENING = 1 << 16
 """The bytes in which the first line that is no comment is looked for, and the words that tell formats apart."""
 
@@ -51,7 +53,7 @@ class TextFile:
         for text in self.lines():
             text, _, comment = text.partition("#")
             if comment := comment.strip("# \t"):
-                self.comments.append(comment)
+                self.comments.append(comment[:NOTED])
             if words := text.replace(",", " ").split():
                 yield words
 

@@ -16,7 +16,7 @@ from ..coordinates import spherical
 from ..measurement import Measurement, Quantity
 from ..rows import arranged, checked_angles, without_cosine
 from ..source import Source
-from ..text import TextFile, opening, shortened
+from ..text import NOTED, TextFile, opening, shortened
 
 NAME = "CSV"
 DESCRIPTION = "a header with theta_i_deg, theta_o_deg, phi_o_deg (or _rad) and f, or r, g, b, or wavelengths in nm"
@@ -31,6 +31,8 @@ VALUE = re.compile(
 )
 UNITS = {"d": np.pi / 180, "°": np.pi / 180, "r": 1.0}
 """Radians in a unit, by its first letter."""
+LONGEST_NAME = 100
+"""The characters of a column's name."""
 MOST_VALUES = 1 << 25
 """Those of a file of 400 MB."""
 
@@ -121,10 +123,13 @@ class Columns:
         ``delta_phi``."""
         found: list[tuple[str, int, bool]] = []
         for k, name in enumerate(names):
-            if match := ANGLE.fullmatch(name.strip().lower()):
+            word = name.strip().lower() if len(name) < LONGEST_NAME else ""
+            if match := ANGLE.fullmatch(word):
                 self._add_angle(k, name, *match.groups())
-            elif match := VALUE.fullmatch(name.strip().lower()):
+            elif match := VALUE.fullmatch(word):
                 colour, grey, wavelength, cos = match.groups()
+                if wavelength and not 0 < float(wavelength) < np.inf:
+                    raise file.error(f"the wavelength {shortened(wavelength)} is none")
                 found.append(((colour or "")[:1] or (grey and "f") or wavelength, k, bool(cos)))
             else:
                 raise file.error(f"the column {shortened(name)} is no angle, no wavelength, and none of f, r, g, b")
@@ -185,7 +190,7 @@ def fields(file: TextFile) -> Iterator[list[str]]:
     mark: str | None = ""
     for text in file.lines():
         if text.startswith("#"):
-            file.comments.append(text.strip("# \t"))
+            file.comments.append(text.strip("# \t")[:NOTED])
         elif text:
             mark = separator(text) if mark == "" else mark
             row = split(text, mark)

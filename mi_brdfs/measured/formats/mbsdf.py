@@ -31,8 +31,8 @@ REFLECTION = "MBSDF_DATA=", "MBSDF_DATA_REFLECTION="
 TRANSMISSION = "MBSDF_DATA_TRANSMISSION="
 CHANNELS = 1, 3
 """Of the types of blocks."""
-LONGEST = 1 << 16
-"""The most bytes of a line of text."""
+LONGEST, LINES = 1 << 12, 10_000
+"""The most bytes of a line of text, and the most lines."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -45,9 +45,12 @@ def read(path: Path) -> Measurement:
         raise file.error(f'the first line must be "{MAGIC}"', 0)
     metadata: dict[str, str] = {}
     values: np.ndarray | None = None
-    blocks = 0
+    blocks = lines = 0
     while file.left:
         start, line = file.offset, _line(file)
+        lines += 1
+        if lines > LINES:
+            raise file.error(f"there are more than {LINES:,} lines of text", start)
         if line == TRANSMISSION:
             _block(file)
             metadata["transmission"] = "in the file, but not read"

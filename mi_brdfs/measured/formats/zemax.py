@@ -222,7 +222,7 @@ class Header:
         """The wavelength in nm that the comments on the light state, NaN if there is not just one."""
         lights = [text for text in self.comments if re.search(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ", text)]
         found = set()
-        for number, unit in re.findall(r"(\d+(?:\.\d+)?)\s*(nm|µm|μm|um)\b", "\n".join(lights)):
+        for number, unit in re.findall(r"(?<!\d)(\d{1,9}(?:\.\d{1,9})?)\s?(nm|µm|μm|um)\b", "\n".join(lights)):
             found.add(round(float(number) * (1 if unit == "nm" else 1000), 6))
         return found.pop() if len(found) == 1 else np.nan
 
@@ -236,8 +236,8 @@ class Header:
 
     @property
     def notes(self) -> dict[str, str]:
-        pairs = (re.match(r"([A-Z][\w ()#']*?)\s*:\s*(\S.*)", text) for text in self.comments)
-        return {match.group(1): match.group(2) for match in pairs if match}
+        pairs = [(name.rstrip(), said.strip()) for name, _, said in (text.partition(":") for text in self.comments)]
+        return {name: said for name, said in pairs if said and re.fullmatch(r"[A-Z][\w ()#']*", name)}
 
 
 class Ordered:
