@@ -183,6 +183,11 @@ class Model(Plugin):
             chosen.get(name) in (value if isinstance(value, tuple) else (value,)) for name, value in given.items()
         ) and not any(isinstance(value, float) for value in given.values())
 
+    @property
+    def has_fresnel(self) -> bool:
+        """Whether a Fresnel term scales the specular reflectance."""
+        return "fresnel" in self.parameters.chosen or any(FRESNEL.fullmatch(name) for name in self.textures)
+
     def excess(self, colours: Mapping[str, Sequence[float]]) -> str:
         """Return what is wrong with constant colours, by property name, that add to more than 1 in a channel, or
         nothing. ``diffuse_reflectance`` and every ``specular_reflectance`` count where the page states that energy is
@@ -191,7 +196,7 @@ class Model(Plugin):
         stated = self.stated_albedo()
         if not self.energy or not stated or stated > 1 or ({"diffuse_reflectance": 1.0}, 1) in self.energy.largest:
             return ""
-        if "fresnel" in self.parameters.chosen or any(FRESNEL.fullmatch(name) for name in self.textures):
+        if self.has_fresnel:
             return ""
         added = {name: c for name, c in colours.items() if ADDED.fullmatch(name)}
         channels = max(map(len, added.values()), default=1)

@@ -163,8 +163,8 @@ def test_names_that_are_not_utf_8_work_or_get_a_sentence(words, status, sentence
         assert status or BAD not in name or path.exists()
         if path.suffix in (".json", ".html") and path.exists():
             text = path.read_text(encoding="utf-8")
-            assert "coat" not in text or r"coat\udcff" in text
-    if words[0] in ("convert", "render") and not status:
+            assert "coat" not in text or re.search(r"coat(\\udcff|\\ufffd|�)", text)
+    if words[0] == "render" and not status:
         assert b"coat\xff" in out
 
 

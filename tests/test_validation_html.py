@@ -161,7 +161,7 @@ def images(text: str) -> list[np.ndarray]:
     found = []
     for file in files:
         data = base64.b64decode(file.removeprefix("data:image/png;base64,"), validate=True)
-        assert data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) < 25_000
+        assert data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) < 32_000
         stream = mi.MemoryStream()
         stream.write(data)
         stream.seek(0)

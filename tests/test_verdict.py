@@ -72,7 +72,8 @@ def test_what_gains_as_much_as_its_page_says_is_noted():
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_no_page_says_that_mitsubas_bsdfs_gain():
-    assert albedo({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}}).verdict == "fail"
+    """A gain is not judged where the sampler is at fault: principled's density is not the one that it draws from."""
+    assert albedo({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}}).verdict == "skip"
     assert albedo({"type": "twosided", "inner": {"type": "diffuse", "reflectance": 1.0}}).verdict == "pass"
 
 

@@ -24,7 +24,7 @@ def against(run: Run, other: BSDFProbe, name: str) -> Finding:
     outcome, probes = Outcome("against", name), (run.probe, other)
     if not all(probe.components for probe in probes):
         return Finding("against", name, "skip", "A delta function has no values to compare.")
-    tolerance = max(run.rounding(run.probe.whole), replace(run, probe=other, _spreads={}).rounding(other.whole))
+    tolerance = max(run.rounding(run.probe.whole), replace(run, probe=other).rounding(other.whole))
     sides = tuple(sorted({side for probe in probes for side in probe.whole.sides}, reverse=True))
     part = run.probe.whole._replace(sides=sides)
     largest, told, at = 0.0, "both are black", {}

@@ -158,9 +158,9 @@ def _limits(run: Run) -> Limits:
 
 
 def _diffuse(model: Model | None) -> float:
-    """Return the diffuse reflectance of a model whose page does not state what it adds up to."""
+    """Return the diffuse reflectance beside a Fresnel term, which pages leave out of the largest albedo."""
     name = "diffuse_reflectance"
-    if model is None or name not in model.textures or not model.energy or ({name: 1.0}, 1) in model.energy.largest:
+    if model is None or not model.energy or not model.has_fresnel or name not in model.textures:
         return 0
     return float(numbers(model.textures[name].eval(interaction([0, 0, 1])), 1).max())
 

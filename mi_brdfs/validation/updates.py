@@ -34,10 +34,12 @@ def updates(run: Run) -> Findings:
         name, _, rest = key.partition(".")
         outcome = Outcome("updates", key)
         with restored(params, key) as original:
+            if rest not in ("", "value") or dr.width(original) != 1:
+                continue
             value = original * 0.95 + 1e-3
             number = numbers(value, 1)[0]
             given = float(number[0]) if len(number) == 1 else {"type": "rgb", "value": number.tolist()}
-            if rest not in ("", "value") or len(number) not in (1, 3):
+            if len(number) not in (1, 3):
                 continue
             try:
                 fresh = BSDFProbe(mi.load_dict(run.given | {name: given}))
