@@ -176,6 +176,7 @@ class Neumann(Shadowing):
 
     lean = 1
     favours_steep = True
+    UNIFORM = 0.2  # of all terms it shadows steep facets least
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.minimum(facet.cos_i, facet.cos_o)
