@@ -9,6 +9,7 @@ import numpy as np
 from ..measure.arrays import Array, context, interaction, numbers, sample_arguments, vectors
 from ..measure.directions import angles_of, hemisphere, on_side, scattered
 from ..measure.variates import random
+from ..mitsuba.errors import unwrapped_ctrl_c
 from .outcome import Findings, Outcome, told
 from .report import Finding
 from .run import Run
@@ -31,7 +32,8 @@ def active(run: Run) -> Findings:
     bsdf, si, towards = probe.bsdf, interaction(wi), vectors(wo)
 
     try:
-        bsdf.eval_diffuse_reflectance(si, True)
+        with unwrapped_ctrl_c():
+            bsdf.eval_diffuse_reflectance(si, True)
         reflects = True
     except RuntimeError:  # not implemented
         reflects = False

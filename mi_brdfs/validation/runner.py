@@ -11,6 +11,7 @@ import mitsuba as mi
 
 from ..measure.probe import BSDFProbe
 from ..measure.sources import find_sources, name_of
+from ..mitsuba.errors import unwrapped_ctrl_c
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, sampling, spectral, textures, updates, values
 from .against import against
@@ -193,6 +194,7 @@ def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:
 def _found(word: str, run: Run) -> Findings:
     """Yield the findings of a check; if it raises, that is another."""
     try:
-        yield from CHECKS[word](run)
+        with unwrapped_ctrl_c():
+            yield from CHECKS[word](run)
     except Exception as error:
         yield Finding(word, "whole", "fail", f"It could not be checked to the end, as it raised {told(error)}.")

@@ -12,6 +12,7 @@ from ..measure.arrays import Array, hero_wavelengths, interaction, numbers, pinn
 from ..measure.directions import angles_of, hemisphere, on_side
 from ..measure.probe import BSDFProbe
 from ..measure.variates import random
+from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
 from . import sampling, values
 from .outcome import Findings, Outcome, told
@@ -75,17 +76,18 @@ def spectral(run: Run) -> Findings:
     outcome, worst = Outcome("spectral", part.name), 0.0
     with mi.variant_context(other):
         try:
-            got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
-            coloured = _load(run.given | _coloured(greys))
-            every = replace(run, probe=coloured, angles=(), given=None)
-            one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, given=None)
-            failed = {
-                check: [it for it in check(again) if it.verdict == "fail"]
-                for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
-                for check in checks
-            }
-            if greys:
-                _check_channels(run, outcome, greys)
+            with unwrapped_ctrl_c():
+                got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
+                coloured = _load(run.given | _coloured(greys))
+                every = replace(run, probe=coloured, angles=(), given=None)
+                one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, given=None)
+                failed = {
+                    check: [it for it in check(again) if it.verdict == "fail"]
+                    for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
+                    for check in checks
+                }
+                if greys:
+                    _check_channels(run, outcome, greys)
         except (RuntimeError, TypeError) as failure:
             yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
             return
@@ -185,9 +187,10 @@ def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
         if rest == "value" and not isinstance(given.get(name), (bool, str)):
             greys[name] = float(numbers(params[key], 1).mean())
     try:
-        asking = mi.load_dict(given | {name: Asking(name, grey) for name, grey in greys.items()})
-        wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
-        asking.eval(mi.BSDFContext(), interaction(wi), vectors(wi), True)
+        with unwrapped_ctrl_c():
+            asking = mi.load_dict(given | {name: Asking(name, grey) for name, grey in greys.items()})
+            wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
+            asking.eval(mi.BSDFContext(), interaction(wi), vectors(wi), True)
     except (RuntimeError, TypeError):
         return {}
     return {name: grey for name, grey in greys.items() if name in asked and grey > 0}

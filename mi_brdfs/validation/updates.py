@@ -11,6 +11,7 @@ from ..measure.directions import angles_of, hemisphere, on_side
 from ..measure.kernels import launched_kernels
 from ..measure.probe import BSDFProbe
 from ..measure.variates import random
+from ..mitsuba.errors import unwrapped_ctrl_c
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run
@@ -42,7 +43,8 @@ def updates(run: Run) -> Findings:
             if len(number) not in (1, 3):
                 continue
             try:
-                fresh = BSDFProbe(mi.load_dict(run.given | {name: given}))
+                with unwrapped_ctrl_c():
+                    fresh = BSDFProbe(mi.load_dict(run.given | {name: given}))
             except (RuntimeError, TypeError):  # it is given otherwise
                 continue
             set_value(params, key, value)
