@@ -67,11 +67,9 @@ class _Clamp(dr.CustomOp):
         return "clamp"
 
 
-def leaving(
-    limit: float, inside: float, function: Callable[..., Any], *parameters: Any, lead: Callable[..., Any] | None = None
-) -> Any:
+def leaving(limit: float, inside: float, function: Callable[..., Any], *parameters: Any) -> Any:
     """Return a function of parameters of at least ``limit``, where its derivatives for them vanish. They are replaced
-    there by those at ``inside``, of the function or of another one: otherwise an optimisation that comes to the limit,
+    there by those at ``inside``: otherwise an optimisation that comes to the limit,
     or goes beyond, would stay there."""
     if not any(dr.is_diff_v(x) and dr.grad_enabled(x) for x in parameters):
         return function(*parameters)
@@ -82,7 +80,7 @@ def leaving(
         moved.append(dr.select(there, dr.replace_grad(type(x)(inside), x), value))
         kept.append(dr.select(there, value, x))
     with dr.suspend_grad(), dr.resume_grad(*moved):
-        slope = (lead or function)(*moved)
+        slope = function(*moved)
     return function(*kept) + dr.replace_grad(type(slope)(0), slope)
 
 
