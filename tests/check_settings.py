@@ -4,7 +4,8 @@
     python tests/check_settings.py --built-ins
 
 Draws parameters over their whole ranges, both ends included, words, colours, textures and rotations, in rgb and
-spectral variants. Prints each failure with the dict that reproduces it, and exits with the number of failures.
+spectral variants. Prints each failure with the dict that reproduces it, and exits with the number of failures. Those of
+``albedo`` do not count where colours add to more than one: such a setting gains energy.
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ import mitsuba as mi
 import numpy as np
 from fuzzing import alternatives
 
+from mi_brdfs.measure.arrays import interaction, numbers
+from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measure.settings import FARTHEST, Axis
 from mi_brdfs.mitsuba.registry import all_models
+from mi_brdfs.model import ADDED
 from mi_brdfs.parameters import File, Preset
 from mi_brdfs.validation import check
 
@@ -97,6 +101,14 @@ def setting(rng, models, presets, files):
     return given
 
 
+def total_colour(bsdf):
+    """The sum of the largest values of the scales of a model's lobes, of which pages say that they add."""
+    uv = np.random.default_rng(2).random((500, 2))
+    textures = {name: it for model in BSDFProbe(bsdf).models if model for name, it in model.textures.items()}
+    scales = [it for name, it in textures.items() if ADDED.fullmatch(name) or name == "a"]
+    return sum(numbers(texture.eval(interaction([0, 0, 1], uv))).max() for texture in scales)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("count", nargs="?", type=int, default=600)
@@ -123,9 +135,12 @@ def main():
             continue
         report = check(given)
         done += 1
-        failed += bool(report.failures)
+        faults = [it for it in report.failures if it.check != "albedo" or total_colour(mi.load_dict(given)) <= 1]
+        failed += bool(faults)
         if report.failures or arguments.built_ins:
-            print(f"{k} {mi.variant()} {given} {time.perf_counter() - start:.0f} s: {report.outcome}", flush=True)
+            outcome = report.outcome if faults or not report.failures else "bright"
+            words = " ".join(str(given).split())  # bitmaps take many lines
+            print(f"{k} {mi.variant()} {words} {time.perf_counter() - start:.0f} s: {outcome}", flush=True)
             for finding in report.failures:
                 print(f"    {finding.check}, {finding.subject}: {finding.sentence}", flush=True)
         if k % 20 == 19:

@@ -108,6 +108,13 @@ def test_no_false_alarm(name):
     assert not report.failures and report.judged, report
 
 
+def test_a_colour_as_a_texture_of_spectra():
+    """It is not given by the coefficients that a constant one has."""
+    mi.set_variant("llvm_ad_spectral")
+    report = check({"type": "orennayar", "reflectance": {"type": "rgb", "value": (0.2, 0.3, 0.8)}}, only="textures")
+    assert not report.failures and {finding.subject for finding in report.findings} == {"reflectance", "sigma"}
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 def test_negative_channels_that_a_page_announces():
     """Those of RGL's colours outside sRGB, which ``measured`` renders, too."""

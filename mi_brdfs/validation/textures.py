@@ -88,9 +88,12 @@ def _textured(run: Run) -> tuple[dict[str, mi.Texture], list[str]]:
         name, _, rest = key.partition(".")
         if rest == "value" and name not in varied:
             value = numbers(params[key], 1)[0]
+            # Those of a colour are the coefficients of its spectrum in spectral variants, which no bitmap has.
+            is_spectrum = mi.is_spectral and len(value) > 1
+            value = np.full(3, 0.5) if is_spectrum else value
             texels = value + rng.random((*SHAPE, 1)) * (0.05 - 0.3 * value)  # up to a value that is 0.7 of it, and .05
             bitmaps[name] = mi.load_dict({"type": "bitmap", "bitmap": mi.Bitmap(texels.astype(np.float32)),
-                                          "raw": True, "filter_type": "nearest"})  # fmt: skip
+                                          "raw": not is_spectrum, "filter_type": "nearest"})  # fmt: skip
     if _loads(given | varied | bitmaps):
         return varied | bitmaps, []
     refused: list[str] = []
