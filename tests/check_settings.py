@@ -23,12 +23,12 @@ import mitsuba as mi
 import numpy as np
 from fuzzing import alternatives
 
-from mi_brdfs.measure.arrays import interaction, numbers
-from mi_brdfs.measure.probe import BSDFProbe
-from mi_brdfs.measure.settings import FARTHEST, Axis
 from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.model import ADDED
 from mi_brdfs.parameters import File, Preset
+from mi_brdfs.probe.arrays import interaction, numbers
+from mi_brdfs.probe.bsdf import BSDFProbe
+from mi_brdfs.probe.parameter_space import FARTHEST, Dimension
 from mi_brdfs.validation import check
 
 VARIANTS = "llvm_ad_rgb", "llvm_ad_rgb", "llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_spectral_polarized"
@@ -64,11 +64,11 @@ def quantity(rng, given):
     kind = rng.random()
     if given.colour and kind < 0.4:
         return colour(rng, low, high)
-    value = float(Axis(given.name, low, high).at(rng.random()))
+    value = float(Dimension(given.name, low, high).at(rng.random()))
     if kind < 0.55:
         value = rng.choice([low, high]) if np.isfinite(given.limits).all() else low
     elif kind < 0.7 and given.name != "rotation":
-        other = float(Axis(given.name, low, high).at(rng.random()))
+        other = float(Dimension(given.name, low, high).at(rng.random()))
         if kind < 0.65:
             return (
                 {"type": "checkerboard", "color0": value, "color1": other}

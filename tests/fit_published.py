@@ -18,9 +18,9 @@ import numpy as np
 
 import mi_brdfs
 from mi_brdfs.fit import METRICS, Observations, fit, observe
-from mi_brdfs.measure.arrays import interaction, numbers
 from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.parameters import FresnelSet
+from mi_brdfs.probe.arrays import interaction, numbers
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 

@@ -9,7 +9,7 @@ import numpy as np
 import reference as ref
 from scipy.stats import qmc
 
-from mi_brdfs.measure.settings import view
+from mi_brdfs.probe.parameter_space import view
 
 
 class Reference(NamedTuple):

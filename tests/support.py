@@ -10,15 +10,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mi_brdfs.measure import directions
-from mi_brdfs.measure.arrays import context as context
-from mi_brdfs.measure.arrays import interaction as interaction
-from mi_brdfs.measure.arrays import luminance
-from mi_brdfs.measure.arrays import numbers as numbers
-from mi_brdfs.measure.arrays import per_lane as per_lane
-from mi_brdfs.measure.directions import direction as direction
-from mi_brdfs.measure.probe import BSDFProbe
-from mi_brdfs.measure.variates import lattice, sampling_efficiency
+from mi_brdfs.probe import directions
+from mi_brdfs.probe.arrays import context as context
+from mi_brdfs.probe.arrays import interaction as interaction
+from mi_brdfs.probe.arrays import luminance
+from mi_brdfs.probe.arrays import numbers as numbers
+from mi_brdfs.probe.arrays import per_lane as per_lane
+from mi_brdfs.probe.bsdf import BSDFProbe
+from mi_brdfs.probe.directions import direction as direction
+from mi_brdfs.probe.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
 
 ROOT = Path(__file__).parent.parent

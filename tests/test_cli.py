@@ -298,12 +298,12 @@ RESUMED = "Interrupted; 0 of 1 fits are finished: the same command goes on from 
 @pytest.mark.parametrize(
     "where, arguments, sentence",
     [
-        ("mi_brdfs.scene_file.SceneFile.load", ["render", "box.xml"], NOTHING),
-        ("mi_brdfs.render.render", ["render", "box.xml"], NOTHING),
-        ("mi_brdfs.measure.sources.find_sources", ["show", "lambert"], NOTHING),
-        ("mi_brdfs.measure.sources.find_sources", ["check", "lambert"], NOTHING),
+        ("mi_brdfs.rendering.scene_file.SceneFile.load", ["render", "box.xml"], NOTHING),
+        ("mi_brdfs.rendering.passes.render", ["render", "box.xml"], NOTHING),
+        ("mi_brdfs.probe.sources.find_sources", ["show", "lambert"], NOTHING),
+        ("mi_brdfs.probe.sources.find_sources", ["check", "lambert"], NOTHING),
         ("mi_brdfs.measured.convert", ["convert", MEASURED, "it.csv"], NOTHING),
-        ("mi_brdfs.measure.albedo.default_albedo", ["energy", "lambert"], NOTHING),
+        ("mi_brdfs.probe.largest_albedo.default_albedo", ["energy", "lambert"], NOTHING),
         ("mi_brdfs.gallery.gallery", ["gallery"], "Interrupted; nothing is finished, nothing was written."),
         ("mi_brdfs.explorer.materials.Materials.loaded", ["explore", "lambert"], NOTHING),
         ("mi_brdfs.explorer.running.serve", ["explore", "lambert", "--port", "0"], "Ended."),

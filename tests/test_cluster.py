@@ -23,15 +23,15 @@ from support import ROOT
 from typer.testing import CliRunner
 
 import mi_brdfs
-from mi_brdfs import render as rendering
 from mi_brdfs.cli import app
 from mi_brdfs.cluster import ClusterError, Failed, client, run
 from mi_brdfs.cluster.passes import passes_on
 from mi_brdfs.cluster.worker import _file
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.mitsuba.registry import info
-from mi_brdfs.render import PassesError, one_thread, pass_source, render
-from mi_brdfs.scene_file import SceneFile
+from mi_brdfs.rendering.passes import PassesError, one_thread, pass_source, render
+from mi_brdfs.rendering.passes import passes as rendering
+from mi_brdfs.rendering.scene_file import SceneFile
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 

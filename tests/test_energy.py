@@ -9,11 +9,11 @@ import pytest
 from reference_albedos import REFERENCES
 from support import direction
 
-from mi_brdfs.measure.albedo import albedos, default_albedo, largest_albedo
-from mi_brdfs.measure.energy import fault
-from mi_brdfs.measure.settings import choices, white
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.models.microfacet import BROUGHT
+from mi_brdfs.probe.largest_albedo import albedos, default_albedo, largest_albedo
+from mi_brdfs.probe.parameter_space import choices, white
+from mi_brdfs.probe.stated_energy import fault
 
 PLUGINS = {model: model.plugins[0] for model in own_models()}
 CONFIGURATIONS = [(model, given, albedo) for model in PLUGINS for given, albedo in model.energy.largest]

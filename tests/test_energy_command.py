@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from mi_brdfs.measure.energy import fault, merged, rounded_up
-from mi_brdfs.measure.variates import sobol
+from mi_brdfs.probe.stated_energy import fault, merged, rounded_up
+from mi_brdfs.probe.variates import sobol
 
 GUESTS = '''
 """Lambertian surfaces that reflect what they are said to, and more."""

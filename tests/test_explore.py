@@ -20,8 +20,8 @@ from mi_brdfs.explorer.stages import Progress, Stages, UserScene, encoded
 from mi_brdfs.explorer.state import StateError, checked, parse
 from mi_brdfs.explorer.tours import parse as parse_tour
 from mi_brdfs.explorer.tours import tours
-from mi_brdfs.measure.sources import find_sources
 from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.probe.sources import find_sources
 
 STAGES = ["studio", "lamp", "point"]
 LOFT = str(ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf")

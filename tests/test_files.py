@@ -18,7 +18,7 @@ from test_cli import SCENE, command
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app, main, options
-from mi_brdfs.render import write
+from mi_brdfs.rendering.output import write
 from mi_brdfs.sweep import Sweep, plan, store
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"

@@ -25,7 +25,8 @@ from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import FAMILIES, Model
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.parameters import Choice, Number, Reflectance
-from mi_brdfs.render import display_image, render
+from mi_brdfs.rendering.output import display_image
+from mi_brdfs.rendering.passes import render
 
 NAMES = [model.plugins[0] for model in own_models()]
 

@@ -10,7 +10,7 @@ from support import context, direction, interaction, numbers
 from test_fuzz import CASES, FuzzedPlugin, directions, magnitudes
 
 from mi_brdfs.math import luminance
-from mi_brdfs.measure.variates import lattice, sampling_efficiency
+from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 SETTINGS = 48
 LARGEST_WEIGHT = 30

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mi_brdfs.measure.chi_square import chi_square
-from mi_brdfs.measure.directions import direction, from_plane, on_side, to_plane
-from mi_brdfs.measure.partition import partition
-from mi_brdfs.measure.variates import lattice, sampling_efficiency
+from mi_brdfs.probe.chi_square import chi_square
+from mi_brdfs.probe.directions import direction, from_plane, on_side, to_plane
+from mi_brdfs.probe.partition import partition
+from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 
 @pytest.mark.parametrize("side", [1, -1])

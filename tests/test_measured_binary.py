@@ -9,8 +9,8 @@ import pytest
 from support import hemisphere, shared
 
 from mi_brdfs.measured import FileError, read
-from mi_brdfs.measured.counts import Counts
 from mi_brdfs.measured.formats import merl
+from mi_brdfs.measured.report.counts import Counts
 from mi_brdfs.measured.source import Source
 
 SCALE = 1 / 1500, 1.15 / 1500, 1.66 / 1500

@@ -8,11 +8,11 @@ from support import hemisphere
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
-from mi_brdfs.measure.probe import BSDFProbe
 from mi_brdfs.measured import FileError, Grid, Measurement, Samples, bake, convert, read
 from mi_brdfs.measured.coordinates import Spherical
 from mi_brdfs.measured.formats import ENDINGS
 from mi_brdfs.measured.measurement import Axis
+from mi_brdfs.probe.bsdf import BSDFProbe
 
 import mitsuba as mi  # isort: skip
 

@@ -15,11 +15,11 @@ import pytest
 from mi_brdfs import plot
 from mi_brdfs.cli import measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
-from mi_brdfs.measured.albedo import albedos, coverage, hemisphere
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
 from mi_brdfs.measured.observer import to_srgb
-from mi_brdfs.measured.reciprocity import reciprocity_error
+from mi_brdfs.measured.report.albedo import albedos, coverage, hemisphere
+from mi_brdfs.measured.report.reciprocity import reciprocity_error
 from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.parameters.messages import listed
 from mi_brdfs.plot.lit import LitTable
@@ -298,7 +298,7 @@ def test_each_rotation_has_its_stated_albedo():
 
 
 def test_of_many_stated_albedos_some_are_looked_at(monkeypatch):
-    monkeypatch.setattr("mi_brdfs.measured.summary.FIGURES", 16)
+    monkeypatch.setattr("mi_brdfs.measured.report.summary.FIGURES", 16)
     measurement = goniometer(0.3 / np.pi, radial=150, anisotropic=True, stated={0.0: [0.3] * 40}, turns=40)
     assert [it.phi_i for it in summarize(measurement).scatter] == pytest.approx(np.arange(0, 360, 27))
 

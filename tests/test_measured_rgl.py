@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from support import context, hemisphere, interaction, numbers, shared
 
-from mi_brdfs.measure.arrays import WAVELENGTHS, luminance, vectors
-from mi_brdfs.measure.directions import direction
-from mi_brdfs.measure.probe import BSDFProbe
-from mi_brdfs.measure.variates import lattice, sampling_efficiency
 from mi_brdfs.measured import FileError, read
 from mi_brdfs.measured.arrays import DRJIT, NUMPY, components
 from mi_brdfs.measured.formats import rgl
 from mi_brdfs.measured.source import Source
+from mi_brdfs.probe.arrays import WAVELENGTHS, luminance, vectors
+from mi_brdfs.probe.bsdf import BSDFProbe
+from mi_brdfs.probe.directions import direction
+from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 TYPES = {"uint8": 1, "int32": 6, "uint32": 5, "float16": 9, "float32": 10, "float64": 11}
 BANDS = np.array([400, 500, 550, 700], dtype=np.float32)

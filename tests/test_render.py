@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import mi_brdfs  # noqa: F401
-from mi_brdfs import render as module
-from mi_brdfs.render import display_image, render, tonemap, write
+from mi_brdfs.rendering.output import display_image, tonemap, write
+from mi_brdfs.rendering.passes import passes as module
+from mi_brdfs.rendering.passes import render
 
 WIDTH, HEIGHT = 32, 24
 

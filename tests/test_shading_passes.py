@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from plates import SUN, WHITE, film, from_above, load, noisy, plate, shaded
 
-from mi_brdfs import render
 from mi_brdfs.mitsuba import integrator as adapter
+from mi_brdfs.rendering.passes import passes as render
 
 
 def in_passes(scene, monkeypatch, samples=4, **given):

@@ -16,8 +16,8 @@ from scipy.interpolate import RegularGridInterpolator
 from support import call, context, direction, efficiencies, hemisphere, interaction, shared
 
 import mi_brdfs
-from mi_brdfs.measure.sources import find_sources
 from mi_brdfs.measured import read
+from mi_brdfs.probe.sources import find_sources
 from mi_brdfs.validation import check
 
 SCALE = np.array([1, 1.15, 1.66]) / 1500

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from mutants import MUTANTS
 
-from mi_brdfs.measure.directions import direction, on_side
-from mi_brdfs.measure.partition import partition
+from mi_brdfs.probe.directions import direction, on_side
+from mi_brdfs.probe.partition import partition
 from mi_brdfs.validation import Finding, Report, check
 from mi_brdfs.validation.html import page
 from mi_brdfs.validation.incidents import Incident

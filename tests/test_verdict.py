@@ -16,10 +16,10 @@ import pytest
 from mutants import MUTANTS
 
 import mi_brdfs
-from mi_brdfs.measure.arrays import interaction, vectors
-from mi_brdfs.measure.sources import find_sources, value_of
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import warn_once
+from mi_brdfs.probe.arrays import interaction, vectors
+from mi_brdfs.probe.sources import find_sources, value_of
 from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
 from mi_brdfs.validation.junit import junit

@@ -16,11 +16,11 @@ from mi_brdfs.gallery import overview, sheet, shot, sweep_row
 from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
-from mi_brdfs.measured.tabulated import Tabulated
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
 from mi_brdfs.models.microfacet import BROUGHT, Microfacet
 from mi_brdfs.preview import body, studio
+from mi_brdfs.tabulated.tabulated import Tabulated
 
 from .made import ROOT, Page, Picture, code
 

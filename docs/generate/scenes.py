@@ -14,7 +14,8 @@ from pathlib import Path
 from mi_brdfs.gallery.families import year
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
-from mi_brdfs.render import display_image, render
+from mi_brdfs.rendering.output import display_image
+from mi_brdfs.rendering.passes import render
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import mi_brdfs  # noqa: F401
-from mi_brdfs.render import display_image
+from mi_brdfs.rendering.output import display_image
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 

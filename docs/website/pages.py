@@ -13,9 +13,9 @@ from generate.made import ROOT
 
 from mi_brdfs.gallery import by_family
 from mi_brdfs.integrators.shading import Shading
-from mi_brdfs.measured.tabulated import Tabulated
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Plugin
+from mi_brdfs.tabulated.tabulated import Tabulated
 
 from . import notebooks
 from .reference import with_formulas

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, luminance
-from ..measure.directions import direction
-from ..measure.probe import BSDFProbe, Part
-from ..measure.variates import lattice, sampling_efficiency
+from ..probe.arrays import Array, luminance
+from ..probe.bsdf import BSDFProbe, Part
+from ..probe.directions import direction
+from ..probe.variates import lattice, sampling_efficiency
 from . import sizes
 from .cases import Plugin
 from .figure import Figure, Target

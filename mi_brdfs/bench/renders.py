@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, luminance
+from ..probe.arrays import Array, luminance
 from . import sizes
 from .cases import Plugin
 from .scenes import scene_of

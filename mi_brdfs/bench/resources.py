@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.kernels import launched_kernels
+from ..probe.kernels import launched_kernels
 from . import sizes
 from .cases import Plugin, defaults
 from .figure import Figure, Target

@@ -7,7 +7,7 @@ from math import comb
 
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 from . import sizes
 from .figure import Figure, Target
 from .run import BenchRun

@@ -29,7 +29,7 @@ from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
-    from ..measure.sources import BSDFSource
+    from ..probe.sources import BSDFSource
     from ..validation import Report
 
 
@@ -124,7 +124,7 @@ def check(
 
 def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     """Return the arguments that are given."""
-    from ..measure.sources import degrees_of
+    from ..probe.sources import degrees_of
     from ..validation.runner import checked_angles
 
     options: dict[str, Any] = {}
@@ -146,7 +146,7 @@ def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
 
 def _found(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
     """Return the BSDFs that a word stands for, or fail with a sentence."""
-    from ..measure.sources import find_sources
+    from ..probe.sources import find_sources
 
     try:
         with unwrapped_ctrl_c():

@@ -35,9 +35,9 @@ def convert(
 ) -> None:
     """Write a measured file in another format, or any BSDF as a table, and say how far the two differ."""
     check_output("OUT", output)
-    from ..measure.sources import is_measured  # imports numpy
     from ..measured import convert as converted
     from ..measured import read
+    from ..probe.sources import is_measured  # imports numpy
 
     is_bsdf = not is_measured(given)
     parts = parameters_of(parameters) if is_bsdf else {}
@@ -58,7 +58,7 @@ def convert(
 
 def _bsdf(word: str, parameters: dict[str, str]) -> dict[str, Any] | mi.BSDF:
     """Return the only BSDF that a word stands for."""
-    from ..measure.sources import find_sources
+    from ..probe.sources import find_sources
 
     found = list(find_sources(word, parameters))
     if len(found) > 1:

@@ -21,7 +21,7 @@ from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
-    from ..measure.albedo import Setting
+    from ..probe.largest_albedo import Maximum
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ class Measured(NamedTuple):
 
     model: type[Model]
     default: float
-    found: list[tuple[dict[str, Any], Setting]]
+    found: list[tuple[dict[str, Any], Maximum]]
 
 
 @command()
@@ -71,8 +71,8 @@ def energy(
 
 
 def _measure_all(models: list[type[Model]]) -> list[Measured]:
-    from ..measure.albedo import default_albedo, largest_albedo
-    from ..measure.energy import configurations
+    from ..probe.largest_albedo import default_albedo, largest_albedo
+    from ..probe.stated_energy import configurations
 
     subject = TextColumn("Measuring {task.description}", markup=False)
     columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
@@ -102,7 +102,7 @@ def _of(model: type[Model], measure: Callable[..., T], *given: Any) -> T:
 
 def _print_statements(measured: list[Measured]) -> None:
     """Print the table of the manual page for each model, and the statement."""
-    from ..measure.energy import energy_of
+    from ..probe.stated_energy import energy_of
 
     for model, default, found in measured:
         stated = energy_of(model, default, found)
@@ -117,7 +117,7 @@ def _print_statements(measured: list[Measured]) -> None:
 
 def _print_comparison(measured: list[Measured]) -> bool:
     """Print a row for each configuration, and below what is wrong. Return whether anything is."""
-    from ..measure.energy import fault
+    from ..probe.stated_energy import fault
 
     table = Table("type", "configuration", "stated", "found", "", box=None, pad_edge=False)
     faults = []

@@ -104,8 +104,8 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     """Return the files among the targets, and the subjects of the page."""
     from ..explorer.materials import Materials, plain
     from ..explorer.state import GIVEN, MEASURED, PRESET, SUBJECTS, checked
-    from ..measure.sources import find_sources, is_measured, value_of
     from ..mitsuba.registry import presets
+    from ..probe.sources import find_sources, is_measured, value_of
 
     if len(targets) > SUBJECTS:
         fail(f"a page shows {SUBJECTS} BSDFs at most, these are {len(targets)}", Exit.USAGE)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from ..measure.sources import value_of
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models, find_models
 from ..model import Model
+from ..probe.sources import value_of
 from .app import command
 from .fit_tables import print_medians, print_ranking
 from .options import check_output, parameters_of, write_json, write_text

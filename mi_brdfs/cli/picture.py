@@ -18,7 +18,7 @@ from .terminal import Exit, err, fail, out, stdout_to_stderr
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..render import Picture
+    from ..rendering.passes import Picture
 
 DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg")
 
@@ -55,9 +55,9 @@ def output_files(output: Path) -> tuple[Path, Path]:
 def render_to(
     files: tuple[Path, Path], load: Callable[[], tuple[mi.Scene, int]], denoise: bool, **options: Any
 ) -> None:
-    """Render the scene and sensor that ``load`` returns, with the options of :func:`mi_brdfs.render.render`, write the
-    files, and print their names. Ctrl-C keeps the finished passes."""
-    from ..render import denoised  # imports numpy
+    """Render the scene and sensor that ``load`` returns, with the options of :func:`.rendering.passes.render`, write
+    the files, and print their names. Ctrl-C keeps the finished passes."""
+    from ..rendering.output import denoised  # imports numpy
 
     start = time.perf_counter()
     try:
@@ -79,7 +79,7 @@ def render_to(
 
 
 def _render(scene: mi.Scene, sensor: int, options: dict[str, Any]) -> Picture:
-    from ..render import render  # imports numpy
+    from ..rendering.passes import render  # imports numpy
 
     seconds, start = options.get("seconds"), time.perf_counter()
     columns = [TextColumn("Rendering"), BarColumn(), TextColumn("{task.fields[spp]} samples per pixel,")]
@@ -103,7 +103,7 @@ def _render(scene: mi.Scene, sensor: int, options: dict[str, Any]) -> Picture:
 
 
 def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
-    from ..render import display_image, write
+    from ..rendering.output import display_image, write
 
     image = display_image(picture.bitmap)
     files = [(picture.bitmap, exr), (image, display)]

@@ -9,7 +9,7 @@ import mitsuba as mi
 import typer
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
-from ..scene_file import RESERVED, SceneFile
+from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
 from .options import parameters_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
@@ -85,7 +85,7 @@ def _window(text: str | None) -> list[int] | None:
 
 
 def _crop(sensor: mi.Sensor, window: list[int]) -> None:
-    from ..render import crop
+    from ..rendering.passes import crop
 
     try:
         crop(sensor, *window)

@@ -46,7 +46,7 @@ def show(
     set_variant(variant)
 
     def load() -> tuple[mi.Scene, int]:
-        from ..measure.sources import find_sources  # imports numpy
+        from ..probe.sources import find_sources  # imports numpy
 
         try:
             with unwrapped_ctrl_c():

@@ -45,7 +45,7 @@ def run(
         scheduler: the address of a Dask scheduler, ``tcp://host:8786``, whose workers have one thread for tasks
             (``--nthreads 1``), and the versions of mi_brdfs, Mitsuba, Dr.Jit and Python that there are here.
         threads: of Dr.Jit in each worker. Default: its share of the cores, or what a scheduler's worker has. At least
-            two, as Mitsuba loads no bitmaps with one; see :func:`mi_brdfs.render.one_thread`.
+            two, as Mitsuba loads no bitmaps with one; see :func:`mi_brdfs.rendering.passes.one_thread`.
         shared: arguments that all calls have in common, sent to each worker once.
 
     Yields:

@@ -9,8 +9,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..render import Passes, PassesError, crop, one_thread, pass_source
-from ..scene_file import SceneFile
+from ..rendering.passes import Passes, PassesError, crop, one_thread, pass_source
+from ..rendering.scene_file import SceneFile
 from ..variants import is_scalar
 from . import ClusterError, Failed, run
 
@@ -21,10 +21,10 @@ _loaded: tuple[str, Any] | None = None
 def passes_on(
     file: SceneFile, *, window: list[int] | None = None, workers: int | None = None, scheduler: str | None = None
 ) -> Passes:
-    """Return the argument ``passes`` of :func:`mi_brdfs.render.render` with which workers render a scene file.
+    """Return the argument ``passes`` of :func:`.rendering.passes.render` with which workers render a scene file.
 
     Workers of a scheduler get the files; those of this machine read them where they are. Each loads the scene once.
-    ``window`` is that of :func:`mi_brdfs.render.crop`; see :func:`mi_brdfs.cluster.run` for the other arguments.
+    ``window`` is that of :func:`.rendering.passes.crop`; see :func:`mi_brdfs.cluster.run` for the other arguments.
     """
 
     def passes(scene: mi.Scene, sensor: int, jobs: Iterable[tuple[int, int]]) -> Generator[Any, None, None]:

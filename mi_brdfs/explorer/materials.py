@@ -13,8 +13,6 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..measure.probe import BSDFProbe
-from ..measure.sources import BSDFSource
 from ..mitsuba.errors import one_line
 from ..mitsuba.names import check_name
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
@@ -22,6 +20,8 @@ from ..model import EnergyWarning
 from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
+from ..probe.bsdf import BSDFProbe
+from ..probe.sources import BSDFSource
 from . import controls
 from .controls import Control
 from .state import GIVEN, MEASURED, PRESET, Bsdf, StateError

@@ -9,8 +9,8 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from ..measure.sources import is_measured
 from ..mitsuba.registry import presets
+from ..probe.sources import is_measured
 from .materials import plain
 from .state import Bsdf
 

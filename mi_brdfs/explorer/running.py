@@ -13,7 +13,7 @@ from typing import Any
 
 from aiohttp import web
 
-from ..measure.sources import BSDFSource
+from ..probe.sources import BSDFSource
 from .engine import Engine
 from .server import LOCAL, MALFORMED, Explorer
 from .stages import UserScene

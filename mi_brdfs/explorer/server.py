@@ -16,10 +16,10 @@ from aiohttp import WSMsgType, web
 from aiohttp.http_exceptions import HttpProcessingError
 
 from .. import __version__
-from ..measure.sources import BSDFSource, is_measured
 from ..measured import FileError, read
 from ..mitsuba.registry import all_models, presets
 from ..parameters.messages import brief, printable
+from ..probe.sources import BSDFSource, is_measured
 from .engine import Engine
 from .materials import Materials, kinds
 from .session import Session

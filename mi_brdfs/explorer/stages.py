@@ -18,7 +18,8 @@ import numpy as np
 from ..mitsuba.names import check_name, linked
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
-from ..render import pass_source, tonemap
+from ..rendering.output import tonemap
+from ..rendering.passes import pass_source
 from .state import Bsdf, State
 
 MOST = 256

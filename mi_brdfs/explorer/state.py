@@ -18,7 +18,7 @@ PARAMETERS = 64
 """The most parameters of a subject."""
 SIZES = 64, 1024
 """The least and the largest side of a picture, in pixels."""
-STEEPEST = 89.0
+MOST_OBLIQUE = 89.0
 VIEWS = "picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"
 CHANNELS = "luminance", "rgb", "red", "green", "blue"
 SHAPES = "body", "sphere", "scene"
@@ -122,7 +122,7 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
     return State(
         subjects=tuple(checked(it.get("bsdf")) for it in subjects),
         hidden=tuple(bool(it.get("hidden")) for it in subjects),
-        theta=_number(data, "theta", 0, STEEPEST),
+        theta=_number(data, "theta", 0, MOST_OBLIQUE),
         phi=_number(data, "phi", -360, 360),
         channel=_word(data, "channel", CHANNELS),
         component=None if component is None else int(_number(data, "component", 0, 99)),

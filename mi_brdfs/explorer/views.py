@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..measure import lobes
-from ..measure.arrays import luminance
-from ..measure.directions import direction
-from ..measure.probe import BSDFProbe, Part
-from ..measure.variates import lattice, sampling_efficiency
 from ..measured.coordinates import HalfDifference
+from ..probe import curves as lobes
+from ..probe.arrays import luminance
+from ..probe.bsdf import BSDFProbe, Part
+from ..probe.directions import direction
+from ..probe.variates import lattice, sampling_efficiency
 from .state import State
 
 Frame = str | bytes

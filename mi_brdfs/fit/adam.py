@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 from .rendered import Rendered
 
 STEPS = 10

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, luminance
 from ..mitsuba.names import tabulated
 from ..model import EnergyWarning
 from ..preview import preview_scene
+from ..probe.arrays import Array, luminance
 from .lanes import rgb_variant
 from .observations import FitError
 from .result import Fit

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array, luminance
+from ..probe.arrays import Array, luminance
 from .metrics import METRICS
 from .observations import Observations
 from .problem import Problem

@@ -9,8 +9,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array
 from ..parameters import PerLobe
+from ..probe.arrays import Array
 from ..ranges import declared
 from .observations import FitError
 from .rendered import Rendered

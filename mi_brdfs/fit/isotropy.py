@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..measure.directions import hemisphere
+from ..probe.directions import hemisphere
 from .lanes import Lanes
 from .unknowns import Configuration
 

@@ -10,9 +10,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, context, floats, interaction, numbers, per_lane, vectors
-from ..measure.directions import hemisphere
 from ..mitsuba import llvm
+from ..probe.arrays import Array, context, floats, interaction, numbers, per_lane, vectors
+from ..probe.directions import hemisphere
 from .observations import FitError
 from .unknowns import Configuration
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 from .rendered import Rendered
 from .solver import DAMPING, STRONGER, WEAKER, damped_steps
 

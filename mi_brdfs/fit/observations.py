@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..measured import Axis, Grid, Measurement, read
-from ..measured.albedo import albedos
 from ..measured.arrays import stacked
 from ..measured.measurement import Quantity
 from ..measured.observer import to_srgb
+from ..measured.report.albedo import albedos
 
 Arrays: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike]
 Source: TypeAlias = str | Path | Measurement | Arrays

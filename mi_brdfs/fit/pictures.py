@@ -12,9 +12,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array
 from ..parameters import Rotation
 from ..parameters.messages import listed, meant
+from ..probe.arrays import Array
 from ..ranges import declared
 from .adam import refine_textures
 from .image_fit import ImageFit, found

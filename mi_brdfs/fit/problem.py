@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 from .lanes import Lanes
 from .metrics import METRICS, Metric
 from .observations import Observations

@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 from .observations import FitError
 from .unknowns import LARGEST, Unknown
 

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..measure.directions import direction
-from ..measure.probe import BSDFProbe
-from ..measure.variates import sobol
 from ..measured.measurement import Quantity
 from ..model import EnergyWarning
 from ..parameters.xml import to_xml
+from ..probe.bsdf import BSDFProbe
+from ..probe.directions import direction
+from ..probe.variates import sobol
 from .lanes import rgb_variant
 
 ANGLES = 0, 20, 40, 60, 70, 80

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 
 STEPS = 80
 """The most steps of a fit."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.arrays import Array
 from ..mitsuba.registry import MODELS, presets
 from ..parameters.published import preset
+from ..probe.arrays import Array
 from .observations import Observations
 from .problem import Problem
 from .solver import solve

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..measure import settings
 from ..model import Model
 from ..parameters import Choice, Colour, Flag, FresnelSet, Number, OneOf, Parameter, PerLobe, Reflectance, Rotation
 from ..parameters.fresnel import OTHERS
 from ..parameters.messages import listed, meant
+from ..probe import parameter_space as settings
 from .observations import FitError
 
 FRESNEL = "fresnel"

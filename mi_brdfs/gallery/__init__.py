@@ -25,12 +25,13 @@ try:
 except ImportError:
     raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
 
-from ..measure.arrays import luminance
 from ..mitsuba.registry import find_models, presets
 from ..model import Model
 from ..parameters.published import preset
 from ..preview import preview_scene
-from ..render import ctrl_c, display_image, write
+from ..probe.arrays import luminance
+from ..rendering.output import display_image, write
+from ..rendering.passes import ctrl_c
 from ..writing import write_text
 from .families import by_family, portrait, stage_of, year
 from .html import Section, page

@@ -3,8 +3,8 @@
 from .diffuse import LambertLobe, over_diffuse
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
-from .mirror import PowerLobe, PowerResponseLobe
 from .mixture import Mixture
+from .power import PowerLobe, PowerResponseLobe
 
 __all__ = [
     "LambertLobe",

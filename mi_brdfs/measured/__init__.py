@@ -7,15 +7,15 @@ if TYPE_CHECKING:
     from .conversion import Conversion, bake, convert
     from .formats import read
     from .measurement import Axis, FileError, Grid, Measurement, Samples
+    from .report.summary import Summary, summarize
     from .source import Source
-    from .summary import Summary, summarize
 
 _HOMES = {
     "conversion": ("Conversion", "bake", "convert"),
     "formats": ("read",),
     "measurement": ("Axis", "FileError", "Grid", "Measurement", "Samples"),
     "source": ("Source",),
-    "summary": ("Summary", "summarize"),
+    "report.summary": ("Summary", "summarize"),
 }
 """The modules of the public names, imported when they are used: the readers take time."""
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..measure.arrays import luminance
+from ..probe.arrays import luminance
 from .adaptive import Adaptive, on_phi, on_theta
 from .arrays import NUMPY, stacked
 from .coordinates import TWO_PI, HalfDifference, polar_angle, spherical

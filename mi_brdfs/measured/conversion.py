@@ -12,9 +12,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import CENTRE, Array
-from ..measure.probe import BSDFProbe
-from ..measure.sources import name_of
+from ..probe.arrays import CENTRE, Array
+from ..probe.bsdf import BSDFProbe
+from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
 from .arrays import NUMPY, components, stacked
@@ -27,7 +27,7 @@ from .source import Source, batches
 LANES = 1 << 20
 """Pairs of directions that a BSDF is evaluated for at once."""
 PAIRS = 1 << 15
-STEEPEST = 80
+BAKED_TO = 80
 """The angle, in degrees, up to which a conversion is judged."""
 GREY = "What was measured at one wavelength became grey."
 ALIKE = 1e-3
@@ -50,7 +50,7 @@ class Conversion:
 
     def __str__(self) -> str:
         error = (
-            f"Read back at {PAIRS:,} random pairs of directions up to {STEEPEST}° from the normal, f cosθ is off by "
+            f"Read back at {PAIRS:,} random pairs of directions up to {BAKED_TO}° from the normal, f cosθ is off by "
             f"{_percent(self.rms)} of its peak (root mean square), and by at most {_percent(self.largest)} farther "
             "than a cell from the peak."
         )
@@ -238,7 +238,7 @@ def _pairs(count: int) -> tuple[Array, Array]:
     return wi, wo
 
 
-LOWEST = np.cos(np.radians(STEEPEST))
+LOWEST = np.cos(np.radians(BAKED_TO))
 
 
 def _lambertian(rng: np.random.Generator, count: int) -> Array:

@@ -254,7 +254,7 @@ class Measurement:
 
     ``values`` of ``data`` are f in 1/sr, as the file has them up to its stated scale: negative ones, and NaN where
     nothing was measured, are kept. Whatever renders takes these as 0, whatever fits gives them no weight, and
-    :func:`mi_brdfs.measured.summary.summarize` counts them.
+    :func:`mi_brdfs.measured.report.summary.summarize` counts them.
     """
 
     path: Path

@@ -16,7 +16,6 @@ import mitsuba as mi
 
 from .. import models
 from ..integrators.shading import Shading
-from ..measured.tabulated import Tabulated
 from ..microfacet.distributions import Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import Shadowing
@@ -25,6 +24,7 @@ from ..model import Model, Plugin, full_name
 from ..models.microfacet import add_term
 from ..parameters import published
 from ..parameters.messages import meant
+from ..tabulated.tabulated import Tabulated
 from . import llvm
 from .bsdf import bsdf_class
 from .integrator import integrator_class

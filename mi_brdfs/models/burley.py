@@ -2,7 +2,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe
-from ..lobes.mirror import AxisFrame
+from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Cosines, Facet

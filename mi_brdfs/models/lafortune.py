@@ -2,7 +2,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import LambertLobe, PowerLobe
-from ..lobes.mirror import AxisFrame
+from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, clamp, log1p_series, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation

@@ -3,7 +3,7 @@ import mitsuba as mi
 
 from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
-from ..lobes.mirror import AxisFrame
+from ..lobes.power import AxisFrame
 from ..math import EPSILON, TINY, choose, leaving, safe_sqrt
 from ..model import Energy, Model
 from ..parameters import Choice, Number, Reflectance

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..measure.sources import degrees_of, value_of
 from ..parameters.messages import listed
+from ..probe.sources import degrees_of, value_of
 from ..writing import replacing
 from . import albedo, cartesian, hemisphere, page, polar, sphere
 

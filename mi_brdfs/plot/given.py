@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import mitsuba as mi
 
-from ..measure.probe import BSDFProbe
-from ..measure.sources import find_sources, name_of
 from ..parameters.messages import brief
+from ..probe.bsdf import BSDFProbe
+from ..probe.sources import find_sources, name_of
 from ..variants import is_measurable
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}

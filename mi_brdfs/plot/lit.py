@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..measure.arrays import luminance
-from ..measure.lobes import Curve, refined
 from ..measured import Measurement, Samples
 from ..measured.arrays import components, stacked
 from ..measured.coordinates import polar_angle, spherical
-from ..measured.counts import batches, census
 from ..measured.measurement import usable
 from ..measured.observer import to_srgb
-from ..measured.summary import azimuths, ends, table
+from ..measured.report.counts import batches, census
+from ..measured.report.summary import azimuths, ends, table
 from ..parameters.messages import brief, printable
+from ..probe.arrays import luminance
+from ..probe.curves import Curve, refined
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from ..measure import lobes
-from ..measure.lobes import largest
+from ..probe import curves as lobes
+from ..probe.curves import largest
 from .given import channels_of, check_angles, constants, named, quantity, with_smooth_part
 from .style import (
     CHANNELS,

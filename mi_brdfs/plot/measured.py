@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from ..measure.lobes import largest
 from ..measured import Measurement, read
-from ..measured.albedo import albedos
 from ..measured.arrays import stacked
 from ..measured.coordinates import HalfDifference
+from ..measured.report.albedo import albedos
+from ..probe.curves import largest
 from .lit import LitTable
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from ..measure import lobes
-from ..measure.lobes import Curve, decades, largest
+from ..probe import curves as lobes
+from ..probe.curves import Curve, decades, largest
 from .given import channels_of, check_angles, constants, named, quantity, scales_of, with_smooth_part
 from .style import (
     CHANNELS,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure import lobes
-from ..measure.directions import direction
+from ..probe import curves as lobes
+from ..probe.directions import direction
 from .given import check_angles, constants, named, quantity, scales_of, with_smooth_part
 from .style import COLOURS, FAINT, INK
 

@@ -17,7 +17,7 @@ from ..gallery import shot
 from ..gallery.sheet import Row, sheet
 from ..mitsuba.names import tabulated
 from ..parameters.messages import printable
-from ..render import write
+from ..rendering.output import write
 from .plan import Outcome, Sweep, check_content, digest, versions
 
 SIZE, SPP = 144, 16

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..measure.directions import angles_of, scattered
-from ..measure.probe import BSDFProbe
-from ..measure.variates import random
+from ..probe.bsdf import BSDFProbe
+from ..probe.directions import angles_of, scattered
+from ..probe.variates import random
 from .incidents import SCATTERED, all_over, incidents
 from .outcome import Outcome
 from .report import Finding

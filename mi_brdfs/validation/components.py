@@ -5,10 +5,10 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, context
-from ..measure.directions import angles_of, direction, hemisphere, on_side
-from ..measure.probe import Part, Samples
-from ..measure.variates import random
+from ..probe.arrays import Array, context
+from ..probe.bsdf import Part, Samples
+from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.variates import random
 from .incidents import SCATTERED, Incident
 from .outcome import Findings, Outcome
 from .run import SEED, Run

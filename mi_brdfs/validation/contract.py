@@ -6,10 +6,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, context, interaction, numbers, sample_arguments, vectors
-from ..measure.directions import angles_of, hemisphere, on_side, scattered
-from ..measure.variates import random
 from ..mitsuba.errors import unwrapped_ctrl_c
+from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
+from ..probe.directions import angles_of, hemisphere, on_side, scattered
+from ..probe.variates import random
 from .outcome import Findings, Outcome, told
 from .report import Finding
 from .run import Run

@@ -8,10 +8,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, interaction, numbers, sample_arguments, vectors
-from ..measure.directions import angles_of, direction, hemisphere, on_side
-from ..measure.probe import Part
-from ..measure.variates import random
+from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
+from ..probe.bsdf import Part
+from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.variates import random
 from ..ranges import ranges
 from .differences import differences
 from .outcome import Findings, Outcome, relative

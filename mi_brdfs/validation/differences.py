@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 from .traversal import set_value, value_of
 
 

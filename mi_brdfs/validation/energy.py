@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array, interaction, luminance, numbers
-from ..measure.directions import direction, on_side
-from ..measure.probe import Part
-from ..measure.variates import SHIFTS, lattice, sampling_efficiency
+from ..probe.arrays import Array, interaction, luminance, numbers
+from ..probe.bsdf import Part
+from ..probe.directions import direction, on_side
+from ..probe.variates import SHIFTS, lattice, sampling_efficiency
 from . import sampling
 from .incidents import Incident, named
 from .outcome import Findings, Outcome

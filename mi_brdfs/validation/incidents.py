@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import CENTRE, Array
-from ..measure.directions import STEEPEST, angles_of, direction, on_side, scattered
-from ..measure.probe import Part
+from ..probe.arrays import CENTRE, Array
+from ..probe.bsdf import Part
+from ..probe.directions import STEEPEST, angles_of, direction, on_side, scattered
 
 AZIMUTH_STEP = 137.5
 """In degrees: each direction has an azimuth of its own, so that what is turned wrongly shows."""

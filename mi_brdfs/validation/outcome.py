@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array
 from ..parameters.messages import brief
+from ..probe.arrays import Array
 from .report import Finding
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array
-from ..measure.directions import from_plane, to_plane
+from ..probe.arrays import Array
+from ..probe.directions import from_plane, to_plane
 from .svg import DENSITY, DEVIATION, IMPOSSIBLE, brief_number, levels_of, png, ticks
 from .trial import Trial
 
@@ -25,7 +25,7 @@ LARGEST = 2.0**127
 
 class View(NamedTuple):
     """A square window on one side of the surface: its middle and half its size, in degrees of the projection
-    :func:`~mi_brdfs.measure.directions.to_plane`, but with y downwards, as in pictures."""
+    :func:`~mi_brdfs.probe.directions.to_plane`, but with y downwards, as in pictures."""
 
     side: int
     x: float

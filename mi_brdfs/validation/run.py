@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.directions import direction, on_side
-from ..measure.probe import BSDFProbe, Part, Samples
-from ..measure.variates import random
+from ..probe.bsdf import BSDFProbe, Part, Samples
+from ..probe.directions import direction, on_side
+from ..probe.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
 from .trial import Trial, Trials, trials_of
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..measure.probe import BSDFProbe
-from ..measure.sources import find_sources, name_of
 from ..mitsuba.errors import unwrapped_ctrl_c
+from ..probe.bsdf import BSDFProbe
+from ..probe.sources import find_sources, name_of
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, sampling, spectral, textures, updates, values
 from .against import against

@@ -7,9 +7,9 @@ from math import erfc, sqrt
 
 import numpy as np
 
-from ..measure.arrays import Array
-from ..measure.directions import angles_of
-from ..measure.probe import Samples
+from ..probe.arrays import Array
+from ..probe.bsdf import Samples
+from ..probe.directions import angles_of
 from .outcome import Findings, Outcome
 from .report import Finding
 from .run import SEED, Run

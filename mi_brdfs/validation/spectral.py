@@ -8,12 +8,12 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
-from ..measure.directions import angles_of, hemisphere, on_side
-from ..measure.probe import BSDFProbe
-from ..measure.variates import random
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
+from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
+from ..probe.bsdf import BSDFProbe
+from ..probe.directions import angles_of, hemisphere, on_side
+from ..probe.variates import random
 from . import sampling, values
 from .outcome import Findings, Outcome, told
 from .report import Finding

@@ -7,7 +7,7 @@ import base64
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array
+from ..probe.arrays import Array
 
 # Viridis and ColorBrewer's RdBu, legible without telling red from green.
 DENSITY = "440154 472d7b 3b528b 2c728e 21918c 28ae80 5ec962 addc30 fde725"

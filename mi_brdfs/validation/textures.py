@@ -8,10 +8,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import interaction, numbers, pinned
-from ..measure.directions import hemisphere, on_side
-from ..measure.probe import BSDFProbe
-from ..measure.variates import random
+from ..probe.arrays import interaction, numbers, pinned
+from ..probe.bsdf import BSDFProbe
+from ..probe.directions import hemisphere, on_side
+from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run

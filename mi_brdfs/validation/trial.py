@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..measure.arrays import Array
-from ..measure.chi_square import ChiSquare, chi_square, lone_cell
-from ..measure.directions import angles_of, azimuth_axis
-from ..measure.partition import Partition, partitions
-from ..measure.probe import BSDFProbe, Part, Samples
-from ..measure.variates import random
+from ..probe.arrays import Array
+from ..probe.bsdf import BSDFProbe, Part, Samples
+from ..probe.chi_square import ChiSquare, chi_square, lone_cell
+from ..probe.directions import angles_of, azimuth_axis
+from ..probe.partition import Partition, partitions
+from ..probe.variates import random
 from .incidents import Incident
 
 COUNT = 1 << 18

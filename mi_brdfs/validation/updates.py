@@ -6,12 +6,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import numbers
-from ..measure.directions import angles_of, hemisphere, on_side
-from ..measure.kernels import launched_kernels
-from ..measure.probe import BSDFProbe
-from ..measure.variates import random
 from ..mitsuba.errors import unwrapped_ctrl_c
+from ..probe.arrays import numbers
+from ..probe.bsdf import BSDFProbe
+from ..probe.directions import angles_of, hemisphere, on_side
+from ..probe.kernels import launched_kernels
+from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import Array
-from ..measure.directions import angles_of, direction, hemisphere, on_side
-from ..measure.probe import Part
-from ..measure.variates import random
+from ..probe.arrays import Array
+from ..probe.bsdf import Part
+from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.variates import random
 from .incidents import SCATTERED
 from .outcome import Findings, Outcome, relative
 from .report import Finding

@@ -19,14 +19,14 @@ import numpy as np
 from harness import replaced
 
 from mi_brdfs.math import luminance
-from mi_brdfs.measure.arrays import interaction, numbers
-from mi_brdfs.measure.directions import direction
-from mi_brdfs.measure.variates import lattice, sampling_efficiency
 from mi_brdfs.microfacet import sampling
 from mi_brdfs.microfacet.forward import ForwardDirections
 from mi_brdfs.microfacet.shadowing import Implicit, SchlickSmith, Shadowing
 from mi_brdfs.microfacet.visible import VisibleNormals
 from mi_brdfs.models.microfacet import DISTRIBUTIONS, SHADOWING
+from mi_brdfs.probe.arrays import interaction, numbers
+from mi_brdfs.probe.directions import direction
+from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 

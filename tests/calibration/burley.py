@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 from harness import Fit, attributes, directions, estimate_loss, main, number, variance_loss
 
-from mi_brdfs.measure.arrays import vectors
 from mi_brdfs.models.burley import BaseLobe, SheenLobe
+from mi_brdfs.probe.arrays import vectors
 
 import mitsuba as mi  # isort: skip
 

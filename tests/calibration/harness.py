@@ -19,9 +19,9 @@ from scipy.optimize import minimize
 
 from mi_brdfs.lobes import LambertLobe, Lobe
 from mi_brdfs.lobes.mixture import Mixture
-from mi_brdfs.measure.arrays import sample_arguments, vectors
-from mi_brdfs.measure.directions import direction
-from mi_brdfs.measure.variates import lattice, sampling_efficiency
+from mi_brdfs.probe.arrays import sample_arguments, vectors
+from mi_brdfs.probe.directions import direction
+from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip

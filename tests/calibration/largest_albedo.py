@@ -17,12 +17,12 @@ from scipy.optimize import differential_evolution
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from reference_albedos import REFERENCES, Reference
 
-from mi_brdfs.measure.energy import fault
-from mi_brdfs.measure.settings import Axis, axes
 from mi_brdfs.mitsuba.registry import find_model
+from mi_brdfs.probe.parameter_space import Dimension, axes
+from mi_brdfs.probe.stated_energy import fault
 
 
-def evolved(reference: Reference, sides: list[Axis]) -> tuple[float, dict[str, float]]:
+def evolved(reference: Reference, sides: list[Dimension]) -> tuple[float, dict[str, float]]:
     """The largest albedo of a reference over some axes, and its numbers."""
 
     def numbers(point):

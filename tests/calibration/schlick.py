@@ -12,8 +12,8 @@ from itertools import product
 from harness import Fit, attributes, estimate_loss, main
 
 from mi_brdfs.lobes import Lobe
-from mi_brdfs.measure.arrays import interaction
 from mi_brdfs.models import schlick
+from mi_brdfs.probe.arrays import interaction
 
 import mitsuba as mi  # isort: skip
 

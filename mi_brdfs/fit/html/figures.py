@@ -15,14 +15,14 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from ...measure.directions import direction
-from ...measure.lobes import GRAZING, Curve, in_plane, value
-from ...measure.probe import BSDFProbe
 from ...measured.measurement import Measurement
-from ...measured.summary import azimuths
+from ...measured.report.summary import azimuths
 from ...plot.lit import LitTable
 from ...plot.planar import THIN
 from ...plot.style import FAINT, GRID, INK, STYLES, calm
+from ...probe.bsdf import BSDFProbe
+from ...probe.curves import GRAZING, Curve, in_plane, value
+from ...probe.directions import direction
 from ..metrics import METRICS
 from ..observations import Observations
 from ..result import Fit

@@ -16,8 +16,8 @@ from matplotlib import colormaps
 from PIL import Image
 
 from ... import __version__
-from ...measure.arrays import Array
 from ...measured import Measurement, read
+from ...probe.arrays import Array
 from ..appearance import MOST, Appearance, check_file, lightness
 from ..lanes import rgb_variant
 from ..metrics import METRICS

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..albedo import hemisphere
 from ..arrays import stacked
 from ..coordinates import Coordinates, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
+from ..report.albedo import hemisphere
 from ..source import Source
 from ..text import TextFile, first_words, is_number, opening, shortened, whole
 

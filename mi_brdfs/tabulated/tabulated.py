@@ -47,7 +47,7 @@ class Tabulated(Model):
     are then drawn as the file says, whatever the values become.
 
     Sampling: from a table over the half vector for 58 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
-    ``MarginalContinuous2D``, and 2 % by the cosine (mi_brdfs.measured.proposal).
+    ``MarginalContinuous2D``, and 2 % by the cosine (mi_brdfs.tabulated.proposal).
 
     W. Matusik, H. Pfister, M. Brand and L. McMillan, A data-driven reflectance model, ACM Transactions on Graphics
     22(3), 2003, doi:10.1145/882262.882343.

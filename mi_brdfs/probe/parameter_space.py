@@ -15,7 +15,7 @@ from .arrays import Array
 if TYPE_CHECKING:
     from ..model import Model
 
-STEEPEST = 89.9
+LOWEST_VIEW = 89.9
 """The largest angle of view, in degrees."""
 FARTHEST = 1e6
 """Where the search for a number ends whose range is infinite."""
@@ -27,7 +27,7 @@ as steep as directions are rounded."""
 # --- Numbers --------------------------------------------------------------------------------------------------------
 
 
-class Axis(NamedTuple):
+class Dimension(NamedTuple):
     """A number that is free, and its range."""
 
     name: str
@@ -42,7 +42,7 @@ class Axis(NamedTuple):
         return np.sinh(low + (high - low) * t).clip(self.low, self.high)
 
 
-VIEW = (Axis("cosine", float(np.cos(np.radians(STEEPEST))), 1), Axis("azimuth", 0, np.pi / 2))
+VIEW = (Dimension("cosine", float(np.cos(np.radians(LOWEST_VIEW))), 1), Dimension("azimuth", 0, np.pi / 2))
 """The axes of the direction of view."""
 
 
@@ -52,7 +52,7 @@ def view(cosine: Array, azimuth: Array) -> Array:
     return np.stack([sin * np.cos(azimuth), sin * np.sin(azimuth), cosine], axis=-1)
 
 
-def axes(model: type[Model], given: Mapping[str, Any]) -> list[Axis]:
+def axes(model: type[Model], given: Mapping[str, Any]) -> list[Dimension]:
     """Return the numbers that are not ``given``, both of a pair, and the direction of view."""
     least = {name: value for word in given.values() for name, value in LEAST.get(word, {}).items()}
     free = []
@@ -60,7 +60,7 @@ def axes(model: type[Model], given: Mapping[str, Any]) -> list[Axis]:
         if isinstance(number, Number) and number.name not in given:
             low, high = (limit if isfinite(limit) else copysign(FARTHEST, limit) for limit in number.limits)
             names = number.pair or number.names[:1]
-            free += [Axis(name, max(low, least.get(name, low)), high) for name in names]
+            free += [Dimension(name, max(low, least.get(name, low)), high) for name in names]
     return [*free, *VIEW]
 
 

@@ -1,19 +1,8 @@
-"""Progressive rendering of a loaded scene, and its output as an EXR and a display image.
-
-From Python::
-
-    scene = mi.load_file("scene.xml")
-    picture = render(scene, spp=256)
-    picture.image                               # the developed tensor
-    write(picture.bitmap, "scene.exr")
-    write(display_image(picture.bitmap), "scene.png")
-"""
+"""Progressive rendering of a loaded scene."""
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
-import os
 import signal
 import threading
 import time
@@ -21,7 +10,6 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,14 +17,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .variants import is_scalar
-from .writing import replacing
-
-SHOULDER = 0.8
-IMAGES = {
-    ".exr": "OpenEXR", ".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".hdr": "RGBE", ".pfm": "PFM", ".ppm": "PPM",
-}  # fmt: skip
-"""Mitsuba's formats by the endings of file names."""
+from ..variants import is_scalar
 
 Passes = Callable[["mi.Scene", int, Iterable[tuple[int, int]]], Generator[Any, None, None]]
 
@@ -195,79 +176,6 @@ def crop(sensor: mi.Sensor, x: int, y: int, width: int, height: int) -> None:
     parameters = mi.traverse(sensor)
     parameters["film.crop_offset"], parameters["film.crop_size"] = [x, y], [width, height]
     parameters.update()
-
-
-def denoised(picture: Picture) -> Picture:
-    """Return a picture whose colours are denoised by Intel's Open Image Denoise; alpha and AOVs are as before. Films
-    with a box filter give the best result, as pixels then share no samples.
-
-    Raises:
-        ImportError: without the extra that brings it.
-        ValueError: if the film has no RGB channels.
-    """
-    try:
-        import mitsuba_oidn
-    except ImportError as error:
-        raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
-    names = [field.name for field in picture.bitmap.struct_()]
-    if names[:3] != ["R", "G", "B"]:
-        raise ValueError("only films with the pixel format rgb or rgba can be denoised")
-    pixels = np.array(picture.bitmap, np.float32).reshape(*reversed(picture.bitmap.size()), -1)
-    pixels[..., :3] = mitsuba_oidn.denoise(np.ascontiguousarray(pixels[..., :3]), hdr=True)
-    bitmap = mi.Bitmap(pixels, picture.bitmap.pixel_format(), names)
-    return dataclasses.replace(picture, image=mi.TensorXf(pixels), bitmap=bitmap)
-
-
-def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
-    """Map linear RGB of any range to [0, 1], still linear, without flat highlights or hue shifts.
-
-    With ``m`` the largest of a pixel's channels and ``p`` the ``peak``, by default the 99.9th percentile of ``m``, a
-    pixel is multiplied by ``f(m) / m``. Up to 0.8, and everywhere if ``p <= 1``, ``f(m) = m``: a well exposed picture
-    stays as it is. Above,
-
-        f(m) = 0.8 + 0.2 t (1 + t/T²) / (1 + t),    t = (m - 0.8) / 0.2,    T = (p - 0.8) / 0.2,
-
-    which continues with slope 1 and reaches 1 at ``m = p``. Brighter pixels are scaled to 1; negative values and NaNs
-    become 0.
-    """
-    image = np.nan_to_num(np.maximum(image, 0), nan=0.0, posinf=np.finfo(np.float32).max)
-    m = image.max(axis=-1, keepdims=True)
-    p = np.percentile(m, 99.9) if peak is None else peak
-    T = max((p - SHOULDER) / (1 - SHOULDER), 1.0)
-    t = np.maximum(m - SHOULDER, 0) / (1 - SHOULDER)
-    f = np.where(m > SHOULDER, SHOULDER + (1 - SHOULDER) * t * (1 / (1 + t) + t / (1 + t) / T / T), m)
-    return image * np.minimum(f, 1) / np.where(m > 0, m, 1)
-
-
-def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
-    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None if it has no
-    colours."""
-    names = "".join(field.name for field in bitmap.struct_())
-    formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
-    colours = next((it for it in formats if names.startswith(it.name)), None)
-    if colours is None:
-        return None
-    pixels = np.array(bitmap).reshape(*reversed(bitmap.size()), -1)[..., : len(colours.name)]
-    linear = mi.Bitmap(np.ascontiguousarray(pixels), colours).convert(mi.Bitmap.PixelFormat.RGB)
-    mapped = mi.Bitmap(tonemap(np.array(linear)).astype(np.float32), mi.Bitmap.PixelFormat.RGB)
-    return mapped.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)
-
-
-def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
-    """Write ``bitmap`` in the format of the file name, all or nothing: ``path`` never holds half an image.
-
-    Raises:
-        ValueError: if the name ends in no format.
-        OSError: if it cannot be written.
-    """
-    suffix = Path(path).suffix.lower()
-    if suffix not in IMAGES:
-        raise ValueError(f"{path}: unknown image format; use {', '.join(IMAGES)}")
-    # Mitsuba takes only file names in UTF-8, and does not notice if the last 8 KB find no room on the disk.
-    stream = mi.MemoryStream()
-    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, IMAGES[suffix]))
-    with replacing(path) as part:
-        part.write_bytes(stream.raw_buffer())
 
 
 def _samples_per_pass(threads: int) -> int:

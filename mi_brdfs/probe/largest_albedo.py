@@ -14,9 +14,9 @@ import mitsuba as mi
 import numpy as np
 
 from .arrays import Array, floats, luminance, per_lane
+from .bsdf import BSDFProbe
 from .directions import angles_of, direction
-from .probe import BSDFProbe
-from .settings import VIEW, accepted, axes, load, view
+from .parameter_space import VIEW, accepted, axes, load, view
 from .variates import sobol
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ SEEDS = range(100, 108)
 """Seeds of variates that have no part in the choice."""
 
 
-class Setting(NamedTuple):
+class Maximum(NamedTuple):
     """An albedo, its standard error, and where it was found: the direction of view, the free numbers by name, and what
     was given."""
 
@@ -76,7 +76,7 @@ def default_albedo(model: type[Model]) -> float:
     return float(np.mean([albedos(bsdf, brightest, LOG2_FINAL, seed) for seed in SEEDS]))
 
 
-def largest_albedo(model: type[Model], given: Mapping[str, Any]) -> Setting:
+def largest_albedo(model: type[Model], given: Mapping[str, Any]) -> Maximum:
     """Return the brightest setting of a model in white over all that is not ``given``, where a tuple stands for each
     of its words. What the plugin refuses is left out.
 
@@ -96,7 +96,7 @@ class _Search:
         self.bsdf = load(model, given, self.textures)
         self.rng = np.random.default_rng(1)
 
-    def run(self) -> Setting:
+    def run(self) -> Maximum:
         """Return the brightest setting."""
         best = self._starts()
         for k in range(ROUNDS):
@@ -127,11 +127,11 @@ class _Search:
         found = self._albedos(np.concatenate(tried), first + (last - first) * k // ROUNDS, seed=2 + k)
         return tried[np.arange(CLIMBS), found.reshape(CLIMBS, -1).argmax(axis=1)]
 
-    def _measured(self, point: Array) -> Setting:
+    def _measured(self, point: Array) -> Maximum:
         """Return the setting of a point with its albedo."""
         found = np.concatenate([self._albedos(point[None], LOG2_FINAL, seed) for seed in SEEDS])
         numbers = {name: float(value) for name, value in self._numbers(point).items()}
-        return Setting(float(found.mean()), float(found.std(ddof=1)) / len(found) ** 0.5, numbers, self.given)
+        return Maximum(float(found.mean()), float(found.std(ddof=1)) / len(found) ** 0.5, numbers, self.given)
 
     def _numbers(self, points: Array) -> dict[str, Array]:
         return {axis.name: axis.at(t) for axis, t in zip(self.axes, np.transpose(points), strict=True)}

@@ -10,9 +10,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..math import clamp
+from ..measured.arrays import DRJIT
+from ..measured.measurement import MARGIN, Axis, Grid
 from ..variants import is_scalar
-from .arrays import DRJIT
-from .measurement import MARGIN, Axis, Grid
 
 
 class Table:

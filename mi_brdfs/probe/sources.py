@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..mitsuba.names import check_name, tabulated
+from .bsdf import BSDFProbe, contained
 from .directions import direction, on_side
-from .probe import BSDFProbe, contained
 from .variates import random
 
 RESERVED = ("path", "string", "parallel", "optimize")

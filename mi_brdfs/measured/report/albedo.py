@@ -13,9 +13,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .arrays import stacked
-from .coordinates import TWO_PI, spherical
-from .measurement import Extrapolation, Grid
+from ..arrays import stacked
+from ..coordinates import TWO_PI, spherical
+from ..measurement import Extrapolation, Grid
 
 RADII = 96
 """The nodes along a radius."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .coordinates import TWO_PI
-from .measurement import Grid, Samples, usable
+from ..coordinates import TWO_PI
+from ..measurement import Grid, Samples, usable
 
 PAIRS = 1 << 17
 """The most nodes that are compared."""

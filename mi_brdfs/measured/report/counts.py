@@ -8,9 +8,9 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from .arrays import components
-from .coordinates import polar_angle
-from .measurement import Grid, Samples
+from ..arrays import components
+from ..coordinates import polar_angle
+from ..measurement import Grid, Samples
 
 AT_ONCE = 1 << 18
 """The most pairs of directions in memory together."""

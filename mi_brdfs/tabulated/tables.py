@@ -6,13 +6,13 @@ from weakref import WeakValueDictionary
 
 import mitsuba as mi
 
+from ..measured.coordinates import PolarAngle
+from ..measured.files import checked, content_hash
+from ..measured.formats import read
+from ..measured.measurement import Axis, Extrapolation, Grid, Interpolation, Measurement, Quantity
+from ..measured.scattered import as_grid
 from .colour import Channels
-from .coordinates import PolarAngle
-from .files import checked, content_hash
-from .formats import read
-from .measurement import Axis, Extrapolation, Grid, Interpolation, Measurement, Quantity
 from .proposal import NODES_I, Proposal, estimated_albedos
-from .scattered import as_grid
 from .table import Table
 
 

@@ -7,8 +7,8 @@ from math import ceil, floor, inf, isinf, log10
 from typing import Any
 
 from ..model import Energy, Model
-from .albedo import Setting
-from .settings import accepted
+from .largest_albedo import Maximum
+from .parameter_space import accepted
 
 ROUNDING = 1e-4
 """What float32 may exceed a limit by, relatively."""
@@ -26,7 +26,7 @@ def configurations(model: type[Model]) -> list[dict[str, Any]]:
     return [given for given, _ in model.energy.largest] if model.energy else accepted(model, {})
 
 
-def energy_of(model: type[Model], default: float, found: Iterable[tuple[dict[str, Any], Setting]]) -> Energy:
+def energy_of(model: type[Model], default: float, found: Iterable[tuple[dict[str, Any], Maximum]]) -> Energy:
     """Return what the class of a model should state, by the largest albedo of its defaults and what was found for its
     configurations."""
     rows = [(given, rounded_up(setting.albedo, setting.noise)) for given, setting in found]

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..files import named
+from ..measurement import FileError, Grid, Measurement, Samples
+from ..scattered import as_grid
 from .albedo import albedos, coverage
 from .counts import Counts, Range, census
-from .files import named
-from .measurement import FileError, Grid, Measurement, Samples
 from .reciprocity import ReciprocityError, reciprocity_error
-from .scattered import as_grid
 
 ANGLES = np.arange(0, 86, 5)
 """The angles of incidence at which albedos are integrated, in degrees, where they were measured."""

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array, context, luminance
+from .bsdf import BSDFProbe, Part
 from .directions import direction, from_plane, on_side, to_plane
-from .probe import BSDFProbe, Part
 from .variates import lattice, random
 
 GRAZING = 89.99
@@ -151,7 +151,7 @@ def disc(
 ) -> Array:
     """Return a picture of the hemisphere above (1) or below (-1), in rows from the bottom, each pixel the mean over it.
 
-    It is the disc of :func:`~mi_brdfs.measure.directions.to_plane` with wi on the left; pixels outside repeat its rim.
+    It is the disc of :func:`~mi_brdfs.probe.directions.to_plane` with wi on the left; pixels outside repeat its rim.
     Pixels with many samples are divided more finely.
     """
     wi, n = direction(theta_i, azimuth), resolution

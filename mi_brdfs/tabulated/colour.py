@@ -8,10 +8,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..measure.arrays import luminance
+from ..measured.measurement import Axis, Grid
+from ..measured.observer import to_srgb
+from ..probe.arrays import luminance
 from .basis import BASIS, WAVELENGTHS
-from .measurement import Axis, Grid
-from .observer import to_srgb
 from .table import Table, TableAxis, array, fetch
 
 

@@ -7,9 +7,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..math import choose, normalize_or, select
-from .arrays import DRJIT, stacked, vector
-from .coordinates import TWO_PI, polar_angle, spherical, wrapped
-from .measurement import Extrapolation, Grid, Interpolation
+from ..measured.arrays import DRJIT, stacked, vector
+from ..measured.coordinates import TWO_PI, polar_angle, spherical, wrapped
+from ..measured.measurement import Extrapolation, Grid, Interpolation
 
 COSINE_SHARE = 0.02
 """The share of directions drawn in proportion to the cosine, wherever the table is zero or coarser than its nodes."""

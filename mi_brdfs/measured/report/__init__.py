@@ -1,0 +1,1 @@
+"""What the values of a measured file say of themselves."""

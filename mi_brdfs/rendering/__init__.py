@@ -1,0 +1,13 @@
+"""Progressive rendering of a loaded scene, its output as an EXR and a display image, and scene files.
+
+From Python::
+
+    from mi_brdfs.rendering.output import display_image, write
+    from mi_brdfs.rendering.passes import render
+
+    scene = mi.load_file("scene.xml")
+    picture = render(scene, spp=256)
+    picture.image                               # the developed tensor
+    write(picture.bitmap, "scene.exr")
+    write(display_image(picture.bitmap), "scene.png")
+"""

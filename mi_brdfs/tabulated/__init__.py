@@ -1,0 +1,1 @@
+"""The plugin that renders measured files, and its tables in kernels."""
