@@ -76,7 +76,7 @@ def quantity(rng, given):
                 else colour(rng, low, high)
             )
         texels = rng.uniform(*sorted((value, other)), (4, 4, 3 if given.colour else 1))
-        return {"type": "bitmap", "bitmap": mi.Bitmap(texels.astype(np.float32)), "raw": True}
+        return {"type": "bitmap", "bitmap": mi.Bitmap(texels.astype(np.float32)), "raw": not given.colour}
     return float(value)
 
 

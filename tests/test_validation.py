@@ -78,6 +78,7 @@ def test_what_is_right_passes(name):
 NARROW = ["pdf", "chi2", "continuity"]
 FALSE_ALARMS = {
     "derivatives that cancel": ({"type": "ward", "rotation": 0.3}, ["active"]),
+    "many turns": ({"type": "ward", "rotation": 100.0, "alpha_u": 0.1, "alpha_v": 0.4}, ["gradients"]),
     "line of ward": ({"type": "ward", "alpha_u": 0.906, "alpha_v": 0.0003}, NARROW),
     "line of walter": ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.001}, NARROW),
     "narrow along and across": ({"type": "walter", "alpha_u": 0.0041, "alpha_v": 0.00035}, NARROW),

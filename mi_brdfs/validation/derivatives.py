@@ -79,6 +79,8 @@ def gradients(run: Run) -> Findings:
             for limit, beyond, inside in _beyond(None if key.endswith(".values") else limits.get(key)):
                 _check_way_back(run, outcome, params, key, (limit, beyond, inside), wi, wo)
             set_value(params, key, original)
+            if probe.is_ours and key.startswith("rotation."):
+                size = min(size, 1)  # many turns are as few
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
             candidates = [(0, 1), (0, 0.1), (0, 0.01), (10 * step, 1), (-10 * step, 1)]
