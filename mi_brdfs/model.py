@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -15,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
-from .parameters import Parameter, ParameterRow, PropertyReader
+from .parameters import Parameter, ParameterRow, PropertyReader, nested
 from .parameters.parameter import BoundParameters
 
 ENERGY_NOTE = """\
@@ -24,12 +23,6 @@ others is 0; parameters not named take all values in their range."""
 
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
-
-
-ADDED = re.compile(r"(diffuse|specular)_reflectance(_\d+)?")
-"""The colours of lobes, whose sum is what all reflect at most."""
-FRESNEL = re.compile(r"(f0|eta|int_ior)(_\d+)?")
-"""The parameters that a Fresnel term has."""
 
 
 class Energy(NamedTuple):
@@ -186,19 +179,24 @@ class Model(Plugin):
     @property
     def has_fresnel(self) -> bool:
         """Whether a Fresnel term scales the specular reflectance."""
-        return "fresnel" in self.parameters.chosen or any(FRESNEL.fullmatch(name) for name in self.textures)
+        return "fresnel" in self.parameters.chosen or bool(self.named("fresnel"))
+
+    def named(self, *roles: str) -> list[str]:
+        """Return the names of the textures whose parameters have one of some roles."""
+        names = [name for it in nested(self.declared()) if it.role in roles for name in it.names]
+        return [name for name in self.textures if name in names]
 
     def excess(self, colours: Mapping[str, Sequence[float]]) -> str:
         """Return what is wrong with constant colours, by property name, that add to more than 1 in a channel, or
-        nothing. ``diffuse_reflectance`` and every ``specular_reflectance`` count where the page states that energy is
-        conserved for this instance's choices, but not that it is with both at 1 (``{"diffuse_reflectance": 1.0}``).
-        Beside a Fresnel term, the latter is only a scale of that, and does not count."""
+        nothing. Diffuse and specular ones count where the page states that energy is conserved for this instance's
+        choices, but not that it is with both at 1 (``{"diffuse_reflectance": 1.0}``). Beside a Fresnel term, the latter
+        is only a scale of that, and does not count."""
         stated = self.stated_albedo()
         if not self.energy or not stated or stated > 1 or ({"diffuse_reflectance": 1.0}, 1) in self.energy.largest:
             return ""
         if self.has_fresnel:
             return ""
-        added = {name: c for name, c in colours.items() if ADDED.fullmatch(name)}
+        added = {name: colours[name] for name in self.named("diffuse", "specular") if name in colours}
         channels = max(map(len, added.values()), default=1)
         sums = [sum(c[k % len(c)] for c in added.values()) for k in range(channels)]
         if not max(sums) > 1 + 1e-3:

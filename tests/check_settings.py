@@ -24,7 +24,6 @@ import numpy as np
 from fuzzing import alternatives
 
 from mi_brdfs.mitsuba.registry import all_models
-from mi_brdfs.model import ADDED
 from mi_brdfs.parameters import File, Preset
 from mi_brdfs.probe.arrays import interaction, numbers
 from mi_brdfs.probe.bsdf import BSDFProbe
@@ -104,9 +103,11 @@ def setting(rng, models, presets, files):
 def total_colour(bsdf):
     """The sum of the largest values of the scales of a model's lobes, of which pages say that they add."""
     uv = np.random.default_rng(2).random((500, 2))
-    textures = {name: it for model in BSDFProbe(bsdf).models if model for name, it in model.textures.items()}
-    scales = [it for name, it in textures.items() if ADDED.fullmatch(name) or name == "a"]
-    return sum(numbers(texture.eval(interaction([0, 0, 1], uv))).max() for texture in scales)
+    found = 0
+    for model in filter(None, BSDFProbe(bsdf).models):
+        scales = [*model.named("diffuse", "specular"), *({"a"} & set(model.textures))]
+        found += sum(numbers(model.textures[name].eval(interaction([0, 0, 1], uv))).max() for name in scales)
+    return found
 
 
 def main():

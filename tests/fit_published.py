@@ -19,7 +19,6 @@ import numpy as np
 import mi_brdfs
 from mi_brdfs.fit import METRICS, Observations, fit, observe
 from mi_brdfs.mitsuba.registry import find_model
-from mi_brdfs.parameters import FresnelSet
 from mi_brdfs.probe.arrays import interaction, numbers
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
@@ -50,7 +49,7 @@ def compare(group: str, published: dict[str, dict], materials: dict[str, Observa
     first = published[names[0]]
     fixed = {name: value for name, value in first.items() if isinstance(value, str) or name == "ext_ior"}
     del fixed["type"]
-    if "int_ior" in first and any(isinstance(it, FresnelSet) for it in find_model(first["type"]).declared()):
+    if "int_ior" in first and any(it.name == "fresnel" for it in find_model(first["type"]).declared()):
         fixed["fresnel"] = "dielectric"
     ratios = []
     for k in range(0, len(names), BATCH):

@@ -14,11 +14,12 @@ from support import ROOT, interaction, numbers, shared
 import mi_brdfs
 from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
 from mi_brdfs.fit.observations import solid_angles
-from mi_brdfs.fit.unknowns import configurations, unknown_in
+from mi_brdfs.fit.unknowns import configurations, unknown_of
 from mi_brdfs.measured import Axis, Grid, Measurement, Samples
 from mi_brdfs.measured.coordinates import HalfDifference, Spherical
 from mi_brdfs.measured.observer import to_srgb
 from mi_brdfs.mitsuba.registry import find_model
+from mi_brdfs.parameters import Quantity
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -60,7 +61,7 @@ def test_weights_are_solid_angles():
 )
 def test_scales(limits):
     """They reach all of the declared range, up to rounding, and back, and know their slopes."""
-    unknown = unknown_in("x", None, False, limits)
+    unknown = unknown_of(Quantity("x", limits, None, ""))
     u = np.linspace(*unknown.ends, 9)
     x = unknown.from_scale(u)
     assert np.isfinite(x).all() and x[0] >= limits[0] and x[-1] <= limits[1] and (np.diff(x) > 0).all()

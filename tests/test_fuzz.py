@@ -13,12 +13,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from fuzzing import examples, ways
+from fuzzing import examples, typical, ways
 from hypothesis import strategies as st
 from support import context, interaction, numbers, per_lane
 
-from mi_brdfs.mitsuba.registry import own_models
-from mi_brdfs.models.microfacet import BROUGHT
+from mi_brdfs.mitsuba.registry import brought_terms, own_models
 
 EVALUATIONS = 1_000_000
 """How many settings and pairs of directions a run tries, or more: with the first way to give each model's parameters,
@@ -60,7 +59,7 @@ def mixture(functions):
 
 
 def usual(quantity, rng, count):
-    return np.full(count, float(quantity.default))
+    return np.full(count, typical(quantity))
 
 
 def uniform(quantity, rng, count):
@@ -381,5 +380,5 @@ def test_everything_declared_is_fuzzed(model):
     assert {re.sub(r"_\d$", "", name) for name in names} == unnumbered
     for row in model.parameter_rows():
         if row.type in ("string", "boolean") and row.name not in ("material", "preset"):
-            words = {word for word in row.range.split(" | ") if (row.name, word) not in BROUGHT}
+            words = {word for word in row.range.split(" | ") if (row.name, word) not in brought_terms()}
             assert {str(options.words.get(row.name)).lower() for options in fuzzed} >= words

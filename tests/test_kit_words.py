@@ -9,8 +9,8 @@ from support import call, hemisphere
 import mi_brdfs
 from mi_brdfs.microfacet import Fresnel, Shadowing
 from mi_brdfs.microfacet.distributions import Beckmann
-from mi_brdfs.models import microfacet
-from mi_brdfs.parameters import Number, fresnel
+from mi_brdfs.mitsuba.registry import KIT
+from mi_brdfs.parameters import Number
 
 
 class Steep(Beckmann):
@@ -43,10 +43,7 @@ class Squared(Fresnel):
 @pytest.fixture(autouse=True)
 def as_before():
     """The kit forgets the words."""
-    tables = [
-        microfacet.DISTRIBUTIONS, microfacet.SHADOWING, microfacet.BROUGHT, fresnel.TERMS, fresnel.OTHERS.words,
-        microfacet.Microfacet.distribution.words, microfacet.Microfacet.shadowing.words,
-    ]  # fmt: skip
+    tables = [table for choice in KIT.values() for table in (choice.words, choice.terms)]
     former = [dict(table) for table in tables]
     yield
     for table, was in zip(tables, former, strict=True):

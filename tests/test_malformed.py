@@ -13,7 +13,7 @@ from functools import singledispatch
 import mitsuba as mi
 import numpy as np
 import pytest
-from fuzzing import examples, ways
+from fuzzing import examples, typical, ways
 from hypothesis import assume
 from hypothesis import strategies as st
 from support import call, direction
@@ -38,7 +38,7 @@ def refusal(load, *arguments):
 
 def usual(options):
     """A plugin's properties, as good as any."""
-    return options.words | {quantity.name: quantity.default for quantity in options.quantities}
+    return options.words | {quantity.name: typical(quantity) for quantity in options.quantities}
 
 
 # --- Values ---------------------------------------------------------------------------------------------------------
@@ -70,7 +70,7 @@ def wrong_quantity(quantity):
     beyond = st.floats(max_value=low, exclude_max=True) | st.integers(max_value=int(low) - 1) | st.just(np.nan)
     if high < np.inf:
         beyond |= st.floats(min_value=high, exclude_min=True) | st.integers(min_value=int(high) + 1)
-    wrong_colours = colours(beyond) if quantity.colour else colours(st.just(quantity.default))
+    wrong_colours = colours(beyond) if quantity.colour else colours(st.just(typical(quantity)))
     return neither_numbers_nor_textures() | st.booleans() | beyond | wrong_colours
 
 
@@ -122,13 +122,14 @@ def _(number: Number):
 
 @contradictions.register
 def _(fresnel: FresnelSet):
-    pairs = itertools.combinations(fresnel.SETS.values(), 2)
+    own = [tuple(fresnel.words[word]) for word in fresnel.implied_words if word != "none"]
+    pairs = itertools.combinations(own, 2)
     return [*(dict.fromkeys(one + other) for one, other in pairs), {"eta": None}, {"k": None}]
 
 
 @contradictions.register
 def _(lobes: PerLobe):
-    lobe = [[p.numbered(number) for p in lobes.declared.values()] for number in lobes.numbers[:4]]
+    lobe = [lobes.lobe(number) for number in lobes.numbers[:4]]
     (alone, *_), (first, *_), (second, *_), (*_, third) = ([p.names[0] for p in each] for each in lobe)
     own = [names for p in lobe[0] + lobe[1] for names in contradictions(p)]
     return [*own, {alone: None, first: None}, {second: None}, {first: None, third: None}]

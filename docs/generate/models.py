@@ -16,9 +16,8 @@ from mi_brdfs.gallery import overview, sheet, shot, sweep_row
 from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
-from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
 from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
-from mi_brdfs.models.microfacet import BROUGHT, Microfacet
 from mi_brdfs.preview import body, studio
 from mi_brdfs.tabulated.tabulated import Tabulated
 
@@ -191,14 +190,13 @@ def own_rows(plugin: type[Plugin]) -> list:
 
 @contextmanager
 def _own_words() -> Iterator[None]:
-    choices = {choice.name: choice for choice in (Microfacet.distribution, Microfacet.shadowing)}
-    before = {choice: dict(choice.words) for choice in choices.values()}
-    for name, word in BROUGHT:
-        if name in choices:
-            choices[name].words.pop(word)
+    before = {choice: dict(choice.words) for choice in KIT.values()}
+    for choice in KIT.values():
+        for word in [word for word, term in choice.terms.items() if term in brought_terms().values()]:
+            choice.words.pop(word)
     yield
     for choice, words in before.items():
-        choice.words = words
+        choice.words.update(words)
 
 
 def _table(rows: list) -> str:

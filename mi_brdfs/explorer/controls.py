@@ -10,8 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..model import Model
-from ..parameters import Choice, Colour, File, Flag, FresnelSet, Number, OneOf, Parameter, PerLobe, Preset, Rotation
-from ..parameters.fresnel import conductors
+from ..parameters import File, Parameter, PerLobe, Preset, Quantity
 from ..ranges import VALUES
 from .state import Bsdf
 
@@ -23,8 +22,8 @@ FINEST = 1e-3
 """The beginning of a logarithmic one, as a part of what ends it, where the range begins at 0."""
 LOBES = "lobes"
 """The control of the number of lobes, which no plugin has as a parameter."""
-PARTNERS = {"eta": {"k": [1.0, 1.0, 1.0]}, "k": {"eta": [1.0, 1.0, 1.0]}}
-"""What is given together with a parameter that cannot be alone."""
+FRESNEL = "Fresnel"
+"""The group of the parameters that imply a word."""
 
 
 def controls_of(model: type[Model], bsdf: Bsdf) -> list[Control]:
@@ -41,46 +40,49 @@ def with_defaults(model: type[Model], bsdf: Bsdf) -> Bsdf:
 
 def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator[Control]:
     for parameter in declared:
-        names = parameter.names
-        if isinstance(parameter, Number):
-            yield from _numbers(parameter, bsdf, group)
-        elif isinstance(parameter, Rotation):
-            yield _number(names[0], parameter.text, (-0.5, 0.5), bsdf, None, group)
-        elif isinstance(parameter, Colour):
-            yield _colour(names[0], parameter.text, parameter.limits, bsdf, parameter.default, group)
-        elif isinstance(parameter, Choice):
-            yield _choice(names[0], parameter.text, parameter.choices, bsdf, group)
-        elif isinstance(parameter, Flag):
-            value = bsdf.get(names[0], parameter.default)
-            yield _control(names[0], parameter.text, "flag", value, parameter.default, group)
-        elif isinstance(parameter, OneOf):
-            yield _choice(parameter.name, parameter.text, tuple(parameter.words), bsdf, group, parameter.names[1:])
-            word = bsdf.get(parameter.name, next(iter(parameter.words)))
-            yield from _controls(parameter.words.get(word, {}).values(), bsdf, group)
-        elif isinstance(parameter, PerLobe):
+        if isinstance(parameter, PerLobe):
             yield from _lobes(parameter, bsdf)
-        elif isinstance(parameter, FresnelSet):
-            yield from _fresnel(parameter, bsdf)
+        elif parameter.spellings:
+            yield from _spelled(parameter, bsdf, group)
+        elif parameter.implied_words:
+            for own in parameter.words.values():
+                # Colours of a word, η and k, cannot be alone.
+                colours = [name for name, it in own.items() if any(q.colour for q in it.quantities(pairs=False))]
+                for control in _controls(own.values(), bsdf, FRESNEL):
+                    also = {name: [1.0, 1.0, 1.0] for name in colours if name != control["name"]}
+                    excludes = parameter.rivals(control["name"])
+                    yield control | {"optional": True, "excludes": excludes, "also": also}
+        elif False in parameter.words:
+            value, default = bsdf.get(parameter.names[0], next(iter(parameter.words))), next(iter(parameter.words))
+            yield _control(parameter.names[0], parameter.text, "flag", value, default, group)
+        elif parameter.words:
+            yield _choice(parameter.names[0], parameter.text, tuple(parameter.words), bsdf, group, parameter.names[1:])
+            word = bsdf.get(parameter.names[0], next(iter(parameter.words)))
+            yield from _controls(parameter.words.get(word, {}).values(), bsdf, group)
+        elif parameter.tried:
+            control = _choice(parameter.names[0], parameter.text, parameter.tried, bsdf, group)
+            yield control | {"value": bsdf.get(parameter.names[0]), "default": None, "optional": True}
         elif not isinstance(parameter, (File, Preset)):
             for row in parameter.rows():
                 yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group)
 
 
-def _numbers(parameter: Number, bsdf: Bsdf, group: str) -> Iterator[Control]:
-    single, pair = parameter.names[0], parameter.pair
-    spellings = [parameter.other] if parameter.spelling else []
-    others = any(name in bsdf for name in [*pair, *spellings])
-    default = None if others else parameter.default
-    first = _number(single, parameter.text, parameter.limits, bsdf, default, group)
-    yield first | {"optional": bool(pair or spellings) or parameter.default is None, "excludes": [*pair, *spellings]}
-    middle = bsdf.get(single, parameter.default)
-    for name, other in zip(pair, reversed(pair), strict=True):
-        text = f"{parameter.text}, {'along dp_du' if name == pair[0] else 'across'}"
-        control = _number(name, text, parameter.limits, bsdf, None, group)
-        yield control | {"excludes": [single, *spellings], "also": {other: middle}}
-    if parameter.spelling:
-        control = _number(parameter.other, parameter.spelling.text, parameter.spelling.limits, bsdf, None, group)
-        yield control | {"excludes": [single, *pair]}
+def _spelled(parameter: Parameter, bsdf: Bsdf, group: str) -> Iterator[Control]:
+    """Yield the controls of each way to give a parameter as numbers or colours; one gives way to another."""
+    ways = parameter.spellings
+    (first,), names = ways[0], [it.name for way in ways for it in way]
+    is_other = any(name in bsdf for name in names[1:])
+    middle = bsdf.get(first.name, first.default)
+    for way in ways:
+        here = [it.name for it in way]
+        for it in way:
+            default = first.default if it is first and not is_other else None
+            control = _colour(it, bsdf, default, group) if it.colour else _number(it, bsdf, default, group)
+            yield control | {
+                "optional": len(ways) > 1 or first.default is None,
+                "excludes": [name for name in names if name not in here],
+                "also": {name: middle for name in here if name != it.name},
+            }
 
 
 def _lobes(parameter: PerLobe, bsdf: Bsdf) -> Iterator[Control]:
@@ -88,8 +90,7 @@ def _lobes(parameter: PerLobe, bsdf: Bsdf) -> Iterator[Control]:
     words = [str(k) for k in range(1, len(parameter.numbers))]
     yield _control(LOBES, "number of lobes", "choice", str(count), "1", "") | {"words": words}
     for number in parameter.numbers[1 : count + 1] if numbered(parameter, bsdf) else [""]:
-        own = [it.numbered(number) for it in parameter.declared.values()]
-        yield from _controls(own, bsdf, f"lobe {number[1:]}" if number else "")
+        yield from _controls(parameter.lobe(number), bsdf, f"lobe {number[1:]}" if number else "")
 
 
 def numbered(parameter: PerLobe, bsdf: Bsdf) -> bool:
@@ -128,35 +129,9 @@ def _popped(parameter: PerLobe, number: str, bsdf: Bsdf) -> Bsdf:
     for it in parameter.declared.values():
         names = zip(it.names, it.numbered(number).names, strict=True)
         given = {name: bsdf.pop(own) for name, own in names if own in bsdf}
-        usual = {it.name: it.default} if isinstance(it, (Number, Colour)) and it.default is not None else {}
+        usual = {q.name: q.default for q in it.quantities(pairs=False) if q.default is not None}
         lobe |= given or usual
     return lobe
-
-
-def _fresnel(parameter: FresnelSet, bsdf: Bsdf) -> Iterator[Control]:
-    group = "Fresnel"
-    for name, text in (("eta", "index of refraction of a conductor"), ("k", "its extinction coefficient")):
-        yield (
-            _colour(name, text, parameter.RANGES[name], bsdf, None, group)
-            | {"also": PARTNERS[name]}
-            | _gives_way(parameter, name)
-        )
-    names = ["none", *conductors()]
-    text = "a conductor of Mitsuba's"
-    yield _choice("material", text, tuple(names), bsdf, group) | _gives_way(parameter, "material") | {
-        "value": bsdf.get("material"), "default": None, "optional": True}  # fmt: skip
-    text = "Schlick's approximation, with this reflectance at normal incidence"
-    yield _colour("f0", text, (0, 1), bsdf, None, group) | _gives_way(parameter, "f0")
-    for name, text in (("int_ior", "index of refraction of a dielectric"), ("ext_ior", "… and of what is outside")):
-        yield _number(name, text, (1, 3), bsdf, None, group) | _gives_way(parameter, name)
-    others = [name for name in parameter.names if name not in parameter.RANGES and name != "material"]
-    for row in parameter.rows():
-        if row.name in others:
-            yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group) | {"optional": True}
-
-
-def _gives_way(parameter: FresnelSet, name: str) -> dict[str, Any]:
-    return {"excludes": parameter.rivals(name)}
 
 
 # --- Plugins that declare nothing -----------------------------------------------------------------------------------
@@ -170,11 +145,12 @@ def traversed(bsdf: mi.BSDF, given: Mapping[str, Any]) -> list[Control]:
         name, short = key_to_name(key), key.rpartition(".")[2]
         if len(numbers) == 1 and np.isfinite(numbers).all():
             limits = _guess(short if short not in VALUES else name, float(numbers[0]))
-            found.append(_number(name, key, limits, {name: float(numbers[0])}, float(numbers[0]), ""))
+            quantity, value = Quantity(name, limits, None, key), float(numbers[0])
+            found.append(_number(quantity, {name: value}, value, ""))
         elif len(numbers) == 3 and np.isfinite(numbers).all():
             colour = [float(f"{it:.6g}") for it in numbers]
             high = 1.0 if max(colour) <= 1 else math.ceil(2 * max(colour))
-            found.append(_colour(name, key, (0, high), {name: colour}, colour, ""))
+            found.append(_colour(Quantity(name, (0, high), None, key), {name: colour}, colour, ""))
     return [it | {"default": given.get(it["name"], it["default"])} for it in found]
 
 
@@ -207,19 +183,18 @@ def _control(name: str, text: str, kind: str, value: Any, default: Any, group: s
     }  # fmt: skip
 
 
-def _number(name: str, text: str, limits: tuple[float, float], bsdf: Bsdf, default: Any, group: str) -> Control:
-    low, high, scale = slider(*limits)
-    value = bsdf.get(name, default)
-    control = _control(name, text, "number", value, default, group)
+def _number(it: Quantity, bsdf: Bsdf, default: Any, group: str) -> Control:
+    low, high, scale = slider(*(it.usual or it.limits))
+    control = _control(it.name, it.text, "number", bsdf.get(it.name, default), default, group)
     return control | {"low": low, "high": high, "scale": scale, "optional": default is None}
 
 
-def _colour(name: str, text: str, limits: tuple[float, float], bsdf: Bsdf, default: Any, group: str) -> Control:
-    value = bsdf.get(name, default)
-    value, default = ([it] * 3 if isinstance(it, (int, float)) else it for it in (value, default))
-    top = limits[1] if limits[1] <= 10 else 10.0
-    control = _control(name, text, "colour", value, default, group)
-    return control | {"low": limits[0], "high": top, "scale": "linear", "optional": default is None}
+def _colour(it: Quantity, bsdf: Bsdf, default: Any, group: str) -> Control:
+    value = bsdf.get(it.name, default)
+    value, default = ([x] * 3 if isinstance(x, (int, float)) else x for x in (value, default))
+    low, high = it.limits
+    control = _control(it.name, it.text, "colour", value, default, group)
+    return control | {"low": low, "high": min(high, 10.0), "scale": "linear", "optional": default is None}
 
 
 def _choice(

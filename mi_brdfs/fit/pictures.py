@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..parameters import Rotation
+from ..parameters import Quantity, Rotation
 from ..parameters.messages import listed, meant
 from ..probe.arrays import Array
 from ..ranges import declared
@@ -21,7 +21,7 @@ from .image_fit import ImageFit, found
 from .noisy import descend, finish
 from .observations import FitError
 from .rendered import Rendered, Slot, View
-from .unknowns import Unknown, unknown_in
+from .unknowns import unknown_of
 
 Picture = Any
 """A file, a bitmap, or an array of linear values, shape (height, width, channels)."""
@@ -158,10 +158,9 @@ def _slot(key: str, model: Any, name: str, value: Any) -> tuple[Slot, Array]:
     numbers = np.array(value, np.float64)
     if numbers.ndim < 3:
         numbers = numbers.ravel()
-    if name in model.ranges:
-        unknown = unknown_in(name, None, numbers.shape[-1] == 3, model.ranges[name])
-    else:
-        unknown = Unknown(name, None, False, -0.5, 0.5, "turns")
+    limits = model.ranges.get(name, (0, 1))
+    is_colour, is_rotation = numbers.shape[-1] == 3, name not in model.ranges
+    unknown = unknown_of(Quantity(name, limits, None, "", is_colour, is_rotation))
     on_scale = unknown.to_scale(numbers)
     if numbers.ndim == 3:
         return Slot(key, unknown, type(value), on_scale), np.zeros(numbers.shape[-1])

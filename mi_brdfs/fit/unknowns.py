@@ -10,25 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..model import Model
-from ..parameters import Choice, Colour, Flag, FresnelSet, Number, OneOf, Parameter, PerLobe, Reflectance, Rotation
-from ..parameters.fresnel import OTHERS
+from ..parameters import Parameter, PerLobe, Quantity, nested
 from ..parameters.messages import listed, meant
-from ..probe import parameter_space as settings
+from ..probe.parameter_space import choices
 from .observations import FitError
 
-FRESNEL = "fresnel"
-"""The choice among the sets of parameters of a Fresnel term, Schlick's by default, which has every reflectance at
-normal incidence with one colour."""
-FRESNEL_SETS: dict[str, tuple[Parameter, ...]] = {
-    "schlick": (Reflectance(None, "").replace(name="f0"),),
-    "dielectric": (Number(None, FresnelSet.INDEX, "").replace(name="int_ior"),),
-    "conductor": (
-        Colour(None, FresnelSet.INDEX, "").replace(name="eta"),
-        Colour(None, FresnelSet.EXTINCTION, "").replace(name="k"),
-    ),
-    "none": (),
-}
-"""The free parameters of each word."""
 SMALLEST, LARGEST = 1e-3, 1e6
 """Where a search on a logarithmic scale begins if a range begins at 0, and ends if it has no end."""
 EDGE = 1e-5
@@ -105,17 +91,22 @@ class Unknown:
         return min(u - low, high - u) < 1e-3 * (high - low)
 
 
-def unknown_in(name: str, channel: int | None, colour: bool, limits: tuple[float, float]) -> Unknown:
+def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
     """Return an unknown on the scale that suits a declared range: shares up to 1 on a logit scale, positive numbers on
     a logarithmic one."""
-    low, high = limits
-    if low < 0:
-        return Unknown(name, channel, colour, max(low, -LARGEST), min(high, LARGEST), "asinh")
-    if low == 0 and high <= 1:
-        return Unknown(name, channel, colour, EDGE * high, (1 - EDGE) * high, "logit")
-    if math.isinf(high):
-        return Unknown(name, channel, colour, max(low, 1 / LARGEST), LARGEST, "log")
-    return Unknown(name, channel, colour, max(low, SMALLEST * min(high, 1)), high, "log")
+    low, high = quantity.limits
+    if quantity.turns:
+        low, high, scale = -0.5, 0.5, "turns"
+    elif low < 0:
+        low, high, scale = max(low, -LARGEST), min(high, LARGEST), "asinh"
+    elif low == 0 and high <= 1:
+        low, high, scale = EDGE * high, (1 - EDGE) * high, "logit"
+    elif math.isinf(high):
+        low, high, scale = max(low, 1 / LARGEST), LARGEST, "log"
+    else:
+        low, scale = max(low, SMALLEST * min(high, 1)), "log"
+    default = None if quantity.colour else quantity.default
+    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default)
 
 
 @dataclass(frozen=True)
@@ -178,19 +169,9 @@ def default_words(model: type[Model]) -> dict[str, Any]:
 
 def _choices(declared: Iterable[Parameter]) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Yield choices with their words, the default first."""
-    for parameter in declared:
-        if isinstance(parameter, PerLobe):
-            yield from _choices(parameter.declared.values())
-        elif isinstance(parameter, OneOf):
-            yield parameter.name, tuple(parameter.words)
-            for own in parameter.words.values():
-                yield from _choices(own.values())
-        elif isinstance(parameter, Choice):
-            yield parameter.name, parameter.choices
-        elif isinstance(parameter, Flag):
-            yield parameter.name, (parameter.default, not parameter.default)
-        elif isinstance(parameter, FresnelSet):
-            yield FRESNEL, (*FRESNEL_SETS, *OTHERS.words)
+    for parameter in nested(declared):
+        if parameter.fit_words:
+            yield parameter.name, parameter.fit_words
 
 
 def configurations(
@@ -219,9 +200,10 @@ def configurations(
                     raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
             words[choice] = wanted
     fixed = {key: value for key, value in given.items() if key not in words}
+    implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
     found = []
     for combination in _combinations(model.declared(), words, fixed):
-        free = list(_free(model.declared(), combination, fixed, lobes, anisotropic))
+        free = _free(model.declared(), combination, lobes)
         unknowns = [u for parameter in free for u in _unknowns_of(parameter, fixed, channels, anisotropic)]
         usable = {u.name for u in unknowns}
         if missing := {*tied, *tied.values()} - usable:
@@ -231,7 +213,7 @@ def configurations(
         unknowns = [u for u in unknowns if u.name not in tied]
         if not unknowns:
             raise FitError(f"{name} has nothing to fit: all its parameters are given.")
-        plain = {k: v for k, v in combination.items() if k != FRESNEL or v in OTHERS.words}
+        plain = {key: word for key, word in combination.items() if word not in implied.get(key, ())}
         passed = {key: value for key, value in fixed.items() if value is not None}
         found.append(Configuration(model, {**plain, **passed}, combination, tuple(unknowns), dict(tied)))
     # A choice may mean nothing beside another one.
@@ -262,45 +244,27 @@ def _combinations(
     declared: list[Parameter], words: Mapping[str, tuple[Any, ...]], fixed: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """Return all combinations of words, each with those of the choices that belong to its words."""
-    combinations: list[dict[str, Any]] = settings.choices(declared, words)
-    sets = [p for p in _nested(declared) if isinstance(p, FresnelSet)]
-    if not sets:
-        return combinations
-    own = next((kind for kind, names in FresnelSet.SETS.items() if any(fixed.get(n) is not None for n in names)), None)
-    if own:
-        return [one | {FRESNEL: "none" if own == "material" else own} for one in combinations]
-    return [one | {FRESNEL: word} for one in combinations for word in words[FRESNEL]]
+    combinations: list[dict[str, Any]] = choices(declared, words)
+    for parameter in nested(declared):
+        if parameter.implied_words:
+            given = (word for word, own in parameter.words.items() if any(fixed.get(name) is not None for name in own))
+            own = next(given, None)
+            allowed = words[parameter.name] if own is None else (own,)
+            combinations = [one | {parameter.name: word} for one in combinations for word in allowed]
+    return combinations
 
 
-def _nested(declared: Iterable[Parameter]) -> Iterator[Parameter]:
-    """Yield parameters with those of all words and lobes."""
-    for parameter in declared:
-        yield parameter
-        if isinstance(parameter, OneOf):
-            for own in parameter.words.values():
-                yield from _nested(own.values())
-        elif isinstance(parameter, PerLobe):
-            yield from _nested(parameter.declared.values())
-
-
-def _free(
-    declared: Iterable[Parameter], words: Mapping[str, Any], fixed: Mapping[str, Any], lobes: int, anisotropic: bool
-) -> Iterator[Parameter]:
-    """Yield the numbers and colours that exist with some words, with those of each lobe."""
+def _free(declared: Iterable[Parameter], words: Mapping[str, Any], lobes: int) -> Iterator[Parameter]:
+    """Yield the parameters without words that exist with some words, with those of each lobe."""
     for parameter in declared:
         if isinstance(parameter, PerLobe):
             if lobes >= len(parameter.numbers):
                 raise FitError(f"There can be {len(parameter.numbers) - 1} lobes at most, not {lobes}.")
             for number in [""] if lobes == 1 else [f"_{k + 1}" for k in range(lobes)]:
-                own = (it.numbered(number) for it in parameter.declared.values())
-                yield from _free(own, words, fixed, lobes, anisotropic)
-        elif isinstance(parameter, OneOf):
-            yield from _free(parameter.words[words[parameter.name]].values(), words, fixed, lobes, anisotropic)
-        elif isinstance(parameter, FresnelSet):
-            word = words[FRESNEL]
-            own_words = OTHERS.words[word].values() if word in OTHERS.words else FRESNEL_SETS[word]
-            yield from own_words
-        elif isinstance(parameter, (Number, Colour)) or (isinstance(parameter, Rotation) and anisotropic):
+                yield from _free(parameter.lobe(number), words, lobes)
+        elif parameter.words:
+            yield from _free(parameter.words[words[parameter.name]].values(), words, lobes)
+        else:
             yield parameter
 
 
@@ -309,12 +273,7 @@ def _unknowns_of(parameter: Parameter, fixed: Mapping[str, Any], channels: int, 
     are anisotropic."""
     if any(name in fixed for name in parameter.names):
         return
-    if isinstance(parameter, Rotation):
-        yield Unknown(parameter.name, None, False, -0.5, 0.5, "turns")
-    elif isinstance(parameter, Number):
-        names = parameter.pair if anisotropic and parameter.pair else parameter.names[:1]
-        for name in names:
-            yield replace(unknown_in(name, None, False, parameter.limits), default=parameter.default)
-    elif isinstance(parameter, Colour):
-        for channel in range(channels) if channels > 1 else (None,):
-            yield unknown_in(parameter.names[0], channel, True, parameter.limits)
+    for quantity in parameter.quantities(pairs=anisotropic):
+        if quantity.sought and (anisotropic or not quantity.turns):
+            for channel in range(channels) if quantity.colour and channels > 1 else (None,):
+                yield unknown_of(quantity, channel)

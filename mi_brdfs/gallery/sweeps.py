@@ -7,7 +7,6 @@ from typing import Any
 
 from ..mitsuba.registry import is_own
 from ..model import Model
-from ..parameters import Choice, Number, Parameter, Reflectance
 from .families import BLUE, CLAY, GREEN, RED, rgb
 
 
@@ -168,24 +167,9 @@ def sweeps_of(model: type[Model]) -> list[Sweep]:
     numbers: list[Sweep] = []
     colours: list[Sweep] = []
     for parameter in model.declared():
-        if values := _values(parameter):
+        if values := parameter.tried:
             own = {"type", *parameter.names}
             given = {name: value for name, value in model.example().items() if name not in own}
-            of_its_kind = colours if isinstance(parameter, Reflectance) else numbers
+            of_its_kind = colours if any(it.colour for it in parameter.quantities(pairs=False)) else numbers
             of_its_kind.append(Sweep(parameter.name, values, given))
     return numbers or colours
-
-
-def _values(parameter: Parameter) -> tuple:
-    """Return the values to show of a parameter; none if it is optional, or of another kind."""
-    if isinstance(parameter, Choice):
-        return parameter.choices
-    if not isinstance(parameter, Number | Reflectance) or parameter.default is None:
-        return ()
-    if isinstance(parameter, Reflectance):
-        return 0.1, 0.3, 0.5, 0.7, 0.9
-    low, high = parameter.limits
-    if high - low <= 10 and not 0 < low < 1e-2 * high:
-        return tuple(low + (high - low) * k / 4 for k in range(5))
-    about = (float(f"{parameter.default * 3.0**k:.1g}") for k in range(-2, 3))
-    return tuple(dict.fromkeys(min(max(value, low), high) for value in about))

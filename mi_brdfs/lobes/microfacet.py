@@ -8,11 +8,10 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, safe_sqrt
-from ..microfacet.distributions import Distribution
 from ..microfacet.facet import Cosines, Facet
-from ..microfacet.fresnel import Fresnel
-from ..microfacet.sampling import Directions, Mixture
+from ..microfacet.sampling import Mixture
 from ..microfacet.shadowing import Shadowing
+from ..microfacet.terms import Directions, Distribution, Fresnel
 from .lobe import Lobe
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, SMALL, normalize_or, safe_sqrt, sin_theta
 from .facet import Facet
-
-if TYPE_CHECKING:
-    from .distributions import Distribution
+from .terms import Distribution
 
 
 class ForwardDirections:

@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import leaving, luminance, safe_sqrt, square
+from ..parameters import Colour, ConductorName, FresnelSet, Index, Reflectance
 from .forward import ForwardDirections
-from .term import Term
-
-if TYPE_CHECKING:
-    from .distributions import Distribution
-
-
-class Fresnel(Term):
-    """A Fresnel reflectance, called with the cosine."""
-
-    def __call__(self, cos: Any) -> Any:
-        raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
-
-    def brightness(self, cos: Any) -> Any:
-        """Return the approximate luminance of the reflectance, as one number for samplers."""
-        return luminance(self(cos))
-
-    def forward(self, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections | None:
-        """Return the forward directions to draw besides half vectors, if there are such."""
-        return None
+from .terms import Distribution, Fresnel
 
 
 class Unit(Fresnel):
     """F = 1."""
+
+    word = "none"
 
     def __call__(self, cos: mi.Float) -> Any:
         return 1.0
@@ -41,6 +27,11 @@ class Unit(Fresnel):
 
 class Schlick(Fresnel):
     """F = f0 + (1 - f0)(1 - cosθ)⁵ (Schlick 1994, doi:10.1111/1467-8659.1330233)."""
+
+    word = "schlick"
+    parameters = {
+        "f0": Reflectance(None, "Schlick's approximation with this reflectance at normal incidence", role="fresnel"),
+    }
 
     def __init__(self, f0: Any) -> None:
         self.f0 = f0
@@ -58,11 +49,20 @@ class Dielectric(Fresnel):
     """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
     Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
+    word = "dielectric"
+    parameters = {
+        "int_ior": Index("bk7", "index of refraction of a dielectric, inside"),
+        "ext_ior": Index("air", "index of refraction of what is outside it", sought=False),
+    }
     LEAST, INSIDE = 0.01, 0.9
     """The least index, which reflects all light, and one that has a derivative."""
 
     def __init__(self, eta: Any) -> None:
         self.eta = eta
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any]) -> Dielectric:
+        return cls(values["int_ior"] / values["ext_ior"])
 
     def __call__(self, cos: mi.Float) -> Any:
         return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
@@ -88,6 +88,14 @@ class Dielectric(Fresnel):
 class Conductor(Fresnel):
     """The exact unpolarized reflectance of a conductor of relative complex index ``eta`` - i ``k``."""
 
+    RANGES = {"eta": (0.01, 100), "k": (0, 100)}
+    word = "conductor"
+    parameters = {
+        "eta": Colour(None, RANGES["eta"], "index of refraction η of a conductor, relative to the exterior",
+                      role="fresnel"),
+        "k": Colour(None, RANGES["k"], "its extinction coefficient k, relative to the exterior"),
+    }  # fmt: skip
+
     def __init__(self, eta: Any, k: mi.Float) -> None:
         self.eta, self.k = eta, k
 
@@ -110,3 +118,18 @@ class Conductor(Fresnel):
         k2 = dr.square(self.k)
         normal = (dr.square(self.eta - 1) + k2) / (dr.square(self.eta + 1) + k2)
         return dr.maximum(Conductor(luminance(self.eta), luminance(self.k))(cos), 0.5 * luminance(normal))
+
+
+class NamedConductor(Conductor):
+    """One of Mitsuba's conductors."""
+
+    word = "material"
+    parameters = {"material": ConductorName(Conductor.RANGES, "a conductor by name; none means F = 1")}
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any]) -> Fresnel:  # type: ignore[override]
+        return Conductor(*values["material"]) if values["material"] else Unit()
+
+
+for _term in (Conductor, NamedConductor, Schlick, Dielectric, Unit):
+    FresnelSet.add_term(_term)

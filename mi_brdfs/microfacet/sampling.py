@@ -13,17 +13,14 @@ Which proposals suit a lobe is said by its terms: :meth:`.shadowing.Shadowing.sa
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, SMALL, choose, clamp, normalize_or, safe_sqrt, select
 from .facet import Facet
-
-if TYPE_CHECKING:
-    from .distributions import Distribution
-    from .fresnel import Fresnel
+from .terms import Distribution, Fresnel, HalfVectors
 
 # Fitted by tests/calibration/half_vectors.py.
 SHADOWED = 0.85
@@ -36,34 +33,6 @@ OUTWARD = -0.75
 """τ of lines that lean."""
 LEANING = 1.25
 """How far those facets lean that count, in typical slopes."""
-
-
-class Directions(Protocol):
-    """A proposal of directions for one ``wi``."""
-
-    def draw(self, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        """Draw a ``wo`` from three uniform variates."""
-        ...
-
-    def pdf(self, facet: Facet) -> mi.Float:
-        """Return the density per solid angle with which ``facet.wo``, above the horizon, is drawn."""
-
-
-class HalfVectors(Protocol):
-    """A proposal of half vectors for one ``wi``, in which each has an image: in a measure of its own both are equally
-    dense."""
-
-    def draw(self, v: mi.Point2f) -> tuple[Facet, Facet]:
-        """Draw a facet from two uniform variates, and return it with its image."""
-
-    def pdf(self, facet: Facet) -> mi.Float:
-        """Return the density per solid angle with which ``facet.wo`` is drawn."""
-
-    def image(self, facet: Facet) -> Facet:
-        """Return the image, whose own image is the facet."""
-
-    def weight(self, facet: Facet) -> Any:
-        """Return D over the density, up to a factor that a facet and its image share."""
 
 
 class Pair:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import TINY
+from ..parameters import Number
 from .facet import Cosines, Facet
-from .sampling import Directions, Mixture, Pair, UniformDirections, clipped_normals
-from .term import Term
-
-if TYPE_CHECKING:
-    from .distributions import Distribution
-    from .fresnel import Fresnel
+from .sampling import Mixture, Pair, UniformDirections, clipped_normals
+from .terms import Directions, Distribution, Fresnel, Term
 
 
 class Shadowing(Term):
@@ -39,6 +37,16 @@ class Shadowing(Term):
     """Whether all light that G removes is lost to further reflections, about as much as
     :meth:`.distributions.Distribution.estimated_albedo` says. Only then may G depend on more than the cosines of a
     facet."""
+
+    @classmethod
+    def suits(cls, distribution: type[Distribution]) -> bool:
+        """Return whether it is known for a distribution."""
+        return True
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any], distribution: Distribution | None = None) -> Shadowing:
+        """Return the term for given values of its parameters, and the distribution that it is to go with."""
+        return super().of_values(values)
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
@@ -126,15 +134,46 @@ class SmithBlinn(Smith):
         return v.z + dr.select(a < 1.6, rational, 0)
 
 
+class SmithOfDistribution(Shadowing):
+    """The separable Smith term that belongs to a distribution."""
+
+    word = "smith"
+    correlated: ClassVar[bool] = False
+
+    @classmethod
+    def suits(cls, distribution: type[Distribution]) -> bool:
+        return distribution.smith is not Distribution.smith
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any], distribution: Distribution) -> Shadowing:  # type: ignore[override]
+        return distribution.smith(cls.correlated)
+
+
+class CorrelatedSmithOfDistribution(SmithOfDistribution):
+    """The height-correlated one."""
+
+    word = "smith-correlated"
+    correlated = True
+
+
 class SchlickSmith(Shadowing):
     """Schlick's rational approximation of Smith's term, Π cosθ/(cosθ (1-k) + k) over both directions (Schlick 1994,
     doi:10.1111/1467-8659.1330233), with k = α √(2/π) for Beckmann facets and k = α/2 for GGX (Karis 2013)."""
 
+    word = "schlick"
     lean = 2
     smithian = True
 
     def __init__(self, k: mi.Float) -> None:
         self.k = k
+
+    @classmethod
+    def suits(cls, distribution: type[Distribution]) -> bool:
+        return distribution.roughness is not Distribution.roughness
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any], distribution: Distribution) -> Shadowing:  # type: ignore[override]
+        return cls(math.sqrt(2 / math.pi) * distribution.roughness())
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
         i, o = (cos / (cos + self.k * (1 - cos)) for cos in (facet.cos_i, facet.cos_o))
@@ -145,6 +184,7 @@ class Kelemen(Shadowing):
     """cosθ_i cosθ_o / cos²θ_d (Kelemen and Szirmay-Kalos, A microfacet based coupled specular-matte BRDF model with
     importance sampling, Eurographics short presentations, 2001)."""
 
+    word = "kelemen"
     conserving = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
@@ -155,6 +195,7 @@ class VCavity(Shadowing):
     """min(1, 2 cosθ_h cosθ_i / cosθ_d, 2 cosθ_h cosθ_o / cosθ_d) (Torrance and Sparrow 1967; Cook and Torrance 1982,
     doi:10.1145/357290.357293)."""
 
+    word = "vcavity"
     conserving = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
@@ -164,6 +205,7 @@ class VCavity(Shadowing):
 class Implicit(Shadowing):
     """cosθ_i cosθ_o, which cancels the denominator."""
 
+    word = "implicit"
     lean = 4
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
@@ -174,6 +216,7 @@ class Neumann(Shadowing):
     """cosθ_i cosθ_o / max(cosθ_i, cosθ_o) (Neumann, Neumann and Szirmay-Kalos, Compact metallic reflectance models,
     Computer Graphics Forum 18(3), 1999)."""
 
+    word = "neumann"
     lean = 1
     favours_steep = True
     UNIFORM = 0.2  # of all terms it shadows steep facets least
@@ -185,6 +228,7 @@ class Neumann(Shadowing):
 class AshikhminPremoze(Shadowing):
     """cosθ_i cosθ_o / (cosθ_i + cosθ_o - cosθ_i cosθ_o) (Ashikhmin and Premoze, Distribution-based BRDFs, 2007)."""
 
+    word = "ashikhmin-premoze"
     lean = 1
     favours_steep = True
 
@@ -197,6 +241,7 @@ class AshikhminShirleyShadowing(Shadowing):
     """cosθ_i cosθ_o / (cosθ_d max(cosθ_i, cosθ_o)) (Ashikhmin and Shirley 2000,
     doi:10.1080/10867651.2000.10487522)."""
 
+    word = "ashikhmin-shirley"
     favours_steep = True
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:
@@ -206,6 +251,8 @@ class AshikhminShirleyShadowing(Shadowing):
 class KurtShadowing(Shadowing):
     """(cosθ_i cosθ_o)^(1-κ) / cosθ_d (Kurt, Szirmay-Kalos and Křivánek 2010, doi:10.1145/1722991.1722996)."""
 
+    word = "kurt"
+    parameters = {"kurt_exponent": Number(0.25, (0, 0.5), "exponent κ: the higher, the brighter at grazing")}
     lean = 1
 
     def __init__(self, kurt_exponent: mi.Float) -> None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import drjit as dr
 import mitsuba as mi
 
 from ..math import SMALL, safe_sqrt, sin_theta
 from .facet import Facet
 from .sampling import draw_linear, linear_density
-
-if TYPE_CHECKING:
-    from .distributions import Distribution
+from .terms import Distribution
 
 
 class VisibleNormals:

@@ -12,10 +12,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..microfacet.term import Term
+from ..microfacet.terms import Term
 from ..model import Model
-from ..models.microfacet import BROUGHT
-from .registry import all_models, is_own, models_in, register, terms_in
+from .registry import all_models, brought_terms, is_own, models_in, register, terms_in
 
 ENTRY_POINTS = "mi_brdfs.models"
 """The entry-point group for models of installed packages."""
@@ -67,7 +66,7 @@ def source(brought: type[Model] | type[Term]) -> str | None:
 
 def sources() -> list[str]:
     """Return the sources of all models and terms registered by others."""
-    brought: list[Any] = [*BROUGHT.values(), *(model for model in all_models() if not is_own(model))]
+    brought: list[Any] = [*brought_terms().values(), *(model for model in all_models() if not is_own(model))]
     found = dict.fromkeys(map(source, brought))
     return [each for each in found if each]
 

@@ -19,9 +19,9 @@ from ..integrators.shading import Shading
 from ..microfacet.distributions import Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import Shadowing
-from ..microfacet.term import Term
+from ..microfacet.terms import Term
 from ..model import Model, Plugin, full_name
-from ..models.microfacet import add_term
+from ..models.microfacet import Microfacet
 from ..parameters import published
 from ..parameters.messages import meant
 from ..tabulated.tabulated import Tabulated
@@ -68,7 +68,7 @@ def register(brought: Registered, *, replace: bool = False) -> Registered:
     if isinstance(brought, type) and issubclass(brought, Model):
         _register_model(brought, replace)
     elif isinstance(brought, type) and issubclass(brought, (Distribution, Shadowing, Fresnel)):
-        add_term(brought, replace)
+        _register_term(brought, replace)
     else:
         raise TypeError(
             f"register takes a subclass of mi_brdfs.Model, or of a term of mi_brdfs.microfacet; {brought!r} is neither."
@@ -95,6 +95,41 @@ def _register_model(model: type[Model], replace: bool) -> None:
         _register_in(variant)
 
 
+KIT: dict[type[Term], Any] = {
+    Distribution: Microfacet.distribution,
+    Shadowing: Microfacet.shadowing,
+    Fresnel: Microfacet.fresnel,
+}
+"""The parameters whose words are terms, by their kind."""
+
+
+def _register_term(term: type[Term], replace: bool) -> None:
+    name, word = term.__name__, term.word
+    if not word or not re.fullmatch(r"[a-z][a-z0-9-]*", word):
+        raise ValueError(f'{name}: word is {word!r}; it must be lower-case letters, digits and -, as in "student-t".')
+    choice = next(choice for kind, choice in KIT.items() if issubclass(term, kind))
+    owner = full_name(choice.terms[word]) if word in choice.terms else None
+    if owner and owner != full_name(term) and not replace:
+        owner = "mi_brdfs" if owner.startswith("mi_brdfs.") else owner
+        raise ValueError(
+            f'{name}: the word "{word}" belongs to {owner}; take another one, or register with replace=True.'
+        )
+    taken = {name for parameter in Microfacet.declared() if parameter is not choice for name in parameter.names}
+    if clash := next((name for it in term.parameters for name in (it, f"{it}_u", f"{it}_v") if name in taken), None):
+        raise ValueError(f"{name}: a parameter cannot be called {clash}, a parameter of microfacet.")
+    choice.add_term(term)
+
+
+def brought_terms() -> dict[tuple[str, str], type[Term]]:
+    """Return the terms registered by others, by the name of the choice and the word."""
+    return {
+        (choice.name, word): term
+        for choice in KIT.values()
+        for word, term in choice.terms.items()
+        if not term.__module__.startswith("mi_brdfs.")
+    }
+
+
 def _owner(name: str, model: type[Model]) -> str | None:
     """Return the owner of a name, if it is not the model itself."""
     if name in MODELS:
@@ -109,8 +144,8 @@ def models_in(module: ModuleType) -> list[type[Model]]:
 
 
 def terms_in(module: ModuleType) -> list[type[Term]]:
-    """Return the terms with a word that a module defines."""
-    return [term for term in _defined(module, Term) if term.word]
+    """Return the terms with a word of their own that a module defines."""
+    return [term for term in _defined(module, Term) if vars(term).get("word")]
 
 
 def _defined(module: ModuleType, kind: type) -> list[Any]:

@@ -43,8 +43,8 @@ class AshikhminShirley(Model):
 
     family = "cosine lobes"
 
-    diffuse_reflectance = Reflectance(0.5, "colour Rd of the diffuse lobe")
-    specular_reflectance = Reflectance(0.05, "reflectance Rs of the specular lobe at normal incidence")
+    diffuse_reflectance = Reflectance(0.5, "colour Rd of the diffuse lobe", role="diffuse")
+    specular_reflectance = Reflectance(0.05, "reflectance Rs of the specular lobe at normal incidence", role="specular")
     exponent = Number(100, (0, 1e6), "exponent n: the higher, the narrower the highlight", anisotropic=True)
     rotation = Rotation()
 

@@ -50,8 +50,8 @@ class BlinnPhong(Model):
 
     family = "cosine lobes"
 
-    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
-    specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe")
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe", role="diffuse")
+    specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe", role="specular")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")
     normalization = Choice(("energy", "approximate", "ndf", "none", "original"), "scale of the specular lobe")
     preset = Preset()

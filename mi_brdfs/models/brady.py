@@ -2,9 +2,9 @@ import drjit as dr
 
 from ..lobes import LambertLobe, MicrofacetLobe
 from ..math import EPSILON
+from ..microfacet.distributions import EPD
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing
-from ..microfacet.tails import EPD
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, Reflectance
 
@@ -46,9 +46,9 @@ class Brady(Model):
 
     family = "fits to measurements"
 
-    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
-    specular_reflectance = Colour(1, (0, float("inf")), "scale ρs of the specular lobe")
-    f0 = Reflectance(0.04, "Fresnel reflectance at normal incidence")
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe", role="diffuse")
+    specular_reflectance = Colour(1, (0, float("inf")), "scale ρs of the specular lobe", role="specular")
+    f0 = Reflectance(0.04, "Fresnel reflectance at normal incidence", role="fresnel")
     exponent = Number(2, (0.1, 3), "exponent α: the lower, the longer the tail of the lobe")
     beta = Number(0.3, (0.01, 2), "width β of the lobe, the square root of a slope")
     normalization = Choice(("unit", "none"), "scale K")

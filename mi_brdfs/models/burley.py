@@ -4,11 +4,10 @@ import mitsuba as mi
 from ..lobes import Lobe, MicrofacetLobe
 from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, choose, clamp, luminance, safe_sqrt, square
-from ..microfacet.distributions import GGX
+from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing, SmithGGX
-from ..microfacet.tails import Berry
 from ..model import Energy, Model
 from ..parameters import Number, Reflectance, Rotation
 

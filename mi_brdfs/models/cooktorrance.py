@@ -49,8 +49,8 @@ class CookTorrance(Model):
 
     family = "microfacets"
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
-    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default", role="diffuse")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical", role="specular")
     alpha = Number(0.1, (1e-4, 2), "roughness α (the paper's m), the root mean square slope of the facets")
     fresnel = FresnelSet()
     distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")

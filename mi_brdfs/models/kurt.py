@@ -40,11 +40,11 @@ class Kurt(Model):
 
     family = "microfacets"
 
-    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe", role="diffuse")
     specular = PerLobe(
         8,
-        specular_reflectance=Reflectance(1, "scale ks of lobe i"),
-        f0=Reflectance(0.04, "Fresnel reflectance of lobe i at normal incidence"),
+        specular_reflectance=Reflectance(1, "scale ks of lobe i", role="specular"),
+        f0=Reflectance(0.04, "Fresnel reflectance of lobe i at normal incidence", role="fresnel"),
         alpha=Number(0.1, (1e-4, 2), "roughness of lobe i, the root mean square slope of its facets", anisotropic=True),
         kurt_exponent=Number(0.25, (0, 0.5), "exponent κ of lobe i: the higher, the brighter at grazing"),
     )

@@ -47,10 +47,10 @@ class Lafortune(Model):
 
     family = "cosine lobes"
 
-    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe")
+    diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe", role="diffuse")
     specular = PerLobe(
         8,
-        specular_reflectance=Reflectance(0.2, "scale ρ of lobe i"),
+        specular_reflectance=Reflectance(0.2, "scale ρ of lobe i", role="specular"),
         cx=Number(-1, (-1.5, 1.5), "factor Cx of lobe i"),
         cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i"),
         cz=Number(1, (-1.5, 1.5), "factor Cz of lobe i"),

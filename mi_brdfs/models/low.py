@@ -3,12 +3,12 @@ import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import EPSILON, SMALL, choose, clamp, luminance, normalize_or, safe_sqrt
+from ..microfacet.distributions import ABC
 from ..microfacet.facet import Facet
 from ..microfacet.forward import ForwardDirections
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
-from ..microfacet.tails import ABC
 from ..model import Energy, Model
 from ..parameters import Choice, Colour, Number, OneOf, Preset, Reflectance
 
@@ -53,11 +53,11 @@ class Low(Model):
 
     family = "fits to measurements"
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default", role="diffuse")
     a = Colour(1, (0, float("inf")), "scale A")
     b = Number(100, (0, 1e8), "width B: the higher, the narrower the highlight")
     c = Number(1.5, (0, 10), "exponent C of the tail: the higher, the steeper")
-    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum; 1 reflects nothing")
+    int_ior = Number(1.5, (1, 100), "index of refraction inside, over vacuum; 1 reflects nothing", role="fresnel")
     variant = OneOf(
         {"microfacet": {"normalization": Choice(("fit", "paper", "unit"), "scale of the lobe")}, "smooth": {}},
         "which of the paper's two models",

@@ -1,89 +1,9 @@
-import math
-import re
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
-
 from ..lobes import MicrofacetLobe, over_diffuse
-from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
-from ..microfacet.fresnel import Fresnel
-from ..microfacet.shadowing import (
-    AshikhminPremoze,
-    AshikhminShirleyShadowing,
-    Implicit,
-    Kelemen,
-    KurtShadowing,
-    Neumann,
-    SchlickSmith,
-    Shadowing,
-    VCavity,
-)
-from ..microfacet.tails import ABC, EPD, GTR, HemiEPD
-from ..microfacet.term import Term
-from ..model import Energy, Model, full_name
-from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Preset, Reflectance, Rotation
-from ..parameters import fresnel as fresnel_parameters
+from ..microfacet import shadowing
+from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, HemiEPD
+from ..model import Energy, Model
+from ..parameters import FresnelSet, OneTerm, ParameterError, Preset, Reflectance, Rotation
 from ..parameters.messages import listed
-
-ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
-ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
-
-
-class Facets(NamedTuple):
-    """The distribution D of a word, made from the values of its parameters."""
-
-    distribution: type[Distribution]
-    parameters: Mapping[str, Parameter]
-
-
-class Shadows(NamedTuple):
-    """The shadowing term G of a word, made from the distribution and the values of its parameters."""
-
-    make: Callable[..., Shadowing]
-    parameters: Mapping[str, Parameter] = {}
-    needs: str | None = None
-    """The method of a distribution that it needs, if any."""
-
-    def suits(self, distribution: type[Distribution]) -> bool:
-        return not self.needs or getattr(distribution, self.needs) is not getattr(Distribution, self.needs)
-
-
-DISTRIBUTIONS = {
-    "beckmann": Facets(Beckmann, {"alpha": ANISOTROPIC_ROUGHNESS}),
-    "ggx": Facets(GGX, {"alpha": ANISOTROPIC_ROUGHNESS}),
-    "blinn": Facets(Blinn, {"exponent": Number(100, (0, 1e6), "exponent n")}),
-    "gtr": Facets(GTR, {
-        "alpha": ROUGHNESS,
-        "gamma": Number(2, (0, 10), "exponent γ: the lower, the longer the tail"),
-    }),
-    "abc": Facets(ABC, {
-        "b": Number(100, (0, 1e8), "width: the higher, the narrower the highlight"),
-        "c": Number(1.5, (0, 10), "exponent of the tail: the higher, the steeper"),
-    }),
-    "hepd": Facets(HemiEPD, {
-        "kappa": Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak"),
-        "gamma": Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe"),
-    }),
-    "epd": Facets(EPD, {
-        "alpha": ROUGHNESS,
-        "gamma": Number(1, (0.1, 4), "exponent γ: the lower, the longer the tail"),
-    }),
-}  # fmt: skip
-
-SHADOWING = {
-    "smith": Shadows(lambda facets: facets.smith(correlated=False), needs="smith"),
-    "smith-correlated": Shadows(lambda facets: facets.smith(correlated=True), needs="smith"),
-    "vcavity": Shadows(lambda facets: VCavity()),
-    "schlick": Shadows(lambda facets: SchlickSmith(math.sqrt(2 / math.pi) * facets.roughness()), needs="roughness"),
-    "implicit": Shadows(lambda facets: Implicit()),
-    "neumann": Shadows(lambda facets: Neumann()),
-    "kelemen": Shadows(lambda facets: Kelemen()),
-    "ashikhmin-shirley": Shadows(lambda facets: AshikhminShirleyShadowing()),
-    "ashikhmin-premoze": Shadows(lambda facets: AshikhminPremoze()),
-    "kurt": Shadows(
-        lambda facets, kurt_exponent: KurtShadowing(kurt_exponent),
-        {"kurt_exponent": Number(0.25, (0, 0.5), "exponent κ: the higher, the brighter at grazing")},
-    ),
-}
 
 NEARLY_ALL = ("beckmann", "ggx", "blinn", "abc", "hepd")
 
@@ -155,10 +75,24 @@ class Microfacet(Model):
 
     family = "microfacets"
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
-    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
-    distribution = OneOf({word: it.parameters for word, it in DISTRIBUTIONS.items()}, "distribution D of the facets")
-    shadowing = OneOf({word: it.parameters for word, it in SHADOWING.items()}, "shadowing term G")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default", role="diffuse")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical", role="specular")
+    distribution = OneTerm((Beckmann, GGX, Blinn, GTR, ABC, HemiEPD, EPD), "distribution D of the facets")
+    shadowing = OneTerm(
+        (
+            shadowing.SmithOfDistribution,
+            shadowing.CorrelatedSmithOfDistribution,
+            shadowing.VCavity,
+            shadowing.SchlickSmith,
+            shadowing.Implicit,
+            shadowing.Neumann,
+            shadowing.Kelemen,
+            shadowing.AshikhminShirleyShadowing,
+            shadowing.AshikhminPremoze,
+            shadowing.KurtShadowing,
+        ),
+        "shadowing term G",
+    )
     fresnel = FresnelSet()
     rotation = Rotation()
     preset = Preset()
@@ -196,7 +130,8 @@ class Microfacet(Model):
 
     def __init__(self, props):
         super().__init__(props)
-        suited = [word for word, it in DISTRIBUTIONS.items() if SHADOWING[self.shadowing].suits(it.distribution)]
+        distributions, shadowings = type(self).distribution.terms, type(self).shadowing.terms
+        suited = [word for word, it in distributions.items() if shadowings[self.shadowing].suits(it)]
         if self.distribution not in suited:
             raise ParameterError(
                 f'microfacet: shadowing = "{self.shadowing}" is not known for distribution = "{self.distribution}"; '
@@ -204,41 +139,6 @@ class Microfacet(Model):
             )
 
     def lobes(self, p):
-        distribution = DISTRIBUTIONS[self.distribution].distribution.of_values(vars(p.distribution))
-        shadowing = SHADOWING[self.shadowing].make(distribution, **vars(p.shadowing))
-        return over_diffuse(
-            p.diffuse_reflectance, MicrofacetLobe(p.specular_reflectance, distribution, shadowing, p.fresnel)
-        )
-
-
-# --- Words of others ------------------------------------------------------------------------------------------------
-
-BROUGHT: dict[tuple[str, str], type[Term]] = {}
-"""The terms registered by others, by the name of the choice and the word."""
-
-
-def add_term(term: type[Term], replace: bool) -> None:
-    """Register a distribution, a shadowing or a Fresnel term under its word: see :func:`mi_brdfs.register`."""
-    name, word = term.__name__, term.word
-    if not word or not re.fullmatch(r"[a-z][a-z0-9-]*", word):
-        raise ValueError(f'{name}: word is {word!r}; it must be lower-case letters, digits and -, as in "student-t".')
-    kinds = {Distribution: Microfacet.distribution, Shadowing: Microfacet.shadowing, Fresnel: fresnel_parameters.OTHERS}
-    kind, choice = next((kind, choice) for kind, choice in kinds.items() if issubclass(term, kind))
-    former = BROUGHT.get((choice.name, word))
-    owner = full_name(former) if former else "mi_brdfs"
-    if word in choice.words and owner != full_name(term) and not replace:
-        raise ValueError(
-            f'{name}: the word "{word}" belongs to {owner}; take another one, or register with replace=True.'
-        )
-    others = [it for it in Microfacet.declared() if it is not choice and not (kind is Fresnel and it.name == "fresnel")]
-    taken = {name for parameter in others for name in parameter.names}
-    if clash := next((name for it in term.parameters for name in (it, f"{it}_u", f"{it}_v") if name in taken), None):
-        raise ValueError(f"{name}: a parameter cannot be called {clash}, a parameter of microfacet.")
-    choice.add(word, term.parameters)
-    BROUGHT[choice.name, word] = term
-    if kind is Distribution:
-        DISTRIBUTIONS[word] = Facets(term, term.parameters)
-    elif kind is Shadowing:
-        SHADOWING[word] = Shadows(lambda facets, **values: term.of_values(values), term.parameters)
-    else:
-        fresnel_parameters.TERMS[word] = term
+        distribution = p.distribution()
+        specular = MicrofacetLobe(p.specular_reflectance, distribution, p.shadowing(distribution), p.fresnel)
+        return over_diffuse(p.diffuse_reflectance, specular)

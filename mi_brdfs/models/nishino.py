@@ -1,7 +1,7 @@
 from ..lobes import MicrofacetLobe, over_diffuse
+from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, VCavity
-from ..microfacet.tails import HemiEPD
 from ..model import Energy, Model
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
 
@@ -48,8 +48,8 @@ class Nishino(Model):
 
     family = "fits to measurements"
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
-    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default", role="diffuse")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe", role="specular")
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")
     gamma = Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe")
     variant = OneOf(

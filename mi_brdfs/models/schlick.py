@@ -62,8 +62,10 @@ class Schlick94(Model):
     plugins = ("schlick",)
     family = "microfacets"
 
-    specular_reflectance = Reflectance(0.04, "reflectance C at normal incidence")
-    diffuse_reflectance = Reflectance(None, "reflectance C' of a diffuse layer below; omitted by default")
+    specular_reflectance = Reflectance(0.04, "reflectance C at normal incidence", role="specular")
+    diffuse_reflectance = Reflectance(
+        None, "reflectance C' of a diffuse layer below; omitted by default", role="diffuse"
+    )
     roughness = Number(0.05, (1e-6, 1), "roughness r, the square of GGX's α")
     isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed")
     variant = Choice(("shadowed", "interreflection", "plain"), "treatment of the shadowed light")

@@ -50,11 +50,13 @@ class Toon(Model):
 
     family = "cartoon"
 
-    diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy")
+    diffuse_reflectance = Reflectance(0.5, "scale ρd of the diffuse lobe; its albedo for energy", role="diffuse")
     diffuse_threshold = Number(0.5, (0, 1), "cosine td at which the lit band ends")
     diffuse_smooth = Number(0.05, (0, 1), "half width sd of its edge, in the cosine; 0 is hard")
     diffuse_shadow = Number(0, (0, 1), "brightness b of the dark band, relative to the lit one")
-    specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe; its largest albedo for energy")
+    specular_reflectance = Reflectance(
+        0.2, "scale ρs of the specular lobe; its largest albedo for energy", role="specular"
+    )
     specular_threshold = Number(0.9, (0, 1), "cosine ts at which the highlight ends")
     specular_smooth = Number(0.02, (0, 1), "half width ss of its edge, in the cosine; 0 is hard")
     normalization = Choice(("energy", "none"), "scale Z")

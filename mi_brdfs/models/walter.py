@@ -40,8 +40,8 @@ class Walter(Model):
 
     family = "microfacets"
 
-    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default")
-    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical")
+    diffuse_reflectance = Reflectance(None, "albedo ρd of the diffuse lobe; omitted by default", role="diffuse")
+    specular_reflectance = Reflectance(1, "scale ρs of the specular lobe; 1 is physical", role="specular")
     alpha = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
     fresnel = FresnelSet()
     shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")

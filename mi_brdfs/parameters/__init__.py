@@ -17,29 +17,34 @@ textured and optimised ones are limited to it where they are evaluated.
 
 from .colours import Colour, Reflectance
 from .file import File
-from .fresnel import FresnelSet
-from .groups import OneOf, PerLobe
-from .parameter import Parameter, ParameterRow
+from .fresnel import ConductorName, FresnelSet
+from .groups import OneOf, OneTerm, PerLobe
+from .parameter import Parameter, ParameterRow, Quantity, nested
 from .preset import Preset
 from .reader import ParameterError, PropertyReader, Range
-from .scalars import Choice, Flag, Number, Rotation, Spelling
+from .scalars import Choice, Flag, Index, Number, Rotation, Spelling
 
 __all__ = [
     "Choice",
     "Colour",
+    "ConductorName",
     "File",
     "Flag",
     "FresnelSet",
+    "Index",
     "Number",
     "OneOf",
+    "OneTerm",
     "Parameter",
     "ParameterError",
     "ParameterRow",
     "PerLobe",
     "Preset",
     "PropertyReader",
+    "Quantity",
     "Range",
     "Reflectance",
     "Rotation",
     "Spelling",
+    "nested",
 ]

@@ -10,16 +10,20 @@ import mitsuba as mi
 
 from ..math import clamp
 from .messages import interval, number_or_none
-from .parameter import Parameter, ParameterRow
+from .parameter import Parameter, ParameterRow, Quantity
 from .reader import PropertyReader, Range
 
 
 class Colour(Parameter):
     """A spectral quantity within ``limits``. Without a default it is None where it is not given."""
 
-    def __init__(self, default: float | None, limits: Range, text: str):
+    def __init__(self, default: float | None, limits: Range, text: str, *, role: str | None = None):
         super().__init__(text)
-        self.default, self.limits = default, limits
+        self.default, self.limits, self.role = default, limits, role
+
+    @property
+    def spellings(self) -> list[tuple[Quantity, ...]]:
+        return [(Quantity(self.names[0], self.limits, self.default, self.text, colour=True),)]
 
     def bind(self, reader: PropertyReader) -> Colour:
         (name,) = self.names
@@ -44,8 +48,12 @@ class Colour(Parameter):
 class Reflectance(Colour):
     """A colour in [0, 1]."""
 
-    def __init__(self, default: float | None, text: str):
-        super().__init__(default, (0, 1), text)
+    def __init__(self, default: float | None, text: str, *, role: str | None = None):
+        super().__init__(default, (0, 1), text, role=role)
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        return () if self.default is None else (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 def evaluate_colour(

@@ -2,118 +2,132 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import mitsuba as mi
 
 from ..math import clamp
-from ..microfacet.fresnel import Conductor, Dielectric, Fresnel, Schlick, Unit
-from .colours import constant_texture, evaluate_colour, rgb_texture, scaled_colour
-from .groups import OneOf
-from .messages import interval, listed, meant, shown
-from .parameter import Parameter, ParameterRow
+from .colours import rgb_texture
+from .messages import listed, meant, shown
+from .parameter import BoundParameters, Parameter, ParameterRow
 from .reader import PropertyReader, Range
-
-OTHERS = OneOf({}, "another Fresnel term").replace(name="fresnel")
-"""The words that others have brought."""
-TERMS: dict[str, type[Fresnel]] = {}
-"""Their terms."""
 
 
 class FresnelSet(Parameter):
     """The Fresnel term: of a conductor (eta and k, or a material's name), Schlick's (f0), of a dielectric (int_ior
-    over ext_ior), or none (F = 1); or another one by its word, with parameters of its own. Evaluated, a function of the
-    cosine."""
+    over ext_ior), or none (F = 1), as the given parameters imply; or another one by its word. Evaluated, a function of
+    the cosine."""
 
-    INDEX: ClassVar[Range] = (0.01, 100)
-    EXTINCTION: ClassVar[Range] = (0, 100)
-    RANGES: ClassVar[dict[str, Range]] = {
-        "eta": INDEX,
-        "k": EXTINCTION,
-        "f0": (0, 1),
-        "int_ior": INDEX,
-        "ext_ior": INDEX,
-    }
-    SETS: ClassVar[dict[str, tuple[str, ...]]] = {
-        "conductor": ("eta", "k"),
-        "material": ("material",),
-        "schlick": ("f0",),
-        "dielectric": ("int_ior", "ext_ior"),
-    }
+    words: dict[str, Mapping[str, Parameter]] = {}
+    terms: ClassVar[dict[str, Any]] = {}
+    """The term of each word, made by ``of_values``: those of :mod:`mi_brdfs.microfacet.fresnel`, and of others."""
+    implied_words = ("conductor", "material", "schlick", "dielectric", "none")
 
-    word: str | None = None
-    """Once bound, the chosen one of these words, if there is one."""
-    own: OneOf
-    """… and its parameters."""
+    own: BoundParameters
+    """Once bound, the parameters of the chosen word."""
+    word: str
 
     def __init__(self) -> None:
-        super().__init__("Fresnel reflectance")
+        super().__init__("another Fresnel term")
+
+    @classmethod
+    def add_term(cls, term: Any) -> None:
+        for name, parameter in term.parameters.items():
+            parameter.__set_name__(None, name)
+        cls.words[term.word], cls.terms[term.word] = term.parameters, term
+
+    @property
+    def brought(self) -> list[str]:
+        """The words that others have brought."""
+        return [word for word in self.words if word not in self.implied_words]
+
+    @property
+    def fit_words(self) -> tuple[str, ...]:
+        # Schlick's colour can be every reflectance at normal incidence.
+        return ("schlick", "dielectric", "conductor", "none", *self.brought)
 
     @property
     def names(self) -> list[str]:
-        common = [name for names in self.SETS.values() for name in names]
-        return [*common, *OTHERS.names] if TERMS else common
+        own = [name for parameter in self.children() for name in parameter.names]
+        return [*own, *([self.name] if self.brought else [])]
 
     def rivals(self, name: str) -> list[str]:
-        own = next(names for names in self.SETS.values() if name in names)
-        return [other for other in self.names if other not in own]
+        declared = next((it for it in self.words.values() if name in it), {})
+        return [other for other in self.names if other not in declared]
 
     def bind(self, reader: PropertyReader) -> FresnelSet:
-        textures = self._textures(reader)
-        if TERMS and (other := next((name for name in OTHERS.names if name in reader), None)):
-            if textures:
-                raise reader.error(other, f"excludes {next(iter(textures))}; give one Fresnel term")
-            if OTHERS.name not in reader:
-                words = listed(TERMS, quote=True)
-                raise reader.error(other, f"needs {OTHERS.name} beside it, which is {words}")
-            own = OTHERS.bind(reader)
-            word = own.chosen[own.name]
-            return self.replace(own=own, word=word, textures=own.textures, ranges=own.ranges, chosen=own.chosen)
-        ranges = {name: limits for name, limits in self.RANGES.items() if name in textures}
-        return self.replace(textures=textures, ranges=ranges)
+        word = self._word(reader)
+        own = BoundParameters(self.words[word].values(), reader)
+        chosen = own.chosen | ({} if word in self.implied_words else {self.name: word})
+        return self.replace(word=word, own=own, textures=own.textures, ranges=own.ranges, chosen=chosen)
 
-    def _textures(self, reader: PropertyReader) -> dict[str, mi.Texture]:
-        """Return the textures of the set that was given."""
-        given = {kind: [name for name in names if name in reader] for kind, names in self.SETS.items()}
-        chosen = [kind for kind, names in given.items() if names]
+    def _word(self, reader: PropertyReader) -> str:
+        """Return the word that the given parameters imply."""
+        given = {word: [name for name in declared if name in reader] for word, declared in self.words.items()}
+        chosen = [word for word in self.implied_words if given[word]]
+        other = next((name for word in self.brought for name in (self.name, *given[word]) if name in reader), None)
+        if other:
+            if chosen:
+                raise reader.error(other, f"excludes {given[chosen[0]][0]}; give one Fresnel term")
+            if self.name not in reader:
+                words = listed(self.brought, quote=True)
+                raise reader.error(other, f"needs {self.name} beside it, which is {words}")
+            word = reader.choice(self.name, tuple(self.brought))
+            wrong = next((name for it in self.brought if it != word for name in given[it]), None)
+            if wrong and wrong not in self.words[word]:
+                has = f"has {listed(self.words[word], 'and')}" if self.words[word] else "has no parameter"
+                raise reader.error(wrong, f'does not belong to {self.name} = "{word}", which {has} of its own')
+            return word
         if len(chosen) > 1:
-            first, second = (given[kind][0] for kind in chosen[:2])
+            first, second = (given[word][0] for word in chosen[:2])
             raise reader.error(
                 first, f"excludes {second}; give one of eta and k, material, f0, int_ior and ext_ior, or none for F = 1"
             )
-        if given["conductor"]:
+        if chosen == ["conductor"]:
             for name, other in (("eta", "k"), ("k", "eta")):
                 if other not in reader:
                     raise reader.error(name, f"needs {other} beside it")
-            eta, k = (scaled_colour(reader, name, 0, self.RANGES[name]) for name in ("eta", "k"))
-            return eta | k
-        if given["material"]:
-            return self._material(reader)
-        if given["schlick"]:
-            return {"f0": reader.colour("f0", 0, self.RANGES["f0"])}
-        if given["dielectric"]:
-            return {"int_ior": self._ior(reader, "int_ior", "bk7"), "ext_ior": self._ior(reader, "ext_ior", "air")}
-        return {}
+        return chosen[0] if chosen else "none"
 
-    def _ior(self, reader: PropertyReader, name: str, default: str) -> mi.Texture:
-        """Return an index of refraction given as a number, a texture, or the name of a substance that Mitsuba knows."""
-        if name in reader and not isinstance(reader.props[name], str):
-            return reader.number(name, 1, self.INDEX)
-        try:
-            index = mi.lookup_ior(reader.props, name, default)
-        except RuntimeError as error:
-            known = str(error).partition("choices are:")[2].strip()
-            problem = f"= {shown(reader.props[name])} is unknown; it must be a number or one of {known}"
-            raise reader.error(name, problem) from None
-        return constant_texture(index)
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
+        return self.terms[self.word].of_values(self.own.evaluate(si, active))
 
-    def _material(self, reader: PropertyReader) -> dict[str, mi.Texture]:
-        """Return the indices of one of Mitsuba's conductors."""
-        material = reader.text("material")
+    def placeholder(self) -> Any:
+        return self.terms[self.word].of_values(self.own.placeholders())
+
+    def rows(self) -> list[ParameterRow]:
+        own = [row for word in self.implied_words for it in self.words[word].values() for row in it.rows()]
+        if not self.brought:
+            return own
+        words = " | ".join(self.brought)
+        others = [
+            row._replace(text=f"with {word}: {row.text}")
+            for word in self.brought
+            for parameter in self.words[word].values()
+            for row in parameter.rows()
+        ]
+        return [*own, ParameterRow(self.name, "string", "none", words, self.text), *others]
+
+
+class ConductorName(Parameter):
+    """The indices of one of Mitsuba's conductors, by its name; "none" stands for no Fresnel term. Evaluated, η and k,
+    or None."""
+
+    def __init__(self, limits: Mapping[str, Range], text: str):
+        super().__init__(text)
+        self.limits = limits
+
+    @property
+    def tried(self) -> tuple[str, ...]:
+        return ("none", *conductors())
+
+    def bind(self, reader: PropertyReader) -> ConductorName:
+        material = reader.text(self.name)
         if material == "none":
-            return {}
+            return self.replace()
         known = conductors()
         if material not in known:
             closest = meant(material, known)
@@ -121,46 +135,21 @@ class FresnelSet(Parameter):
             # Of two measurements of a material, as Cu and Cu_palik, the first.
             first = [it for it in known if not (it.endswith("_palik") and it.removesuffix("_palik") in known)]
             raise reader.error(
-                "material",
+                self.name,
                 f'= {shown(material)} is unknown{hint} must be "none", for F = 1, or one of Mitsuba\'s conductors '
                 + ", ".join(first),
             )
-        return {name: _measured(_indices() / f"{material}.{name}.spd") for name in ("eta", "k")}
+        textures = {name: _measured(_indices() / f"{material}.{name}.spd") for name in self.limits}
+        return self.replace(textures=textures, ranges=dict(self.limits))
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Fresnel:
-        if self.word:
-            return TERMS[self.word].of_values(vars(self.own.evaluate(si, active)))
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Any, ...] | None:
+        return tuple(clamp(it.eval(si, active), *self.ranges[name]) for name, it in self.textures.items()) or None
 
-        def colour(name: str) -> mi.UnpolarizedSpectrum:
-            return clamp(evaluate_colour(self.textures, name, si, active), *self.RANGES[name])
-
-        def number(name: str) -> mi.Float:
-            return clamp(self.textures[name].eval_1(si, active), *self.RANGES[name])
-
-        if "eta" in self.textures:
-            return Conductor(colour("eta"), colour("k"))
-        if "f0" in self.textures:
-            return Schlick(colour("f0"))
-        if "int_ior" in self.textures:
-            return Dielectric(number("int_ior") / number("ext_ior"))
-        return Unit()
-
-    def placeholder(self) -> Fresnel:
-        return TERMS[self.word].of_values(vars(self.own.placeholder())) if self.word else Unit()
+    def placeholder(self) -> None:
+        return None
 
     def rows(self) -> list[ParameterRow]:
-        index, extinction = interval(*self.INDEX), interval(*self.EXTINCTION)
-        rows = [
-            ParameterRow("eta, k", "colour", "-", f"{index}, {extinction}",
-                         "complex index of refraction of a conductor, relative to the exterior"),
-            ParameterRow("material", "string", "none", "Mitsuba's conductors | none",
-                         "a conductor by name; none means F = 1"),
-            ParameterRow("f0", "colour", "-", "[0, 1]",
-                         "Schlick's approximation with this reflectance at normal incidence"),
-            ParameterRow("int_ior, ext_ior", "number or name", "bk7, air", index,
-                         "indices of refraction of a dielectric, inside and outside"),
-        ]  # fmt: skip
-        return rows + OTHERS.rows() if TERMS else rows
+        return [ParameterRow(self.name, "string", "none", "Mitsuba's conductors | none", self.text)]
 
 
 @cache

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Iterable, Mapping
 from types import SimpleNamespace
+from typing import Any
 
 import mitsuba as mi
 
@@ -24,7 +26,7 @@ class OneOf(Parameter):
 
     def __init__(self, words: Mapping[str, Mapping[str, Parameter]], text: str):
         super().__init__(text)
-        self.words: dict[str, Mapping[str, Parameter]] = {}
+        self.words: dict[str, Mapping[str, Parameter]] = {}  # of its own
         for word, declared in words.items():
             self.add(word, declared)
 
@@ -36,7 +38,7 @@ class OneOf(Parameter):
 
     @property
     def names(self) -> list[str]:
-        own = [name for declared in self.words.values() for p in declared.values() for name in p.names]
+        own = [name for parameter in self.children() for name in parameter.names]
         return list(dict.fromkeys([self.name, *own]))
 
     def rivals(self, name: str) -> list[str]:
@@ -54,10 +56,10 @@ class OneOf(Parameter):
         chosen = {self.name: word, **own.chosen}
         return self.replace(own=own, textures=own.textures, ranges=own.ranges, chosen=chosen)
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
         return SimpleNamespace(**self.own.evaluate(si, active))
 
-    def placeholder(self) -> SimpleNamespace:
+    def placeholder(self) -> Any:
         return SimpleNamespace(**self.own.placeholders())
 
     def rows(self) -> list[ParameterRow]:
@@ -69,6 +71,30 @@ class OneOf(Parameter):
         for parameter, words in users.items():
             rows += [row._replace(text=f"with {listed(words, 'and')}: {row.text}") for row in parameter.rows()]
         return rows
+
+
+class OneTerm(OneOf):
+    """One of several terms (:class:`mi_brdfs.microfacet.terms.Term`), by its word, with its parameters. Evaluated, a
+    function that makes the term, of what else it needs."""
+
+    def __init__(self, terms: Iterable[Any], text: str):
+        super().__init__({}, text)
+        self.terms: dict[str, Any] = {}
+        for term in terms:
+            self.add_term(term)
+
+    def add_term(self, term: Any) -> None:
+        self.add(term.word, term.parameters)
+        self.terms[term.word] = term
+
+    def _made_of(self, values: dict[str, Any]) -> Callable[..., Any]:
+        return functools.partial(self.terms[str(self.chosen[self.name])].of_values, values)
+
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Callable[..., Any]:
+        return self._made_of(self.own.evaluate(si, active))
+
+    def placeholder(self) -> Callable[..., Any]:
+        return self._made_of(self.own.placeholders())
 
 
 class PerLobe(Parameter):
@@ -87,11 +113,15 @@ class PerLobe(Parameter):
             parameter.__set_name__(None, name)
         self.numbers = ["", *(f"_{i}" for i in range(1, most + 1))]
 
-    def _lobe(self, number: str) -> list[Parameter]:
+    def lobe(self, number: str) -> list[Parameter]:
+        """Return the declarations of the lobe of a number, one of ``numbers``."""
         return [parameter.numbered(number) for parameter in self.declared.values()]
 
+    def children(self) -> list[Parameter]:
+        return [parameter for number in self.numbers for parameter in self.lobe(number)]
+
     def _names(self, number: str) -> list[str]:
-        return [name for parameter in self._lobe(number) for name in parameter.names]
+        return [name for parameter in self.lobe(number) for name in parameter.names]
 
     @property
     def names(self) -> list[str]:
@@ -102,7 +132,7 @@ class PerLobe(Parameter):
         return self._names("_i")
 
     def bind(self, reader: PropertyReader) -> PerLobe:
-        lobes = [BoundParameters(self._lobe(number), reader) for number in self._given(reader)]
+        lobes = [BoundParameters(self.lobe(number), reader) for number in self._given(reader)]
         return self.replace(
             lobes=lobes,
             textures={name: texture for lobe in lobes for name, texture in lobe.textures.items()},
@@ -129,4 +159,4 @@ class PerLobe(Parameter):
         return [SimpleNamespace(**lobe.chosen, **lobe.placeholders()) for lobe in self.lobes]
 
     def rows(self) -> list[ParameterRow]:
-        return [row for parameter in self._lobe("_i") for row in parameter.rows()]
+        return [row for parameter in self.lobe("_i") for row in parameter.rows()]

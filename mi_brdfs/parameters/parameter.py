@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 import mitsuba as mi
@@ -23,6 +23,22 @@ class ParameterRow(NamedTuple):
     text: str
 
 
+class Quantity(NamedTuple):
+    """A number or a colour that a parameter may be given as."""
+
+    name: str
+    limits: Range
+    default: float | None
+    text: str
+    colour: bool = False
+    turns: bool = False
+    """Whether it is a rotation: whole turns change nothing."""
+    usual: Range | None = None
+    """Where its values usually are, if that is not nearly all of its range."""
+    sought: bool = True
+    """Whether fits seek it."""
+
+
 class Parameter:
     """A parameter of a plugin: as a class attribute its declaration, and as a bound copy its value in one instance.
 
@@ -31,6 +47,13 @@ class Parameter:
 
     name: str
     """The attribute that it was assigned to."""
+    words: Mapping[Any, Mapping[str, Parameter]] = {}
+    """The words or flags that it may be, the default first, each with the parameters that it has beside it."""
+    implied_words: tuple[str, ...] = ()
+    """Those of them that are not given, but follow from which parameters are."""
+    role: str | None = None
+    """Of a colour "diffuse" or "specular", the scale of a lobe, which adds to the others; of a number or a colour
+    "fresnel", if a Fresnel term has it."""
 
     def __init__(self, text: str):
         self.text = text
@@ -70,6 +93,33 @@ class Parameter:
         """These names as messages list them."""
         return self.names
 
+    @property
+    def spellings(self) -> list[tuple[Quantity, ...]]:
+        """The ways to give it as numbers or colours, the usual one first: fits, the explorer, sweeps and searches know
+        from these, and from the words, what to vary."""
+        return []
+
+    def quantities(self, pairs: bool) -> tuple[Quantity, ...]:
+        """Return what it is usually given as, or the pair for both tangent directions if it may be and ``pairs`` are
+        wanted."""
+        ways = self.spellings
+        paired = [way for way in ways if len(way) > 1] if pairs else []
+        return (paired or ways or [()])[0]
+
+    @property
+    def fit_words(self) -> tuple[Any, ...]:
+        """Its words in fits, the first where none is given."""
+        return tuple(self.words)
+
+    @property
+    def tried(self) -> tuple[Any, ...]:
+        """Values that show what it does; none if nobody needs a picture of them."""
+        return ()
+
+    def children(self) -> Iterable[Parameter]:
+        """Return the parameters that belong to its words or lobes."""
+        return [parameter for declared in self.words.values() for parameter in declared.values()]
+
     def rivals(self, name: str) -> list[str]:
         """Return the names that one of its names gives way to, where it comes from a preset."""
         return []
@@ -92,6 +142,13 @@ class Parameter:
     def rows(self) -> list[ParameterRow]:
         """Return its lines in the table of the manual page."""
         raise NotImplementedError(f"{type(self).__name__} does not define rows.")
+
+
+def nested(declared: Iterable[Parameter]) -> Iterator[Parameter]:
+    """Yield parameters, each followed by those that belong to it."""
+    for parameter in declared:
+        yield parameter
+        yield from nested(parameter.children())
 
 
 class BoundParameters(dict[str, Parameter]):

@@ -8,8 +8,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import clamp
-from .messages import interval, number_or_none
-from .parameter import Parameter, ParameterRow
+from .colours import constant_texture
+from .messages import interval, number_or_none, shown
+from .parameter import Parameter, ParameterRow, Quantity
 from .reader import PropertyReader, Range
 
 
@@ -39,8 +40,10 @@ class Number(Parameter):
         anisotropic: bool = False,
         lone_default: bool = False,
         spelling: Spelling | None = None,
+        role: str | None = None,
     ):
         super().__init__(text)
+        self.role = role
         self.default, self.limits, self.spelling = default, limits, spelling
         self.anisotropic, self.lone_default = anisotropic, lone_default
         self.scale = 1.0
@@ -58,6 +61,27 @@ class Number(Parameter):
     @property
     def names(self) -> list[str]:
         return [self.name + self.number, *self.pair, *([self.other] if self.spelling else [])]
+
+    @property
+    def spellings(self) -> list[tuple[Quantity, ...]]:
+        found: list[tuple[Quantity, ...]] = [(Quantity(self.names[0], self.limits, self.default, self.text),)]
+        if self.anisotropic:
+            ways = zip(self.pair, ("along dp_du", "across"), strict=True)
+            found.append(tuple(Quantity(name, self.limits, self.default, f"{self.text}, {way}") for name, way in ways))
+        if self.spelling:
+            default = None if self.default is None else self.default / self.spelling.scale
+            found.append((Quantity(self.other, self.spelling.limits, default, self.spelling.text),))
+        return found
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        if self.default is None:
+            return ()
+        low, high = self.limits
+        if high - low <= 10 and not 0 < low < 1e-2 * high:
+            return tuple(low + (high - low) * k / 4 for k in range(5))
+        about = (float(f"{self.default * 3.0**k:.1g}") for k in range(-2, 3))
+        return tuple(dict.fromkeys(min(max(value, low), high) for value in about))
 
     def rivals(self, name: str) -> list[str]:
         return [other for other in self.names if other != name]
@@ -111,11 +135,51 @@ class Number(Parameter):
         return rows
 
 
+class Index(Number):
+    """An index of refraction: a number, a texture, or the name of a substance that Mitsuba knows, by default
+    ``substance``."""
+
+    LIMITS = (0.01, 100)
+
+    def __init__(self, substance: str, text: str, *, sought: bool = True):
+        super().__init__(None, self.LIMITS, text, role="fresnel")
+        self.substance, self.is_sought = substance, sought
+
+    @property
+    def spellings(self) -> list[tuple[Quantity, ...]]:
+        return [(Quantity(self.name, self.limits, None, self.text, usual=(1, 3), sought=self.is_sought),)]
+
+    def bind(self, reader: PropertyReader) -> Index:
+        if self.name in reader and not isinstance(reader.props[self.name], str):
+            texture = reader.number(self.name, 1, self.limits)
+        else:
+            texture = constant_texture(self._known(reader))
+        return self.replace(textures={self.name: texture}, ranges={self.name: self.limits})
+
+    def _known(self, reader: PropertyReader) -> float:
+        try:
+            return mi.lookup_ior(reader.props, self.name, self.substance)
+        except RuntimeError as error:
+            known = str(error).partition("choices are:")[2].strip()
+            problem = f"= {shown(reader.props[self.name])} is unknown; it must be a number or one of {known}"
+            raise reader.error(self.name, problem) from None
+
+    def placeholder(self) -> mi.Float:
+        return mi.Float(1)
+
+    def rows(self) -> list[ParameterRow]:
+        return [ParameterRow(self.name, "number or name", self.substance, interval(*self.limits), self.text)]
+
+
 class Rotation(Parameter):
-    """An optional turn of the tangent frame. Evaluated, its (cosine, sine)."""
+    """An optional turn of the tangent frame, in which the lobes are evaluated. Evaluated, its (cosine, sine)."""
 
     def __init__(self) -> None:
         super().__init__("turn of the tangent frame, counter-clockwise about n from dp_du, in turns (1 is 360°)")
+
+    @property
+    def spellings(self) -> list[tuple[Quantity, ...]]:
+        return [(Quantity(self.name, (-1e4, 1e4), None, self.text, turns=True, usual=(-0.5, 0.5)),)]
 
     def bind(self, reader: PropertyReader) -> Rotation:
         if self.name not in reader:
@@ -142,6 +206,11 @@ class Choice(Parameter):
     def __init__(self, choices: tuple[str, ...], text: str):
         super().__init__(text)
         self.choices = choices
+        self.words = {word: {} for word in choices}
+
+    @property
+    def tried(self) -> tuple[str, ...]:
+        return self.choices
 
     def bind(self, reader: PropertyReader) -> str:
         return reader.choice(self.names[0], self.choices)
@@ -156,6 +225,7 @@ class Flag(Parameter):
     def __init__(self, default: bool, text: str):
         super().__init__(text)
         self.default = default
+        self.words = {default: {}, not default: {}}
 
     def bind(self, reader: PropertyReader) -> bool:
         return reader.flag(self.names[0], self.default)

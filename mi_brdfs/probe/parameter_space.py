@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..parameters import Choice, Colour, Flag, Number, OneOf, Parameter, PerLobe
+from ..parameters import Parameter, PerLobe
 from .arrays import Array
 
 if TYPE_CHECKING:
@@ -56,20 +56,21 @@ def axes(model: type[Model], given: Mapping[str, Any]) -> list[Dimension]:
     """Return the numbers that are not ``given``, both of a pair, and the direction of view."""
     least = {name: value for word in given.values() for name, value in LEAST.get(word, {}).items()}
     free = []
-    for number in _parameters(model.declared(), given):
-        if isinstance(number, Number) and number.name not in given:
-            low, high = (limit if isfinite(limit) else copysign(FARTHEST, limit) for limit in number.limits)
-            names = number.pair or number.names[:1]
-            free += [Dimension(name, max(low, least.get(name, low)), high) for name in names]
+    for parameter in _parameters(model.declared(), given):
+        for it in parameter.quantities(pairs=True):
+            if not (it.colour or it.turns or parameter.name in given):
+                low, high = (limit if isfinite(limit) else copysign(FARTHEST, limit) for limit in it.limits)
+                free.append(Dimension(it.name, max(low, least.get(it.name, low)), high))
     return [*free, *VIEW]
 
 
 def white(model: type[Model], given: Mapping[str, Any]) -> dict[str, float]:
     """Return the colours that make a model brightest: 1, but 0 for ``diffuse_reflectance`` beside others."""
-    colours = [p for p in _parameters(model.declared(), given) if isinstance(p, Colour)]
+    known = [(it, it.quantities(pairs=False)) for it in _parameters(model.declared(), given)]
+    colours = [(it.role, quantity) for it, quantities in known for quantity in quantities if quantity.colour]
     return {
-        colour.name: 0.0 if colour.name == "diffuse_reflectance" and len(colours) > 1 else min(1.0, colour.limits[1])
-        for colour in colours
+        colour.name: 0.0 if role == "diffuse" and len(colours) > 1 else min(1.0, colour.limits[1])
+        for role, colour in colours
     }
 
 
@@ -77,10 +78,10 @@ def _parameters(declared: Iterable[Parameter], given: Mapping[str, Any]) -> Iter
     """Yield declared parameters with those of a lobe, and of the words that are given, among them."""
     for parameter in declared:
         if isinstance(parameter, PerLobe):
-            yield from _parameters(parameter.declared.values(), given)
+            yield from _parameters(parameter.lobe(""), given)
             continue
         yield parameter
-        if isinstance(parameter, OneOf) and parameter.name in given:
+        if parameter.name in given:
             yield from _parameters(parameter.words.get(given[parameter.name], {}).values(), given)
 
 
@@ -99,16 +100,16 @@ def choices(declared: Iterable[Parameter], given: Mapping[str, Any]) -> list[dic
 def _words(parameter: Parameter, given: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the words of a parameter, each with those of the choices that belong to it."""
     if isinstance(parameter, PerLobe):
-        return choices(parameter.declared.values(), given)
-    if isinstance(parameter, OneOf):
-        own: Mapping[Any, Iterable[Parameter]] = {word: it.values() for word, it in parameter.words.items()}
-    elif isinstance(parameter, (Choice, Flag)):
-        own = dict.fromkeys((False, True) if isinstance(parameter, Flag) else parameter.choices, ())
-    else:
+        return choices(parameter.lobe(""), given)
+    if not parameter.words or parameter.implied_words:
         return [{}]
-    allowed = given.get(parameter.name, tuple(own))
+    allowed = given.get(parameter.name, tuple(parameter.words))
     allowed = allowed if isinstance(allowed, tuple) else (allowed,)
-    return [{parameter.name: word} | more for word in allowed for more in choices(own.get(word, ()), given)]
+    return [
+        {parameter.name: word} | more
+        for word in allowed
+        for more in choices(parameter.words.get(word, {}).values(), given)
+    ]
 
 
 def accepted(model: type[Model], given: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -159,10 +159,10 @@ def _limits(run: Run) -> Limits:
 
 def _diffuse(model: Model | None) -> float:
     """Return the diffuse reflectance beside a Fresnel term, which pages leave out of the largest albedo."""
-    name = "diffuse_reflectance"
-    if model is None or not model.energy or not model.has_fresnel or name not in model.textures:
+    if model is None or not model.energy or not model.has_fresnel:
         return 0
-    return float(numbers(model.textures[name].eval(interaction([0, 0, 1])), 1).max())
+    si = interaction([0, 0, 1])
+    return sum(float(numbers(model.textures[name].eval(si), 1).max()) for name in model.named("diffuse"))
 
 
 def _excess(model: Model | None) -> str:

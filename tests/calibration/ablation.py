@@ -23,7 +23,7 @@ from mi_brdfs.microfacet import sampling
 from mi_brdfs.microfacet.forward import ForwardDirections
 from mi_brdfs.microfacet.shadowing import Implicit, SchlickSmith, Shadowing
 from mi_brdfs.microfacet.visible import VisibleNormals
-from mi_brdfs.models.microfacet import DISTRIBUTIONS, SHADOWING
+from mi_brdfs.models.microfacet import Microfacet
 from mi_brdfs.probe.arrays import interaction, numbers
 from mi_brdfs.probe.directions import direction
 from mi_brdfs.probe.variates import lattice, sampling_efficiency
@@ -97,8 +97,8 @@ FACETS_AND_MODELS = [
     *(
         kit(name, shading, f0=0.04, **given)
         for name, given in FACETS.items()
-        for shading in SHADOWING
-        if SHADOWING[shading].suits(DISTRIBUTIONS[name].distribution)
+        for shading, term in Microfacet.shadowing.terms.items()
+        if term.suits(Microfacet.distribution.terms[name])
     ),
     *({"type": "microfacet", "shadowing": shading, **given} for given, shading in METALS),
     *({"type": "microfacet", **given} for given in ROUGH),

@@ -12,9 +12,9 @@ from itertools import product
 from harness import Fit, attributes, main, number, variance_loss
 
 from mi_brdfs.lobes import MicrofacetLobe
+from mi_brdfs.microfacet.distributions import EPD
 from mi_brdfs.microfacet.fresnel import Unit
 from mi_brdfs.microfacet.shadowing import VCavity
-from mi_brdfs.microfacet.tails import EPD
 
 ANGLES = 5, 30, 60, 80
 ALPHAS = 0.02, 0.1, 0.5

@@ -15,9 +15,8 @@ from harness import Fit, OverDiffuse, attributes, main, number, variance_loss
 
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet import shadowing
-from mi_brdfs.microfacet.distributions import GGX, Beckmann, Blinn, Distribution
+from mi_brdfs.microfacet.distributions import ABC, GGX, GTR, Beckmann, Blinn, Distribution, HemiEPD
 from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
-from mi_brdfs.microfacet.tails import ABC, GTR, HemiEPD
 from mi_brdfs.models.ward import Ward1992, WardDuer
 
 ANGLES = 5, 30, 60, 80

@@ -12,9 +12,8 @@ from harness import Fit, attributes, main, number, variance_loss
 
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet import sampling, shadowing
-from mi_brdfs.microfacet.distributions import GGX, Beckmann, Blinn
+from mi_brdfs.microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn
 from mi_brdfs.microfacet.fresnel import Dielectric, Schlick, Unit
-from mi_brdfs.microfacet.tails import ABC, EPD, GTR
 
 ANGLES = 5, 30, 60, 80
 GRAZING = 60, 75, 85

@@ -16,7 +16,7 @@ import numpy as np
 from harness import Fit, attributes, main, number, replaced
 from scipy.integrate import quad
 
-from mi_brdfs.microfacet.tails import HemiEPD
+from mi_brdfs.microfacet.distributions import HemiEPD
 
 KAPPAS = 0.5, 1, 2, 5, 10, 20, 40, 80
 GAMMAS = 1, 10, 100, 1e4

@@ -1,0 +1,153 @@
+"""What the terms of a microfacet model are: distributions (D), shadowing terms (G), Fresnel reflectances (F), and the
+proposals that samplers are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol, TypeVar
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import luminance
+from ..parameters import Parameter
+from .facet import Facet
+
+T = TypeVar("T", bound="Term")
+
+
+class Term:
+    """A term of a microfacet model. :func:`mi_brdfs.register` adds it to ``microfacet`` under its ``word``."""
+
+    word: ClassVar[str | None] = None
+    """Its word in the kit."""
+    parameters: ClassVar[Mapping[str, Parameter]] = {}
+    """The declarations that go with the word, by name. The class is called with their values by name; an anisotropic
+    one comes as NAME_u and NAME_v."""
+
+    @classmethod
+    def of_values(cls: type[T], values: Mapping[str, Any]) -> T:
+        """Return the term for given values of its parameters."""
+        spread: dict[str, Any] = {}
+        for name, value in values.items():
+            spread |= {f"{name}_u": value[0], f"{name}_v": value[1]} if isinstance(value, tuple) else {name: value}
+        return cls(**spread)
+
+
+class Distribution(Term):
+    """A distribution of two roughnesses, αu along dp_du and αv across: anisotropic, unless both are the same object."""
+
+    LOSS = 1.7
+    """How much light is lost to multiple reflections, which tests/calibration/estimated_albedo.py fits."""
+    long_tailed = False
+    """Whether there are many more steep facets than a Gaussian distribution of slopes has."""
+
+    def __init__(self, alpha_u: mi.Float, alpha_v: mi.Float) -> None:
+        self.alpha_u, self.alpha_v = alpha_u, alpha_v
+        self.anisotropic = alpha_u is not alpha_v
+
+    def unstretched(self, facet: Facet) -> mi.Vector3f:
+        """(h_x/αu, h_y/αv, h_z), with reciprocals that Dr.Jit computes once for all facets."""
+        return mi.Vector3f(facet.h.x * dr.rcp(self.alpha_u), facet.h.y * dr.rcp(self.alpha_v), facet.h.z)
+
+    def steepness(self, facet: Facet) -> mi.Float:
+        """(h_x/αu)² + (h_y/αv)²."""
+        h = self.unstretched(facet)
+        return h.x * h.x + h.y * h.y
+
+    def mean_square_slope(self) -> mi.Float:
+        """About the mean square slope, over both axes."""
+        return 0.5 * (dr.square(self.alpha_u) + dr.square(self.alpha_v))
+
+    def mean_square_slope_along(self, v: mi.Vector3f) -> mi.Float:
+        """The same along a direction, times sin²θ of that."""
+        return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
+
+    def estimated_albedo(self, cos: mi.Float) -> Any:
+        """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
+        have in the direction of that cosine."""
+        r2 = self.mean_square_slope()
+        return 1 / (1 + self.LOSS * r2 * dr.sqrt(dr.sqrt(dr.sqrt(r2))) * (0.5 + 0.5 * cos))
+
+    def roughness(self) -> Any:
+        """The α that Schlick's stand-in for Smith's shadowing goes by, or None if there is no such."""
+        return None
+
+    def smith(self, correlated: bool) -> Any:
+        """Smith's shadowing term that belongs to this distribution, or None if that is not known."""
+        return None
+
+    def visible_normals(self, wi: mi.Vector3f) -> HalfVectors | None:
+        """Return the half vectors that ``wi`` sees under Smith's masking, or None if there is no sampler of them."""
+        return None
+
+    def eval(self, facet: Facet) -> mi.Float:
+        """D(h)."""
+        raise NotImplementedError
+
+    def density(self, facet: Facet, g: mi.Float) -> mi.Float:
+        """q(h); by default D cosθ_h."""
+        return self.eval(facet) * facet.cos_h
+
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
+        """``(C, 1 - C)``: the cumulative distribution in t on the line, to 1e-7, and its complement with digits of its
+        own."""
+        raise NotImplementedError
+
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
+        """The t of a ``cdf`` value."""
+        raise NotImplementedError
+
+
+class Isotropic(Distribution):
+    """A distribution whose own parameters replace the roughness."""
+
+    def __init__(self) -> None:
+        one = mi.Float(1)
+        super().__init__(one, one)
+
+    def mean_square_slope_along(self, v: mi.Vector3f) -> mi.Float:
+        return self.mean_square_slope() * (v.x * v.x + v.y * v.y)
+
+
+class Fresnel(Term):
+    """A Fresnel reflectance, called with the cosine."""
+
+    def __call__(self, cos: Any) -> Any:
+        raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
+
+    def brightness(self, cos: Any) -> Any:
+        """Return the approximate luminance of the reflectance, as one number for samplers."""
+        return luminance(self(cos))
+
+    def forward(self, distribution: Distribution, wi: mi.Vector3f) -> Any:
+        """Return the forward directions to draw besides half vectors, if there are such."""
+        return None
+
+
+class Directions(Protocol):
+    """A proposal of directions for one ``wi``."""
+
+    def draw(self, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+        """Draw a ``wo`` from three uniform variates."""
+        ...
+
+    def pdf(self, facet: Facet) -> mi.Float:
+        """Return the density per solid angle with which ``facet.wo``, above the horizon, is drawn."""
+
+
+class HalfVectors(Protocol):
+    """A proposal of half vectors for one ``wi``, in which each has an image: in a measure of its own both are equally
+    dense."""
+
+    def draw(self, v: mi.Point2f) -> tuple[Facet, Facet]:
+        """Draw a facet from two uniform variates, and return it with its image."""
+
+    def pdf(self, facet: Facet) -> mi.Float:
+        """Return the density per solid angle with which ``facet.wo`` is drawn."""
+
+    def image(self, facet: Facet) -> Facet:
+        """Return the image, whose own image is the facet."""
+
+    def weight(self, facet: Facet) -> Any:
+        """Return D over the density, up to a factor that a facet and its image share."""
