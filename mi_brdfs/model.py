@@ -155,6 +155,8 @@ class Model(Plugin):
     """With which models it is shown: one of ``FAMILIES`` or another word; those without one come last."""
     energy: ClassVar[Energy | None] = None
     """The largest albedos; None if they were not measured."""
+    data = False
+    """Whether its values are data, which need not agree at the normal, where each azimuth has its own."""
     signed = False
     """Whether channels may be negative, of colours outside sRGB, as the page must then say."""
 

@@ -108,7 +108,7 @@ class Conductor(Fresnel):
         modulus = safe_sqrt(real * real + 4 * eta2 * k2)
         a = safe_sqrt(0.5 * (modulus + real))
         even_s, odd_s = modulus + cos2, 2 * cos * a
-        s = (even_s - odd_s) / (even_s + odd_s)
+        s = dr.maximum(even_s - odd_s, 0) / (even_s + odd_s)  # rounding may leave less
         even_p, odd_p = modulus * cos2 + sin2 * sin2, odd_s * sin2
         p = (even_p - odd_p) / (even_p + odd_p)
         return 0.5 * s * (1 + p)

@@ -143,4 +143,4 @@ class LafortuneLobe(PowerLobe):
         buried, log_s, _ = self._buried(frame)
         t = dr.maximum(log_s - log_a, 1e-8)  # rounding may make it negative
         density = dr.square(n + 1) * t * dr.exp(-n * t - log_s) * cos_phi / (2 * self._arc(frame, t))
-        return dr.select(buried, dr.select(power > 0, density, 0), usual)
+        return dr.select(buried, dr.select(log_a < 0, density, 0), usual)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -134,6 +135,11 @@ class BSDFProbe:
         return [getattr(inner, "model", None) for inner in contained(self.bsdf)] or [None]
 
     @property
+    def is_data(self) -> bool:
+        """Whether values of it are measured data."""
+        return any(model.data for model in self.models if model)
+
+    @property
     def is_ours(self) -> bool:
         """Whether the plugin is one of a model, of this pack or registered with it."""
         return hasattr(self.bsdf, "model")
@@ -196,6 +202,18 @@ class BSDFProbe:
     def is_smooth(self, bs: mi.BSDFSample3f) -> mi.Bool:
         """Return whether samples are not of a delta function."""
         return (bs.sampled_type & int(mi.BSDFFlags.Smooth)) != 0 if self.deltas else mi.Bool(True)
+
+
+def load(given: Mapping[str, Any]) -> Any:
+    """Load a plugin dict that may be loaded again. In spectral variants Mitsuba writes the coefficients of spectra into
+    the bitmaps that it is given, and a second time those of the coefficients: give it copies."""
+    return mi.load_dict(_copied(given))
+
+
+def _copied(given: Any) -> Any:
+    if isinstance(given, Mapping):
+        return {name: _copied(value) for name, value in given.items()}
+    return mi.Bitmap(given) if isinstance(given, mi.Bitmap) else given
 
 
 def contained(bsdf: mi.BSDF) -> list[mi.BSDF]:

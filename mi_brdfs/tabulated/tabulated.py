@@ -62,6 +62,7 @@ class Tabulated(Model):
     """
 
     plugins = "tabulated", "merl"
+    data = True
 
     filename = File("the measured file")
     scale = Colour(1, (0, np.inf), "factor on all values")

@@ -152,7 +152,7 @@ def mode(run: Run) -> Findings:
                 expected = run.probe.eval(part, wi, wo)
             else:
                 expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
-            larger = np.nan_to_num(np.maximum(got, expected))
+            larger = np.nan_to_num(np.maximum(abs(got), abs(expected)))
             error = np.nan_to_num(abs(got - expected) / np.maximum(larger, 1e-6 * larger.max() + 1e-12)).max(axis=1)
             off = error > tolerance
             if off.mean() > 1e-3:

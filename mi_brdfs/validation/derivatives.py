@@ -240,7 +240,7 @@ def _check_way_back(
     if any(found.any() for found in ways):
         return
     # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump.
-    near, nearer = (abs(backward(limit + share * (inside - limit), (1,))[1][0]).sum() for share in (0.1, 0.01))
+    near, nearer = (abs(backward(limit + share * (inside - limit), (1,))[1][0]).sum() for share in (0.1, 0.001))
     if max(0.3 * near, 1e-6 * len(wi)) < nearer < 3 * near:
         outcome.fault(
             f"at {beyond:g}, beyond its limit of {limit:g}, no derivative leads back: those of the sum of eval and of "

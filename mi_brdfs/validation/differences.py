@@ -61,7 +61,9 @@ def differences(params: mi.SceneParameters, key: str, values: Callable[[], Array
     first, second = (above + below) / 2, (nearer_above + nearer_below) / 2
     smooth = np.where(lone, up, (4 * second - first) / 3)
     change = np.where(lone, up - np.where(above == 0, below, above), first - second)
-    trusted = kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)
+    # Across a peak far narrower than the steps the two sides cancel, but each grows as the step shrinks.
+    grows = nearer_gap > 1.5 * gap + 4 * noise
+    trusted = (kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)) & (lone | ~grows)
     noise = noise + np.where(kink, 0, 0.5 * abs(change))
     low, high = (np.where(kink, choose(up, down), smooth) for choose in (np.minimum, np.maximum))
     return Differences(low, high, trusted & np.isfinite(low) & np.isfinite(high), noise)

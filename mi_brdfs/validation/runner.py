@@ -10,7 +10,7 @@ from typing import Any
 import mitsuba as mi
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, load
 from ..probe.sources import find_sources, name_of
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, sampling, spectral, textures, updates, values
@@ -181,7 +181,7 @@ def _described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF
 
 
 def _probe(bsdf: dict[str, Any] | mi.BSDF) -> BSDFProbe:
-    loaded = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    loaded = load(bsdf) if isinstance(bsdf, dict) else bsdf
     if not isinstance(loaded, mi.BSDF):
         raise ValueError(f"{bsdf['type'] if isinstance(bsdf, dict) else type(bsdf).__name__} is not a BSDF.")
     return BSDFProbe(loaded)

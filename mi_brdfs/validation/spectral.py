@@ -11,7 +11,7 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
 from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import angles_of, hemisphere, on_side
 from ..probe.variates import random
 from . import sampling, values
@@ -118,7 +118,7 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (84, 85))
     wavelengths = hero_wavelengths(COUNT)
     textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
-    coloured, si = mi.load_dict(given | textures), interaction(wi, wavelengths=wavelengths)
+    coloured, si = load(given | textures), interaction(wi, wavelengths=wavelengths)
     wo[::2] = BSDFProbe(coloured).sample(part, wi, random(COUNT, 86)).wo[::2]
 
     def evaluated(bsdf: mi.BSDF, wavelengths: Array) -> Array:
@@ -128,7 +128,7 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     count = got.shape[1]
     alike = [np.repeat(wavelengths[:, [k]], 4, axis=1) for k in range(4)]
     grey = [
-        evaluated(mi.load_dict(given | {name: pinned(texture, si, k) for name, texture in textures.items()}), alike[k])
+        evaluated(load(given | {name: pinned(texture, si, k) for name, texture in textures.items()}), alike[k])
         for k in range(count)
     ]
     errors = np.array([[_error(got[:, k], grey[other][:, k])[1] for other in range(count)] for k in range(count)])
@@ -185,10 +185,10 @@ def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
     for key in params.keys():
         name, _, rest = key.partition(".")
         if rest == "value" and not isinstance(given.get(name), (bool, str)):
-            greys[name] = float(numbers(params[key], 1).mean())
+            greys[name] = float(f"{numbers(params[key], 1).mean():.6g}")  # in float32 a limit may lie beyond it
     try:
         with unwrapped_ctrl_c():
-            asking = mi.load_dict(given | {name: Asking(name, grey) for name, grey in greys.items()})
+            asking = load(given | {name: Asking(name, grey) for name, grey in greys.items()})
             wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
             asking.eval(mi.BSDFContext(), interaction(wi), vectors(wi), True)
     except (RuntimeError, TypeError):
@@ -216,7 +216,7 @@ def _coloured(greys: dict[str, float]) -> dict[str, dict[str, Any]]:
 
 
 def _load(given: dict[str, Any]) -> BSDFProbe:
-    return BSDFProbe(mi.load_dict(given), every_wavelength=True)
+    return BSDFProbe(load(given), every_wavelength=True)
 
 
 def _rgb(grey: float, hue: tuple[float, ...]) -> dict[str, Any]:

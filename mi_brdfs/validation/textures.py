@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import interaction, numbers, pinned
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
@@ -54,11 +54,11 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     uv = np.random.default_rng(33).uniform(-1, 2, (COUNT, 2)).astype(np.float32)
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (30, 32))
     constant = {name: pinned(texture, interaction(wi, uv)) for name, texture in varied.items()}
-    real = BSDFProbe(mi.load_dict(given | constant | {name: varied[name] for name in free}))
+    real = BSDFProbe(load(given | constant | {name: varied[name] for name in free}))
     samples = real.sample(part, wi, random(COUNT, 31), uv)
     wo[::2] = samples.wo[::2]
     # The one has its values wherever it is asked: let it be asked elsewhere.
-    other = BSDFProbe(mi.load_dict(given | constant))
+    other = BSDFProbe(load(given | constant))
     reflected = samples.weight * samples.pdf[:, None]
     lit = samples.lit[:, None]
     words = "but {:.4g} where its textures have the values of this point everywhere"
@@ -108,7 +108,7 @@ def _textured(run: Run) -> tuple[dict[str, mi.Texture], list[str]]:
 def _texture(value: Any) -> mi.Texture | None:
     """Return what is given for a parameter if it is a texture that varies."""
     try:
-        loaded = mi.load_dict(value) if isinstance(value, dict) else value
+        loaded = load(value) if isinstance(value, dict) else value
     except RuntimeError:  # a spectrum that only an unbounded parameter takes
         return None
     return loaded if isinstance(loaded, mi.Texture) and loaded.is_spatially_varying() else None
@@ -116,7 +116,7 @@ def _texture(value: Any) -> mi.Texture | None:
 
 def _loads(given: dict[str, Any]) -> bool:
     try:
-        mi.load_dict(given)
+        load(given)
     except (RuntimeError, TypeError):
         return False
     return True

@@ -27,7 +27,7 @@ RANDOM_COUNT, RANDOM_CELLS = 1 << 14, 128
 CAPS = 2, 4, 8
 """The radii of caps that are tested, in degrees."""
 CONFIRMED = 2
-"""Directions that stay suspect before the others need no second look."""
+"""Directions that fail before the others need no second look."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,11 @@ class Trial:
         return not (self.test.p_value > 1e-3 and abs(self.integral - self.share) < 5e-4)
 
     @property
+    def is_wrong(self) -> bool:
+        """Whether it fails, whatever the significance."""
+        return not (self.test.p_value > 1e-6 and abs(self.integral - self.share) < 2e-3)
+
+    @property
     def deviation(self) -> str:
         """Where the two deviate most."""
         worst = self.test.worst
@@ -117,12 +122,12 @@ def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random
     if at_random:
         found += _trials(probe, part, at_random, RANDOM_COUNT, RANDOM_CELLS)
     # What is narrow, or jumps close to a line of the cells, may escape the quadrature: suspects get cells across that
-    # line, made by as many samples as are counted, until some stay suspect.
+    # line, made by as many samples as are counted, until some fail.
     confirmed = 0
     for k in [k for k, trial in enumerate(found) if trial.is_suspect]:
         if confirmed < CONFIRMED:
             (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, pilot=1, turn=0.6)
-            confirmed += found[k].is_suspect
+            confirmed += found[k].is_wrong
     return Trials(found[: len(asked)], found[len(asked) :])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import numbers
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import angles_of, hemisphere, on_side
 from ..probe.kernels import launched_kernels
 from ..probe.variates import random
@@ -40,11 +40,11 @@ def updates(run: Run) -> Findings:
             value = original * 0.95 + 1e-3
             number = numbers(value, 1)[0]
             given = float(number[0]) if len(number) == 1 else {"type": "rgb", "value": number.tolist()}
-            if len(number) not in (1, 3):
+            if len(number) != 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
                 continue
             try:
                 with unwrapped_ctrl_c():
-                    fresh = BSDFProbe(mi.load_dict(run.given | {name: given}))
+                    fresh = BSDFProbe(load(run.given | {name: given}))
             except (RuntimeError, TypeError):  # it is given otherwise
                 continue
             set_value(params, key, value)
