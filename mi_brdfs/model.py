@@ -156,7 +156,7 @@ class Model(Plugin):
     energy: ClassVar[Energy | None] = None
     """The largest albedos; None if they were not measured."""
     data = False
-    """Whether its values are data, which need not agree at the normal, where each azimuth has its own."""
+    """Whether its values are measured data, which may jump."""
     signed = False
     """Whether channels may be negative, of colours outside sRGB, as the page must then say."""
 

@@ -68,9 +68,9 @@ class Samples(NamedTuple):
         """Which of them carry light or may be black ones, drawn where f = 0.
 
         A sampler may also reject a direction by a weight of zero, and leave anything in the other fields: so a black
-        sample must have f = 0 and the density that ``pdf`` states.
+        sample must have f = 0, or next to it, and the density that ``pdf`` states.
         """
-        black = ~self.value.any(axis=1) & (self.pdf > 0) & self.smooth
+        black = (abs(self.value) < 1e-30).all(axis=1) & (self.pdf > 0) & self.smooth
         return self.lit | (black & (abs(self.density - self.pdf) < 0.01 * self.pdf))
 
 

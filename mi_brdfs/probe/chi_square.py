@@ -50,9 +50,15 @@ def lone_cell(observed: Array, expected: Array) -> float:
     By Chernoff's bound a Poisson count of mean e is at most exp(-(o ln(o/e) - o + e)) likely to be as far out as o;
     Bonferroni's factor is that of the cells and of both sides. One wrong cell of a thousand is lost in the sum of chi².
     """
-    o, e = np.asarray(observed, np.float64), np.maximum(expected, 1e-9)
-    farthest = np.max(o * np.log(np.where(o > 0, o, 1) / e) - o + e, initial=0)
-    return float(min(2 * len(o) * np.exp(-farthest), 1))
+    farthest = np.max(surprise(observed, expected), initial=0)
+    return float(min(2 * len(observed) * np.exp(-farthest), 1))
+
+
+def surprise(observed: Array, expected: Array) -> Array:
+    """Return the negative logarithm of that bound for each count. What is expected is an integral over the cell, which
+    may miss a sliver of it."""
+    o, e = np.asarray(observed, np.float64), np.maximum(expected, 0.05)
+    return o * np.log(np.where(o > 0, o, 1) / e) - o + e
 
 
 def _survival(statistic: float, degrees: int) -> float:

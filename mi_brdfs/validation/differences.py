@@ -66,4 +66,6 @@ def differences(params: mi.SceneParameters, key: str, values: Callable[[], Array
     trusted = (kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)) & (lone | ~grows)
     noise = noise + np.where(kink, 0, 0.5 * abs(change))
     low, high = (np.where(kink, choose(up, down), smooth) for choose in (np.minimum, np.maximum))
-    return Differences(low, high, trusted & np.isfinite(low) & np.isfinite(high), noise)
+    # Float32 must know the values to far less than a step.
+    fine = np.spacing(np.abs(np.array(original, np.float32)).max()) < 0.01 * step
+    return Differences(low, high, fine & trusted & np.isfinite(low) & np.isfinite(high), noise)

@@ -52,6 +52,10 @@ class Run:
             self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, SEED))
         return self._samples[key]
 
+    def is_black(self, part: Part) -> bool:
+        """Return whether no sample of a part carries light, so that its density is of no use."""
+        return not any(self.samples(part, incident).lit.any() for incident in self.views(part))
+
     # --- Statistical tests ------------------------------------------------------------------------------------------
 
     def trials(self, part: Part) -> list[Trial]:

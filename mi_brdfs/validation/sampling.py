@@ -20,6 +20,9 @@ def chi2(run: Run) -> Findings:
     to the lobe, and in larger ones. Together with ``pdf`` below it sees whatever is wrong with one of the two."""
     for part in run.probe.parts:
         outcome, smallest = Outcome("chi2", part.name), 1.0
+        if run.is_black(part):
+            yield Finding("chi2", part.name, "skip", "Black.")
+            continue
         own = run.trials(part)
         for trial in own:
             smallest = min(smallest, trial.test.p_value)
@@ -34,9 +37,6 @@ def chi2(run: Run) -> Findings:
                     wi=trial.incident.wi,
                     seed=trial.seed,
                 )
-        if not any(trial.share or trial.integral for trial in own):
-            yield Finding("chi2", part.name, "skip", "It draws nothing.")
-            continue
         yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}.")
 
 
@@ -45,6 +45,9 @@ def pdf(run: Run) -> Findings:
     within 0.1 % for the quadrature and for float32, and the noise of the samples."""
     for part in run.probe.parts:
         outcome, largest = Outcome("pdf", part.name), 0.0
+        if run.is_black(part):
+            yield Finding("pdf", part.name, "skip", "Black.")
+            continue
         for trial in run.trials(part):
             name = trial.incident.name
             noise = sqrt(max(trial.share * (1 - trial.share), 1 / trial.count) / trial.count)

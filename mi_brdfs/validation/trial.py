@@ -11,7 +11,7 @@ import numpy as np
 
 from ..probe.arrays import Array
 from ..probe.bsdf import BSDFProbe, Part, Samples
-from ..probe.chi_square import ChiSquare, chi_square, lone_cell
+from ..probe.chi_square import ChiSquare, chi_square, lone_cell, surprise
 from ..probe.directions import angles_of, azimuth_axis
 from ..probe.partition import Partition, partitions
 from ..probe.variates import random
@@ -26,6 +26,8 @@ RANDOM_COUNT, RANDOM_CELLS = 1 << 14, 128
 """Those of a direction at random."""
 CAPS = 2, 4, 8
 """The radii of caps that are tested, in degrees."""
+DOUBTFUL = 64
+"""The most cells of a suspect over which the density is integrated anew."""
 CONFIRMED = 2
 """Directions that fail before the others need no second look."""
 
@@ -86,6 +88,13 @@ class Trial:
         caps = [(cosines > np.cos(radius)) @ np.stack(own, axis=1) for radius in np.radians(CAPS)]
         counts, expected = (np.concatenate([each, *(cap[:, k] for cap in caps)]) for k, each in enumerate(own))
         return counts, expected
+
+    @property
+    def doubtful(self) -> Array:
+        """The cells that deviate most, if far."""
+        excess = surprise(self.counts, self.expected)
+        worst = np.argsort(excess)[-DOUBTFUL:]
+        return worst[excess[worst] > 6]
 
     @property
     def is_suspect(self) -> bool:
@@ -158,7 +167,8 @@ def _trials(
     pilots = [samples.wo[samples.drawn] for samples in drawn(int(count * pilot), 0)]
     # The quadrature is as precise as for the larger count, for the sake of the sum.
     cos, sin = np.cos(turn), np.sin(turn)
-    made = partitions(density, pilots, list(wis @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]), COUNT, cells)
+    axes = np.array([azimuth_axis(wi) for wi in wis]) @ [[cos, sin, 0], [-sin, cos, 0]]
+    made = partitions(density, pilots, list(axes), COUNT, cells)
     found = []
     at_once = max(1, COUNT // count)
     for k, (incident, partition, samples) in enumerate(zip(incidents, made, drawn(count, 1), strict=True)):
@@ -166,5 +176,10 @@ def _trials(
         integral = partition.integrals.sum()
         counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
         counts = partition.histogram(samples.wo[counted])
-        found.append(Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once)))
+        trial = Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once))
+        if turn and len(doubtful := trial.doubtful):
+            of = np.zeros(1, int) + k
+            finer = partition.refined(lambda wo, of=of: density(np.repeat(of, len(wo)), wo), doubtful)
+            trial = replace(trial, partition=finer)
+        found.append(trial)
     return found

@@ -263,17 +263,15 @@ def continuity(run: Run) -> Findings:
     """Check that values do not jump where formulas treat directions apart: at exactly normal incidence and reflection,
     and where azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides (or,
     of narrow lobes, a twentieth of their width), to float32's rounding and for all but one pair in a hundred; or it
-    comes nearer to that the smaller the angle is (measured data need not agree at the normal, where each azimuth has
-    its own). And as the height above the horizon halves, from 0.5° to 0.01°, eval
+    comes nearer to that the smaller the angle is (values of measured data may jump between nodes, and are judged at
+    grazing only). And as the height above the horizon halves, from 0.5° to 0.01°, eval
     does not change by more than a fifth power does, unless it does so before and after, too."""
     for part in run.probe.parts:
         outcome, worst = Outcome("continuity", part.name), 0.0
         step = min(STEP, run.spread(part) / 20)
         tolerance = 10 * run.rounding(part)
         for side in part.sides:
-            for where, crossing in _crossings(np.degrees(step)):
-                if where == NORMAL and run.probe.is_data:
-                    continue
+            for where, crossing in _crossings(np.degrees(step)) if not run.probe.is_data else ():
                 crossing = [on_side(w, side) for w in crossing]
                 others = _companions(run, part, crossing[0])
                 for word, (at, *around) in _both_ways(run, part, crossing, others):
@@ -292,14 +290,15 @@ def continuity(run: Run) -> Findings:
                             wo=wo,
                         )
             for phi in (0, 77):
-                # As far apart as the first two, but far above the horizon: only hard edges jump there.
-                angles = [70 + np.degrees(STEP), 70, *(90 - np.degrees(STEP) * times for times in OCTAVES)]
+                # Far above the horizon only hard edges jump, the more often the farther apart two heights are.
+                angles = [70, 70 + np.degrees(STEP), *(90 - np.degrees(STEP) * times for times in OCTAVES)]
+                angles[0] -= np.degrees(STEP) * (OCTAVES[0] - 1)
                 heights = [on_side(direction(angle, phi), side) for angle in angles]
                 others = on_side(hemisphere(1000, 23), side)
                 for word, values in _both_ways(run, part, heights, others):
                     values = np.nan_to_num(values)
-                    edges = _changes(values[:2])[0] > np.log(32)
-                    _check_octaves(outcome, word, values[2:], heights[2:], others, float(edges.mean()))
+                    edges = float((_changes(values[:2])[0] > np.log(32)).sum()) / OCTAVES[0]
+                    _check_octaves(outcome, word, values[2:], heights[2:], others, edges)
         yield outcome.finding(
             f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
         )
@@ -315,14 +314,15 @@ def _check_octaves(
     outcome: Outcome, word: str, values: Array, heights: list[Array], others: Array, edges: float
 ) -> None:
     """Add a fault for values that change far more while the height above the horizon halves than while it halves before
-    and after: a power of the height changes alike. The part of pairs that jump at hard ``edges`` elsewhere may do so
-    here."""
+    and after: a power of the height changes alike. Of the pairs, as many may jump as there are hard ``edges`` in a STEP
+    elsewhere."""
     change = _changes(values)
     lit = np.maximum(values[:-1], values[1:]) > 1e-2 * values.max()  # a soft edge may end between two heights
     beside = np.pad(change, ((1, 1), (0, 0)))
     jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
     jump[0] = False  # a highlight may end there: without what lies above, a slope is no jump
-    if (jump.sum(axis=1) > 0.01 * np.maximum(lit.sum(axis=1), 1) + 2 * edges * len(others)).any():
+    usual = 2 * edges * -np.diff(OCTAVES)
+    if (jump.sum(axis=1) > 0.01 * np.maximum(lit.sum(axis=1), 1) + usual).any():
         octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
         upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
         factor = np.exp(change[octave, k])
@@ -335,14 +335,11 @@ def _check_octaves(
         )
 
 
-NORMAL = "the normal"
-
-
 def _crossings(step: float) -> Iterator[tuple[str, list[Array]]]:
     """Yield ``(name, directions)``: one where formulas may break, with neighbours on both sides, near and farther."""
     turns = 0, -step, step, -4 * step, 4 * step
     for phi in (0, 90, 135):
-        yield NORMAL, [direction(turn, phi) for turn in turns]
+        yield "the normal", [direction(turn, phi) for turn in turns]
     for phi in (0, 90, 180, 270):
         yield f"θ = 50°, φ = {phi}°", [direction(50, phi + turn) for turn in turns]
 
