@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..probe.bsdf import BSDFProbe, Part, Samples
-from ..probe.directions import direction, on_side
+from ..probe.directions import direction, on_side, scattered
 from ..probe.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
 from .trial import Trial, Trials, trials_of
@@ -53,8 +53,10 @@ class Run:
         return self._samples[key]
 
     def is_black(self, part: Part) -> bool:
-        """Return whether no sample of a part carries light, so that its density is of no use."""
-        return not any(self.samples(part, incident).lit.any() for incident in self.views(part))
+        """Return whether f of a part is 0 and no sample carries light, so that its density is of no use."""
+        wi, wo = (scattered(1000, seed, part.sides) for seed in (4, 5))
+        lit = (self.samples(part, incident).lit.any() for incident in self.views(part))
+        return not (self.probe.eval(part, wi, wo).any() or any(lit))
 
     # --- Statistical tests ------------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -161,7 +161,7 @@ def _trials(
             for fields in zip(*(np.split(field, len(some) // count) for field in samples), strict=True):
                 yield Samples(*fields)
 
-    def density(of: Array, wo: Array) -> Array:
+    def density(of: Array | int, wo: Array) -> Array:
         return np.nan_to_num(probe.pdf(part, wis[of], wo, uvs[of]))
 
     pilots = [samples.wo[samples.drawn] for samples in drawn(int(count * pilot), 0)]
@@ -178,8 +178,7 @@ def _trials(
         counts = partition.histogram(samples.wo[counted])
         trial = Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once))
         if turn and len(doubtful := trial.doubtful):
-            of = np.zeros(1, int) + k
-            finer = partition.refined(lambda wo, of=of: density(np.repeat(of, len(wo)), wo), doubtful)
+            finer = partition.refined(partial(density, k), doubtful)
             trial = replace(trial, partition=finer)
         found.append(trial)
     return found
