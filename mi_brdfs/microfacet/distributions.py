@@ -8,8 +8,6 @@ t = tan²θ_h, which may depend on ``g`` = 1/((αu cosψ)² + (αv sinψ)²).
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
@@ -51,7 +49,7 @@ class Distribution(Term):
         """The same along a direction, times sin²θ of that."""
         return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
 
-    def estimated_albedo(self, cos: mi.Float) -> Any:
+    def estimated_albedo(self, cos: mi.Float) -> mi.Float:
         """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
         have in the direction of that cosine."""
         r2 = self.mean_square_slope()

@@ -12,6 +12,7 @@ from .facet import Facet
 
 if TYPE_CHECKING:
     from .distributions import Distribution
+    from .fresnel import Dielectric
 
 
 class ForwardDirections:
@@ -33,7 +34,7 @@ class ForwardDirections:
     """The share where they need it most."""
 
     def __init__(
-        self, fresnel: Any, wi: mi.Vector3f, fraction: mi.Float, cos2: mi.Float, slopes2: Any = (1e6, 1e6)
+        self, fresnel: Dielectric, wi: mi.Vector3f, fraction: mi.Float, cos2: mi.Float, slopes2: Any = (1e6, 1e6)
     ) -> None:
         """For what ``fraction`` of the lobe lies there if F = 1, the square of the cosθ_d that is typical of the rest,
         and the squares of typical slopes along u and v."""
@@ -55,7 +56,7 @@ class ForwardDirections:
         self.share = self.LARGEST * self.reflectance / (self.reflectance + rest)
 
     @classmethod
-    def of_facets(cls, fresnel: Any, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections:
+    def of_facets(cls, fresnel: Dielectric, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections:
         x, y = normalize_or(wi.x, wi.y, (1, 0))
         alphas2 = dr.square(distribution.alpha_u), dr.square(distribution.alpha_v)
         along = alphas2[0] * x * x + alphas2[1] * y * y

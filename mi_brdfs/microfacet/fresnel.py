@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import leaving, luminance, safe_sqrt, square
+from ..math import Spectrum, leaving, luminance, safe_sqrt, square
 from .forward import ForwardDirections
 from .term import Term
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 class Fresnel(Term):
     """A Fresnel reflectance, called with the cosine."""
 
-    def __call__(self, cos: Any) -> Any:
+    def __call__(self, cos: mi.Float) -> Spectrum:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
-    def brightness(self, cos: Any) -> Any:
+    def brightness(self, cos: mi.Float) -> mi.Float:
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
 
@@ -33,7 +33,7 @@ class Fresnel(Term):
 class Unit(Fresnel):
     """F = 1."""
 
-    def __call__(self, cos: mi.Float) -> Any:
+    def __call__(self, cos: mi.Float) -> mi.Float:
         return 1.0
 
     brightness = __call__
@@ -42,7 +42,7 @@ class Unit(Fresnel):
 class Schlick(Fresnel):
     """F = f0 + (1 - f0)(1 - cosθ)⁵ (Schlick 1994, doi:10.1111/1467-8659.1330233)."""
 
-    def __init__(self, f0: Any) -> None:
+    def __init__(self, f0: Spectrum) -> None:
         self.f0 = f0
 
     def __call__(self, cos: mi.Float) -> Any:
@@ -61,14 +61,14 @@ class Dielectric(Fresnel):
     LEAST, INSIDE = 0.01, 0.9
     """The least index, which reflects all light, and one that has a derivative."""
 
-    def __init__(self, eta: Any) -> None:
+    def __init__(self, eta: mi.Float) -> None:
         self.eta = eta
 
-    def __call__(self, cos: mi.Float) -> Any:
+    def __call__(self, cos: mi.Float) -> mi.Float:
         return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
 
     @staticmethod
-    def _reflectance(eta: Any, cos: mi.Float) -> Any:
+    def _reflectance(eta: mi.Float, cos: mi.Float) -> mi.Float:
         step = eta * eta - 1
         g2 = step + cos * cos
         total = g2 <= 0
@@ -88,10 +88,10 @@ class Dielectric(Fresnel):
 class Conductor(Fresnel):
     """The exact unpolarized reflectance of a conductor of relative complex index ``eta`` - i ``k``."""
 
-    def __init__(self, eta: Any, k: mi.Float) -> None:
+    def __init__(self, eta: Spectrum, k: Spectrum) -> None:
         self.eta, self.k = eta, k
 
-    def __call__(self, cos: mi.Float) -> Any:
+    def __call__(self, cos: mi.Float) -> Spectrum:
         cos2 = cos * cos
         sin2 = 1 - cos2
         # a + ib = sqrt((η - ik)² - sin²θ)

@@ -51,7 +51,7 @@ class BentLaw:
         _, _, power, self.norm = self._at(1)
         self.lowest = 1 / power
 
-    def _at(self, x: Any) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
+    def _at(self, x: mi.Float) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
         """``(b, r, b³², mass)`` of an m or s: b = 1 + k x, the base r is b or its root, and the mass from 0 to x is not
         normalised."""
         b = 1 + self.k * x
@@ -151,7 +151,7 @@ def root_32(x: mi.Float) -> mi.Float:
 
 def power_32(x: mi.Float) -> tuple[mi.Float, mi.Float]:
     """``(x³², (x³² - 1)/(x - 1))``."""
-    power, quotient = x, 1
+    power, quotient = x, 1.0
     for _ in range(5):
         quotient, power = quotient * (1 + power), power * power
     return power, quotient

@@ -62,7 +62,7 @@ class HalfVectors(Protocol):
     def image(self, facet: Facet) -> Facet:
         """Return the image, whose own image is the facet."""
 
-    def weight(self, facet: Facet) -> Any:
+    def weight(self, facet: Facet) -> mi.Float:
         """Return D over the density, up to a factor that a facet and its image share."""
 
 

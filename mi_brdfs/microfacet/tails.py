@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -96,7 +95,7 @@ class ABC(Isotropic):
 
     long_tailed = True
 
-    def __init__(self, b: mi.Float, c: mi.Float, scale: Any = None) -> None:
+    def __init__(self, b: mi.Float, c: mi.Float, scale: mi.Float | None = None) -> None:
         super().__init__()
         self.law = PowerLaw(b, c)
         cosine_mass = self._cosine_mass()
@@ -119,7 +118,7 @@ class ABC(Isotropic):
     def mean_square_slope(self) -> mi.Float:
         return dr.minimum(2 / (1 + self.law.k * self.law.gamma), 1)
 
-    def estimated_albedo(self, cos: mi.Float) -> Any:
+    def estimated_albedo(self, cos: mi.Float) -> mi.Float:
         return super().estimated_albedo(cos) * self.total
 
     def eval(self, facet: Facet) -> mi.Float:
@@ -247,7 +246,7 @@ class EPD(Isotropic):
         power = dr.exp(dr.minimum(self.gamma * dr.log(dr.maximum(x, 1e-24)), 5))
         return dr.select(x > 1e-24, power, 0)
 
-    def _rest(self, tan2: mi.Float) -> Any:
+    def _rest(self, tan2: mi.Float) -> mi.Float:
         """What D cosθ dω is proportional to, per tan²θ, but for that power."""
         return 1
 
