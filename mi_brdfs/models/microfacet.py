@@ -1,9 +1,13 @@
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from ..lobes import MicrofacetLobe, over_diffuse
+import mitsuba as mi
+
+from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import (
@@ -19,7 +23,7 @@ from ..microfacet.shadowing import (
 )
 from ..microfacet.tails import ABC, EPD, GTR, HemiEPD
 from ..microfacet.term import Term
-from ..model import Energy, Model, full_name
+from ..model import Energy, Model, Values, full_name
 from ..parameters import FresnelSet, Number, OneOf, Parameter, ParameterError, Preset, Reflectance, Rotation
 from ..parameters import fresnel as fresnel_parameters
 from ..parameters.messages import listed
@@ -194,7 +198,7 @@ class Microfacet(Model):
         ],
     )
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         suited = [word for word, it in DISTRIBUTIONS.items() if SHADOWING[self.shadowing].suits(it.distribution)]
         if self.distribution not in suited:
@@ -203,7 +207,7 @@ class Microfacet(Model):
                 f'take it with {listed(suited)}, or another one such as "vcavity".'
             )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = DISTRIBUTIONS[self.distribution].distribution.of_values(vars(p.distribution))
         shadowing = SHADOWING[self.shadowing].make(distribution, **vars(p.shadowing))
         return over_diffuse(
@@ -236,9 +240,9 @@ def add_term(term: type[Term], replace: bool) -> None:
         raise ValueError(f"{name}: a parameter cannot be called {clash}, a parameter of microfacet.")
     choice.add(word, term.parameters)
     BROUGHT[choice.name, word] = term
-    if kind is Distribution:
+    if issubclass(term, Distribution):
         DISTRIBUTIONS[word] = Facets(term, term.parameters)
-    elif kind is Shadowing:
+    elif issubclass(term, Shadowing):
         SHADOWING[word] = Shadows(lambda facets, **values: term.of_values(values), term.parameters)
-    else:
+    elif issubclass(term, Fresnel):
         fresnel_parameters.TERMS[word] = term

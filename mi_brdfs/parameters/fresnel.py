@@ -13,7 +13,7 @@ from ..microfacet.fresnel import Conductor, Dielectric, Fresnel, Schlick, Unit
 from .colours import constant_texture, evaluate_colour, rgb_texture, scaled_colour
 from .groups import OneOf
 from .messages import interval, listed, meant, shown
-from .parameter import Parameter, ParameterRow
+from .parameter import BoundParameters, Parameter, ParameterRow
 from .reader import PropertyReader, Range
 
 OTHERS = OneOf({}, "another Fresnel term").replace(name="fresnel")
@@ -45,7 +45,7 @@ class FresnelSet(Parameter):
 
     word: str | None = None
     """Once bound, the chosen one of these words, if there is one."""
-    own: OneOf
+    own: BoundParameters
     """… and its parameters."""
 
     def __init__(self) -> None:
@@ -70,7 +70,7 @@ class FresnelSet(Parameter):
                 raise reader.error(other, f"needs {OTHERS.name} beside it, which is {words}")
             own = OTHERS.bind(reader)
             word = own.chosen[own.name]
-            return self.replace(own=own, word=word, textures=own.textures, ranges=own.ranges, chosen=own.chosen)
+            return self.replace(own=own.own, word=word, textures=own.textures, ranges=own.ranges, chosen=own.chosen)
         ranges = {name: limits for name, limits in self.RANGES.items() if name in textures}
         return self.replace(textures=textures, ranges=ranges)
 
@@ -129,7 +129,7 @@ class FresnelSet(Parameter):
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Fresnel:
         if self.word:
-            return TERMS[self.word].of_values(vars(self.own.evaluate(si, active)))
+            return TERMS[self.word].of_values(self.own.evaluate(si, active))
 
         def colour(name: str) -> mi.UnpolarizedSpectrum:
             return clamp(evaluate_colour(self.textures, name, si, active), *self.RANGES[name])
@@ -146,7 +146,7 @@ class FresnelSet(Parameter):
         return Unit()
 
     def placeholder(self) -> Fresnel:
-        return TERMS[self.word].of_values(vars(self.own.placeholder())) if self.word else Unit()
+        return TERMS[self.word].of_values(self.own.placeholders()) if self.word else Unit()
 
     def rows(self) -> list[ParameterRow]:
         index, extinction = interval(*self.INDEX), interval(*self.EXTINCTION)
