@@ -11,11 +11,14 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+Spectrum: TypeAlias = "mi.UnpolarizedSpectrum | mi.Float"
+"""A colour, or what is the same in all of its channels."""
 
 ONE_MINUS_EPSILON = 1 - 2**-24
 """The largest float32 below one: uniform variates are clamped to it."""

@@ -24,6 +24,9 @@ others is 0; parameters not named take all values in their range."""
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
 
+Values = SimpleNamespace
+"""The values of the declared parameters at a surface point, by name."""
+
 
 class Energy(NamedTuple):
     """The largest directional albedos of a model, at angles up to 89.9°, rounded up to three digits, as
@@ -114,9 +117,9 @@ class Plugin:
         members = {name: value for base in reversed(cls.__mro__) for name, value in vars(base).items()}
         return [value for value in members.values() if isinstance(value, Parameter)]
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Values:
         """Return the values of the parameters at a surface interaction, except for choices."""
-        return SimpleNamespace(**self.parameters.evaluate(si, active))
+        return Values(**self.parameters.evaluate(si, active))
 
     def described(self) -> str:
         """Return the class and the parameters, in the style of Mitsuba's plugins."""
@@ -160,7 +163,7 @@ class Model(Plugin):
     signed = False
     """Whether channels may be negative, of colours outside sRGB, as the page must then say."""
 
-    def lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         """Return the model's lobes at a surface point, where ``p`` holds the values of the declared parameters. Their
         number and kinds depend only on the model's choices and on which parameters are given."""
         raise NotImplementedError(f"{type(self).__name__} does not define lobes.")
@@ -206,9 +209,9 @@ class Model(Plugin):
         where = f" in channel {sums.index(max(sums)) + 1}" if max(sums) - min(sums) > 1e-3 else ""
         return f"{' + '.join(added)} = {max(sums):.4g}{where}, but energy is conserved only up to 1"
 
-    def placeholders(self) -> SimpleNamespace:
+    def placeholders(self) -> Values:
         """Return stand-ins for these values, to find out which lobes the model has."""
-        return SimpleNamespace(**self.parameters.placeholders())
+        return Values(**self.parameters.placeholders())
 
     @classmethod
     def manual(cls) -> str:

@@ -98,8 +98,8 @@ def _literal(texture: mi.Texture) -> Any:
     """Return a texture as a plugin dict has it: a number, an rgb colour, or itself."""
     params = mi.traverse(texture)
     value = params.get("value")
-    if isinstance(value, mi.Float) and len(value) == 1:
-        return float(value[0])
+    if isinstance(value, mi.Float) and np.size(value) == 1:
+        return float(np.ravel(value)[0])
     if isinstance(value, mi.Color3f) and mi.is_rgb:
         return {"type": "rgb", "value": [float(channel[0]) for channel in value]}
     return texture

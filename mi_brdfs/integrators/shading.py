@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import clamp, select
+from ..math import Spectrum, clamp, select
 from ..model import Plugin
 from ..parameters import Choice, Colour, Flag, ParameterError, PropertyReader
 from ..parameters.messages import listed
@@ -89,17 +91,19 @@ class Shading(Plugin):
     clamp = Flag(True, "whether values above 1 are cut off")
     tonemap = Choice(("none", "reinhard"), "tone mapping of a pixel, before the clamp")
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.warned = False
 
-    def shade(self, scene, sampler, ray, active):
+    def shade(self, scene: mi.Scene, sampler: mi.Sampler, ray: mi.Ray3f, active: mi.Bool) -> tuple[Spectrum, mi.Float]:
         """Return ``(radiance, opacity)`` along a ray: the formula above for the first surface and those seen through
         it, and how much they hide of what is behind. An environment hides everything."""
         self._check(scene)
         spectrum, veils = mi.UnpolarizedSpectrum, may_pass(scene)
 
-        def layer(sampler, ray, radiance, through, active):
+        def layer(
+            sampler: mi.Sampler, ray: mi.Ray3f, radiance: Spectrum, through: Spectrum, active: mi.Bool
+        ) -> tuple[Any, ...]:
             si = scene.ray_intersect(ray, active)
             hit = select(si.is_valid(), active, False)
             here = self._seen(scene, sampler, si, hit, active, veils)
@@ -112,15 +116,16 @@ class Shading(Plugin):
         _, _, radiance, through, _ = dr.while_loop(state, lambda *state: state[-1], layer) if veils else layer(*state)
         return radiance, mi.Float(1) if scene.environment() is not None else 1 - dr.max(through)
 
-    def finish(self, colour):
+    def finish(self, colour: Spectrum) -> Spectrum:
         """Return the final colour of a pixel."""
         if self.tonemap == "reinhard":
             colour = colour / (1 + colour)
         return clamp(colour, 0, 1) if self.clamp else colour
 
-    def _check(self, scene):
+    def _check(self, scene: mi.Scene) -> None:
         """Raise if there is nothing to shade with, and warn once about BSDFs without mirror reflectance."""
-        if not scene.emitters() and self.parameters["ambient"].dark:
+        ambient = self.parameters["ambient"]
+        if not scene.emitters() and isinstance(ambient, Radiance) and ambient.dark:
             raise ParameterError("shading: the scene has no light; add an emitter to it, or give ambient.")
         if self.environment_reflection and scene.environment() is None:
             raise ParameterError("shading: environment_reflection needs an environment; add an envmap or constant.")
@@ -135,7 +140,15 @@ class Shading(Plugin):
                     stacklevel=2,
                 )
 
-    def _seen(self, scene, sampler, si, hit, active, veils):
+    def _seen(
+        self,
+        scene: mi.Scene,
+        sampler: mi.Sampler,
+        si: mi.SurfaceInteraction3f,
+        hit: mi.Bool,
+        active: mi.Bool,
+        veils: bool,
+    ) -> Spectrum:
         """Return the radiance of an intersection, or of the environment: emitted and reflected."""
         colour = mi.UnpolarizedSpectrum(0)
         emitter = si.emitter(scene, active)
@@ -145,7 +158,9 @@ class Shading(Plugin):
             colour += select(hit, self._reflected(scene, sampler, si, hit, veils), 0)
         return colour
 
-    def _reflected(self, scene, sampler, si, hit, veils):
+    def _reflected(
+        self, scene: mi.Scene, sampler: mi.Sampler, si: mi.SurfaceInteraction3f, hit: mi.Bool, veils: bool
+    ) -> Spectrum:
         bsdf = si.bsdf()
         colour = self.evaluate(si, hit).ambient * of_each(diffuse_reflectance, bsdf, si, hit)
         mirrored = mi.Bool(False)
@@ -171,7 +186,7 @@ class Shading(Plugin):
             colour += select(lit, value * (dr.pi if self.pi_folded else 1), mi.UnpolarizedSpectrum(0))
         return colour
 
-    def _place(self, light, sampler) -> mi.Point2f:
+    def _place(self, light: mi.Emitter, sampler: mi.Sampler) -> mi.Point2f:
         """Return the sample with which to sample a light's direction."""
         flags = mi.EmitterFlags
         if mi.has_flag(light.flags(), flags.DeltaPosition) or mi.has_flag(light.flags(), flags.DeltaDirection):
@@ -194,7 +209,7 @@ CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
 # --- Occlusion ---------------------------------------------------------------------------------------------
 
 
-def ray_to(light, si, ds):
+def ray_to(light: mi.Emitter, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f) -> mi.Ray3f:
     """Return the ray from a surface to a light, sampled as ``ds``."""
     # Nothing lies beyond these; and their position is unknown if Mitsuba lost the scene's bounds, as when it merges
     # rectangles.
@@ -202,10 +217,12 @@ def ray_to(light, si, ds):
     return si.spawn_ray(ds.d) if infinite else si.spawn_ray_to(ds.p)
 
 
-def straight_through(scene, si, ds, light, active):
+def straight_through(
+    scene: mi.Scene, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f, light: mi.Emitter, active: mi.Bool
+) -> Spectrum:
     """Return the fraction of a light that the surfaces between it and ``si`` let straight through."""
 
-    def step(ray, through, active):
+    def step(ray: mi.Ray3f, through: Spectrum, active: mi.Bool) -> tuple[Any, ...]:
         met = scene.ray_intersect(ray, active)
         active = select(met.is_valid(), active, False)
         through = mi.UnpolarizedSpectrum(select(active, through * null_transmission(met, active), through))
@@ -215,13 +232,13 @@ def straight_through(scene, si, ds, light, active):
     return dr.while_loop(state, lambda *state: state[-1], step)[1]
 
 
-def null_transmission(si, active):
+def null_transmission(si: mi.SurfaceInteraction3f, active: mi.Bool) -> Spectrum:
     if active is False:  # there may be no BSDF
         return mi.UnpolarizedSpectrum(0)
     return mi.unpolarized_spectrum(si.bsdf().eval_null_transmission(si, active))
 
 
-def may_pass(scene) -> bool:
+def may_pass(scene: mi.Scene) -> bool:
     """Return whether light may pass straight through some surface: always in scalar variants, which can ask each
     surface."""
     if is_scalar():
@@ -229,7 +246,7 @@ def may_pass(scene) -> bool:
     return any(mi.has_flag(it.flags(), mi.BSDFFlags.Null) for it in bsdfs_of(scene))
 
 
-def bsdfs_of(scene) -> list:
+def bsdfs_of(scene: mi.Scene) -> list[Any]:
     """Return the BSDFs of a scene's shapes, including those in shape groups."""
     shapes = [it for it in children(scene) if isinstance(it, mi.Shape)]
     grouped = [it for shape in shapes for it in children(shape) if isinstance(it, mi.Shape)]
@@ -239,12 +256,12 @@ def bsdfs_of(scene) -> list:
 # --- Reflectances ---------------------------------------------------------------------------------------------
 
 
-def of_each(function, bsdf, si, active):
+def of_each(function: Callable[..., Any], bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
     """Return ``function(bsdf, si, active)``, where vectorized variants have many BSDFs at once."""
     return function(bsdf, si, active) if isinstance(bsdf, mi.BSDF) else dr.dispatch(bsdf, function, si, active)
 
 
-def diffuse_reflectance(bsdf, si, active):
+def diffuse_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Spectrum:
     """Return k_a: for our BSDFs, also in ``twosided``, from their diffuse lobes, as their ``eval_diffuse_reflectance``
     includes the others."""
     if not mirrors(bsdf):
@@ -258,7 +275,7 @@ def diffuse_reflectance(bsdf, si, active):
     return dr.pi * mi.unpolarized_spectrum(bsdf.eval(only_diffuse(), upright, normal, active))
 
 
-def mirror_reflectance(bsdf, si, active):
+def mirror_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Spectrum, mi.Bool]:
     """Return ``(ρ_m, known)``, zero for a BSDF that does not know its own."""
     total = mi.UnpolarizedSpectrum(0)
     inner = mirrors(bsdf)
@@ -271,7 +288,7 @@ def mirror_reflectance(bsdf, si, active):
     return mi.UnpolarizedSpectrum(total), mi.Bool(True)
 
 
-def mirrors(bsdf) -> list:
+def mirrors(bsdf: mi.BSDF) -> list[Any]:
     """Return our BSDFs that make up a BSDF, front side first: itself, or those in ``twosided``."""
     inner = [bsdf]
     if bsdf.class_name() == "TwoSidedBRDF":
@@ -279,21 +296,21 @@ def mirrors(bsdf) -> list:
     return inner if all(hasattr(it, "mirror_reflectance") for it in inner) else []
 
 
-def only_diffuse():
+def only_diffuse() -> mi.BSDFContext:
     ctx = mi.BSDFContext()
     ctx.type_mask = mi.BSDFFlags.DiffuseReflection
     return ctx
 
 
-def children(parent) -> list:
+def children(parent: mi.Object) -> list[Any]:
     """Return the objects in another."""
 
     class Collector(mi.TraversalCallback):
-        def __init__(self):
+        def __init__(self) -> None:
             mi.TraversalCallback.__init__(self)
-            self.objects = []
+            self.objects: list[Any] = []
 
-        def put(self, name, value, flags, cpptype=None):
+        def put(self, name: str, value: Any, flags: int, cpptype: Any = None) -> None:
             if isinstance(value, mi.Object):
                 self.objects.append(value)
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, TINY, choose, normalize_or, safe_sqrt
+from ..math import EPSILON, TINY, Spectrum, choose, normalize_or, safe_sqrt
 from .lobe import AdjointLobe, Lobe
 
 
@@ -16,13 +14,13 @@ class LambertLobe(Lobe):
 
     glossy = False
 
-    def __init__(self, reflectance: Any) -> None:
+    def __init__(self, reflectance: Spectrum) -> None:
         self.reflectance = reflectance
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.reflectance
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         pdf = wo.z * dr.inv_pi
         return self.reflectance * pdf, pdf
 
@@ -30,7 +28,7 @@ class LambertLobe(Lobe):
         return mi.warp.square_to_cosine_hemisphere(v)
 
 
-def over_diffuse(reflectance: Any, *lobes: Lobe) -> tuple[Lobe, ...]:
+def over_diffuse(reflectance: Spectrum | None, *lobes: Lobe) -> tuple[Lobe, ...]:
     """Return lobes over a diffuse one, if its reflectance was given."""
     return lobes if reflectance is None else (LambertLobe(reflectance), *lobes)
 
@@ -52,7 +50,7 @@ class ZonalLobe(Lobe):
     def adjoint(self) -> Lobe:
         return self if self.reciprocal else AdjointZonalLobe(self)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         pdf = self.density(wo.z) * dr.inv_two_pi
         return self.estimated_albedo(wi) * pdf, pdf
 
@@ -72,10 +70,10 @@ class AdjointZonalLobe(AdjointLobe):
         """Return π times the response of a lobe of albedo 1 to light from ``wi``."""
         return 0.5 * self.lobe.density(self._mirrored(wi).z) / dr.maximum(wi.z, EPSILON)
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.lobe.estimated_albedo(mi.Vector3f(0, 0, 1)) * self._radiance(wi)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         viewer = self._mirrored(wo)
         pdf = viewer.z * dr.inv_pi
         return self.lobe.estimated_albedo(viewer) * (self._radiance(wi) * pdf), pdf
@@ -97,10 +95,10 @@ class RoughDiffuseLobe(Lobe):
 
     glossy = False
 
-    def __init__(self, reflectance: Any, retro: mi.Float) -> None:
+    def __init__(self, reflectance: Spectrum, retro: mi.Float) -> None:
         self.reflectance, self.retro = reflectance, retro
 
-    def eval(self, wi: mi.Vector3f, wo: mi.Vector3f) -> Any:
+    def eval(self, wi: mi.Vector3f, wo: mi.Vector3f) -> Spectrum:
         """Return f."""
         raise NotImplementedError
 
@@ -122,7 +120,7 @@ class RoughDiffuseLobe(Lobe):
         # The clipping below needs d <= 0; the fit exceeds that by 0.003 near normal incidence.
         return a, b, c, dr.minimum(d, 0)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         a, b, c, d = self._matrix(wi)
         x, y = normalize_or(wi.x, wi.y, (1, 0))
         along, across = x * wo.x + y * wo.y, x * wo.y - y * wo.x

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON
+from ..math import EPSILON, Spectrum
 
 
 class Lobe:
@@ -16,8 +15,8 @@ class Lobe:
 
     Directions are unit vectors of the local frame (n = z) that point away from the surface: ``wi`` is the given one
     (towards the viewer, in Mitsuba's radiance transport), ``wo`` the sampled one. The caller guarantees wi.z > 0 and,
-    in :meth:`eval_pdf`, wo.z > 0, or wo.z < 0 if the lobe transmits, so a lobe needs no masks. Colours are
-    ``mi.UnpolarizedSpectrum`` or floats, densities are per solid angle of ``wo``.
+    in :meth:`eval_pdf`, wo.z > 0, or wo.z < 0 if the lobe transmits, so a lobe needs no masks. Densities are per
+    solid angle of ``wo``.
     """
 
     glossy = True
@@ -32,12 +31,12 @@ class Lobe:
     transmits = False
     """Whether the light comes from the other side of the surface."""
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         """Return an estimate of ∫ f |cosθ_o| dω_o. It decides the choice among lobes and the albedo AOV, so it need not
         be exact, but it must be positive wherever the lobe reflects anything."""
         raise NotImplementedError(f"{type(self).__name__} does not define estimated_albedo.")
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         """Return ``(value, pdf)``: f |cosθ_o|, and the density with which :meth:`sample` draws ``wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define eval_pdf.")
 
@@ -54,7 +53,7 @@ class Lobe:
         The default is sampled like the lobe itself; override it if that misses directions."""
         return self if self.reciprocal else AdjointLobe(self)
 
-    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         """Return the lobe's colour times its Fresnel reflectance for the mirror direction of ``wi``, regardless of its
         width and scale: its reflectance as a mirror. It is 0 for diffuse lobes."""
         return 0
@@ -68,10 +67,10 @@ class AdjointLobe(Lobe):
     def __init__(self, lobe: Lobe) -> None:
         self.lobe, self.glossy, self.transmits = lobe, lobe.glossy, lobe.transmits
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.lobe.estimated_albedo(wi)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))
         _, pdf = self.lobe.eval_pdf(wi, wo)
         return value * (abs(wo.z) / dr.maximum(wi.z, EPSILON)), pdf
@@ -87,20 +86,22 @@ class WeightedLobe(Lobe):
     """A lobe times g(wi, wo) = g(wo, wi), sampled like the lobe: the weight is g times the lobe's. ``mean(wi)``
     approximates the mean of g over ``wo``."""
 
-    def __init__(self, lobe: Lobe, g: Callable[[Any, Any], Any], mean: Callable[[Any], Any]) -> None:
+    def __init__(
+        self, lobe: Lobe, g: Callable[[mi.Vector3f, mi.Vector3f], Spectrum], mean: Callable[[mi.Vector3f], Spectrum]
+    ) -> None:
         self.lobe, self.g, self.mean = lobe, g, mean
         self.glossy, self.reciprocal = lobe.glossy, lobe.reciprocal
         self.anisotropic, self.transmits = lobe.anisotropic, lobe.transmits
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.lobe.estimated_albedo(wi) * self.mean(wi)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         value, pdf = self.lobe.eval_pdf(wi, wo)
         return value * self.g(wi, wo), pdf
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.lobe.sample(wi, u, v)
 
-    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.lobe.mirror_reflectance(wi) * self.mean(wi)

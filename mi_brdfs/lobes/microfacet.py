@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, safe_sqrt
+from ..math import EPSILON, Spectrum, safe_sqrt
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.sampling import Mixture
 from ..microfacet.shadowing import Shadowing
@@ -35,13 +33,13 @@ class MicrofacetLobe(Lobe):
     """and for a shadowing term that does not lean."""
 
     def __init__(
-        self, colour: Any, distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel, scale: Any = 1
+        self, colour: Spectrum, distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel, scale: mi.Float = 1
     ) -> None:
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
         self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         """Return an estimate from F, D and G at a typical facet.
 
         At grazing angles the visible facets lean towards the viewer: F is evaluated at a cosine larger than cosθ_i, and
@@ -74,7 +72,7 @@ class MicrofacetLobe(Lobe):
             fresnel += forward.reflectance
         return self.reflectance * (fresnel * seen)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         facet = Facet.between(wi, wo)
         return self._eval(facet), self._sampler(wi).pdf(facet)
 
@@ -86,13 +84,13 @@ class MicrofacetLobe(Lobe):
         forward = self.fresnel.forward(self.distribution, wi)
         return sampler if forward is None else Mixture(sampler, forward, forward.share)
 
-    def _eval(self, facet: Facet) -> Any:
+    def _eval(self, facet: Facet) -> Spectrum:
         """Return f cosθ_o."""
         # The last factor is the same for all facets of wi, so Dr.Jit computes it once.
         facets = self.distribution.eval(facet) * self.shadowing(facet) * (0.25 / facet.cos_i)
         return self.reflectance * (self.fresnel(facet.cos_d) * facets)
 
-    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.colour * self.fresnel(wi.z)
 
     def _reflect(self, facet: Facet) -> mi.Float:

@@ -33,12 +33,12 @@ class Mixture:
 
     def eval_pdf(self, wo: mi.Vector3f, transmitted: bool) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
         """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
-        total, density = 0, 0
+        total, density = mi.UnpolarizedSpectrum(0), 0.0
         for probability, lobe in zip(self.probabilities, self.lobes, strict=True):
             if lobe.transmits == transmitted:
                 value, pdf = lobe.eval_pdf(self.wi, wo)
                 total, density = total + value, density + probability * pdf
-        return mi.UnpolarizedSpectrum(total), density
+        return total, density
 
     def sample(self, u: mi.Float, v: mi.Point2f) -> tuple[mi.Vector3f, mi.UInt32]:
         """Return ``(wo, k)``: a direction and the index of the lobe that it was drawn from."""

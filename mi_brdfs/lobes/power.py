@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, ONE_MINUS_EPSILON, TINY, choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
+from ..math import EPSILON, ONE_MINUS_EPSILON, TINY, Spectrum, choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
 from .lobe import Lobe
 
 
@@ -46,17 +44,17 @@ class AxisFrame:
 class MirrorLobe(Lobe):
     """A lobe of scale·max(0, A)ⁿ around the mirror direction."""
 
-    def __init__(self, reflectance: Any, exponent: mi.Float, scale: Any) -> None:
+    def __init__(self, reflectance: Spectrum, exponent: mi.Float, scale: Spectrum) -> None:
         self.reflectance, self.exponent, self.scale = reflectance, exponent, scale
 
     def frame(self, wi: mi.Vector3f) -> AxisFrame:
         return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
 
-    def peak(self, wi: mi.Vector3f) -> Any:
+    def peak(self, wi: mi.Vector3f) -> Spectrum:
         """Return the scale for ``wi``."""
         return self.scale
 
-    def mirror_reflectance(self, wi: mi.Vector3f) -> Any:
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         log_a, _, inside = self.frame(wi).cosine(mi.Vector3f(-wi.x, -wi.y, wi.z))
         relative = dr.select(inside, dr.exp(self.exponent * log_a), 0) * self.peak(wi) / self.scale
         return self.reflectance * relative
@@ -85,13 +83,13 @@ class PowerLobe(MirrorLobe):
         axial, lateral = self._masses(frame)
         return axial / dr.maximum(axial + lateral, EPSILON)  # both are zero for an axis straight below the surface
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         # Exact for an axis along the normal or in the horizon.
         axial, lateral = self._masses(self.frame(wi))
         mass = dr.sqrt(axial * axial + lateral * lateral)
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 2) * mass)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         n, frame = self.exponent, self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(n * log_a), 0)
@@ -145,12 +143,12 @@ class PowerResponseLobe(MirrorLobe):
 
     reciprocal = False
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         # The tanh estimates the fraction above the horizon, within 0.12.
         visible = 0.5 + 0.5 * dr.tanh(wi.z * dr.sqrt(self.exponent + 1))
         return self.reflectance * (self.peak(wi) * dr.two_pi / (self.exponent + 1) * visible)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         frame = self.frame(wi)
         log_a, versine, inside = frame.cosine(wo)
         power = dr.select(inside, dr.exp(self.exponent * log_a), 0)

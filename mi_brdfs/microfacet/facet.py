@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -14,10 +14,10 @@ from ..math import SMALL, normalize_or, select
 class Cosines(NamedTuple):
     """The cosines of a facet, without directions, for estimates."""
 
-    cos_i: Any
-    cos_o: Any
-    cos_h: Any
-    cos_d: Any
+    cos_i: mi.Float
+    cos_o: mi.Float
+    cos_h: mi.Float
+    cos_d: mi.Float
 
     @classmethod
     def leaning(cls, cos_i: mi.Float, sin_i: mi.Float, slope: mi.Float) -> Cosines:
@@ -32,10 +32,10 @@ class Facet:
     """A reflection of ``wi`` into ``wo`` at a facet with the normal ``h``, the half vector. The cosines (n·wi), (n·wo),
     (n·h) and (wi·h) = (wo·h) are written cosθ_i, cosθ_o, cosθ_h and cosθ_d."""
 
-    wi: Any
-    wo: Any
-    h: Any
-    cos_d: Any
+    wi: mi.Vector3f
+    wo: mi.Vector3f
+    h: mi.Vector3f
+    cos_d: mi.Float
 
     @classmethod
     def between(cls, wi: mi.Vector3f, wo: mi.Vector3f) -> Facet:

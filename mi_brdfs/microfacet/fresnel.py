@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import leaving, luminance, safe_sqrt, square
+from ..math import Spectrum, leaving, luminance, safe_sqrt, square
 from ..parameters import Colour, ConductorName, FresnelSet, Index, Reflectance
 from .forward import ForwardDirections
 from .terms import Distribution, Fresnel
@@ -19,7 +19,7 @@ class Unit(Fresnel):
 
     word = "none"
 
-    def __call__(self, cos: mi.Float) -> Any:
+    def __call__(self, cos: mi.Float) -> mi.Float:
         return 1.0
 
     brightness = __call__
@@ -33,7 +33,7 @@ class Schlick(Fresnel):
         "f0": Reflectance(None, "Schlick's approximation with this reflectance at normal incidence", role="fresnel"),
     }
 
-    def __init__(self, f0: Any) -> None:
+    def __init__(self, f0: Spectrum) -> None:
         self.f0 = f0
 
     def __call__(self, cos: mi.Float) -> Any:
@@ -57,18 +57,18 @@ class Dielectric(Fresnel):
     LEAST, INSIDE = 0.01, 0.9
     """The least index, which reflects all light, and one that has a derivative."""
 
-    def __init__(self, eta: Any) -> None:
+    def __init__(self, eta: mi.Float) -> None:
         self.eta = eta
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any]) -> Dielectric:
         return cls(values["int_ior"] / values["ext_ior"])
 
-    def __call__(self, cos: mi.Float) -> Any:
+    def __call__(self, cos: mi.Float) -> mi.Float:
         return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
 
     @staticmethod
-    def _reflectance(eta: Any, cos: mi.Float) -> Any:
+    def _reflectance(eta: mi.Float, cos: mi.Float) -> mi.Float:
         step = eta * eta - 1
         g2 = step + cos * cos
         total = g2 <= 0
@@ -96,10 +96,10 @@ class Conductor(Fresnel):
         "k": Colour(None, RANGES["k"], "its extinction coefficient k, relative to the exterior"),
     }  # fmt: skip
 
-    def __init__(self, eta: Any, k: mi.Float) -> None:
+    def __init__(self, eta: Spectrum, k: Spectrum) -> None:
         self.eta, self.k = eta, k
 
-    def __call__(self, cos: mi.Float) -> Any:
+    def __call__(self, cos: mi.Float) -> Spectrum:
         cos2 = cos * cos
         sin2 = 1 - cos2
         # a + ib = sqrt((η - ik)² - sin²θ)
@@ -127,7 +127,7 @@ class NamedConductor(Conductor):
     parameters = {"material": ConductorName(Conductor.RANGES, "a conductor by name; none means F = 1")}
 
     @classmethod
-    def of_values(cls, values: Mapping[str, Any]) -> Fresnel:  # type: ignore[override]
+    def of_values(cls, values: Mapping[str, Any]) -> Any:
         return Conductor(*values["material"]) if values["material"] else Unit()
 
 

@@ -43,7 +43,7 @@ def root_32(x: mi.Float) -> mi.Float:
 
 def power_32(x: mi.Float) -> tuple[mi.Float, mi.Float]:
     """``(x³², (x³² - 1)/(x - 1))``."""
-    power, quotient = x, 1
+    power, quotient = x, 1.0
     for _ in range(5):
         quotient, power = quotient * (1 + power), power * power
     return power, quotient

@@ -145,7 +145,7 @@ class SmithOfDistribution(Shadowing):
         return distribution.smith is not Distribution.smith
 
     @classmethod
-    def of_values(cls, values: Mapping[str, Any], distribution: Distribution) -> Shadowing:  # type: ignore[override]
+    def of_values(cls, values: Mapping[str, Any], distribution: Any = None) -> Any:
         return distribution.smith(cls.correlated)
 
 
@@ -172,7 +172,7 @@ class SchlickSmith(Shadowing):
         return distribution.roughness is not Distribution.roughness
 
     @classmethod
-    def of_values(cls, values: Mapping[str, Any], distribution: Distribution) -> Shadowing:  # type: ignore[override]
+    def of_values(cls, values: Mapping[str, Any], distribution: Any = None) -> Any:
         return cls(math.sqrt(2 / math.pi) * distribution.roughness())
 
     def __call__(self, facet: Facet | Cosines) -> mi.Float:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 import drjit as dr
 import mitsuba as mi
 
-from ..math import luminance
+from ..math import Spectrum, luminance
 from ..parameters import Parameter
 from .facet import Facet
 
@@ -63,7 +63,7 @@ class Distribution(Term):
         """The same along a direction, times sin²θ of that."""
         return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
 
-    def estimated_albedo(self, cos: mi.Float) -> Any:
+    def estimated_albedo(self, cos: mi.Float) -> mi.Float:
         """An estimate, to some 20 %, of the albedo that facets with F = 1 and a shadowing term that conserves energy
         have in the direction of that cosine."""
         r2 = self.mean_square_slope()
@@ -113,10 +113,10 @@ class Isotropic(Distribution):
 class Fresnel(Term):
     """A Fresnel reflectance, called with the cosine."""
 
-    def __call__(self, cos: Any) -> Any:
+    def __call__(self, cos: mi.Float) -> Spectrum:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
-    def brightness(self, cos: Any) -> Any:
+    def brightness(self, cos: mi.Float) -> mi.Float:
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
 
@@ -149,5 +149,5 @@ class HalfVectors(Protocol):
     def image(self, facet: Facet) -> Facet:
         """Return the image, whose own image is the facet."""
 
-    def weight(self, facet: Facet) -> Any:
+    def weight(self, facet: Facet) -> mi.Float:
         """Return D over the density, up to a factor that a facet and its image share."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import drjit as dr
@@ -10,7 +9,7 @@ import mitsuba as mi
 
 from ..lobes import Lobe, Mixture
 from ..math import clamp, select
-from ..model import Model, warn_once
+from ..model import Model, Values, warn_once
 from ..parameters.colours import evaluate_colour
 from ..variants import is_scalar
 
@@ -65,7 +64,7 @@ class ModelBSDF:
 
     # --- Evaluation and sampling ------------------------------------------------------------------------------------
 
-    def _lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
+    def _lobes(self, p: Values) -> tuple[Lobe, ...]:
         """Return the model's lobes, which must be of the kinds that the components were made for."""
         name, lobes = type(self.model).__name__, self.model.lobes(p)
         if isinstance(lobes, Lobe) or not all(isinstance(lobe, Lobe) for lobe in lobes):
@@ -119,10 +118,10 @@ class ModelBSDF:
         return value, pdf
 
     def _sample(
-        self, valid: mi.Bool, mixture: Mixture, components: list[int], frame: LobeFrame, sample1: Any, sample2: Any
+        self, valid: mi.Bool, mixture: Mixture, components: list[int], frame: LobeFrame, u: mi.Float, v: mi.Point2f
     ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
         bs = mi.BSDFSample3f()
-        wo, index = mixture.sample(sample1, sample2)
+        wo, index = mixture.sample(u, v)
         wo = frame.to_world(wo)
         if dr.is_diff_v(mi.Float) and dr.grad_enabled(wo):
             # Differentiate the estimator f/pdf of a fixed direction, not the direction: then an unbiased gradient needs
@@ -243,7 +242,7 @@ class LobeFrame:
     (cosine, sine), or None; and mirrored at the surface in the lanes where wi comes from behind, or None if there are
     none."""
 
-    def __init__(self, cos_sin: Any, mirrored: Any = None) -> None:
+    def __init__(self, cos_sin: tuple[mi.Float, mi.Float] | None, mirrored: mi.Bool | None = None) -> None:
         self.cos_sin, self.mirrored = cos_sin, mirrored
 
     def mirror(self, w: mi.Vector3f) -> mi.Vector3f:

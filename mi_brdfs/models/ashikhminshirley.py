@@ -1,10 +1,12 @@
+from __future__ import annotations
+
 import mitsuba as mi
 
-from ..lobes import LambertLobe, MicrofacetLobe, WeightedLobe
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
 from ..microfacet.distributions import AshikhminShirleyNormals
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import AshikhminShirleyShadowing
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Number, Reflectance, Rotation
 
 
@@ -50,7 +52,7 @@ class AshikhminShirley(Model):
 
     energy = Energy(0.509, [({}, 1), ({"diffuse_reflectance": 1.0}, 1)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         specular = MicrofacetLobe(
             mi.UnpolarizedSpectrum(1),
             AshikhminShirleyNormals(*p.exponent),
@@ -65,7 +67,7 @@ class AshikhminShirley(Model):
         return diffuse, specular
 
 
-def darkening(cos):
+def darkening(cos: mi.Float) -> mi.Float:
     """1-(1-cosθ/2)⁵."""
     m = 1 - 0.5 * cos
     m2 = m * m

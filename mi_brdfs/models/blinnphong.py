@@ -1,10 +1,14 @@
-import drjit as dr
+from __future__ import annotations
 
-from ..lobes import LambertLobe, MicrofacetLobe
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe
 from ..microfacet.distributions import Blinn
+from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, Shadowing
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Preset, Reflectance
 
 
@@ -67,7 +71,7 @@ class BlinnPhong(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         n = p.exponent
         scale = {
             "energy": lambda: (n + 2) * (n + 4) / (8 * dr.pi * (dr.exp2(-0.5 * n) + n)),
@@ -89,5 +93,5 @@ class ResponseShadowing(Shadowing):
     favours_steep = True
     reciprocal = False
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return facet.cos_i

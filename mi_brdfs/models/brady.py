@@ -1,11 +1,15 @@
-import drjit as dr
+from __future__ import annotations
 
-from ..lobes import LambertLobe, MicrofacetLobe
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe
 from ..math import EPSILON
 from ..microfacet.distributions import EPD
+from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Colour, Number, Reflectance
 
 
@@ -55,7 +59,7 @@ class Brady(Model):
 
     energy = Energy(0.56, [({"normalization": "unit"}, 1), ({"normalization": "none"}, 1.13)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")
         specular = MicrofacetLobe(p.specular_reflectance, distribution, Projected(), Schlick(p.f0))
         return LambertLobe(p.diffuse_reflectance), specular
@@ -66,27 +70,27 @@ class Projected(Shadowing):
 
     lean = 1
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return facet.cos_i * facet.cos_o / facet.cos_d
 
 
 class Exponential(EPD):
     """D = K exp(-(tan²θ_h/α²)ᵞ), without the EPD's 1/cos⁴θ_h."""
 
-    def __init__(self, alpha, gamma, unit):
+    def __init__(self, alpha: mi.Float, gamma: mi.Float, unit: bool) -> None:
         super().__init__(alpha, gamma)
         if not unit:
             self.scale = 1
 
-    def _limited(self, tan2):
+    def _limited(self, tan2: mi.Float) -> mi.Float:
         return tan2 / (1 + tan2)
 
-    def _rest(self, tan2):
+    def _rest(self, tan2: mi.Float) -> mi.Float:
         return 1 / dr.square(1 + tan2)
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         return self.scale * dr.exp(-self._power(facet.sin2_h / dr.maximum(dr.square(facet.cos_h), EPSILON)))
 
-    def estimated_albedo(self, cos):
+    def estimated_albedo(self, cos: mi.Float) -> mi.Float:
         """∫ D cosθ_h dω_h, as the ramps have it."""
         return self.scale * dr.pi * self.ramps.total

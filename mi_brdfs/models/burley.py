@@ -1,14 +1,16 @@
+from __future__ import annotations
+
 import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe
 from ..lobes.power import AxisFrame
-from ..math import EPSILON, SMALL, TINY, choose, clamp, luminance, safe_sqrt, square
+from ..math import EPSILON, SMALL, TINY, Spectrum, choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.shadowing import Shadowing, SmithGGX
-from ..model import Energy, Model
+from ..microfacet.shadowing import Shadowing
+from ..model import Energy, Model, Values
 from ..parameters import Number, Reflectance, Rotation
 
 
@@ -80,11 +82,11 @@ class Burley(Model):
 
     energy = Energy(0.688, [({"metallic": 1.0, "clearcoat": 0.0}, 1), ({}, 1.89)])
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.is_stretched = "anisotropic" in props
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         brightness = luminance(p.base_color)
         black = brightness < EPSILON
         tint = dr.select(black, 1, p.base_color / dr.select(black, 1, brightness))
@@ -92,16 +94,16 @@ class Burley(Model):
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)
         alpha, aspect = square(p.roughness), dr.sqrt(1 - 0.9 * p.anisotropic)
         alpha = [clamp(along, 0.001, dr.inf) for along in (alpha / aspect, alpha * aspect)]
-        lobes = [BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface)]
+        lobes: list[Lobe] = [BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface)]
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
-        facets = GGX(*alpha), SmithGGX(*alpha, correlated=False)
-        specular = MicrofacetLobe(1, *facets, Schlick(f0))
+        facets = GGX(*alpha)
+        specular = MicrofacetLobe(1, facets, facets.smith(correlated=False), Schlick(f0))
         specular.anisotropic = self.is_stretched
         lobes.append(specular)
         if p.clearcoat is not None:
-            facets = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss)), CoatShadowing()
-            lobes.append(CoatLobe(0.25 * p.clearcoat, *facets, Schlick(0.04)))
+            narrow = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss))
+            lobes.append(CoatLobe(0.25 * p.clearcoat, narrow, CoatShadowing(), Schlick(0.04)))
         return tuple(lobes)
 
 
@@ -109,11 +111,11 @@ class CoatShadowing(Shadowing):
     """Smith's separable term for GGX of α = 0.25, at any gloss. The facets' distribution is narrower, so they do not
     lean."""
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return self._seen(facet.cos_i) * self._seen(facet.cos_o)
 
     @staticmethod
-    def _seen(cos):
+    def _seen(cos: mi.Float) -> mi.Float:
         alpha2 = 0.0625
         return 2 * cos / (cos + dr.sqrt(alpha2 + (1 - alpha2) * cos * cos))
 
@@ -121,12 +123,12 @@ class CoatShadowing(Shadowing):
 class CoatLobe(MicrofacetLobe):
     """A lobe so narrow that its albedo is about that of a mirror."""
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         mirror = Cosines(wi.z, wi.z, 1, wi.z)
         return self.reflectance * (self.fresnel(dr.minimum(wi.z, 0.9)) * self.shadowing(mirror))
 
 
-def schlick_weight(cos):
+def schlick_weight(cos: mi.Float) -> mi.Float:
     """(1 - cosθ)⁵."""
     return Schlick(0)(cos)
 
@@ -145,23 +147,23 @@ class BaseLobe(Lobe):
     SUBSURFACE = 1.43, 0.68
     """a and b of the albedo of subsurface scattering, about a - b cosθ_i."""
 
-    def __init__(self, reflectance, roughness, subsurface):
+    def __init__(self, reflectance: Spectrum, roughness: mi.Float, subsurface: mi.Float) -> None:
         self.reflectance, self.roughness, self.subsurface = reflectance, roughness, subsurface
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         # Accurate to about 10 %. cos²θ_d is a half on average, for which d - 1 is roughness - 0.5.
         retro = 1 + (self.roughness - 0.5) * schlick_weight(wi.z)
         return self.reflectance * dr.lerp(retro, self.SUBSURFACE[0] - self.SUBSURFACE[1] * wi.z, self.subsurface)
 
-    def _uniform(self, wi):
+    def _uniform(self, wi: mi.Vector3f) -> mi.Float:
         """Return the fraction of uniform directions."""
         return self.UNIFORM[0] * self.roughness + self.UNIFORM[1] * self.subsurface * dr.square(1 - wi.z)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         weight_i, weight_o = schlick_weight(wi.z), schlick_weight(wo.z)
         grazing = self.roughness * dr.square(Facet.between(wi, wo).cos_d)
 
-        def falloff(f90):
+        def falloff(f90: mi.Float) -> mi.Float:
             return (1 + (f90 - 1) * weight_i) * (1 + (f90 - 1) * weight_o)
 
         retro = falloff(0.5 + 2 * grazing)
@@ -170,7 +172,7 @@ class BaseLobe(Lobe):
         value = self.reflectance * (dr.lerp(retro, subsurface, self.subsurface) * cosine)
         return value, dr.lerp(cosine, dr.inv_two_pi, self._uniform(wi))
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         uniform, _ = choose(u, self._uniform(wi))
         cos = dr.select(uniform, v.y, dr.sqrt(v.y))
         sin = dr.sqrt(1 - cos * cos)
@@ -191,20 +193,20 @@ class SheenLobe(Lobe):
     ALBEDO = 3e-4, 0.06, 0.02
     """a, b and c of the albedo, about a + b x² + c x³ with x = 1 - cosθ_i; fitted, too."""
 
-    def __init__(self, reflectance):
+    def __init__(self, reflectance: Spectrum) -> None:
         self.reflectance = reflectance
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         x, (a, b, c) = 1 - wi.z, self.ALBEDO
         return self.reflectance * (a + x * x * (b + c * x))
 
     @staticmethod
-    def _largest(sin):
+    def _largest(sin: mi.Float) -> mi.Float:
         """The largest m there is: of the direction in the horizon opposite to wi."""
         cos_d2 = 0.5 * (1 - sin)
         return (1 - cos_d2) / (1 + dr.sqrt(dr.maximum(cos_d2, EPSILON)))
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         frame = AxisFrame(-wi)
         cos = dr.dot(frame.axis, wo)
         sin_d2 = dr.minimum(0.25 * dr.squared_norm(wo - wi), 1)
@@ -226,7 +228,7 @@ class SheenLobe(Lobe):
         arc = 0.375 * (wo.z * inverse) * safe_sqrt((lateral + wo.z - axial) * inverse)
         return self.reflectance * value, density * dr.select(whole, circle, arc)
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         frame = AxisFrame(-wi)
         m = self._largest(frame.sin) * dr.power(1 - dr.cbrt(1 - v.x), 2 / 9)
         sin_d2 = m * (2 - m)

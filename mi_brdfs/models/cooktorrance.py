@@ -1,10 +1,12 @@
+from __future__ import annotations
+
 import drjit as dr
 
-from ..lobes import MicrofacetLobe, over_diffuse
+from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import clamp
-from ..microfacet.distributions import GGX, Beckmann, Blinn
+from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
 from ..microfacet.shadowing import VCavity
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, FresnelSet, Number, Preset, Reflectance
 
 
@@ -59,11 +61,11 @@ class CookTorrance(Model):
 
     energy = Energy(1, [({"normalization": "modern"}, 1), ({"normalization": "tog82"}, 4)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         α = p.alpha
         if self.distribution == "blinn":
             α = clamp(α, 1e-4, 1)
-            distribution = Blinn(2 / dr.square(α) - 2)
+            distribution: Distribution = Blinn(2 / dr.square(α) - 2)
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1

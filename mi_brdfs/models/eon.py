@@ -1,10 +1,14 @@
+from __future__ import annotations
+
 import math
 
 import drjit as dr
+import mitsuba as mi
 
+from ..lobes import Lobe
 from ..lobes.diffuse import RoughDiffuseLobe
-from ..math import sin_theta
-from ..model import Energy, Model
+from ..math import Spectrum, sin_theta
+from ..model import Energy, Model, Values
 from ..parameters import Number, Reflectance
 
 
@@ -46,7 +50,7 @@ class EON(Model):
 
     energy = Energy(0.5, [({}, 1)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (EONLobe(p.reflectance, p.roughness),)
 
 
@@ -55,24 +59,24 @@ class EONLobe(RoughDiffuseLobe):
     NORMAL = 1 / 2 - 2 / (3 * math.pi)
     MEAN = NORMAL - (2 / 3 - 28 / (15 * math.pi))
 
-    def __init__(self, reflectance, roughness):
+    def __init__(self, reflectance: Spectrum, roughness: mi.Float) -> None:
         super().__init__(reflectance, roughness)
         self.a = 1 / (1 + self.NORMAL * roughness)
         mean_loss = self.a * roughness * self.MEAN
         self.multiple = dr.square(reflectance) * (1 - mean_loss) / (1 - reflectance * mean_loss)
 
-    def _loss(self, w):
+    def _loss(self, w: mi.Vector3f) -> mi.Float:
         """Return (1 - E)/(A r), arranged so that nothing cancels at grazing angles, where it vanishes."""
         cos, sin = w.z, sin_theta(w)
         cos2 = cos * cos
         rise = dr.atan2(cos, sin) - cos * cos2 * (2 + sin) / (3 * dr.square(1 + sin))
         return self.NORMAL * cos2 / (1 + sin) + dr.inv_pi * sin * rise
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         loss = self.a * self.retro * self._loss(wi)
         return self.reflectance * (1 - loss) + self.multiple * loss
 
-    def eval(self, wi, wo):
+    def eval(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
         s = wi.x * wo.x + wi.y * wo.y
         s = dr.maximum(s / dr.select(s > 0, dr.maximum(wi.z, wo.z), 1), -1)
         single = self.reflectance * (self.a * (1 + self.retro * s))

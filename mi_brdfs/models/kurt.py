@@ -1,8 +1,10 @@
-from ..lobes import LambertLobe, MicrofacetLobe
+from __future__ import annotations
+
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import KurtShadowing
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Number, PerLobe, Reflectance, Rotation
 
 
@@ -52,7 +54,7 @@ class Kurt(Model):
 
     energy = Energy(0.81, [({"kurt_exponent": 0.0}, 1), ({"kurt_exponent": 0.25}, 3.19), ({}, 16.6)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         glossy = [
             MicrofacetLobe(
                 lobe.specular_reflectance,

@@ -1,10 +1,12 @@
+from __future__ import annotations
+
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import LambertLobe, PowerLobe
+from ..lobes import LambertLobe, Lobe, PowerLobe
 from ..lobes.power import AxisFrame
-from ..math import EPSILON, SMALL, TINY, clamp, log1p_series, safe_sqrt
-from ..model import Energy, Model
+from ..math import EPSILON, SMALL, TINY, Spectrum, clamp, log1p_series, safe_sqrt
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
 
@@ -61,7 +63,7 @@ class Lafortune(Model):
 
     energy = Energy(0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, float("inf"))])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         energy = self.normalization == "energy"
         glossy = []
         for lobe in p.specular:
@@ -78,22 +80,24 @@ class LafortuneLobe(PowerLobe):
 
     anisotropic = True  # Cx and Cy are separate parameters, which may differ
 
-    def __init__(self, reflectance, exponent, scale, c, unit):
+    def __init__(
+        self, reflectance: Spectrum, exponent: mi.Float, scale: mi.Float, c: tuple[mi.Float, ...], unit: mi.Float
+    ) -> None:
         super().__init__(reflectance, exponent, scale)
         self.c, self.unit = c, unit
 
-    def _stretched(self, wi):
+    def _stretched(self, wi: mi.Vector3f) -> tuple[mi.Vector3f, mi.Float]:
         """Return ``(C∘wi, its length)``, the length relative to that of wi, which may differ from one by a rounding
         error."""
         v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
         # At less than SMALL, the derivatives of its power leave the range of float32.
         return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), SMALL * SMALL))
 
-    def frame(self, wi) -> AxisFrame:
+    def frame(self, wi: mi.Vector3f) -> AxisFrame:
         v, length = self._stretched(wi)
         return AxisFrame(dr.select(length > SMALL, v / length, mi.Vector3f(0, 0, 1)))
 
-    def peak(self, wi):
+    def peak(self, wi: mi.Vector3f) -> Spectrum:
         _, length = self._stretched(wi)
         # (length/unit)² is one minus the deficit of the factors smaller than unit: a large exponent needs its digits.
         taken = sum((self.unit - c) * (self.unit + c) * w * w for c, w in zip(self.c, wi, strict=True))
@@ -107,27 +111,27 @@ class LafortuneLobe(PowerLobe):
     # Above the horizon, A is at most s, the sine of the axis's angle to the normal. If the axis lies so far below the
     # horizon that most of the lobe does, too, draw t = log(s/A) ∝ t exp(-(n+1) t), and an azimuth above the horizon.
 
-    def _buried(self, frame):
+    def _buried(self, frame: AxisFrame) -> tuple[mi.Bool, mi.Float, mi.Float]:
         """Return ``(whether it does, log s, c² (n+1))``, where c is the axis's cosine."""
         cos2 = dr.square(frame.axis.z)
         sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # 1 - c² would have no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
         return depth > sin2, 0.5 * dr.log(sin2), depth
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         _, log_s, depth = self._buried(self.frame(wi))
         return super().estimated_albedo(wi) * (
             dr.select(depth > 0, dr.exp((self.exponent + 1) * log_s), 1) / (1 + depth)
         )
 
     @staticmethod
-    def _arc(frame, t):
+    def _arc(frame: AxisFrame, t: mi.Float) -> mi.Float:
         """Return the sine of the largest azimuth above the horizon, relative to ``up``, or a little more."""
         square = dr.minimum(2 * t / (1 + t), 1)  # the squared cosine to the horizon, whose sine is A/s
         s2, c2 = dr.square(frame.sin), dr.square(frame.axis.z)
         return dr.sqrt(square / (c2 + s2 * square))
 
-    def _draw(self, frame, u, v):
+    def _draw(self, frame: AxisFrame, u: mi.Float, v: mi.Point2f) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
         left, log_a, b, c = super()._draw(frame, u, v)
         buried, log_s, _ = self._buried(frame)
         t = -dr.log(dr.maximum((1 - u) * (1 - v.x), TINY)) / (self.exponent + 1)
@@ -138,7 +142,9 @@ class LafortuneLobe(PowerLobe):
         )
         return left, log_a, b, c
 
-    def _pair(self, frame, log_a, versine, power, cos_phi):
+    def _pair(
+        self, frame: AxisFrame, log_a: mi.Float, versine: mi.Float, power: mi.Float, cos_phi: mi.Float
+    ) -> mi.Float:
         n, usual = self.exponent, super()._pair(frame, log_a, versine, power, cos_phi)
         buried, log_s, _ = self._buried(frame)
         t = dr.maximum(log_s - log_a, 1e-8)  # rounding may make it negative

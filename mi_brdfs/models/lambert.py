@@ -1,5 +1,7 @@
-from ..lobes import LambertLobe
-from ..model import Energy, Model
+from __future__ import annotations
+
+from ..lobes import LambertLobe, Lobe
+from ..model import Energy, Model, Values
 from ..parameters import Reflectance
 
 
@@ -30,5 +32,5 @@ class Lambert(Model):
 
     energy = Energy(0.5, [({}, 1)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (LambertLobe(p.reflectance),)

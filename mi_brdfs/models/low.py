@@ -1,15 +1,19 @@
+from __future__ import annotations
+
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
-from ..math import EPSILON, SMALL, choose, clamp, luminance, normalize_or, safe_sqrt
+from ..math import EPSILON, SMALL, Spectrum, choose, clamp, luminance, normalize_or, safe_sqrt
 from ..microfacet.distributions import ABC
 from ..microfacet.facet import Facet
 from ..microfacet.forward import ForwardDirections
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Colour, Number, OneOf, Preset, Reflectance
 
 
@@ -62,6 +66,8 @@ class Low(Model):
         {"microfacet": {"normalization": Choice(("fit", "paper", "unit"), "scale of the lobe")}, "smooth": {}},
         "which of the paper's two models",
     )
+    normalization: str
+    """The choice that goes with microfacet."""
     preset = Preset()
 
     energy = Energy(
@@ -74,10 +80,10 @@ class Low(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Denser(p.int_ior)
         if self.variant == "smooth":
-            specular = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
+            specular: Lobe = SmoothLobe(p.a, PowerLaw(p.b, p.c), fresnel)
         else:
             scale = {"fit": 4 * dr.inv_pi, "paper": 4.0, "unit": None}[self.normalization]
             specular = MicrofacetLobe(p.a, ABC(p.b, p.c, scale), VCavity(), fresnel)
@@ -99,13 +105,13 @@ class SmoothLobe(Lobe):
     both sides has a share of forward directions besides (:mod:`mi_brdfs.microfacet.forward`).
     """
 
-    def __init__(self, reflectance, law, fresnel):
+    def __init__(self, reflectance: Spectrum, law: PowerLaw, fresnel: Dielectric) -> None:
         self.reflectance, self.law, self.fresnel = reflectance, law, fresnel
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.reflectance * ((self.fresnel(wi.z) + self._forward(wi).reflectance) * self.law.norm * dr.pi)
 
-    def _forward(self, wi):
+    def _forward(self, wi: mi.Vector3f) -> ForwardDirections:
         """Return the directions about the horizon opposite to ``wi``."""
         d, z = dr.sqrt(self.law.inverse(0.75 * self.law.norm)), dr.maximum(wi.z, 1e-3)
         z2 = z * z + 0.3 * abs(dr.square(self.fresnel.eta) - 1)
@@ -113,24 +119,24 @@ class SmoothLobe(Lobe):
         low = z2 / cos2
         return ForwardDirections(self.fresnel, wi, low * dr.sqrt(low) * (1 - low), cos2)
 
-    def mirror_reflectance(self, wi):
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.reflectance * self.fresnel(wi.z)
 
-    def _mass(self, wi, x, y):
+    def _mass(self, wi: mi.Vector3f, x: mi.Float, y: mi.Float) -> mi.Float:
         """Return the power law's mass between -wi_xy and the edge of the disc in the direction (x, y)."""
         along = x * wi.x + y * wi.y
         reach = along + dr.sqrt(along * along + wi.z * wi.z)
         return dr.maximum(self.law.mass(reach * reach), EPSILON)  # at grazing angles, rounding may leave no distance
 
-    def _reflectance(self, wi, x, y):
+    def _reflectance(self, wi: mi.Vector3f, x: mi.Float, y: mi.Float) -> Spectrum:
         """Return F for the projected direction (x, y)."""
         return self.fresnel(safe_sqrt(1 - 0.25 * (dr.square(x - wi.x) + dr.square(y - wi.y))))
 
-    def _brightness(self, wi, x, y):
+    def _brightness(self, wi: mi.Vector3f, x: mi.Float, y: mi.Float) -> mi.Float:
         """Return the reflectance that decides the choice of a side, which must not vanish."""
         return dr.maximum(luminance(self._reflectance(wi, x, y)), SMALL)
 
-    def _end(self, wi, x, y, u):
+    def _end(self, wi: mi.Vector3f, x: mi.Float, y: mi.Float, u: mi.Float) -> tuple[Any, mi.Float]:
         """Return ``(point, W)``: the point at the fraction ``u`` of the mass on one side of a chord, and that mass
         times F."""
         mass = self._mass(wi, x, y)
@@ -138,7 +144,7 @@ class SmoothLobe(Lobe):
         point = (d * x - wi.x, d * y - wi.y)
         return point, mass * self._brightness(wi, *point)
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         dx, dy = wi.x + wo.x, wi.y + wo.y
         d2 = dx * dx + dy * dy
         x, y = normalize_or(dx, dy, (1, 0))
@@ -151,7 +157,7 @@ class SmoothLobe(Lobe):
         forward = self._forward(wi)
         return self.reflectance * value, dr.lerp(pdf, forward.pdf(Facet.between(wi, wo)), forward.share)
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         forward = self._forward(wi)
         is_forward, u = choose(u, forward.share)
         y, x = dr.sincos(dr.two_pi * v.x)

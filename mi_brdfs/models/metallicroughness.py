@@ -1,11 +1,13 @@
+from __future__ import annotations
+
 import drjit as dr
 
-from ..lobes import LambertLobe, MicrofacetLobe, WeightedLobe
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.shadowing import SchlickSmith, SmithGGX
-from ..model import Energy, Model
+from ..microfacet.shadowing import SchlickSmith, Shadowing, SmithGGX
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -64,11 +66,11 @@ class MetallicRoughness(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))
         alpha = dr.square(p.roughness)
         if self.shadowing == "smith":
-            shadowing = SmithGGX(alpha, alpha, correlated=False)
+            shadowing: Shadowing = SmithGGX(alpha, alpha, correlated=False)
         else:
             shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
         diffuse = WeightedLobe(

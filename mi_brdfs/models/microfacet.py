@@ -1,7 +1,11 @@
-from ..lobes import MicrofacetLobe, over_diffuse
+from __future__ import annotations
+
+import mitsuba as mi
+
+from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet import shadowing
 from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, HemiEPD
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import FresnelSet, OneTerm, ParameterError, Preset, Reflectance, Rotation
 from ..parameters.messages import listed
 
@@ -128,7 +132,7 @@ class Microfacet(Model):
         ],
     )
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         distributions, shadowings = type(self).distribution.terms, type(self).shadowing.terms
         suited = [word for word, it in distributions.items() if shadowings[self.shadowing].suits(it)]
@@ -138,7 +142,7 @@ class Microfacet(Model):
                 f'take it with {listed(suited)}, or another one such as "vcavity".'
             )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = p.distribution()
         specular = MicrofacetLobe(p.specular_reflectance, distribution, p.shadowing(distribution), p.fresnel)
         return over_diffuse(p.diffuse_reflectance, specular)

@@ -1,10 +1,14 @@
+from __future__ import annotations
+
 import math
 
 import drjit as dr
+import mitsuba as mi
 
+from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
-from ..math import safe_sqrt
-from ..model import Energy, Model
+from ..math import Spectrum, safe_sqrt
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -55,7 +59,7 @@ class Minnaert(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (MinnaertLobe(p.reflectance, p.exponent, self.normalization),)
 
 
@@ -64,7 +68,7 @@ class MinnaertLobe(ZonalLobe):
 
     HELD = 0.1
 
-    def __init__(self, reflectance, exponent, normalization):
+    def __init__(self, reflectance: Spectrum, exponent: mi.Float, normalization: str) -> None:
         self.reflectance, self.exponent, self.normalization = reflectance, exponent, normalization
         self.reciprocal = normalization != "none"
         self.held = exponent < 1 if normalization == "energy" else False
@@ -72,19 +76,19 @@ class MinnaertLobe(ZonalLobe):
         self.mass = dr.select(self.held, dr.exp(math.log(self.HELD) * (exponent + 1)), 0)
         self.lost = 0.5 * (1 - exponent) * self.mass
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         mu, k = wi.z, self.exponent
         if self.normalization == "none":
             return self.reflectance * (2 / (k + 1) * dr.power(mu, k))
         mu = dr.select(self.held, dr.maximum(mu / self.HELD, 1), mu)
         return self.reflectance * ((1 - self.lost) * dr.power(mu, k - 1))
 
-    def density(self, cos):
+    def density(self, cos: mi.Float) -> mi.Float:
         k = self.exponent
         base = dr.maximum(cos, dr.select(self.held, self.HELD, 0))
         return (k + 1) / (1 - self.lost) * cos * dr.power(base, k - 1)
 
-    def cosine(self, u):
+    def cosine(self, u: mi.Float) -> mi.Float:
         k, u = self.exponent, u * (1 - self.lost)
         below = u < 0.5 * (k + 1) * self.mass
         inside = self.HELD * safe_sqrt(2 * u / ((k + 1) * dr.select(below, self.mass, 1)))

@@ -1,8 +1,10 @@
-from ..lobes import MicrofacetLobe, over_diffuse
+from __future__ import annotations
+
+from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, VCavity
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
 
 
@@ -59,7 +61,7 @@ class Nishino(Model):
 
     energy = Energy(1, [({"variant": "microfacet"}, 1), ({"variant": "dsbrdf"}, 1)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = HemiEPD(p.kappa, p.gamma)
         terms = (VCavity(), p.variant.fresnel) if self.variant == "microfacet" else (Implicit(), Unit())
         specular = MicrofacetLobe(p.specular_reflectance, distribution, *terms)

@@ -1,10 +1,14 @@
+from __future__ import annotations
+
 import math
 
 import drjit as dr
+import mitsuba as mi
 
+from ..lobes import Lobe
 from ..lobes.diffuse import RoughDiffuseLobe
-from ..math import EPSILON, sin_theta, square
-from ..model import Energy, Model
+from ..math import EPSILON, Spectrum, sin_theta, square
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Flag, Number, Reflectance, Spelling
 
 
@@ -54,7 +58,7 @@ class OrenNayar(Model):
 
     energy = Energy(0.498, [({"model": "qualitative"}, 1.02), ({"model": "full"}, 1.05)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         lobe = FullLobe if self.model == "full" else QualitativeLobe
         return (lobe(p.reflectance, p.sigma),)
 
@@ -91,7 +95,7 @@ class RoughDiffuse(Model):
 
     energy = Energy(0.508, [({"use_fast_approx": False}, 1.05), ({"use_fast_approx": True}, 1.02)])
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         lobe = QualitativeLobe if self.use_fast_approx else FullLobe
         return (lobe(p.reflectance, p.alpha * dr.inv_sqrt_two),)
 
@@ -101,17 +105,17 @@ class QualitativeLobe(RoughDiffuseLobe):
 
     RETRO = 0.7  # of B/C1; fitted by tests/calibration/orennayar.py, as is that of the full form
 
-    def __init__(self, reflectance, sigma):
+    def __init__(self, reflectance: Spectrum, sigma: mi.Float) -> None:
         self.sigma2 = square(sigma)
         self.c1 = 1 - 0.5 * self.sigma2 / (self.sigma2 + 0.33)
         self.b = 0.45 * self.sigma2 / (self.sigma2 + 0.09)
         super().__init__(reflectance, self.RETRO * self.b / self.c1)
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         # Exact at normal and at grazing incidence.
         return self.reflectance * (self.c1 + 0.5 * self.b * (1 - wi.z * wi.z))
 
-    def eval(self, wi, wo):
+    def eval(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
         toward = dr.maximum(wi.x * wo.x + wi.y * wo.y, 0) / dr.maximum(wi.z, wo.z)
         return self.reflectance * dr.inv_pi * (self.c1 + self.b * toward)
 
@@ -121,13 +125,13 @@ class FullLobe(QualitativeLobe):
 
     RETRO = 1
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return super().estimated_albedo(wi) + dr.square(self.reflectance) * self._twice()
 
-    def _twice(self):
+    def _twice(self) -> mi.Float:
         return 0.17 * self.sigma2 / (self.sigma2 + 0.13)
 
-    def eval(self, wi, wo):
+    def eval(self, wi: mi.Vector3f, wo: mi.Vector3f) -> mi.Float:
         sin_i, sin_o = sin_theta(wi), sin_theta(wo)
         flatter = wi.z < wo.z
         cos_a, cos_b = dr.select(flatter, wi.z, wo.z), dr.select(flatter, wo.z, wi.z)

@@ -1,7 +1,9 @@
+from __future__ import annotations
+
 import drjit as dr
 
-from ..lobes import LambertLobe, PowerLobe, PowerResponseLobe
-from ..model import Energy, Model
+from ..lobes import LambertLobe, Lobe, PowerLobe, PowerResponseLobe
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -50,7 +52,7 @@ class Phong(Model):
         0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, dr.pi), ({"normalization": "original"}, 2)]
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         diffuse, n = LambertLobe(p.diffuse_reflectance), p.exponent
         if self.normalization == "original":
             return diffuse, PowerResponseLobe(p.specular_reflectance, n, dr.inv_pi)

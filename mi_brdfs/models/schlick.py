@@ -1,14 +1,16 @@
+from __future__ import annotations
+
 import drjit as dr
 import mitsuba as mi
 
 from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
-from ..math import EPSILON, TINY, clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
+from ..math import EPSILON, TINY, Spectrum, clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
 from ..microfacet.distributions import GGX, Distribution
-from ..microfacet.facet import Facet
-from ..microfacet.fresnel import Schlick
+from ..microfacet.facet import Cosines, Facet
+from ..microfacet.fresnel import Fresnel, Schlick
 from ..microfacet.laws import LARGEST_TAN2
 from ..microfacet.shadowing import SchlickSmith, Shadowing
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Reflectance, Rotation
 
 TYPICAL = 0.58
@@ -80,22 +82,22 @@ class Schlick94(Model):
         ],
     )
 
-    def __init__(self, props):
+    def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)
         self.is_brushed = "isotropy" in props
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel, distribution = Schlick(p.specular_reflectance), SchlickNormals(p.roughness, p.isotropy)
         shadowing = Unshadowed() if self.variant == "plain" else SchlickSmith(p.roughness)
         specular = MicrofacetLobe(mi.UnpolarizedSpectrum(1), distribution, shadowing, fresnel)
         specular.anisotropic = self.is_brushed
-        lobes = [specular]
+        lobes: list[Lobe] = [specular]
         if self.variant == "interreflection":
             lobes.append(InterreflectionLobe(p.roughness, fresnel))
         if p.diffuse_reflectance is not None:
             lower = Schlick(p.diffuse_reflectance)
 
-            def passed(cos_d):
+            def passed(cos_d: mi.Float) -> Spectrum:
                 return (1 - fresnel(cos_d)) * lower(cos_d)
 
             weighted = WeightedLobe(
@@ -111,7 +113,7 @@ class Unshadowed(Shadowing):
     lean = 1
     favours_steep = True
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return 1.0
 
 
@@ -122,41 +124,41 @@ class SchlickNormals(Distribution):
     LOSS = GGX.LOSS
     long_tailed = True
 
-    def __init__(self, roughness, isotropy):
+    def __init__(self, roughness: mi.Float, isotropy: mi.Float) -> None:
         self.r, self.isotropy = roughness, isotropy
         stretch = dr.sqrt(dr.sqrt(isotropy))
         alpha = dr.sqrt(roughness)
         super().__init__(alpha * stretch, alpha / stretch)
 
-    def mean_square_slope(self):
+    def mean_square_slope(self) -> mi.Float:
         return self.r
 
-    def mean_square_slope_along(self, v):
+    def mean_square_slope_along(self, v: mi.Vector3f) -> mi.Float:
         u, v2 = dr.square(v.x) * self.alpha_u, dr.square(v.y) * self.alpha_v
         return 2 * self.r * (u + v2) / (self.alpha_u + self.alpha_v)
 
-    def estimated_albedo(self, cos):
+    def estimated_albedo(self, cos: mi.Float) -> mi.Float:
         root = dr.sqrt(self.isotropy)
         mean = 0.5 * (0.5 * (1 + self.isotropy) + root)  # two steps of the arithmetic-geometric mean
         return super().estimated_albedo(cos) * root / mean
 
-    def _zenith(self, facet):
+    def _zenith(self, facet: Facet) -> mi.Float:
         """Return Z."""
         return self.r / dr.square(facet.sin2_h + self.r * dr.square(facet.cos_h))
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         w, _ = normalize_or(facet.h.x, facet.h.y, (1, 0))
         p2 = dr.square(self.isotropy)
         return dr.inv_pi * self._zenith(facet) * dr.sqrt(self.isotropy / (p2 + (1 - p2) * w * w))
 
-    def density(self, facet, g):
+    def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         return dr.inv_pi * self._zenith(facet) * facet.cos_h / (self.r * g)
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         x = dr.minimum(tan2 / self.r, LARGEST_TAN2)
         return x / (1 + x), 1 / (1 + x)
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return dr.minimum(c / dr.maximum(complement, TINY) * self.r, LARGEST_TAN2)
 
 
@@ -169,29 +171,29 @@ class InterreflectionLobe(Lobe):
     falls as 1/√log k.
     """
 
-    def __init__(self, roughness, fresnel):
+    def __init__(self, roughness: mi.Float, fresnel: Fresnel) -> None:
         self.roughness, self.fresnel = roughness, fresnel
         self.k = (1 - roughness) / roughness
         self.scale = log1p_ratio(self.k)
         self.power = dr.rsqrt((1 + self.k) * self.scale)  # e
         self.integral = self._integral()
 
-    def _integral(self):
+    def _integral(self) -> mi.Float:
         """Return ∫ h from 0 to 1."""
         k = self.k
         series = 1 / 2 - k * (1 / 6 - k * (1 / 12 - k * (1 / 20 - k / 30)))
         k = dr.maximum(k, 0.2)
         return dr.select(self.k < 0.2, series, ((1 + k) * dr.log(1 + k) - k) / dr.square(k))
 
-    def _constant(self, wi):
+    def _constant(self, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
         """Return ``(1 - G(cosθ_i), the integral of 1 - G G')``."""
         lost = self.roughness * (1 - wi.z) / (wi.z + self.roughness * (1 - wi.z))
         return lost, lost + (1 - lost) * self.integral
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.fresnel(TYPICAL) * (0.5 * self._constant(wi)[1] / dr.maximum(wi.z, EPSILON))
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         lost, integral = self._constant(wi)
         x, k = wo.z, self.k
         gone = x * log1p_ratio(k * x) / self.scale
@@ -202,7 +204,7 @@ class InterreflectionLobe(Lobe):
         value = self.fresnel(facet.cos_d) * (shadowed / (4 * dr.pi * dr.maximum(wi.z, EPSILON)))
         return value, dr.inv_two_pi * (lost + (1 - lost) * self.integral * law) / integral
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         lost, integral = self._constant(wi)
         t = 1 - dr.power(1 - v.x, 1 / (1 + self.power))
         x = t * self.scale * expm1_ratio(t * self.k * self.scale)

@@ -1,11 +1,13 @@
+from __future__ import annotations
+
 import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
 from ..lobes.power import AxisFrame
-from ..math import EPSILON, TINY, choose, leaving, safe_sqrt
-from ..model import Energy, Model
+from ..math import EPSILON, TINY, Spectrum, choose, leaving, safe_sqrt
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -71,7 +73,7 @@ class Toon(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         lit, highlight = Step(p.diffuse_threshold, p.diffuse_smooth), Step(p.specular_threshold, p.specular_smooth)
         dark = p.diffuse_shadow
         mass = dark + (1 - dark) * lit.mass
@@ -80,7 +82,7 @@ class Toon(Model):
             HighlightLobe(p.specular_reflectance, self._albedo(1, highlight.mass), highlight),
         )
 
-    def _albedo(self, reflectance, mass):
+    def _albedo(self, reflectance: Spectrum, mass: mi.Float) -> Spectrum:
         """Return the albedo of a band whose integral over the cosines is ``mass``."""
         return reflectance * (2 * mass if self.normalization == "none" else dr.select(mass > EMPTY, 1.0, 0.0))
 
@@ -97,30 +99,30 @@ class Step:
     START = 0.1, 0.28
     """Of the search for a quantile; tests/calibration/toon.py fits it."""
 
-    def __init__(self, threshold, smooth):
+    def __init__(self, threshold: mi.Float, smooth: mi.Float) -> None:
         self.threshold, self.smooth = threshold, smooth
         self.start = self._integral(-threshold)
         self.mass = self._integral(1 - threshold) - self.start
 
     @staticmethod
-    def _x(smooth, excess):
+    def _x(smooth: mi.Float, excess: mi.Float) -> mi.Float:
         # The floor turns an edge of width 0 into a jump.
         smooth = dr.maximum(smooth, EPSILON)
         return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
 
-    def _integral(self, excess):
+    def _integral(self, excess: mi.Float) -> mi.Float:
         """Return the integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""
         x = self._x(self.smooth, excess)
         return 2 * self.smooth * x * x * x * (1 - 0.5 * x) + dr.maximum(excess - self.smooth, 0)
 
-    def eval(self, excess):
-        def height(smooth):
+    def eval(self, excess: mi.Float) -> mi.Float:
+        def height(smooth: mi.Float) -> mi.Float:
             x = self._x(smooth, excess)
             return x * x * (3 - 2 * x)
 
         return leaving(0, 0.1, height, self.smooth)
 
-    def sample(self, u):
+    def sample(self, u: mi.Float) -> mi.Float:
         """Return the excess of the cosine below which the fraction ``u`` of the density lies."""
         integral = self.start + u * self.mass
         ramp = integral < self.smooth
@@ -139,16 +141,16 @@ class BandsLobe(ZonalLobe):
 
     reciprocal = False
 
-    def __init__(self, reflected, lit, dark, mass):
+    def __init__(self, reflected: Spectrum, lit: Step, dark: mi.Float, mass: mi.Float) -> None:
         self.reflected, self.lit, self.dark, self.mass = reflected, lit, dark, dr.maximum(mass, EMPTY)
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.reflected
 
-    def density(self, cos):
+    def density(self, cos: mi.Float) -> mi.Float:
         return (self.dark + (1 - self.dark) * self.lit.eval(cos - self.lit.threshold)) / self.mass
 
-    def cosine(self, u):
+    def cosine(self, u: mi.Float) -> mi.Float:
         everywhere, u = choose(u, self.dark / self.mass)
         return dr.select(everywhere, u, dr.clip(self.lit.threshold + self.lit.sample(u), 0, 1))
 
@@ -162,17 +164,17 @@ class HighlightLobe(Lobe):
 
     reciprocal = False
 
-    def __init__(self, colour, scale, step):
+    def __init__(self, colour: Spectrum, scale: Spectrum, step: Step) -> None:
         self.colour, self.reflected, self.step = colour, colour * scale, step
         self.mass = dr.maximum(step.mass, EMPTY)
 
-    def mirror_reflectance(self, wi):
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.colour
 
-    def _frame(self, wi):
+    def _frame(self, wi: mi.Vector3f) -> AxisFrame:
         return AxisFrame(mi.Vector3f(-wi.x, -wi.y, wi.z))
 
-    def _ring(self, frame, versine):
+    def _ring(self, frame: AxisFrame, versine: mi.Float) -> tuple[mi.Float, mi.Float]:
         """Return ``(sinθ_ring, visible)``, with the fraction of the ring at A = 1 - versine >= 0 above the horizon."""
         sin = safe_sqrt(versine * (2 - versine))
         rise, height = frame.sin * sin, frame.axis.z * (1 - versine)
@@ -180,16 +182,16 @@ class HighlightLobe(Lobe):
         below = dr.acos(dr.select(cut, height, 0) / dr.select(cut, rise, 1)) * dr.inv_pi
         return sin, dr.select(cut, 1 - below, 1)
 
-    def _pair(self, excess, visible):
+    def _pair(self, excess: mi.Float, visible: mi.Float) -> tuple[mi.Float, mi.Float]:
         """Return what the visible parts of the rings of A and -A reflect, from the excess of A."""
         behind = -2 * self.step.threshold - excess
         return self.step.eval(excess) * visible, self.step.eval(behind) * (1 - visible)
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         # The ring that halves the highlight's solid angle represents all rings.
         return self.reflected * self._ring(self._frame(wi), 0.5 * dr.minimum(self.mass, 1))[1]
 
-    def eval_pdf(self, wi, wo):
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         frame, t = self._frame(wi), self.step.threshold
         # The versine keeps the digits of a small highlight, the cosine those of a wide one. Subtract the squares one by
         # one, as rounding errors shrink with the remainder.
@@ -204,7 +206,7 @@ class HighlightLobe(Lobe):
         value = self.step.eval(excess) / (dr.two_pi * self.mass)
         return self.reflected * value, value * self.step.eval(nearer) / dr.maximum(front + back, EPSILON)
 
-    def sample(self, wi, u, v):
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         frame, excess = self._frame(wi), self.step.sample(v.x)
         versine = dr.clip(1 - self.step.threshold - excess, 0, 1)
         sin, visible = self._ring(frame, versine)

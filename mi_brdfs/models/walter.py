@@ -1,7 +1,8 @@
-from ..lobes import MicrofacetLobe, over_diffuse
+from __future__ import annotations
+
+from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import GGX
-from ..microfacet.shadowing import SmithGGX
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
 
 
@@ -49,11 +50,8 @@ class Walter(Model):
 
     energy = Energy(0.989, [({}, 1)])
 
-    def lobes(self, p):
-        specular = MicrofacetLobe(
-            p.specular_reflectance,
-            GGX(*p.alpha),
-            SmithGGX(*p.alpha, correlated=self.shadowing == "correlated"),
-            p.fresnel,
-        )
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
+        facets = GGX(*p.alpha)
+        shadowing = facets.smith(correlated=self.shadowing == "correlated")
+        specular = MicrofacetLobe(p.specular_reflectance, facets, shadowing, p.fresnel)
         return over_diffuse(p.diffuse_reflectance, specular)

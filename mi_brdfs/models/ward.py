@@ -1,12 +1,16 @@
-import drjit as dr
+from __future__ import annotations
 
-from ..lobes import LambertLobe, MicrofacetLobe
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe
 from ..math import expm1
 from ..microfacet.distributions import Beckmann, Distribution
+from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Unit
 from ..microfacet.laws import log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.shadowing import Kelemen, Shadowing
-from ..model import Energy, Model
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Preset, Reflectance, Rotation
 
 
@@ -70,7 +74,7 @@ class Ward(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)
         specular = MicrofacetLobe(p.specular_reflectance, distribution, SHADOWING[self.variant](), Unit())
         return LambertLobe(p.diffuse_reflectance), specular
@@ -83,17 +87,17 @@ class ApproximateBeckmann(Distribution):
     one as α → 0, and its cumulative distribution can be inverted; q = D/(1 - exp(-2g)).
     """
 
-    def eval(self, facet):
+    def eval(self, facet: Facet) -> mi.Float:
         return dr.exp(-2 * self.steepness(facet) / (1 + facet.cos_h)) / (dr.pi * self.alpha_u * self.alpha_v)
 
-    def density(self, facet, g):
+    def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         return self.eval(facet) / -expm1(-2 * g)
 
-    def cdf(self, tan2, g):
+    def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         v, total = versine_of_tan2(tan2), -expm1(-2 * g)
         return -expm1(-2 * g * v) / total, (dr.exp(-2 * g * v) - dr.exp(-2 * g)) / total
 
-    def inverse_cdf(self, c, complement, g):
+    def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         total = -expm1(-2 * g)
         return tan2_of_versine(-log_complement(complement * total + (1 - total)) / (2 * g))
 
@@ -101,21 +105,21 @@ class ApproximateBeckmann(Distribution):
 class WardDuer(Shadowing):
     """h_z⁴, which cancels D's 1/h_z⁴ and leaves 1/(cosθ_i cosθ_o)."""
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.square(dr.square(facet.cos_h))
 
 
 class GeometricMean(Shadowing):
     """√(cosθ_i cosθ_o)."""
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.sqrt(facet.cos_i * facet.cos_o)
 
 
 class Ward1992(Shadowing):
     """h_z⁴ √(cosθ_i cosθ_o)."""
 
-    def __call__(self, facet):
+    def __call__(self, facet: Facet | Cosines) -> mi.Float:
         return dr.square(dr.square(facet.cos_h)) * dr.sqrt(facet.cos_i * facet.cos_o)
 
 

@@ -1,8 +1,12 @@
-import drjit as dr
+from __future__ import annotations
 
+import drjit as dr
+import mitsuba as mi
+
+from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
-from ..math import TINY
-from ..model import Energy, Model
+from ..math import TINY, Spectrum
+from ..model import Energy, Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -65,7 +69,7 @@ class Wrap(Model):
         ],
     )
 
-    def lobes(self, p):
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         w, n = p.wrap, p.exponent
         behind = _power(w / (1 + w), n + 1)
         whole = p.reflectance
@@ -79,7 +83,7 @@ class Wrap(Model):
         return FrontLobe(front, w, n, behind), BackLobe(whole * behind, w, n)
 
 
-def _power(x, exponent):
+def _power(x: mi.Float, exponent: mi.Float) -> mi.Float:
     """Return x^exponent for x >= 0, with a derivative at 0."""
     return dr.power(x + TINY, exponent)
 
@@ -87,25 +91,25 @@ def _power(x, exponent):
 class WrapLobe(ZonalLobe):
     reciprocal = False
 
-    def __init__(self, reflected, wrap, exponent):
+    def __init__(self, reflected: Spectrum, wrap: mi.Float, exponent: mi.Float) -> None:
         self.reflected, self.wrap, self.exponent = reflected, wrap, exponent
 
-    def estimated_albedo(self, wi):
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.reflected
 
 
 class FrontLobe(WrapLobe):
     """p ∝ (μ + w)ⁿ for μ > 0; ``behind`` is the fraction of the integral over μ > -w that this leaves out."""
 
-    def __init__(self, reflected, wrap, exponent, behind):
+    def __init__(self, reflected: Spectrum, wrap: mi.Float, exponent: mi.Float, behind: mi.Float) -> None:
         super().__init__(reflected, wrap, exponent)
         self.behind = behind
 
-    def density(self, cos):
+    def density(self, cos: mi.Float) -> mi.Float:
         w, n = self.wrap, self.exponent
         return (n + 1) / ((1 + w) * (1 - self.behind)) * _power((cos + w) / (1 + w), n)
 
-    def cosine(self, u):
+    def cosine(self, u: mi.Float) -> mi.Float:
         w, n = self.wrap, self.exponent
         return (1 + w) * dr.power(self.behind + u * (1 - self.behind), 1 / (n + 1)) - w
 
@@ -115,10 +119,10 @@ class BackLobe(WrapLobe):
 
     transmits = True
 
-    def density(self, cos):
+    def density(self, cos: mi.Float) -> mi.Float:
         w, n = dr.maximum(self.wrap, 1e-6), self.exponent  # without one there is no such light
         x = 1 + cos / w
         return dr.select(x > 0, (n + 1) / w * _power(dr.maximum(x, 0), n), 0)
 
-    def cosine(self, u):
+    def cosine(self, u: mi.Float) -> mi.Float:
         return self.wrap * (dr.power(u, 1 / (self.exponent + 1)) - 1)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import mitsuba as mi
 
-from .parameter import Parameter, ParameterRow
+from .parameter import Chosen, ParameterRow
 from .reader import PropertyReader
 
 
-class File(Parameter):
+class File(Chosen[str]):
     """The name of a file, which must be given: a path, or a name relative to where Mitsuba looks for files. It becomes
     an attribute of the plugin, a resolved path in words."""
 

@@ -10,11 +10,11 @@ from typing import Any
 import mitsuba as mi
 
 from .messages import listed
-from .parameter import BoundParameters, Parameter, ParameterRow
+from .parameter import BoundParameters, Chosen, Parameter, ParameterRow
 from .reader import PropertyReader
 
 
-class OneOf(Parameter):
+class OneOf(Chosen[str]):
     """One of several words, by default the first, each with parameters of its own.
 
     The word is an attribute of the model, like a :class:`Choice`. Evaluated, it has the parameters of the word as

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar, overload
 
 import mitsuba as mi
 
 from .reader import PropertyReader, Range
 
 P = TypeVar("P", bound="Parameter")
+V = TypeVar("V")
 
 
 class ParameterRow(NamedTuple):
@@ -63,7 +64,7 @@ class Parameter:
         """Once bound, its textures by property name. A parameter without a default that was not given has none."""
         self.ranges: dict[str, Range] = {}
         """What the values of these are limited to."""
-        self.chosen: dict[str, str | bool] = {}
+        self.chosen: dict[str, Any] = {}
         """Once bound, the choices made with it, by declared name."""
 
     def __set_name__(self, owner: type | None, name: str) -> None:
@@ -144,6 +145,17 @@ class Parameter:
         raise NotImplementedError(f"{type(self).__name__} does not define rows.")
 
 
+class Chosen(Parameter, Generic[V]):
+    """A parameter that is read from a plugin instance: there an attribute of its name, found first, holds its value."""
+
+    @overload
+    def __get__(self: P, plugin: None, owner: type) -> P: ...
+    @overload
+    def __get__(self, plugin: Any, owner: type) -> V: ...
+    def __get__(self, plugin: Any, owner: type) -> Any:
+        return self
+
+
 def nested(declared: Iterable[Parameter]) -> Iterator[Parameter]:
     """Yield parameters, each followed by those that belong to it."""
     for parameter in declared:
@@ -161,7 +173,7 @@ class BoundParameters(dict[str, Parameter]):
         super().__init__()
         self.textures: dict[str, mi.Texture] = {}
         self.ranges: dict[str, Range] = {}
-        self.chosen: dict[str, str | bool] = {}
+        self.chosen: dict[str, Any] = {}
         for parameter in declared:
             bound = parameter.bind(reader)
             if not isinstance(bound, Parameter):

@@ -10,7 +10,7 @@ import mitsuba as mi
 from ..math import clamp
 from .colours import constant_texture
 from .messages import interval, number_or_none, shown
-from .parameter import Parameter, ParameterRow, Quantity
+from .parameter import Chosen, Parameter, ParameterRow, Quantity
 from .reader import PropertyReader, Range
 
 
@@ -200,7 +200,7 @@ class Rotation(Parameter):
         return [ParameterRow(self.name, "number", "none", "any", self.text)]
 
 
-class Choice(Parameter):
+class Choice(Chosen[str]):
     """One of several words, by default the first: an attribute of the model, or of its lobe in a :class:`PerLobe`."""
 
     def __init__(self, choices: tuple[str, ...], text: str):
@@ -219,7 +219,7 @@ class Choice(Parameter):
         return [ParameterRow(self.names[0], "string", self.choices[0], " | ".join(self.choices), self.text)]
 
 
-class Flag(Parameter):
+class Flag(Chosen[bool]):
     """True or false: an attribute like a :class:`Choice`."""
 
     def __init__(self, default: bool, text: str):

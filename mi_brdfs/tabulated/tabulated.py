@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
 import numpy as np
 
 from ..lobes import Lobe
-from ..model import Model
+from ..math import Spectrum
+from ..model import Model, Values
 from ..parameters import Choice, Colour, File, Flag, Rotation
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Tabulated(Model):
         from .tables import Tables  # on first use: the readers take time
 
         super().__init__(props)
-        chosen: dict[str, Any] = self.parameters.chosen
+        chosen = self.parameters.chosen
         shared = not chosen["differentiable"]
         words = chosen["interpolation"], chosen["extrapolate"], chosen["quantity"]
         self.tables = Tables.of(chosen["filename"], *words, shared)
@@ -88,26 +88,26 @@ class Tabulated(Model):
     def manual(cls) -> str:
         return super(Model, cls).manual()  # a file has no largest albedo but its own
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> SimpleNamespace:
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Values:
         p = super().evaluate(si, active)
         p.wavelengths = si.wavelengths
         return p
 
-    def lobes(self, p: SimpleNamespace) -> tuple[Lobe, ...]:
+    def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (TabulatedLobe(self.tables, p.scale, getattr(p, "wavelengths", None)),)
 
 
 class TabulatedLobe(Lobe):
     """A table times a colour."""
 
-    def __init__(self, tables: Tables, scale: Any, wavelengths: Any) -> None:
+    def __init__(self, tables: Tables, scale: Spectrum, wavelengths: Any) -> None:
         self.tables, self.colour, self.wavelengths = tables, scale, wavelengths
         self.anisotropic, self.reciprocal = tables.anisotropic, tables.reciprocal
 
-    def estimated_albedo(self, wi: mi.Vector3f) -> Any:
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.colour * self.tables.channels.colour(self.tables.albedo, wi, wi, self.wavelengths)
 
-    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Any, mi.Float]:
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         f = self.tables.channels.colour(self.tables.f, wi, wo, self.wavelengths)
         return self.colour * f * wo.z, self.tables.proposal.pdf(wi, wo)
 
