@@ -82,7 +82,8 @@ def compare(*bsdfs: str | dict | BSDFSource, on_progress: Callable[[str], None] 
     found: list[Any] = [it for given in bsdfs for it in (find_sources(given) if isinstance(given, str) else [given])]
     names = [it["type"] if isinstance(it, dict) else it.name for it in found]
     if len(found) not in (1, 2):
-        raise ValueError(f"name one BSDF or two to compare, not {len(found)}{': ' * bool(names)}{', '.join(names)}")
+        words = ", ".join(str(it["type"]) if isinstance(it, dict) else it.word for it in found)
+        raise ValueError(f"name one BSDF or two to compare, not {len(found)}: {words}")
     efficiency, calls, pictures, first = STAGES
     on_progress(efficiency)
     probes = [_probe(it) for it in found]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import cycle, islice
 from typing import Any
 
 from mi_brdfs.mitsuba.registry import own_models
@@ -158,11 +157,6 @@ def defaults() -> list[Plugin]:
     return list({case.bsdf["type"]: case.bsdf for case in reversed(CASES)}.values())[::-1]
 
 
-def built_ins(count: int) -> list[Plugin]:
-    """Return this many built-ins, with different code as far as possible."""
-    return list(islice(cycle(BUILT_INS), count))
-
-
 BUILT_INS = [
     diffuse(),
     {"type": "conductor"},
@@ -186,4 +180,4 @@ BUILT_INS = [
     {"type": "principledthin"},
     {"type": "hair"},
 ]
-"""Built-ins, no two with the same code."""
+"""Built-ins, no two with the same code, to load as many of them as models."""
