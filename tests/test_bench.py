@@ -1,32 +1,35 @@
 """The bench measures what is known, catches what is worse, and says so."""
 
-import io
 import json
 import sys
 from contextlib import nullcontext
+from functools import partial
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from generate import readme
+from benchmarks import SECTIONS, resources, times
+from benchmarks.cases import BUILT_INS, CASES, Case, defaults
+from benchmarks.efficiency import efficiency, mean_of_lobes, samplings
+from benchmarks.figure import Figure, Target
+from benchmarks.times import ALONE, BOX, SPHERE, scene
+from generate import bench, readme
 from generate.models import model_table
 from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, phong
-from rich.console import Console
+from typer.testing import CliRunner
 
 import mi_brdfs
-from mi_brdfs.bench import SECTIONS, Figure, Results, Target, bench, process, renders, resources, runner, sizes, timing
-from mi_brdfs.bench import run as bench_run
-from mi_brdfs.bench.cases import BUILT_INS, TABLE, Case, all_cases, built_ins, defaults
-from mi_brdfs.bench.efficiency import Sampling, _mean, efficiency, sampling
-from mi_brdfs.bench.first import first_picture
-from mi_brdfs.bench.renders import alternate
-from mi_brdfs.bench.run import BenchRun
-from mi_brdfs.bench.scenes import ALONE, BOX, PATH, SPHERE, scene_of, sphere
-from mi_brdfs.bench.timing import deviations, median_interval, time_variance
+from mi_brdfs.bench import calls, comparison, first, pictures, sampling, statistics
+from mi_brdfs.bench.comparison import compare
+from mi_brdfs.bench.first import first_picture, in_new_process
+from mi_brdfs.bench.pictures import render_in_turn, sphere
+from mi_brdfs.bench.sampling import Sampling
+from mi_brdfs.bench.statistics import deviations, median_interval, time_variance
+from mi_brdfs.cli import app
 from mi_brdfs.lobes import LambertLobe, PowerLobe
 from mi_brdfs.mitsuba.bsdf import ModelBSDF
-from mi_brdfs.mitsuba.registry import all_models, own_models
+from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.models.lambert import Lambert
 
 LAMBERT, WALTER = {"type": "lambert"}, {"type": "walter", "alpha": 0.5}
@@ -80,11 +83,13 @@ def plugin(name, model, methods=ModelBSDF):
 
 @pytest.fixture
 def small(monkeypatch):
-    for name, value in {
-        "LOG2_POINTS": 10, "PICTURE": 32, "SPP": 16, "PAIRS": 7, "RESAMPLINGS": 200, "FIRST_PAIRS": 1,
-        "FIRST_ALL_PAIRS": 1, "CYCLES": 60, "SCALAR_PICTURE": 4, "SCALAR_SPP": 4, "SCALAR_PAIRS": 2,
-    }.items():  # fmt: skip
-        monkeypatch.setattr(sizes, name, value)
+    sizes = {sampling: {"LOG2_POINTS": 10}, pictures: {"SIZE": 32, "ROUNDS": 7}, statistics: {"RESAMPLINGS": 200},
+             comparison: {"SIZE": 32, "FIRST_ROUNDS": 1}, calls: {"LANES": 1 << 12, "ROUNDS": 7},
+             times: {"SIZE": 32, "FIRST_ROUNDS": 1, "FIRST_ROUNDS_OF_ALL": 1, "SCALAR_SIZE": 4, "SCALAR_SPP": 4,
+                     "SCALAR_ROUNDS": 2}, resources: {"CYCLES": 60}}  # fmt: skip
+    for module, values in sizes.items():
+        for name, value in values.items():
+            monkeypatch.setattr(module, name, value)
 
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb", "small")
@@ -92,8 +97,83 @@ pytestmark = pytest.mark.usefixtures("llvm_rgb", "small")
 
 def measured(section, cases):
     """The figures of a section for some cases only, by subject and name."""
-    run = BenchRun(lambda *_: None, cases)
-    return {(figure.subject, figure.name): figure for figure in section(run)}
+    return {(figure.subject, figure.name): figure for figure in section(cases)}
+
+
+def alternate(ours, theirs, name):
+    return render_in_turn([partial(scene, bsdf, name) for bsdf in (ours, theirs)])
+
+
+# --- Any two BSDFs --------------------------------------------------------------------------------------------------
+
+
+class Chalk(Lambert):
+    """A guest that draws uniform directions for Lambert's lobe."""
+
+    def lobes(self, p):
+        return (Uniform(p.reflectance),)
+
+
+def test_two_bsdfs_beside_each_other(as_before, tmp_path):
+    """Cosine-weighted directions are perfect for Lambert's lobe; of uniform ones η is 1/∫(2cosθ)² dω/2π = 3/4. Whatever
+    the time, noise under BSDF samples and lights goes with it."""
+    mi_brdfs.register(Chalk)
+    words = ["bench", "lambert", "chalk", "-D", "reflectance=0.8", "--json", str(tmp_path / "it.json")]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "it.json").read_text())
+    assert found["names"] == ["lambert reflectance=0.8", "chalk reflectance=0.8"]
+    rows = {row["name"]: row for row in found["measurements"]}
+    for angle in (5, 30, 60, 80):
+        assert rows[f"η at {angle}°"]["values"] == pytest.approx([1, 0.75], abs=1e-3)
+        assert f"η at {angle}°" in done.stdout
+    assert all(len(rows[name]["values"]) == 2 and min(rows[name]["values"]) > 0 and rows[name]["ratio"][0] > 0
+               for name in ("eval and sample", "picture", "first picture"))  # fmt: skip
+    ours, theirs = rows["its variance"]["values"]
+    assert ours < 0.95 * theirs
+    assert rows["time × variance"]["ratio"][0] == pytest.approx(rows["picture"]["ratio"][0] * ours / theirs)
+
+
+def test_one_bsdf_alone_and_what_no_other_process_knows(as_before):
+    """A model of a function has no first picture; nothing has a ratio."""
+    mi_brdfs.register(type("Local", (Chalk,), {"__doc__": "It cannot be imported.", "plugins": ("local",)}))
+    found = compare({"type": "local"})
+    names = [it.name for it in found.measurements]
+    assert names[:4] == [f"η at {angle}°" for angle in sampling.ANGLES]
+    assert found.measurements[0].values == pytest.approx([0.75], abs=1e-3)
+    assert names[4:] == ["eval and sample", "picture", "its variance"]
+    assert not any(it.ratio for it in found.measurements)
+
+
+def test_the_time_of_calls_is_that_of_kernels(monkeypatch):
+    """Four lobes take longer than one, and tracing does not count."""
+    monkeypatch.setattr(calls, "LANES", 1 << 18)
+    bsdfs = [{"type": "burley", "sheen": 0.5, "clearcoat": 0.5}, LAMBERT]
+    slow, fast = np.median(calls.call_times([comparison._probe(bsdf) for bsdf in bsdfs]), axis=1)
+    assert slow > 3 * fast > 0
+
+
+@pytest.mark.parametrize(
+    "words, sentence",
+    [
+        (["lambrt", "ward"], 'lambrt: there is no plugin "lambrt"; did you mean "lambert"?'),
+        (["lambert", "ward", "-D", "beta=1"], "lambert: "),
+        (["lambert", "ward", "phong"], "name one BSDF or two to compare, not 3: lambert, ward, phong"),
+        (["lambert", "gone.xml"], "gone.xml: no such file"),
+        (["lambert", "--variant", "scalar_rgb"], "this needs a vectorized and unpolarized variant, not scalar_rgb"),
+    ],
+)
+def test_wrong_words_are_told_in_a_sentence(words, sentence):
+    done = CliRunner().invoke(app, ["bench", *words])
+    assert done.exit_code == 2 and done.stdout == ""
+    assert done.stderr.startswith(f"mi-brdfs: {sentence}") and done.stderr.count("\n") == 1
+
+
+def test_compare_tells_wrong_usage():
+    with mi.variant_context("scalar_rgb"), pytest.raises(ValueError, match="vectorized and unpolarized"):
+        compare(LAMBERT)
+    with pytest.raises(ValueError, match="constant is not a BSDF"):
+        compare({"type": "constant"})
 
 
 # --- Cases ----------------------------------------------------------------------------------------------------------
@@ -101,46 +181,13 @@ def measured(section, cases):
 
 def test_cases_are_of_all_models():
     """Several of each, the defaults first; and each has a name of its own."""
-    cases, by_model = all_cases(), {}
-    for case in cases:
+    by_model = {}
+    for case in CASES:
         by_model.setdefault(case.bsdf["type"], []).append(case.bsdf)
-    assert list(by_model) == [model.plugins[0] for model in all_models()]
-    assert all(sets[0] == {"type": name} for name, sets in by_model.items())
-    assert all(len(by_model[model.plugins[0]]) >= 2 for model in own_models())
-    assert len({case.name for case in cases}) == len(cases)
-    assert [case for case in cases if case in TABLE] == TABLE
-    assert defaults(cases) == [{"type": model.plugins[0]} for model in all_models()]
-
-
-def test_as_many_built_ins_as_asked_for():
-    assert built_ins(3) == BUILT_INS[:3]
-    assert built_ins(len(BUILT_INS) + 2) == BUILT_INS + BUILT_INS[:2]
-
-
-class Guest(Lambert):
-    """A model of somebody else's.
-
-    {"type": "guest", "reflectance": 0.9}
-    """
-
-
-def test_guests_are_measured(as_before):
-    """By their defaults and their example; in processes of their own if these can import them."""
-    mi_brdfs.register(Guest)
-    mi_brdfs.register(type("Local", (Lambert,), {"__doc__": "It cannot be imported."}))
-    cases = {case.name: case for case in all_cases() if case.name.split()[0] in ("guest", "local")}
-    assert {name: case.bsdf for name, case in cases.items()} == {
-        "guest": {"type": "guest"}, "guest example": {"type": "guest", "reflectance": 0.9}, "local": {"type": "local"},
-    }  # fmt: skip
-    assert defaults(list(cases.values())) == [{"type": "guest"}]
-    figures = measured(efficiency, list(cases.values()))
-    assert all(figures[name, "80°"].value == pytest.approx(1, abs=1e-3) for name in cases)
-    assert process.in_new_process(first_picture, defaults(list(cases.values()))) > 0
-
-
-def test_what_another_model_takes_the_name_of_has_no_cases_in_the_table(as_before):
-    mi_brdfs.register(type("Other", (Lambert,), {"__doc__": "Another.", "plugins": ("low",)}), replace=True)
-    assert [case.name for case in all_cases() if case.bsdf["type"] == "low"] == ["low"]
+    assert set(by_model) == {model.plugins[0] for model in own_models()}
+    assert all(sets[0] == {"type": name} and len(sets) >= 2 for name, sets in by_model.items())
+    assert len({case.name for case in CASES}) == len(CASES)
+    assert defaults() == [{"type": name} for name in by_model]
 
 
 @pytest.mark.slow
@@ -148,17 +195,17 @@ def test_no_two_built_ins_are_of_the_same_code():
     kernels = set()
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         for bsdf in BUILT_INS:
-            kernels.add(frozenset(resources._launched(mi.load_dict(sphere(bsdf, PATH, 16)))))
+            kernels.add(frozenset(resources._launched(mi.load_dict(sphere(bsdf, 16)))))
     assert len(kernels) == len(BUILT_INS)
 
 
 def test_the_same_model_is_the_same_model():
     """``same`` says that the two reflect the same: to the noise, or where ``principled`` differs (its Fresnel and
     shadowing terms, its coat) nearly."""
-    same = [case for case in TABLE if case.same]
+    same = [case for case in CASES if case.same]
     assert {case.bsdf["type"] for case in same} == {"lambert", "walter", "microfacet", "burley", "metallicroughness"}
     for case in same:
-        ours, theirs = (sampling(bsdf)["whole"].albedo for bsdf in (case.bsdf, case.builtin))
+        ours, theirs = (samplings(bsdf)["whole"].albedo for bsdf in (case.bsdf, case.builtin))
         np.testing.assert_allclose(ours, theirs, rtol=0.22 if case.builtin["type"] == "principled" else 1e-3)
 
 
@@ -171,18 +218,18 @@ def test_the_same_model_is_the_same_model():
 def test_known_efficiencies(name, lobe, expected):
     """At every angle, and whatever is reflected."""
     for reflectance in (0.5, 0.1):
-        parts = sampling(plugin(name, lambert(lobe)) | {"reflectance": reflectance})
+        parts = samplings(plugin(name, lambert(lobe)) | {"reflectance": reflectance})
         assert list(parts) == ["whole"]
         np.testing.assert_allclose(parts["whole"].eta, expected, atol=1e-3)
         np.testing.assert_allclose(parts["whole"].albedo, reflectance * (0.5 if lobe is HalfLost else 1), rtol=1e-3)
 
 
 def test_the_worst_azimuth_counts(monkeypatch):
-    together = sampling(ANISOTROPIC)["whole"].least()
+    together = samplings(ANISOTROPIC)["whole"].least()
     alone = []
-    for azimuth in sizes.AZIMUTHS:
-        monkeypatch.setattr(sizes, "AZIMUTHS", (azimuth,))
-        alone.append(sampling(ANISOTROPIC)["whole"].least())
+    for azimuth in sampling.AZIMUTHS:
+        monkeypatch.setattr(sampling, "AZIMUTHS", (azimuth,))
+        alone.append(samplings(ANISOTROPIC)["whole"].least())
     np.testing.assert_allclose(together, np.min(alone, axis=0), atol=1e-6)
     assert np.ptp(alone, axis=0).max() > 0.01
 
@@ -194,7 +241,7 @@ def test_the_mean_of_the_lobes_is_weighted_by_energy():
         Sampling(np.array([[0.1, 0.3]]), np.array([[0.6, 0.2]])),
     ]
     whole = Sampling(np.array([[0.4, 1.2]]), np.array([[0.5, 0.7]]))
-    assert _mean(whole, lobes, 0) == pytest.approx((0.3 * 1 + 0.1 * 0.6) / 0.4)
+    assert mean_of_lobes(whole, lobes, 0) == pytest.approx((0.3 * 1 + 0.1 * 0.6) / 0.4)
 
 
 def test_efficiencies_that_miss_their_targets():
@@ -232,25 +279,25 @@ def test_the_scene_of_bsdf_samples_shows_one_over_eta():
     """Uniform directions for Lambert's lobe: the variance of a sample is 1/η - 1 = ⅓ of its mean squared, everywhere
     on the sphere, which fills the picture."""
     bsdf = plugin("uniform", lambert(Uniform))
-    renders = alternate(bsdf, bsdf, ALONE)
-    np.testing.assert_allclose(renders.pictures.mean(axis=1), 0.5, atol=0.25)
-    np.testing.assert_allclose(deviations(renders.pictures).mean(axis=1) * sizes.SPP, 1 / 3, rtol=0.06)
+    luminance = alternate(bsdf, bsdf, ALONE).luminance
+    np.testing.assert_allclose(luminance.mean(axis=1), 0.5, atol=0.25)
+    np.testing.assert_allclose(deviations(luminance).mean(axis=1) * pictures.SPP, 1 / 3, rtol=0.06)
 
 
-@pytest.mark.parametrize("scene", [SPHERE, BOX])
-def test_a_bsdf_beside_itself(scene):
+@pytest.mark.parametrize("name", [SPHERE, BOX])
+def test_a_bsdf_beside_itself(name):
     """The same pictures from the same seeds; the times differ by what else the machine does."""
-    renders = alternate(LAMBERT, LAMBERT, scene)
-    np.testing.assert_allclose(renders.pictures[0], renders.pictures[1], rtol=1e-4)
-    assert np.ptp(renders.pictures, axis=1).max() > 0
-    value, (low, high) = time_variance(np.ones(sizes.PAIRS), deviations(renders.pictures))
+    luminance = alternate(LAMBERT, LAMBERT, name).luminance
+    np.testing.assert_allclose(luminance[0], luminance[1], rtol=1e-4)
+    assert np.ptp(luminance, axis=1).max() > 0
+    value, (low, high) = time_variance(np.ones(pictures.ROUNDS), deviations(luminance))
     assert value == pytest.approx(1, rel=1e-4) and low <= value * 1.001 and high >= value / 1.001
 
 
 def test_pairs_are_rendered_in_turn_and_alone(monkeypatch):
     """One first, then the other, with the same seed; and while one is rendered the other is not loaded, or else it
     would be part of the kernel."""
-    rendered, render = [], renders.render
+    rendered, render = [], pictures.render
 
     def recording(scene, seed):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
@@ -262,51 +309,49 @@ def test_pairs_are_rendered_in_turn_and_alone(monkeypatch):
 
     expected = {}
     for bsdf in (WALTER, LAMBERT):
-        recording(scene_of(bsdf, SPHERE), 0)
+        recording(scene(bsdf, SPHERE), 0)
         expected[bsdf["type"]] = rendered.pop()[2]
-    monkeypatch.setattr(renders, "render", recording)
+    monkeypatch.setattr(pictures, "render", recording)
     alternate(WALTER, LAMBERT, SPHERE)
     assert all(kernels == expected[name] for name, _, kernels in rendered)
     pairs = [dict((rendered[k][:2], rendered[k + 1][:2])) for k in range(2, len(rendered), 2)]
-    assert pairs == [{"walter": seed, "lambert": seed} for seed in range(sizes.PAIRS)]
+    assert pairs == [{"walter": seed, "lambert": seed} for seed in range(pictures.ROUNDS)]
     assert {rendered[k][0] for k in range(2, len(rendered), 2)} == {"walter", "lambert"}
 
 
 def test_what_is_slower_and_quieter_is_told(monkeypatch):
-    """``burley`` has four lobes where ``walter`` has one, and wastes less. The sections of times and of variances
-    render once."""
+    """``burley`` has four lobes where ``walter`` has one, and wastes less. Each scene is rendered once."""
     burley = {"type": "burley", "sheen": 0.5, "clearcoat": 0.5}
-    cases = [Case("burley", burley, WALTER, True), Case("other", LAMBERT, WALTER)]
-    renders = {}
+    cases = [Case("burley", burley, WALTER, True), Case("other", LAMBERT, WALTER), Case("alone", WALTER)]
+    renders = []
 
-    def recording(ours, theirs, scene):
-        assert (ours["type"], scene) not in renders
-        renders[ours["type"], scene] = result = alternate(ours, theirs, scene)
-        return result
+    def recording(scenes):
+        renders.append(render_in_turn(scenes))
+        return renders[-1]
 
-    monkeypatch.setattr(bench_run, "alternate", recording)
-    run = BenchRun(lambda *_: None, cases)
-    times = {(f.subject, f.name): f for f in timing.time(run)}
-    variances = {(f.subject, f.name): f for f in timing.variance(run)}
+    monkeypatch.setattr(times, "render_in_turn", recording)
+    found = {(f.section, f.subject, f.name): f for f in times.pictures(cases)}
     assert len(renders) == 3 + 2
-    slower = times["burley / walter", SPHERE]
+    assert {subject for _, subject, _ in found} == {"burley / walter", "other / walter, another model"}
+    slower = found["time", "burley / walter", SPHERE]
     assert slower.value > 1.3 and slower.missed and slower.interval[0] <= slower.value <= slower.interval[1]
-    ours, theirs = (times["burley / walter", f"{SPHERE}, {name}"].value for name in ("ours", "built-in"))
+    ours, theirs = (found["time", "burley / walter", f"{SPHERE}, {name}"].value for name in ("ours", "built-in"))
     assert ours > 1.3 * theirs > 0
-    alone, noise = (variances["burley / walter", f"{ALONE}{words}"] for words in ("", ", variance"))
+    alone, noise = (found["variance", "burley / walter", f"{ALONE}{words}"] for words in ("", ", variance"))
     assert noise.value < 0.2 and not alone.targets
-    ours, theirs = renders["burley", ALONE].seconds
+    ours, theirs = renders[0].seconds
     assert alone.value == pytest.approx(noise.value * np.median(ours / theirs))
-    assert variances["burley / walter", SPHERE].targets == (Target("≤", 1.0, "walter"),)
+    assert found["variance", "burley / walter", SPHERE].targets == (Target("≤", 1.0, "walter"),)
     other = "other / walter, another model"
-    assert (other, ALONE) not in variances and not variances[other, SPHERE].targets
-    assert times[other, SPHERE].targets
+    assert ("variance", other, ALONE) not in found and not found["variance", other, SPHERE].targets
+    assert found["time", other, SPHERE].targets
 
 
 def test_nothing_is_compared_with_no_noise():
     black = {"type": "diffuse", "reflectance": 0.0}
-    figures = measured(timing.variance, [Case("black", LAMBERT, black, True)])
-    assert {name for _, name in figures} == {BOX, f"{BOX}, variance"}  # whose other walls are not black
+    found = times.pictures([Case("black", LAMBERT, black, True)])
+    names = {figure.name for figure in found if figure.section == "variance"}
+    assert names == {BOX, f"{BOX}, variance"}  # whose other walls are not black
 
 
 # --- Statistics -----------------------------------------------------------------------------------------------------
@@ -355,11 +400,11 @@ def test_deviations_of_known_pictures():
 
 def test_first_pictures_compile(monkeypatch, tmp_path):
     """In a process that finds no kernels; if it does, it says so."""
-    assert 0.02 < process.in_new_process(first_picture, [LAMBERT]) < 60
-    monkeypatch.setattr(process, "TemporaryDirectory", lambda: nullcontext(str(tmp_path)))
-    process.in_new_process(first_picture, [LAMBERT])
+    assert 0.02 < in_new_process(first_picture, [LAMBERT]) < 60
+    monkeypatch.setattr(first, "TemporaryDirectory", lambda: nullcontext(str(tmp_path)))
+    in_new_process(first_picture, [LAMBERT])
     with pytest.raises(RuntimeError, match="kernels compiled by earlier runs"):
-        process.in_new_process(first_picture, [LAMBERT])
+        in_new_process(first_picture, [LAMBERT])
 
 
 def test_kernels_for_changes_are_counted():
@@ -374,12 +419,11 @@ def leaking_cycles(rounds):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
-def test_a_leak_is_caught(monkeypatch, pytestconfig):
+def test_a_leak_is_caught():
     """What stays alive is part of every kernel after it: each cycle compiles one. What does not stay costs nothing."""
-    monkeypatch.setenv("PYTHONPATH", str(pytestconfig.rootpath / "tests"))
     growth = []
     for function, given in ((resources.load_render_discard, [[LAMBERT]]), (leaking_cycles, [])):
-        seconds, memory = process.in_new_process(function, *given, 30)
+        seconds, memory = in_new_process(function, *given, 30)
         assert len(seconds) == 30 and len(memory) == 31
         growth.append(memory[-1] - memory[0])
     assert growth[0] < 3 < growth[1]
@@ -412,58 +456,51 @@ def figure(value, *targets, section="time", subject="walter", name="sphere", dig
 )
 def test_judged_as_shown(value, target, met):
     assert (not figure(value, target).missed) == met
-    assert figure(value, target).marked.endswith("!") == (not met)
 
 
-def results():
+def test_figures_in_json():
     slow = figure(1.2, Target("≤", 1.05, "roughconductor"), interval=(1.1, 1.3), subject="walter / roughconductor")
-    lobes = [figure(eta, Target("≥", bound, "each lobe"), digits=3, unit="", section="efficiency", name=name)
-             for eta, bound, name in ((0.97, 0.95, "5°"), (0.8, 0.85, "80°"))]  # fmt: skip
-    fast = figure(1.0, subject="lambert / diffuse")
-    cases = {
-        name: {"name": name, "bsdf": {"type": name}, "builtin": {"type": builtin}, "same": True}
-        for name, builtin in (("walter", "roughconductor"), ("lambert", "diffuse"))
-    }
-    setup = {"mitsuba": "3.9", "drjit": "1.5", "variant": "llvm_ad_rgb", "threads": "2"}
-    return Results([*lobes, slow, fast], setup, cases)
-
-
-def test_results_in_json():
-    data = json.loads(json.dumps(results().to_dict()))
-    assert Results.from_dict(data) == results()
-    assert [figure["missed"] for figure in data["figures"]] == [False, True, True, False]
-    assert data["missed"] == [
-        "efficiency: walter: 80° is 0.800, and should be ≥ 0.850 (each lobe).",
-        "time: walter / roughconductor: sphere is 1.20× [1.10, 1.30], and should be ≤ 1.05 (roughconductor).",
+    data = json.loads(json.dumps(slow.to_dict()))
+    assert data["missed"] and data["targets"] == [{"relation": "≤", "bound": 1.05, "reason": "roughconductor"}]
+    assert slow.sentences() == [
+        "time: walter / roughconductor: sphere is 1.20× [1.10, 1.30], and should be ≤ 1.05 (roughconductor)."
     ]
-
-
-def test_results_as_tables():
-    console = Console(width=200, record=True, file=io.StringIO())
-    for table in results().tables():
-        console.print(table)
-    lines = [line.split() for line in console.export_text().splitlines()]
-    assert ["walter", "0.970", "0.800", "!"] in lines
-    assert ["walter", "/", "roughconductor", "1.20×", "[1.10,", "1.30]", "!"] in lines
-    assert ["lambert", "/", "diffuse", "1.00×"] in lines
-
-
-def test_results_in_markdown():
-    text = results().markdown()
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
-    assert len({len(row) for row in rows}) == 1
-    assert rows[2:] == [
-        ["`walter` / `roughconductor`", "0.800 to 0.970 !", "", "1.20× !", "", "", ""],
-        ["`lambert` / `diffuse`", "", "", "1.00×", "", "", ""],
-    ]
-    assert "* The least efficiency η = E[w]²/E[w²] of a lobe of any model is 0.970 at 5°, 0.800 ! at 80°." in text
-    assert "* Of 3 targets 2 are missed !" in text
 
 
 def test_a_page_has_the_summary(monkeypatch, tmp_path):
-    monkeypatch.setattr(readme, "MEASURED", tmp_path / "bench.json")
-    readme.MEASURED.write_text(json.dumps(results().to_dict()), encoding="utf-8")
-    assert readme.bench() == f"{readme.INTRODUCTION}\n{results().markdown()}"
+    """A line for a case, and a mark for what misses a target."""
+    eta = partial(figure, digits=3, unit="", section="efficiency")
+    beside = partial(figure, subject="walter / roughconductor")
+    slow, kernels = Target("≤", 1.05, "roughconductor"), partial(figure, section="recompiles", digits=0, unit="")
+    figures = [
+        eta(0.97, Target("≥", 0.95, "each lobe"), name="5°"), eta(0.8, Target("≥", 0.85, "each lobe"), name="80°"),
+        eta(0.9, Target("≥", 0.85, "each lobe"), name="80°", subject="ward"), eta(0.5, name="gain"),
+        eta(0.75, name="5°", subject="walter / roughconductor"), beside(1.2, slow), beside(1.01, slow, name=BOX),
+        beside(0.5, section="variance"), beside(0.9, section="variance", name=BOX),
+        figure(1.1, slow, section="first"), kernels(7, name="parameters"), kernels(0, Target("≤", 0, "")),
+        figure(1.02, slow, section="cycles", subject="308 cycles", name="last over first"),
+        figure(42, slow, section="scalar"),
+    ]  # fmt: skip
+    data = {
+        "setup": {"mitsuba": "3.9", "drjit": "1.5", "llvm": "20", "variant": "llvm_ad_rgb", "threads": "2"},
+        "missed": [sentence for each in figures for sentence in each.sentences()],
+        "figures": [each.to_dict() for each in figures],
+        "cases": {"walter": {"name": "walter", "builtin": {"type": "roughconductor"}, "same": True},
+                  "ward": {"name": "ward", "builtin": None, "same": False}},
+    }  # fmt: skip
+    monkeypatch.setattr(bench, "MEASURED", tmp_path / "bench.json")
+    bench.MEASURED.write_text(json.dumps(data), encoding="utf-8")
+    head, line, *rows = (row.split(" | ") for row in bench.text().splitlines() if row.startswith("| "))
+    assert rows == [["| `walter` / `roughconductor`", "0.800 to 0.970 !", "0.750 to 0.750", "1.20× !", "1.01×", "0.50×",
+                     "0.90× |"]] and len(head) == len(line) == len(rows[0])  # fmt: skip
+    assert bench.text().splitlines()[-6:] == [
+        "* The least efficiency η = E[w]²/E[w²] of a lobe of any model is 0.970 at 5°, 0.800 ! at 80°.",
+        "* The time to the first picture, traced and compiled, over the built-in's: walter 1.10× !.",
+        "* Changing 7 parameters, and loading a scene again, compiles 0 kernels.",
+        "* Over 308 cycles of loading, rendering and discarding a scene: last over first 1.02×.",
+        "* The time in `scalar_rgb`, over the built-in's: walter 42.00× !.",
+        "* Of 9 targets 4 are missed !; `python tests/benchmarks` names them.",
+    ]
 
 
 def test_the_readme_has_the_models(monkeypatch, tmp_path):
@@ -482,30 +519,12 @@ def test_the_readme_has_the_models(monkeypatch, tmp_path):
 # --- All together ---------------------------------------------------------------------------------------------------
 
 
-def test_bench_runs_what_is_asked_for(monkeypatch):
-    told = []
-    monkeypatch.setattr(runner, "all_cases", lambda: TABLE[:2])
-    found = bench(iter(["recompiles"]), lambda *progress: told.append(progress))
-    assert told == [("recompiles", 0, 2), ("recompiles", 1, 2)]
-    assert found.sections == ["recompiles"] and found.setup["variant"] == "llvm_ad_rgb"
-    assert not found.missed and set(found.cases) == {case.name for case in TABLE[:2]}
-
-
-def test_wrong_usage():
-    with pytest.raises(ValueError, match="There is no section 'speed'; there are efficiency, time"):
-        bench(["speed"])
-    with mi.variant_context("scalar_rgb"), pytest.raises(ValueError, match="vectorized and unpolarized"):
-        bench(["efficiency"])
-
-
 @pytest.mark.slow
 def test_bench_of_everything():
     """Small, but complete: each section has figures with targets; what does not depend on the machine is reached."""
     threads = dr.thread_count()
-    found = bench()
-    assert found.sections == list(SECTIONS)
-    assert all(any(figure.targets for figure in found.of(section)) for section in SECTIONS)
-    assert not [figure for figure in found.of("recompiles") if figure.missed]
+    found = {name: list(section()) for name, section in SECTIONS.items()}
+    assert all(any(figure.targets for figure in figures) for figures in found.values())
+    assert not [figure for figure in found["recompiles"] if figure.missed]
     assert dr.thread_count() == threads and mi.variant() == "llvm_ad_rgb"
-    json.dumps(found.to_dict(), allow_nan=False)
-    assert found.markdown().count("\n| `") == sum(case.same for case in TABLE)
+    json.dumps([figure.to_dict() for figures in found.values() for figure in figures], allow_nan=False)

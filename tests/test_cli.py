@@ -302,6 +302,7 @@ RESUMED = "Interrupted; 0 of 1 fits are finished: the same command goes on from 
         ("mi_brdfs.rendering.passes.render", ["render", "box.xml"], NOTHING),
         ("mi_brdfs.probe.sources.find_sources", ["show", "lambert"], NOTHING),
         ("mi_brdfs.probe.sources.find_sources", ["check", "lambert"], NOTHING),
+        ("mi_brdfs.bench.comparison.compare", ["bench", "lambert"], NOTHING),
         ("mi_brdfs.measured.convert", ["convert", MEASURED, "it.csv"], NOTHING),
         ("mi_brdfs.probe.largest_albedo.default_albedo", ["energy", "lambert"], NOTHING),
         ("mi_brdfs.gallery.gallery", ["gallery"], "Interrupted; nothing is finished, nothing was written."),

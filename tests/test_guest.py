@@ -87,4 +87,4 @@ def test_it_is_plotted_and_pictured(tmp_path):
 
 
 def test_it_is_benched(tmp_path):
-    assert "regolith" in command(tmp_path, "bench", "--only", "efficiency")
+    assert "first picture" in command(tmp_path, "bench", "dust", "lambert")

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import mi_brdfs
-from mi_brdfs.bench.cases import Case
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -27,7 +26,6 @@ SHORTER = {
     "mi-brdfs render": " --spp 4",
     "mi-brdfs show": " --spp 4",
     "mi-brdfs gallery": " --size 64 --spp 4",
-    "mi-brdfs bench": " --only recompiles",
 }
 """What the README names to make commands that take long shorter, and here is added to them."""
 
@@ -131,7 +129,7 @@ def test_links_are_absolute_where_the_address_is_known(monkeypatch):
 def test_noise_and_speed():
     """The ranges are those of the last bench, rounded."""
     bench = json.loads((ROOT / "docs" / "bench.json").read_text(encoding="utf-8"))
-    same = {case.beside for case in (Case(**case) for case in bench["cases"].values()) if case.same}
+    same = {f"{it['name']} / {it['builtin']['type']}" for it in bench["cases"].values() if it["same"]}
     paragraph = README.split("## Noise and speed\n")[1].split("\n## ")[0]
     said = [tuple(map(float, pair)) for pair in re.findall(r"([\d.]+) to ([\d.]+) times", paragraph)]
     compared = [f for f in bench["figures"] if f["section"] == "variance" and f["subject"] in same]

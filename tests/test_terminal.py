@@ -30,7 +30,7 @@ COMMANDS = {
     "convert": ["convert", "phong", "phong.binary"],
     "check": ["check", "lambert", "phong", "scene.xml", "--only", "finite", "--only", "albedo"],
     "energy": ["energy", "lambert"],
-    "bench": ["bench", "--only", "recompiles"],
+    "bench": ["bench", "lambert", "scene.xml"],
 }
 SCENE = """<scene version="3.0.0"><integrator type="direct"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/></film></sensor>

@@ -1,11 +1,5 @@
-"""Compare the noise and cost of BSDFs with those of Mitsuba's own: ``bench()``, or ``bench(["efficiency"])``.
+"""Compare the noise and the cost of any two BSDFs: ``compare("walter", {"type": "roughconductor"})``."""
 
-:func:`bench` returns :class:`Results`: figures with their targets. :data:`SECTIONS` lists the measurements by name;
-their docstrings say how they work.
-"""
+from .comparison import Comparison, Measurement, compare
 
-from .figure import Figure, Target
-from .report import Results
-from .runner import SECTIONS, bench
-
-__all__ = ["SECTIONS", "Figure", "Results", "Target", "bench"]
+__all__ = ["Comparison", "Measurement", "compare"]

@@ -2,61 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import importlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from . import sizes
-from .cases import Plugin, built_ins, defaults, pairs
-from .figure import Figure, Target
-from .process import in_new_process
-from .run import BenchRun
-from .scenes import PATH, sphere, spheres
-from .timing import median_interval
+from ..mitsuba import guests
+from ..probe.arrays import Array
+from ..probe.sources import BSDFSource
+from .pictures import sphere
+from .statistics import in_turn
 
-ALL = "all models"
 SIZE = 16
 
 
-def first(run: BenchRun) -> Iterator[Figure]:
-    """Measure the time from loading a scene to its first, small picture, traced and compiled, over that with the
-    built-in: the median of pairs of fresh processes, alternating, without cached kernels. The scenes are one sphere
-    with the default parameters of a model, and one sphere for each model, compared with as many built-ins.
-
-    Targets: 1.15 for one model, 1.3 for all of them.
-    """
-    singles = [(case.name, [case.bsdf], [case.other], case.other["type"]) for case in pairs(run.cases)]
-    models = defaults(run.cases)
-    scenes = [*singles, (ALL, models, built_ins(len(models)), f"{len(models)} built-ins")]
-    for name, ours, theirs, beside in run.steps(scenes):
-        count = sizes.FIRST_ALL_PAIRS if name == ALL else sizes.FIRST_PAIRS
-        seconds = np.array([_pair(ours, theirs, k % 2 == 1) for k in range(count)]).T
-        median, interval = median_interval(seconds[0] / seconds[1])
-        target = Target("≤", 1.3 if name == ALL else 1.15, beside)
-        yield Figure("first", name, "first picture", median, 2, "×", interval, (target,))
-        yield Figure("first", name, "ours", float(np.median(seconds[0])), 2, " s")
-        yield Figure("first", name, "built-in", float(np.median(seconds[1])), 2, " s")
+def bsdf_of(given: Any) -> Any:
+    """Return the dict or the BSDF of a source, which another process gets as a list, and a dict as it is."""
+    return given if isinstance(given, dict) else BSDFSource(*given).load()
 
 
-def _pair(ours: list[Plugin], theirs: list[Plugin], ours_first: bool) -> tuple[float, float]:
-    order = (ours, theirs) if ours_first else (theirs, ours)
-    seconds = [in_new_process(first_picture, bsdfs) for bsdfs in order]
-    return tuple(seconds if ours_first else seconds[::-1])
+def first_pictures(subjects: Sequence[list[Any]], rounds: int) -> Array:
+    """Return the seconds to the first picture of each subject, some BSDFs each, in new processes without cached
+    kernels; shape (subjects, rounds)."""
+    seconds = np.zeros((len(subjects), rounds))
+    for k, each in in_turn(len(subjects), rounds):
+        seconds[k, each] = in_new_process(first_picture, subjects[k])
+    return seconds
 
 
-def first_picture(bsdfs: list[Plugin]) -> float:
-    """Return the seconds from loading a scene with some BSDFs to its picture, in a process that has rendered
-    nothing."""
-    scene = spheres(bsdfs, SIZE) if len(bsdfs) > 1 else sphere(bsdfs[0], PATH, SIZE)
+def first_picture(bsdfs: list[Any]) -> float:
+    """Return the seconds from loading a scene with a sphere for each of some BSDFs to its small picture, traced and
+    compiled, in a process that has rendered nothing."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         start = perf_counter()
-        dr.eval(mi.render(mi.load_dict(scene), spp=1))
+        seen, *others = map(bsdf_of, bsdfs)
+        beside = {
+            f"sphere_{k}": {"type": "sphere", "center": [3 * k, 0, 0], "bsdf": bsdf} for k, bsdf in enumerate(others, 1)
+        }
+        dr.eval(mi.render(mi.load_dict(sphere(seen, SIZE) | beside), spp=1))
         dr.sync_thread()
         seconds = perf_counter() - start
         kernels = dr.kernel_history([dr.KernelType.JIT])
     if any(kernel["cache_disk"] for kernel in kernels):
         raise RuntimeError("kernels compiled by earlier runs were found")
     return seconds
+
+
+def in_new_process(function: Callable, *arguments: Any) -> Any:
+    """Return a function's result from a process that knows the same models (:func:`mi_brdfs.mitsuba.guests.source`),
+    but no kernels of earlier runs: these are cached in the user's home folder, so the process gets an empty one.
+    Arguments and result must be of JSON's types."""
+    call = json.dumps([guests.sources(), mi.variant(), function.__module__, function.__name__, arguments])
+    with TemporaryDirectory() as folder:
+        # The path names packages in the home folder, which would not be found.
+        env = os.environ | {"HOME": folder, "TMP": folder, "PYTHONPATH": os.pathsep.join(sys.path)}
+        done = subprocess.run(
+            [sys.executable, "-c", f"from {__name__} import answer; answer()", call],
+            capture_output=True, text=True, env=env,
+        )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"{function.__name__} failed in its process:\n{done.stderr.strip()}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def answer() -> None:
+    """Carry out the call given as the argument of the new process."""
+    sources, variant, module, name, arguments = json.loads(sys.argv[1])
+    for source in sources:
+        guests.import_models(source)
+    mi.set_variant(variant)
+    print(json.dumps(getattr(importlib.import_module(module), name)(*arguments)))

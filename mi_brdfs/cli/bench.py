@@ -9,39 +9,46 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from ..bench import SECTIONS
-from ..bench import bench as measure
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .options import check_names, check_output, write_json
-from .terminal import err, out, print_table, stdout_to_stderr
+from .options import Parameters, check_output, parameters_of, sources_of, write_json
+from .terminal import Exit, err, fail, print_table, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 
 @command()
 def bench(
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="SECTION", help=f"Measure only one of {', '.join(SECTIONS)}; may be repeated."),
-    ] = None,
+    targets: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="TYPE|FILE|FILE.xml:ID|XML…",
+            help="One BSDF or two: plugins; files with a scene, a BSDF or measured values; one BSDF of a scene.",
+        ),
+    ],
+    parameters: Parameters = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures to this file.")
     ] = None,
     variant: TracingVariant = None,
 ) -> None:
-    """Measure efficiency, time and noise against Mitsuba's BSDFs: about ten minutes on an idle machine."""
-    check_names(only, SECTIONS, "section")
+    """Compare two BSDFs: the efficiency of their samplers, the time of calls and pictures, noise. One alone shows its
+    own numbers. Intervals are those of 95 % confidence."""
+    given = parameters_of(parameters)
     check_output("--json", json_file)
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
     columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
     with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("")
-        results = measure(only or None, lambda section, done, of: progress.update(
-            task, description=section, completed=done, total=of))  # fmt: skip
-    write_json(json_file, results.to_dict())
-    for table in results.tables():
-        print_table(table)
-        out.print()
-    for sentence in results.missed:
-        out.print(sentence)
-    err.print(f"Measured in {time.perf_counter() - start:.0f} s, {chosen}; {len(results.missed)} targets are missed.")
+        from ..bench.comparison import STAGES, compare
+
+        task = progress.add_task("", total=len(STAGES))
+        sources = [source for word in targets for source in sources_of(word, given)]
+        try:
+            with unwrapped_ctrl_c():
+                result = compare(*sources, on_progress=lambda stage: progress.update(
+                    task, description=stage, completed=STAGES.index(stage)))  # fmt: skip
+        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
+            fail(one_line(error), Exit.USAGE)
+    write_json(json_file, result.to_dict())
+    print_table(result.table())
+    err.print(f"Measured in {time.perf_counter() - start:.0f} s, {chosen}.")

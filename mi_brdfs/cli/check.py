@@ -17,14 +17,13 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..mitsuba import guests
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
 from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
 from .interrupts import ending_processes
-from .options import Parameters, check_names, check_output, parameters_of, write_json, write_text
+from .options import Parameters, check_names, check_output, parameters_of, sources_of, write_json, write_text
 from .terminal import Exit, err, fail, out, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
@@ -102,7 +101,7 @@ def check(
     warnings.simplefilter("ignore", EnergyWarning)  # the report says it
     with stdout_to_stderr():
         words = targets or [model.plugins[0] for model in all_models()]
-        sources = [source for word in words for source in _found(word, given)]
+        sources = [source for word in words for source in sources_of(word, given)]
         settings = Settings(options, None if against is None else _other(against))
         reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])
@@ -144,24 +143,12 @@ def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     return options
 
 
-def _found(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
-    """Return the BSDFs that a word stands for, or fail with a sentence."""
-    from ..probe.sources import find_sources
-
-    try:
-        with unwrapped_ctrl_c():
-            return list(find_sources(word, parameters))
-    except Exception as error:
-        text = one_line(error)
-        fail(text if text.startswith((word, "-D")) else f"{word}: {text}", Exit.USAGE)
-
-
 def _other(word: str) -> BSDFSource:
     """Return the one BSDF to compare with."""
-    found = _found(word, {})
-    if len(found) > 1:
-        fail(f"--against {word}: name one of {', '.join(source.word for source in found)}", Exit.USAGE)
-    return found[0]
+    sources = sources_of(word, {})
+    if len(sources) > 1:
+        fail(f"--against {word}: name one of {', '.join(source.word for source in sources)}", Exit.USAGE)
+    return sources[0]
 
 
 def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs: int) -> list[Report]:

@@ -7,12 +7,16 @@ import os
 import tempfile
 from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .. import writing
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .terminal import Exit, fail
+
+if TYPE_CHECKING:
+    from ..probe.sources import BSDFSource
 
 Parameters = Annotated[
     list[str] | None,
@@ -43,6 +47,18 @@ def quantity_of(definitions: list[str] | None) -> Any:
     for name in parameters.keys() - {"quantity"}:
         fail(f"-D {name}: a measured file has no parameter but quantity", Exit.USAGE)
     return parameters["quantity"]
+
+
+def sources_of(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
+    """Return the BSDFs that a word stands for, or fail with a sentence."""
+    from ..probe.sources import find_sources
+
+    try:
+        with unwrapped_ctrl_c():
+            return list(find_sources(word, parameters))
+    except Exception as error:
+        text = one_line(error)
+        fail(text if text.startswith((word, "-D")) else f"{word}: {text}", Exit.USAGE)
 
 
 def check_names(names: list[str] | None, known: Collection[str], kind: str) -> None:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
-
-MISSED = " !"
-"""The mark of a figure that misses a target."""
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, NamedTuple
 
 
 class Target(NamedTuple):
@@ -22,7 +19,6 @@ class Figure:
     """A measured number. It is judged as displayed, rounded to ``digits`` decimals."""
 
     section: str
-    """The name of a section, one of ``mi_brdfs.bench.SECTIONS``."""
     subject: str
     """The subject measured: its row in the section's table."""
     name: str
@@ -41,11 +37,6 @@ class Figure:
         reached = {"≥": lambda bound: value >= bound, "≤": lambda bound: value <= bound}
         return [t for t in self.targets if not reached[t.relation](round(t.bound, self.digits))]
 
-    @property
-    def marked(self) -> str:
-        """Return the number with its unit, and a mark if it misses a target."""
-        return f"{self._shown(self.value)}{self.unit}{MISSED if self.missed else ''}"
-
     def __str__(self) -> str:
         interval = f" [{', '.join(map(self._shown, self.interval))}]" if self.interval else ""
         return f"{self._shown(self.value)}{self.unit}{interval}"
@@ -60,3 +51,8 @@ class Figure:
             f"({t.reason})."
             for t in self.missed
         ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it in JSON's types."""
+        targets = [target._asdict() for target in self.targets]
+        return asdict(self) | {"targets": targets, "missed": bool(self.missed)}

@@ -2,59 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
 
 import mitsuba as mi
 import numpy as np
 
-from ..probe.arrays import Array, luminance
-from ..probe.bsdf import BSDFProbe, Part
-from ..probe.directions import direction
-from ..probe.variates import lattice, sampling_efficiency
-from . import sizes
-from .cases import Plugin
+from mi_brdfs.bench.sampling import ANGLES, Sampling, sampling
+from mi_brdfs.probe.bsdf import BSDFProbe
+
+from .cases import CASES, Case, Plugin
 from .figure import Figure, Target
-from .run import BenchRun
 
 WHOLE, GAIN = "whole", "gain"
 UP_TO_60 = {"walter alpha 0.5": 0.91, "walter alpha 1": 0.97}
 """Targets of ``walter`` beyond those of all models."""
 
 
-class Sampling(NamedTuple):
-    """The statistics of a part's samples: arrays over the angles and azimuths."""
-
-    albedo: Array
-    eta: Array
-    """0 where the part is black."""
-
-    def least(self) -> Array:
-        """Return the least efficiency over the azimuths, for each angle."""
-        return self.eta.min(axis=1)
-
-
-def efficiency(run: BenchRun) -> Iterator[Figure]:
-    """Measure η = E[w]²/E[w²], w being the luminance of the weights that ``sample`` returns, zeros included: 1 is
-    perfect, and 1/η - 1 is the relative variance of one sample under uniform light. Anisotropic parts count with the
-    least η over three azimuths. The points fill the space of the variates evenly, so that η is accurate to 0.001.
+def efficiency(cases: Sequence[Case] = CASES) -> Iterator[Figure]:
+    """Measure η; anisotropic parts count with the least of three azimuths.
 
     Targets: 0.95 for each lobe up to 60° and 0.85 beyond; for the mixture of several lobes 0.9 of their mean, weighted
     by their albedos; no less than the built-in's; for ``walter`` 0.91 and 0.97 up to 60°; and for ``burley``, on
     average over all its sets and angles, 1.1 of ``principled``.
     """
     gains: dict[str, list[float]] = {}
-    for case in run.steps(run.cases):
-        ours = sampling(case.bsdf)
-        theirs = sampling(case.other)[WHOLE].least() if case.same else np.empty(0)
+    for case in cases:
+        ours = samplings(case.bsdf)
+        theirs = samplings(case.other)[WHOLE].least() if case.same else np.empty(0)
         lobes = {name: part for name, part in ours.items() if name != WHOLE and part.albedo.any()}
         if len(lobes) < 2:
             lobes = {}  # the whole is a single lobe
         for name, part in {WHOLE: ours[WHOLE], **lobes}.items():
             subject = case.name if name == WHOLE else f"{case.name}, {name}"
-            for k, (angle, eta) in enumerate(zip(sizes.ANGLES, part.least(), strict=True)):
+            for k, (angle, eta) in enumerate(zip(ANGLES, part.least(), strict=True)):
                 if name == WHOLE and lobes:
-                    targets = [Target("≥", 0.9 * _mean(part, lobes.values(), k), "0.9 of its lobes' mean")]
+                    targets = [Target("≥", 0.9 * mean_of_lobes(part, lobes.values(), k), "0.9 of its lobes' mean")]
                 else:
                     targets = [Target("≥", 0.95 if angle <= 60 else 0.85, "each lobe")]
                 if name == WHOLE and case.same:
@@ -66,14 +48,14 @@ def efficiency(run: BenchRun) -> Iterator[Figure]:
             gain = float(np.mean(ours[WHOLE].least() / theirs))
             gains.setdefault(f"{case.bsdf['type']} over {case.other['type']}", []).append(gain)
             yield Figure("efficiency", case.name, GAIN, gain)
-            for angle, eta in zip(sizes.ANGLES, theirs, strict=True):
+            for angle, eta in zip(ANGLES, theirs, strict=True):
                 yield Figure("efficiency", case.beside, f"{angle}°", float(eta))
     for pair, of_sets in gains.items():
         target = (Target("≥", 1.1, "on average"),) if pair == "burley over principled" else ()
         yield Figure("efficiency", pair, GAIN, float(np.mean(of_sets)), targets=target)
 
 
-def _mean(whole: Sampling, lobes: Iterable[Sampling], k: int) -> float:
+def mean_of_lobes(whole: Sampling, lobes: Iterable[Sampling], k: int) -> float:
     """Return the mean efficiency of the lobes, weighted by their albedos, at an angle and at the whole's worst azimuth
     there."""
     worst = int(np.argmin(whole.eta[k]))
@@ -81,16 +63,7 @@ def _mean(whole: Sampling, lobes: Iterable[Sampling], k: int) -> float:
     return float(albedo @ eta / albedo.sum())
 
 
-def sampling(bsdf: Plugin) -> dict[str, Sampling]:
+def samplings(bsdf: Plugin) -> dict[str, Sampling]:
     """Return the statistics of the samples of the whole BSDF, and of each component if there are several."""
     probe = BSDFProbe(mi.load_dict(bsdf))
-    return {part.name: _sampling(probe, part) for part in probe.parts}
-
-
-def _sampling(probe: BSDFProbe, part: Part) -> Sampling:
-    azimuths = sizes.AZIMUTHS if part.has(mi.BSDFFlags.Anisotropic) else sizes.AZIMUTHS[:1]
-    directions = np.array([direction(theta, phi) for theta in sizes.ANGLES for phi in azimuths])
-    w = luminance(probe.weights(part, directions, lattice(sizes.LOG2_POINTS, 1)))
-    w = w.reshape(len(sizes.ANGLES), len(azimuths), -1)
-    full = len(sizes.ANGLES), len(sizes.AZIMUTHS)
-    return Sampling(np.broadcast_to(w.mean(axis=-1), full), np.broadcast_to(sampling_efficiency(w), full))
+    return {part.name: sampling(probe, part) for part in probe.parts}

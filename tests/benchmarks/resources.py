@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import median
 from time import thread_time
@@ -12,21 +12,23 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..probe.kernels import launched_kernels
-from . import sizes
-from .cases import Plugin, defaults
-from .figure import Figure, Target
-from .process import in_new_process
-from .run import BenchRun
-from .scenes import PATH, sphere
+from mi_brdfs.bench.first import SIZE, in_new_process
+from mi_brdfs.bench.pictures import sphere
+from mi_brdfs.probe.kernels import launched_kernels
 
-SIZE = 16
+from .cases import CASES, Case, Plugin, defaults
+from .figure import Figure, Target
+
+CYCLES = 300
+"""The least number of scenes to load, render and discard."""
+EDGE = 50
+"""The least number of these, at the beginning and at the end, to compare."""
 
 
 # --- Kernels --------------------------------------------------------------------------------------------------------
 
 
-def recompiles(run: BenchRun) -> Iterator[Figure]:
+def recompiles(cases: Sequence[Case] = CASES) -> Iterator[Figure]:
     """Count the kernels compiled for a new value of each parameter in turn, and for loading the same scene again after
     discarding it, summed over all cases of a model. As compilation depends on what earlier runs cached on disk, kernels
     are identified by their hashes: those count that the first picture did not need.
@@ -34,7 +36,7 @@ def recompiles(run: BenchRun) -> Iterator[Figure]:
     Target: 0.
     """
     counts: dict[str, np.ndarray] = {}
-    for case in run.steps(run.cases):
+    for case in cases:
         model = case.bsdf["type"]
         counts[model] = counts.get(model, 0) + np.array(fresh_kernels(case.bsdf))
     for model, (parameters, changed, loaded) in counts.items():
@@ -46,7 +48,7 @@ def recompiles(run: BenchRun) -> Iterator[Figure]:
 def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
     """Return ``(parameters, changed, loaded)``: the number of parameters changed, and of kernels compiled for that and
     for loading the scene again."""
-    scene = sphere(bsdf, PATH, SIZE)
+    scene = sphere(bsdf, SIZE)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         loaded = mi.load_dict(scene)
         known = _launched(loaded)
@@ -71,7 +73,7 @@ def _launched(scene: mi.Scene) -> set[int]:
 # --- Time and memory ------------------------------------------------------------------------------------------------
 
 
-def cycles(run: BenchRun) -> Iterator[Figure]:
+def cycles() -> Iterator[Figure]:
     """Load, render and discard scenes with one model each in a new process, in rounds over all models, and measure the
     time of the last rounds over that of the first after a warm-up, and the growth in memory. The time is that of the
     thread that loads and traces: each model's best, which other processes disturb least, then the median over the
@@ -79,11 +81,10 @@ def cycles(run: BenchRun) -> Iterator[Figure]:
 
     Targets: within 1.1 of the first rounds, and below 5 MB.
     """
-    bsdfs = defaults(run.cases)
-    edge = -(-sizes.EDGE // len(bsdfs))
-    rounds = max(2 * edge, -(-sizes.CYCLES // len(bsdfs)))
-    for _ in run.steps([rounds]):
-        seconds, memory = in_new_process(load_render_discard, bsdfs, rounds)
+    bsdfs = defaults()
+    edge = -(-EDGE // len(bsdfs))
+    rounds = max(2 * edge, -(-CYCLES // len(bsdfs)))
+    seconds, memory = in_new_process(load_render_discard, bsdfs, rounds)
     subject = f"{rounds * len(bsdfs)} cycles"
     limit = (Target("≤", 1.1, "flat"),)
     yield Figure("cycles", subject, "last over first", slowdown(seconds, edge), 2, "×", targets=limit)
@@ -100,7 +101,7 @@ def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[flo
         seconds.append([])
         for bsdf in bsdfs:
             start = thread_time()
-            dr.eval(mi.render(mi.load_dict(sphere(bsdf, PATH, SIZE)), spp=1, seed=seed))
+            dr.eval(mi.render(mi.load_dict(sphere(bsdf, SIZE)), spp=1, seed=seed))
             dr.sync_thread()
             seconds[-1].append(thread_time() - start)
         memory += _resident()

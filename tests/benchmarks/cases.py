@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import cycle, islice
 from typing import Any
 
-from ..mitsuba.guests import source
-from ..mitsuba.registry import all_models, find_model, is_own
+from mi_brdfs.mitsuba.registry import own_models
 
 Plugin = dict[str, Any]
 
@@ -72,7 +69,7 @@ COATED = {"base_color": rgb(0.6, 0.1, 0.05), "roughness": 0.4, "clearcoat": 0.5,
 METAL = {"base_color": GOLD, "metallic": 1.0, "roughness": 0.4}
 VELVET = {"base_color": rgb(0.2, 0.1, 0.4), "roughness": 0.8, "sheen": 1.0}
 
-TABLE = [
+CASES = [
     case("ashikhminshirley", plastic(0.14)),
     case("ashikhminshirley anisotropic", exponent_u=13, exponent_v=310),
     case("ashikhminshirley metal", exponent=1000, specular_reflectance=0.9, diffuse_reflectance=0.0),
@@ -144,43 +141,20 @@ TABLE = [
     case("wrap little", wrap=0.3, exponent=1),
     case("wrap sphere", wrap=0.5, domain="sphere"),
 ]  # fmt: skip
-
-"""The cases of the pack's models, each model's defaults first."""
-
-
-def all_cases() -> list[Case]:
-    """Return the cases of every registered model: those of the table, or else its defaults and the example on its
-    manual page."""
-    table: dict[str, list[Case]] = {}
-    for each in TABLE:
-        table.setdefault(each.bsdf["type"], []).append(each)
-    found = []
-    for model in all_models():
-        name = model.plugins[0]
-        if is_own(model) and name in table:
-            found += table[name]
-        else:
-            found.append(case(name))
-            if (example := model.example()) != {"type": name}:
-                found.append(Case(f"{name} example", example))
-    return found
+TABLED = {case.bsdf["type"] for case in CASES}
+for name, model in ((model.plugins[0], model) for model in own_models() if model.plugins[0] not in TABLED):
+    CASES += [case(name), Case(f"{name} example", model.example())]
+"""The cases of the pack's models, each model's defaults first: those above, or else the example on its manual page."""
 
 
-def pairs(cases: Sequence[Case]) -> list[Case]:
+def pairs() -> list[Case]:
     """Return the first case of each model that has a built-in."""
-    return list({case.bsdf["type"]: case for case in reversed(cases) if case.builtin}.values())[::-1]
+    return list({case.bsdf["type"]: case for case in reversed(CASES) if case.builtin}.values())[::-1]
 
 
-def defaults(cases: Sequence[Case]) -> list[Plugin]:
-    """Return the first case of each model that a new process can import, which excludes those defined in notebooks."""
-    names = dict.fromkeys(case.bsdf["type"] for case in cases)
-    first = {name: next(case.bsdf for case in cases if case.bsdf["type"] == name) for name in names}
-    return [bsdf for name, bsdf in first.items() if source(find_model(name))]
-
-
-def built_ins(count: int) -> list[Plugin]:
-    """Return this many built-ins, with different code as far as possible."""
-    return list(islice(cycle(BUILT_INS), count))
+def defaults() -> list[Plugin]:
+    """Return the first case of each model."""
+    return list({case.bsdf["type"]: case.bsdf for case in reversed(CASES)}.values())[::-1]
 
 
 BUILT_INS = [
@@ -206,4 +180,4 @@ BUILT_INS = [
     {"type": "principledthin"},
     {"type": "hair"},
 ]
-"""Built-ins, no two with the same code."""
+"""Built-ins, no two with the same code, to load as many of them as models."""
