@@ -11,7 +11,7 @@ import pytest
 
 import mi_brdfs  # noqa: F401
 from mi_brdfs.rendering.output import display_image, tonemap, write
-from mi_brdfs.rendering.passes import passes as module
+from mi_brdfs.rendering import passes as module
 from mi_brdfs.rendering.passes import render
 
 WIDTH, HEIGHT = 32, 24

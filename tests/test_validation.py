@@ -81,6 +81,19 @@ FALSE_ALARMS = {
     "many turns": ({"type": "ward", "rotation": 100.0, "alpha_u": 0.1, "alpha_v": 0.4}, ["gradients"]),
     "line of ward": ({"type": "ward", "alpha_u": 0.906, "alpha_v": 0.0003}, NARROW),
     "line of walter": ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.001}, NARROW),
+    "line at the normal": ({"type": "ward", "variant": "ward", "alpha_u": 0.00015}, NARROW),
+    "hard edges": (
+        {"type": "toon", "diffuse_threshold": 0.62, "specular_reflectance": 1.0, "specular_smooth": 0.0},
+        ["chi2", "pdf", "continuity"],
+    ),
+    "a lobe below the horizon": ({"type": "lafortune", "cx": -0.4, "cy": -1.5, "cz": -1.5}, ["chi2", "pdf"]),
+    "a black band": ({"type": "toon", "diffuse_threshold": 1.0, "diffuse_smooth": 0.0}, ["chi2", "pdf"]),
+    "an index at its limit": ({"type": "cooktorrance", "eta": 0.01, "k": 60.0}, ["spectral"]),
+    "peaks far narrower than steps": (
+        {"type": "schlick", "roughness": 1e-6, "isotropy": 0.01, "rotation": 0.3},
+        ["gradients"],
+    ),
+    "turns that float32 hardly knows": ({"type": "ward", "rotation": 1e4, "alpha_v": 0.01}, ["gradients"]),
     "narrow along and across": ({"type": "walter", "alpha_u": 0.0041, "alpha_v": 0.00035}, NARROW),
     "diffuse lobe beside facets": ({"type": "walter", "diffuse_reflectance": 0.9, "f0": 0.9}, ["albedo"]),
     "texels beyond a limit": (
@@ -114,6 +127,54 @@ def test_a_colour_as_a_texture_of_spectra():
     mi.set_variant("llvm_ad_spectral")
     report = check({"type": "orennayar", "reflectance": {"type": "rgb", "value": (0.2, 0.3, 0.8)}}, only="textures")
     assert not report.failures and {finding.subject for finding in report.findings} == {"reflectance", "sigma"}
+
+
+def test_bitmaps_are_not_used_up():
+    """Spectral variants write into those that they are given."""
+    mi.set_variant("llvm_ad_spectral")
+    bitmap = mi.Bitmap(np.random.default_rng(3).uniform(0.1, 0.9, (4, 4, 3)).astype(np.float32))
+    before = np.array(bitmap)
+    report = check(
+        {"type": "lambert", "reflectance": {"type": "bitmap", "bitmap": bitmap}}, only=["spectral", "updates"]
+    )
+    assert not report.failures and (np.array(bitmap) == before).all()
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_parameters_that_are_no_numbers():
+    """Nor any numbers at all."""
+
+    class Odd(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.m_flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.BackSide
+            self.m_components = [self.m_flags]
+            self.matrix, self.nothing = mi.Matrix3f(1), mi.Float()
+
+        def traverse(self, callback):
+            callback.put("matrix", self.matrix, mi.ParamFlags.Differentiable)
+            callback.put("nothing", self.nothing, mi.ParamFlags.Differentiable)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            density = dr.select(active & (si.wi.z < 0) & (wo.z < 0), -wo.z * dr.inv_pi, 0)
+            return mi.Color3f(0.5 * density), density
+
+        def eval(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo = -mi.warp.square_to_cosine_hemisphere(sample2)
+            bs.pdf, bs.eta = self.pdf(ctx, si, bs.wo, active), 1
+            bs.sampled_type = mi.UInt32(int(mi.BSDFFlags.DiffuseReflection))
+            return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
+
+    mi.register_bsdf("odd", Odd)
+    report = check({"type": "odd"}, only=["gradients", "updates", "recompiles", "reflectance"])
+    assert not report.failures, report
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -32,6 +32,8 @@ imported: list[str] = []
 def main() -> None:
     """Run the command ``mi-brdfs``."""
     warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
+    if sys.stdout is None:  # a daemon may have closed it
+        sys.stdout = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
     cast(TextIOWrapper, sys.stdout).reconfigure(errors="surrogateescape")  # names of files need not be UTF-8
     try:
         app(prog_name="mi-brdfs")

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from .messages import brief, interval, kind_of, listed, meant, shown
 
@@ -96,7 +97,8 @@ class PropertyReader:
         for number in numbers:
             if isinstance(number, bool) or not isinstance(number, (int, float)):
                 raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be {allowed}")
-            if not math.isfinite(number) or not limits[0] <= number <= limits[1]:
+            at_limit = number in np.float32(limits)  # as colours are kept, which may be beyond it
+            if not math.isfinite(number) or not (limits[0] <= number <= limits[1] or at_limit):
                 raise self.error(name, f"= {shown(value)} is not allowed; it must be {allowed}")
 
     def choice(self, name: str, words: tuple[str, ...]) -> str:

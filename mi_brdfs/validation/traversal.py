@@ -32,7 +32,8 @@ def _is_traced(params: mi.SceneParameters, key: str) -> bool:
         value = params[key]
     except TypeError:  # it may be None, which Mitsuba does not expect itself
         return False
-    return bool(dr.is_arithmetic_v(value) and dr.is_float_v(value) and dr.is_jit_v(value))
+    is_float = dr.is_arithmetic_v(value) and dr.is_float_v(value) and dr.is_jit_v(value)
+    return is_float and not dr.is_matrix_v(value) and dr.width(value) > 0
 
 
 def value_of(params: mi.SceneParameters, key: str) -> Any:
