@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from ..bench import SECTIONS
 from ..bench import bench as measure
 from .app import command
 from .options import check_names, check_output, write_json
-from .terminal import err, out, print_table, stdout_to_stderr
+from .terminal import err, out, print_table, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 
@@ -33,10 +32,9 @@ def bench(
     check_output("--json", json_file)
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
-    columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
-    with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("")
-        results = measure(only or None, lambda section, done, of: progress.update(
+    with stdout_to_stderr(), progress("Measuring") as bar:
+        task = bar.add_task("")
+        results = measure(only or None, lambda section, done, of: bar.update(
             task, description=section, completed=done, total=of))  # fmt: skip
     write_json(json_file, results.to_dict())
     for table in results.tables():
