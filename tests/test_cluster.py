@@ -29,8 +29,8 @@ from mi_brdfs.cluster.passes import passes_on
 from mi_brdfs.cluster.worker import _file
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.mitsuba.registry import info
+from mi_brdfs.rendering import passes as rendering
 from mi_brdfs.rendering.passes import PassesError, one_thread, pass_source, render
-from mi_brdfs.rendering.passes import passes as rendering
 from mi_brdfs.rendering.scene_file import SceneFile
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")

@@ -16,7 +16,7 @@ from support import ROOT
 
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
-from mi_brdfs.explorer.stages import Progress, Stages, UserScene, encoded
+from mi_brdfs.explorer.stages import Progress, Stages, UserScene, rgba
 from mi_brdfs.explorer.state import StateError, checked, parse
 from mi_brdfs.explorer.tours import parse as parse_tour
 from mi_brdfs.explorer.tours import tours
@@ -224,7 +224,7 @@ def test_the_copied_xml_and_dict_give_the_same_picture(client):
     for again in (mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.load_dict(eval(told["dict"]))):
         progress = Progress(stage)
         progress.advance(again)
-        assert encoded(progress.pixels(), 0) == picture["payload"]
+        assert rgba(progress.pixels(), 0) == picture["payload"]
     assert told["command"].startswith("mi-brdfs show ward -D alpha_u=0.1")
 
 

@@ -101,11 +101,21 @@ def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
     assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize(("package", "option"), [("jinja2", "-ofit.html"), ("flip_evaluator", "--image")])
-def test_a_missing_package_is_told_before_anything_is_fitted(package, option, tmp_path, monkeypatch):
+FIT = "fit", LOFT, "--model", "ward"
+
+
+@pytest.mark.parametrize(
+    ("package", "command"),
+    [
+        ("jinja2", (*FIT, "-ofit.html")),
+        ("flip_evaluator", (*FIT, "--image")),
+        ("matplotlib", ("check", "ward", "--html", "check.html")),
+    ],
+)
+def test_a_missing_package_is_told_before_anything_is_done(package, command, tmp_path, monkeypatch):
     (tmp_path / f"{package}.py").write_text(f"raise ModuleNotFoundError('No module named {package}')")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
-    done = run("fit", LOFT, "--model", "ward", option, cwd=tmp_path)
+    done = run(*command, cwd=tmp_path)
     assert done.returncode == 1 and done.stdout == ""
     assert "pip install 'mi_brdfs[report]'" in done.stderr and len(done.stderr.splitlines()) == 1
 

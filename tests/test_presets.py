@@ -14,6 +14,7 @@ from support import call, direction, hemisphere, lattice
 from typer.testing import CliRunner
 
 import mi_brdfs
+from mi_brdfs import srgb
 from mi_brdfs.cli import app
 from mi_brdfs.parameters.published import provenance
 from mi_brdfs.testing import assert_bsdf
@@ -422,3 +423,11 @@ def test_command_shows_one():
 def test_command_refuses(words, sentence):
     status, text = run(*words)
     assert status == 2 and sentence in " ".join(text.split())
+
+
+@pytest.mark.parametrize("linear, encoded, byte", [(0, 0, 0), (0.001, 0.01292, 3), (0.18, 0.461356, 118), (1, 1, 255)])
+def test_srgb(linear, encoded, byte):
+    """The curve of IEC 61966-2-1, in both its parts; what no display shows is clipped."""
+    assert srgb.encoded(linear) == pytest.approx(encoded, abs=1e-6)
+    assert srgb.decoded(encoded) == pytest.approx(linear, abs=1e-6)
+    assert srgb.encoded_8bit([linear, np.nan, -1, 2]).tolist() == [byte, 0, 0, 255]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import mi_brdfs  # noqa: F401
-from mi_brdfs.rendering.output import display_image, tonemap, write
 from mi_brdfs.rendering import passes as module
+from mi_brdfs.rendering.output import display_image, tonemap, write
 from mi_brdfs.rendering.passes import render
 
 WIDTH, HEIGHT = 32, 24

@@ -10,7 +10,7 @@ import pytest
 from plates import SUN, WHITE, film, from_above, load, noisy, plate, shaded
 
 from mi_brdfs.mitsuba import integrator as adapter
-from mi_brdfs.rendering.passes import passes as render
+from mi_brdfs.rendering import passes as render
 
 
 def in_passes(scene, monkeypatch, samples=4, **given):

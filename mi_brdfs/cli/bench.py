@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
 from .options import Parameters, check_output, parameters_of, sources_of, write_json
-from .terminal import Exit, err, fail, print_table, stdout_to_stderr
+from .terminal import Exit, err, fail, print_table, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 
@@ -37,15 +36,14 @@ def bench(
     check_output("--json", json_file)
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
-    columns = [TextColumn("Measuring {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
-    with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+    with stdout_to_stderr(), progress("Measuring") as bar:
         from ..bench.comparison import STAGES, compare
 
-        task = progress.add_task("", total=len(STAGES))
+        task = bar.add_task("", total=len(STAGES))
         sources = [source for word in targets for source in sources_of(word, given)]
         try:
             with unwrapped_ctrl_c():
-                result = compare(*sources, on_progress=lambda stage: progress.update(
+                result = compare(*sources, on_progress=lambda stage: bar.update(
                     task, description=stage, completed=STAGES.index(stage)))  # fmt: skip
         except (ValueError, RuntimeError) as error:  # Mitsuba raises both
             fail(one_line(error), Exit.USAGE)

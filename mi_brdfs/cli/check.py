@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import mitsuba as mi
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..mitsuba import guests
 from ..mitsuba.registry import all_models
@@ -24,7 +23,7 @@ from ..validation import CHECKS
 from .app import command, imported
 from .interrupts import ending_processes
 from .options import Parameters, check_names, check_output, parameters_of, sources_of, write_json, write_text
-from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
@@ -71,7 +70,8 @@ def check(
         typer.Option(metavar="P", help="How probable it is that a right BSDF fails a statistical test. Default: 0.01."),
     ] = None,
     html_file: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Also write a report with pictures to this file.")
+        Path | None,
+        typer.Option("--html", metavar="FILE", help="Also write a page with pictures (extra report)."),
     ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
@@ -96,6 +96,11 @@ def check(
         fail("--against compares values; --only, --conserves and --significance belong to the checks", Exit.USAGE)
     for option, file in ("--html", html_file), ("--json", json_file), ("--junit", junit_file):
         check_output(option, file)
+    if html_file is not None:
+        try:
+            from ..validation.html import page
+        except ImportError as error:
+            fail(str(error))
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
     warnings.simplefilter("ignore", EnergyWarning)  # the report says it
@@ -106,8 +111,6 @@ def check(
         reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
-        from ..validation.html import page
-
         write_text(html_file, page(reports))
     if junit_file is not None:
         from ..validation.junit import junit
@@ -153,16 +156,14 @@ def _other(word: str) -> BSDFSource:
 
 def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs: int) -> list[Report]:
     """Return the reports on all BSDFs, made in separate processes if there are several jobs."""
-    subject = TextColumn("Checking {task.description}", markup=False)
-    columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     each = 1 if settings.other else len(settings.options["only"] or CHECKS)
     reports = []
-    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("", total=len(sources) * each)
+    with progress("Checking") as bar:
+        task = bar.add_task("", total=len(sources) * each)
         if jobs == 1:
             for source in sources:
-                progress.update(task, description=source.name)
-                reports.append(_check_one(source, settings, partial(progress.advance, task)))
+                bar.update(task, description=source.name)
+                reports.append(_check_one(source, settings, partial(bar.advance, task)))
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
         known = variant, guests.sources()
@@ -170,7 +171,7 @@ def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs
         with pool, ending_processes():
             for future in [pool.submit(_check_one, source, settings) for source in sources]:
                 reports.append(future.result())
-                progress.update(task, description=reports[-1].name, advance=each)
+                bar.update(task, description=reports[-1].name, advance=each)
     return reports
 
 

@@ -9,7 +9,6 @@ from math import isinf
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -17,7 +16,7 @@ from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import find_models
 from ..model import Energy, Model
 from .app import command
-from .terminal import Exit, err, fail, out, print_table, stdout_to_stderr
+from .terminal import Exit, err, fail, out, print_table, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
@@ -74,18 +73,16 @@ def _measure_all(models: list[type[Model]]) -> list[Measured]:
     from ..probe.largest_albedo import default_albedo, largest_albedo
     from ..probe.stated_energy import configurations
 
-    subject = TextColumn("Measuring {task.description}", markup=False)
-    columns = [subject, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
     measured = []
-    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
+    with progress("Measuring") as bar:
         todo = {model: _of(model, configurations) for model in models}
-        task = progress.add_task("", total=sum(map(len, todo.values())))
+        task = bar.add_task("", total=sum(map(len, todo.values())))
         for model, configured in todo.items():
-            progress.update(task, description=model.plugins[0])
+            bar.update(task, description=model.plugins[0])
             result = Measured(model, _of(model, default_albedo), [])
             for given in configured:
                 result.found.append((given, _of(model, largest_albedo, given)))
-                progress.advance(task)
+                bar.advance(task)
             measured.append(result)
     return measured
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import TaskProgressColumn
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models, find_models
@@ -18,7 +16,7 @@ from ..probe.sources import value_of
 from .app import command
 from .fit_tables import print_medians, print_ranking
 from .options import check_output, parameters_of, write_json, write_text
-from .terminal import Exit, err, fail, stdout_to_stderr
+from .terminal import Exit, err, fail, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
@@ -165,14 +163,6 @@ def _read(files: list[Path], quantity: Any, cut: float, seed: int) -> tuple[list
     return materials, len(files) - len(materials)
 
 
-@contextmanager
-def _progress(doing: str) -> Iterator[Progress]:
-    columns = [TextColumn(f"{doing} {{task.description}}", markup=False), BarColumn(), TaskProgressColumn(),
-               TimeRemainingColumn()]  # fmt: skip
-    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        yield progress
-
-
 def _fit_all(
     materials: list[Observations],
     names: list[str],
@@ -188,16 +178,16 @@ def _fit_all(
 
     batches = [materials[k : k + TOGETHER] for k in range(0, len(materials), TOGETHER)]
     failed = set()
-    with _progress("Fitting") as progress:
-        task = progress.add_task("", total=len(materials) * len(names))
+    with progress("Fitting", TaskProgressColumn()) as bar:
+        task = bar.add_task("", total=len(materials) * len(names))
         for batch in batches:
             for name in names:
-                done = progress.tasks[0].completed
+                done = bar.tasks[0].completed
 
                 def advance(ended: int, total: int, done: float = done, count: int = len(batch)) -> None:
-                    progress.update(task, completed=done + count * ended / total)
+                    bar.update(task, completed=done + count * ended / total)
 
-                progress.update(task, description=name)
+                bar.update(task, description=name)
                 try:
                     (each,) = find_models([name])
                     own = {key: value for key, value in given.items() if key in known_names(each)}
@@ -208,9 +198,9 @@ def _fit_all(
                     fits += found
                 except (ValueError, RuntimeError) as error:
                     if name not in failed:
-                        progress.console.print(f"mi-brdfs: {one_line(error)}")
+                        bar.console.print(f"mi-brdfs: {one_line(error)}")
                     failed.add(name)
-                progress.update(task, completed=done + len(batch))
+                bar.update(task, completed=done + len(batch))
     return len(failed)
 
 
@@ -220,15 +210,15 @@ def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: boo
     from ..fit.appearance import MOST, Appearance, by_flip, render
 
     found = []
-    with _progress("Rendering") as progress:
-        task = progress.add_task("", total=sum(1 + len(own if image else own[:MOST]) for own in ranked))
+    with progress("Rendering") as bar:
+        task = bar.add_task("", total=sum(1 + len(own if image else own[:MOST]) for own in ranked))
         for own in ranked:
             shown: Appearance | None = None
-            progress.update(task, description=Path(own[0].file).name)
+            bar.update(task, description=Path(own[0].file).name)
             if complete:
                 try:
                     with unwrapped_ctrl_c():
-                        shown = render(own if image else own[:MOST], lambda: progress.advance(task))
+                        shown = render(own if image else own[:MOST], lambda: bar.advance(task))
                     own, shown = by_flip(own, shown) if image else (own, shown)
                     if page:
                         page.add(own, shown)
@@ -236,7 +226,7 @@ def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: boo
                     complete, shown = False, None
                 except (ValueError, RuntimeError) as error:
                     shown = None
-                    progress.console.print(f"mi-brdfs: {own[0].file}: no pictures: {one_line(error)}")
+                    bar.console.print(f"mi-brdfs: {own[0].file}: no pictures: {one_line(error)}")
             if page and not shown:
                 page.add(own)
             found.append(own)

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
 from .variants import AnyVariant, set_variant
 
 
@@ -40,15 +39,13 @@ def gallery(
         fail(str(error))
     chosen = set_variant(variant)
     start, finished, total = time.perf_counter(), 0, 0
-    columns = [TextColumn("Rendering {task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
-    columns += [TextColumn("pictures,"), TimeRemainingColumn(), TextColumn("left")]
-    with stdout_to_stderr(), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("", total=None)
+    with stdout_to_stderr(), progress("Rendering") as bar:
+        task = bar.add_task("", total=None)
 
         def advance(type: str, done: int, of: int) -> None:
             nonlocal finished, total
             finished, total = done, of
-            progress.update(task, description=type, completed=done, total=of)
+            bar.update(task, description=type, completed=done, total=of)
 
         try:
             with unwrapped_ctrl_c():

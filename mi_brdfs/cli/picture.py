@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import mitsuba as mi
 import typer
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import TextColumn
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .interrupts import answer_ctrl_c
-from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,17 +82,15 @@ def _render(scene: mi.Scene, sensor: int, options: dict[str, Any]) -> Picture:
     from ..rendering.passes import render  # imports numpy
 
     seconds, start = options.get("seconds"), time.perf_counter()
-    columns = [TextColumn("Rendering"), BarColumn(), TextColumn("{task.fields[spp]} samples per pixel,")]
-    columns += [TimeRemainingColumn(), TextColumn("left")]
-    with Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("", total=None, spp=0)
+    with progress("Rendering", TextColumn("{task.fields[spp]} samples per pixel,")) as bar:
+        task = bar.add_task("", total=None, spp=0)
 
         def advance(done: int, total: int | None) -> None:
             spp = done if total is None else f"{done}/{total}"
             # The end that comes first.
             parts = [done / total] if total else []
             parts += [] if seconds is None else [(time.perf_counter() - start) / max(seconds, 1e-3)]
-            progress.update(task, completed=max(parts), total=1, spp=spp)
+            bar.update(task, completed=max(parts), total=1, spp=spp)
 
         with answer_ctrl_c(lambda: err.print("Stopping; Ctrl-C again aborts at once.")):
             try:

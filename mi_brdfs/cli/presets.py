@@ -46,8 +46,9 @@ def presets_(
 
 def _hex(rgb: list[float]) -> Text:
     """Return a linear colour as sRGB, and in it a mark."""
-    curve = (12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in rgb)
-    word = "#" + "".join(f"{round(255 * min(max(c, 0), 1)):02x}" for c in curve)
+    from ..srgb import encoded_8bit  # imports numpy
+
+    word = f"#{encoded_8bit(rgb).tobytes().hex()}"
     return Text.assemble(word, (" █" if out.is_terminal else "", word))
 
 

@@ -7,14 +7,13 @@ from collections.abc import Generator
 from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .terminal import Exit, err, fail, out, stdout_to_stderr
+from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
@@ -132,12 +131,10 @@ def _numbers(text: str) -> list[int]:
 
 def _follow(outcomes: Generator[Outcome, None, None], what: str, total: int, finished: int, errors: list[str]) -> None:
     """Show how far something has come, and why parts of it fail, each reason once."""
-    columns: list[Any] = [TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()]
-    columns += [TextColumn(f"{what},"), TimeRemainingColumn(), TextColumn("left")]
-    with closing(outcomes), Progress(*columns, console=err, disable=not err.is_terminal, transient=True) as progress:
-        task = progress.add_task("Sweep", total=total, completed=finished)
+    with closing(outcomes), progress(f"Sweep of {what}") as bar:
+        task = bar.add_task("", total=total, completed=finished)
         for outcome in outcomes:
-            progress.advance(task, outcome.size)
+            bar.advance(task, outcome.size)
             if outcome.error and (sentence := one_line(RuntimeError(outcome.error))) not in errors:
                 errors.append(sentence)
-                progress.console.print(f"mi-brdfs: {sentence}")
+                bar.console.print(f"mi-brdfs: {sentence}")

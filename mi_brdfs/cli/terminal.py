@@ -12,6 +12,7 @@ from typing import NoReturn
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 out = Console(markup=False, highlight=False, soft_wrap=True)
@@ -38,6 +39,14 @@ def print_paragraph(text: str) -> None:
     width = min(out.width, 100) if out.is_terminal else 100
     lines = textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     out.print("\n".join(lines))
+
+
+def progress(doing: str, count: ProgressColumn | None = None) -> Progress:
+    """Return a bar that says what is being done, how much of it is finished, and how long the rest will take; it is
+    seen only on a terminal, and only until the end."""
+    columns = [TextColumn(f"{doing} {{task.description}}", markup=False), BarColumn(), count or MofNCompleteColumn(),
+               TimeRemainingColumn(), TextColumn("left")]  # fmt: skip
+    return Progress(*columns, console=err, disable=not err.is_terminal, transient=True)
 
 
 def fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:

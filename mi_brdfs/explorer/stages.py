@@ -20,6 +20,7 @@ from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
 from ..rendering.output import tonemap
 from ..rendering.passes import pass_source
+from ..srgb import encoded_8bit
 from .state import Bsdf, State
 
 MOST = 256
@@ -182,15 +183,11 @@ class Progress:
         return np.array(bitmap)
 
 
-def encoded(linear: np.ndarray, exposure: float) -> bytes:
+def rgba(linear: np.ndarray, exposure: float) -> bytes:
     """Return RGBA8, sRGB-encoded, in rows from the top. Bright values are compressed as :func:`tonemap` does, with the
     same peak for all pictures, so that they can be compared."""
-    mapped = tonemap(linear * np.float32(2.0**exposure), PEAK)
-    low = mapped * 12.92
-    high = 1.055 * np.maximum(mapped, 1e-6) ** np.float32(1 / 2.4) - 0.055
-    rgb = np.where(mapped <= 0.0031308, low, high)
-    alpha = np.full((*rgb.shape[:2], 1), 255, np.uint8)
-    return np.concatenate([(rgb * 255 + 0.5).astype(np.uint8), alpha], axis=-1).tobytes()
+    rgb = encoded_8bit(tonemap(linear * np.float32(2.0**exposure), PEAK))
+    return np.concatenate([rgb, np.full_like(rgb[..., :1], 255)], axis=-1).tobytes()
 
 
 def shown(
@@ -201,7 +198,7 @@ def shown(
     linear = progress.pixels()
     height, width = linear.shape[:2]
     header = {"width": width, "height": height, "spp": progress.spp, "denoised": denoise is not None}
-    return encoded(denoise(linear) if denoise else linear, exposure), header
+    return rgba(denoise(linear) if denoise else linear, exposure), header
 
 
 class Stages:

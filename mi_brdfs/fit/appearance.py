@@ -15,6 +15,7 @@ from ..mitsuba.names import tabulated
 from ..model import EnergyWarning
 from ..preview import preview_scene
 from ..probe.arrays import Array, luminance
+from ..srgb import decoded, encoded
 from .lanes import rgb_variant
 from .observations import FitError
 from .result import Fit
@@ -52,7 +53,7 @@ def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> A
             pictures.append(_picture(bsdf))
             advance()
         stops = _stops(pictures[0])
-        measured, *others = (_encoded(2.0**stops * picture) for picture in pictures)
+        measured, *others = (encoded(2.0**stops * picture).astype(np.float32) for picture in pictures)
     return Appearance(measured, others, stops)
 
 
@@ -98,8 +99,7 @@ def evaluator() -> Callable[..., Any]:
 
 def lightness(picture: Array) -> Array:
     """Return CIE L* of a picture in sRGB, from 0 to 100."""
-    linear = np.where(picture <= 0.04045, picture / 12.92, ((picture + 0.055) / 1.055) ** 2.4)
-    y = luminance(linear)
+    y = luminance(decoded(picture))
     return np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, 24389 / 27 * y)
 
 
@@ -118,9 +118,3 @@ def _stops(picture: Array) -> int:
     at = np.linspace(-1, 1, SIZE)
     ball = np.hypot(at, at[:, None]) < 0.55
     return int(np.clip(np.floor(np.log2(BRIGHT / max(np.quantile(luminance(picture)[ball], 0.95), 1e-6))), 0, STOPS))
-
-
-def _encoded(picture: Array) -> Array:
-    """Return linear values in sRGB, clipped."""
-    x = np.clip(np.nan_to_num(picture), 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)

@@ -20,13 +20,15 @@ import mitsuba as mi
 import numpy as np
 
 try:
+    import jinja2  # noqa: F401
     import mitsuba_oidn
     from PIL import Image
 except ImportError:
-    raise ImportError("the gallery needs Pillow and Open Image Denoise: pip install 'mi_brdfs[gallery]'") from None
+    raise ImportError("the gallery needs Jinja2, Pillow and mitsuba-oidn: pip install 'mi_brdfs[gallery]'") from None
 
 from ..mitsuba.registry import find_models, presets
 from ..model import Model
+from ..pages import environment
 from ..parameters.published import preset
 from ..preview import preview_scene
 from ..probe.arrays import luminance
@@ -34,7 +36,6 @@ from ..rendering.output import display_image, write
 from ..rendering.passes import ctrl_c
 from ..writing import write_text
 from .families import by_family, portrait, stage_of, year
-from .html import Section, page
 from .sheet import Row, sheet
 from .sweeps import Sweep, shown, sweeps_of
 
@@ -94,8 +95,7 @@ def gallery(
         if begun:
             begun[-1].write(folder)
             _save(overview([(entry.model, entry.shots[0].picture) for entry in begun]), folder / "overview.png")
-            text = page([entry.section() for entry in begun], f"{power_of_4(spp)} samples per pixel, denoised")
-            write_text(folder / "index.html", text)
+            write_text(folder / "index.html", page(begun, spp))
     return folder / "index.html"
 
 
@@ -186,10 +186,21 @@ class Entry:
             if rows:
                 _save(sheet(rows), folder / name)
 
-    def section(self) -> Section:
-        rows = [(row.headings[0], row.captions) for row in self.rows()]
-        names = self.presets[: max(len(self.shots) - len(self.bsdfs), 0)]
-        return Section(self.model, year(self.model), self.bsdfs[0], rows, names)
+    def described(self) -> str:
+        """Return what the contact sheet shows, in words."""
+        return "; ".join(f"{row.headings[0]}: {', '.join(row.captions)}" for row in self.rows())
+
+    def finished_presets(self) -> list[str]:
+        return self.presets[: max(len(self.shots) - len(self.bsdfs), 0)]
+
+
+def page(entries: list[Entry], spp: int) -> str:
+    """Return the page beside the pictures, as text."""
+    families = [(family, list(group)) for family, group in groupby(entries, key=lambda it: it.model.family)]
+    quality = f"{mi.variant()}: {power_of_4(spp)} samples per pixel, denoised"
+    return environment.get_template("gallery.html").render(
+        entries=entries, families=families, year=year, quality=quality
+    )
 
 
 def _save(image: Image.Image, path: Path) -> None:

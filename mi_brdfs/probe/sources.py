@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import mitsuba as mi
+import numpy as np
 
 from ..mitsuba.names import check_name, tabulated
+from ..srgb import decoded
 from .bsdf import BSDFProbe, contained
 from .directions import direction, on_side
 from .variates import random
@@ -117,8 +119,7 @@ def value_of(text: str) -> Any:
         except ValueError:
             continue
     if re.fullmatch("#[0-9a-fA-F]{6}", text):
-        encoded = [int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-        return _rgb([c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded])
+        return _rgb(decoded(np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255).tolist())
     try:
         colour = [float(part) for part in text.split(";")]
     except ValueError:

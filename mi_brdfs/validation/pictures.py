@@ -1,22 +1,31 @@
-"""Pictures of what a sampler draws beside its density, by the histograms of the statistical tests."""
+"""Pictures of what a sampler draws beside its density, by the histograms of the statistical tests, and of energy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from html import escape
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+from matplotlib.ticker import MaxNLocator
 
+from ..pages.figures import DENSITY, DIFFERENCE, SERIES
+from ..plot.style import FAINT, SMALL, STYLES, calm, new_figure
 from ..probe.arrays import Array
 from ..probe.directions import from_plane, to_plane
-from .svg import DENSITY, DEVIATION, IMPOSSIBLE, brief_number, levels_of, png, ticks
 from .trial import Trial
 
 SURE = 1e-6
 """A p-value below which no luck is to blame."""
-PIXELS, GAP = 190, 10
-"""The size of a picture, and the distance of the next."""
+PIXELS = 190
+"""The size of a picture."""
+LEVELS = 64
+"""How many colours a picture has: with more, its file would be larger and show no more."""
+IMPOSSIBLE = 230 / 255, 0, 60 / 255, 1
+"""The red of what no density may be."""
 HEMISPHERE = 92.0
 """Half the size of a window, in degrees, that shows a side of the surface from horizon to horizon."""
 LARGEST = 2.0**127
@@ -85,78 +94,91 @@ def rasters(trial: Trial, view: View) -> Array:
     return pictures
 
 
-def pictures(alt: str, trials: Sequence[Trial]) -> str:
-    """Return a figure of what the sampler of a part draws, for each direction of incidence."""
-    rows = []
-    for trial in trials:
-        where, seen, p = f"light from {trial.incident.name}", list(views(trial)), trial.test.p_value
-        panels = "".join(_panels(f"{alt}, {where}", trial, view) for view in seen)
-        told = f'<span class="{"" if p >= SURE else "fail"}">p = {p:.2g}</span>' if seen else "next to nothing is drawn"
-        rows.append(f"<div><p>{escape(where.capitalize())}: {told}</p>{panels}</div>")
-    return f"""<figure>
-<figcaption>The samples drawn should look like the pdf, and the difference, in standard deviations, like noise: all seen
-from above, at the distance θ from the centre, with the light from the left (the circle; the cross is the mirror
-direction, or straight on), in the colours of the scale below and white for nothing.</figcaption>
-<div class="rows">
-{"".join(rows)}
-</div>
-</figure>"""
+class Panels(NamedTuple):
+    """The three pictures of a window, side by side."""
+
+    side: str
+    drawing: Figure
+    low: str
+    high: str
+    """The densities at the ends of the scale."""
 
 
-def _panels(alt: str, trial: Trial, view: View) -> str:
-    """Return the three pictures of a window, side by side."""
-    drawn, density, deviation = rasters(trial, view)
-    samples = np.concatenate([drawn, density])
-    samples = samples[(samples > 0) & (samples < LARGEST)]
-    low, high = (samples[k] for k in _ends(samples, samples, 1e-3)) if samples.size else (0.1, 1)
-    low = min(low, high / 10)
-    side = f"{'above' if view.side > 0 else 'below'} the surface"
-    with np.errstate(divide="ignore", invalid="ignore"):
-        drawn_levels, levels = (levels_of(np.log(values / low) / np.log(high / low)) for values in (drawn, density))
-    impossible = (density < 0) | (density >= LARGEST)
-    levels[impossible] = IMPOSSIBLE
-    panels = [
-        (f"drawn, {side}", png(drawn_levels, DENSITY)),
-        ("pdf, red where negative or infinite" if impossible.any() else "pdf", png(levels, DENSITY)),
-        ("difference", png(levels_of(deviation / 10 + 0.5), DEVIATION)),
-    ]
-    overlay = _overlay(trial, view)
-    drawing = "".join(
-        f'<g transform="translate({k * (PIXELS + GAP)} 14)"><text y="-4">{title}</text>'
-        f'<rect width="{PIXELS}" height="{PIXELS}" fill="#fff"/>'
-        f'<image width="{PIXELS}" height="{PIXELS}" href="data:image/png;base64,{data}"/>{overlay}</g>'
-        for k, (title, data) in enumerate(panels)
-    )
-    scale, right = 2 * PIXELS + GAP, 3 * PIXELS + 2 * GAP
-    return f"""<svg class="panels" viewBox="0 0 {right} {PIXELS + 58}" role="img"
-aria-label="{escape(alt)}, {side}: the samples drawn, their pdf, and the difference">
-{drawing}
-<g transform="translate(0 {PIXELS + 34})">
-<rect width="{scale}" height="6" fill="url(#density)"/>
-<text y="19">{brief_number(low)} per sr</text><text y="19" x="{scale}" class="end">{brief_number(high)} per sr</text>
-<rect x="{scale + GAP}" width="{PIXELS}" height="6" fill="url(#deviation)"/>
-<text y="19" x="{scale + GAP}">−5σ</text><text y="19" x="{right}" class="end">5σ</text>
-</g></svg>"""
+def pictures(trial: Trial) -> Iterator[Panels]:
+    """Yield what the sampler draws, what ``pdf`` says of it and their difference, for each window."""
+    for view in views(trial):
+        drawn, density, deviation = rasters(trial, view)
+        samples = np.concatenate([drawn, density])
+        samples = samples[(samples > 0) & (samples < LARGEST)]
+        low, high = (samples[k] for k in _ends(samples, samples, 1e-3)) if samples.size else (0.1, 1)
+        low = min(low, high / 10)
+        side = f"{'above' if view.side > 0 else 'below'} the surface"
+        scale, palette = LogNorm(low, high), DENSITY.resampled(LEVELS)
+        expected, impossible = palette(scale(density)), (density < 0) | (density >= LARGEST)
+        expected[impossible] = IMPOSSIBLE
+        shown = {
+            f"drawn, {side}": palette(scale(drawn)),
+            "pdf, red where negative or infinite" if impossible.any() else "pdf": expected,
+            "difference": DIFFERENCE.resampled(LEVELS - 1)(Normalize(-5, 5)(deviation)),
+        }
+        # Without a layout that is computed, which takes ten times as long as the drawing.
+        figure = Figure(figsize=(6.1, 2.3))
+        places = {"left": 0, "right": 1, "bottom": 0.09, "top": 0.92, "wspace": 0.05}
+        for ax, (title, colours) in zip(figure.subplots(1, 3, gridspec_kw=places), shown.items(), strict=True):
+            ax.set_title(title, loc="left", fontsize=SMALL, pad=3)
+            _draw(ax, colours, trial, view)
+        yield Panels(side, figure, _brief(low), _brief(high))
 
 
-def _overlay(trial: Trial, view: View) -> str:
-    """Return the lines over a picture, in degrees, and the ticks below it."""
+def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:
+    """Draw a picture, white where it is transparent, with where the light comes from and where a mirror sends it."""
+    left, right, size = view.x - view.half, view.x + view.half, 2 * view.half
+    top, bottom = view.y - view.half, view.y + view.half
+    ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, color="white", zorder=-1))
+    ax.imshow(colours, interpolation="none", extent=(left, right, bottom, top))
+    ax.axhline(0, color=FAINT, linewidth=0.6, linestyle=(0, (3, 4)))
     wi = trial.incident.wi
-    theta, r = float(np.degrees(np.arctan2(np.hypot(wi[0], wi[1]), abs(wi[2])))), view.half / 25
-    marks = f"M{theta - r:.9g} 0h{2 * r:g}M{theta:.9g} {-r:g}v{2 * r:g}"
-    if wi[2] * view.side > 0:
-        marks += f"M{-theta - r:.9g} 0a{r:g} {r:g} 0 1 0 {2 * r:g} 0a{r:g} {r:g} 0 1 0 {-2 * r:g} 0"
-    left, size = view.x - view.half, 2 * view.half
-    marked, rings = ticks(max(left + 0.05 * size, -90), min(left + 0.95 * size, 90)), ""
+    theta = float(np.degrees(np.arctan2(np.hypot(wi[0], wi[1]), abs(wi[2]))))
+    for colour, width in ("white", 2.2), ("black", 0.9):
+        ax.plot(theta, 0, "+", color=colour, markersize=7, markeredgewidth=width)
+        if wi[2] * view.side > 0:
+            ax.plot(-theta, 0, "o", color=colour, markersize=5, markeredgewidth=width, fillstyle="none")
+    ax.set(xlim=(left, right), ylim=(bottom, top), yticks=[], frame_on=False)
     if view.half == HEMISPHERE:
         marked = [-60, 0, 60]
-        rings = '<circle class="ring" r="30"/><circle class="ring" r="60"/><circle class="horizon" r="90"/>'
-    labels = "".join(
-        f'<text class="middle" x="{(tick - left) / size * PIXELS:.1f}" y="{PIXELS + 11}">{tick:g}°</text>'
-        for tick in marked
-    )
-    return (
-        f'<svg width="{PIXELS}" height="{PIXELS}" viewBox="{left:.9g} {view.y - view.half:.9g} {size:g} {size:g}">'
-        f'{rings}<path class="ring" d="M{left:.9g} 0h{size:g}"/><path class="halo" d="{marks}"/>'
-        f'<path class="mark" d="{marks}"/></svg>{labels}'
-    )
+        for radius, style in (30, (0, (3, 4))), (60, (0, (3, 4))), (90, "-"):
+            ax.add_patch(Circle((0, 0), radius, fill=False, color=FAINT, linewidth=0.6, linestyle=style))
+    else:
+        low, high = max(left + 0.05 * size, -90), min(right - 0.05 * size, 90)
+        marked = [tick for tick in MaxNLocator(4).tick_values(low, high) if low <= tick <= high]
+    ax.set_xticks(marked, [f"{tick:g}°" for tick in marked])
+    ax.tick_params(labelsize=SMALL, length=0, pad=1)
+
+
+def _brief(value: float) -> str:
+    """Return a number with two digits."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def chart(energy: dict[str, dict[str, Any]]) -> Figure:
+    """Return a chart of the albedo and the efficiency of a part over the angle of incidence."""
+    figure = new_figure(4, 1.9)
+    ax = figure.subplots()
+    calm(ax)
+    ax.grid(axis="x", visible=False)
+    largest = 1.0
+    looks = dict(zip(("albedo", "efficiency"), zip(SERIES, STYLES, strict=False), strict=False))
+    for kind, data in energy.items():
+        colour, style = looks[kind]
+        values = {name: value["albedo"] if kind == "albedo" else value for name, value in data.items() if "°" in name}
+        for behind in (False, True):
+            points = [
+                (float(name.split("°")[0]), value)
+                for name, value in values.items()
+                if name.endswith("behind") == behind and np.isfinite(value)
+            ]
+            ax.plot(*zip(*points, strict=True), color=colour, linestyle=style, linewidth=0.8 if behind else 1.6)
+            largest = max([largest, *(value for _, value in points)])
+    ax.set(xlim=(0, 90), ylim=(0, min(largest, 4) * 1.02))
+    ax.set_xticks([0, 30, 60, 90], ["0°", "30°", "60°", "90°"])
+    return figure

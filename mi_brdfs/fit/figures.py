@@ -1,13 +1,9 @@
-"""The drawings of a report as SVG, whose ink is that of the page."""
+"""The drawings of a report."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from io import StringIO
-from itertools import count
 
-import matplotlib as mpl
 import mitsuba as mi
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -15,23 +11,21 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from ...measured.measurement import Measurement
-from ...measured.report.summary import azimuths
-from ...plot.lit import LitTable
-from ...plot.planar import THIN
-from ...plot.style import FAINT, GRID, INK, STYLES, calm
-from ...probe.bsdf import BSDFProbe
-from ...probe.curves import GRAZING, Curve, in_plane, value
-from ...probe.directions import direction
-from ..metrics import METRICS
-from ..observations import Observations
-from ..result import Fit
+from ..measured.measurement import Measurement
+from ..measured.report.summary import azimuths
+from ..pages.figures import DIFFERENCE, SERIES
+from ..plot.lit import LitTable
+from ..plot.planar import THIN
+from ..plot.style import FAINT, GRID, INK, STYLES, calm, new_figure
+from ..probe.bsdf import BSDFProbe
+from ..probe.curves import GRAZING, Curve, in_plane, value
+from ..probe.directions import direction
+from .metrics import METRICS
+from .observations import Observations
+from .result import Fit
 
-SERIES = "#010101", "#020202", "#030303"
-"""In place of the page's colours of the best fits."""
 CURVES = len(SERIES)
 """How many fits are drawn over the data."""
-PALETTE = "RdBu_r"
 NODES = 60
 """The most nodes that are drawn of a lobe."""
 CELLS = 8, 28
@@ -44,9 +38,9 @@ def probe_of(fit: Fit) -> BSDFProbe:
     return BSDFProbe(mi.load_dict(fit.bsdf))
 
 
-def lobes(measurement: Measurement, fits: Sequence[BSDFProbe], cut: float) -> list[tuple[str, str]]:
-    """Return ``(caption, SVG)`` of f in the plane of incidence, of the data and of fits, for some angles of incidence;
-    of anisotropic data for two azimuths."""
+def lobes(measurement: Measurement, fits: Sequence[BSDFProbe], cut: float) -> list[tuple[str, Figure]]:
+    """Return ``(caption, figure)`` of f in the plane of incidence, of the data and of fits, for some angles of
+    incidence; of anisotropic data for two azimuths."""
     first = LitTable(measurement)
     tables = [first]
     if first.grid.anisotropic:
@@ -63,13 +57,13 @@ def lobes(measurement: Measurement, fits: Sequence[BSDFProbe], cut: float) -> li
     return drawn
 
 
-def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Sequence[BSDFProbe]) -> str:
+def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Sequence[BSDFProbe]) -> Figure:
     azimuth = float(np.degrees(table.phi))
     curve = table.curve(theta_i)
     near = np.geomspace(0.02, 20, 30)
     theta = np.unique(np.concatenate([np.linspace(-GRAZING, GRAZING, 241), theta_i + near, theta_i - near, [theta_i]]))
     theta = theta[abs(theta) < 88]
-    figure = _figure(3.5, 2.5)
+    figure = new_figure(3.5, 2.5)
     ax = figure.subplots()
     calm(ax)
     ax.plot(*curve, color=FAINT, linewidth=3, alpha=0.45, solid_capstyle="round")
@@ -91,7 +85,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
     ax.set_title(caption, fontsize=9, color=INK)
     ax.set_xlabel(r"$\theta_o$", fontsize=9, color=INK)
     ax.set_ylabel("f [1/sr]", fontsize=9, color=INK)
-    return svg(figure)
+    return figure
 
 
 class Residuals:
@@ -121,15 +115,15 @@ class Residuals:
         """The residual that all but a few cells stay below."""
         return float(np.nanquantile(abs(self.cells), 0.97))
 
-    def draw(self, limit: float) -> str:
-        """Return them as SVG, with a scale from ``-limit`` to ``limit``."""
-        figure = _figure(3.5, 2.7)
+    def draw(self, limit: float) -> Figure:
+        """Return them as a figure, with a scale from ``-limit`` to ``limit``."""
+        figure = new_figure(3.5, 2.7)
         ax = figure.subplots()
         calm(ax)
         ax.grid(False)
         norm = Normalize(-limit, limit)
         ax.add_patch(Rectangle((0, 0), 1, 1, fill=False, edgecolor=GRID, hatch="////", linewidth=0))
-        ax.pcolormesh(self.edges, self.edges, np.ma.masked_invalid(self.cells.T), norm=norm, cmap=PALETTE,
+        ax.pcolormesh(self.edges, self.edges, np.ma.masked_invalid(self.cells.T), norm=norm, cmap=DIFFERENCE,
                       rasterized=True)  # fmt: skip
         places = [0, 2, 10, 30, 60, 90]
         ax.set_xticks(np.sqrt(np.array(places) / 90), [f"{angle}°" for angle in places])
@@ -137,33 +131,7 @@ class Residuals:
         ax.set(xlim=(0, 1), ylim=(0, 1))
         ax.set_xlabel(r"$\theta_h$", fontsize=9, color=INK)
         ax.set_ylabel(r"$\theta_d$", fontsize=9, color=INK)
-        bar = figure.colorbar(ScalarMappable(norm, PALETTE), ax=ax, aspect=18, pad=0.03, extend="both")
+        bar = figure.colorbar(ScalarMappable(norm, DIFFERENCE), ax=ax, aspect=18, pad=0.03, extend="both")
         bar.ax.tick_params(labelsize=8, labelcolor=INK)
         bar.outline.set_visible(False)
-        return svg(figure)
-
-
-_numbers = count()
-
-
-def _figure(width: float, height: float) -> Figure:
-    return Figure(figsize=(width, height), dpi=110, layout="constrained")
-
-
-def svg(figure: Figure) -> str:
-    """Return a figure as an element of a page: transparent, its inks the page's variables, its text text."""
-    text = StringIO()
-    # Names of definitions are hashes, and must be different in other figures of the page.
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"figure {next(_numbers)}"}):
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    found = text.getvalue()
-    found = found[found.index("<svg") :]
-    found = re.sub(r"<metadata>.*?</metadata>", "", found, flags=re.DOTALL)
-    found = re.sub(r'<g id="[^"]*"', "<g", found)
-    found = re.sub(r"<!--.*?-->\n?", "", found, flags=re.DOTALL)
-    found = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*"', r"\1", found)
-    found = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*"', r"\1", found)
-    inks = {INK: "--ink", FAINT: "--faint", GRID: "--line"} | {s: f"--series-{k}" for k, s in enumerate(SERIES, 1)}
-    for ink, name in inks.items():
-        found = found.replace(ink, f"var({name})")
-    return found
+        return figure

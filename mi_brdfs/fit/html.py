@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
-import mitsuba as mi
 import numpy as np
-from jinja2 import Environment, FileSystemLoader
-from markupsafe import Markup
-from matplotlib import colormaps
-from PIL import Image
 
-from ... import __version__
-from ...measured import Measurement, read
-from ...probe.arrays import Array
-from ..appearance import MOST, Appearance, check_file, lightness
-from ..lanes import rgb_variant
-from ..metrics import METRICS
-from ..observations import observe
-from ..result import Fit
-from ..summary import Median, medians, notes, values
-from .figures import CURVES, PALETTE, Residuals, lobes, probe_of
+from ..measured import Measurement, read
+from ..pages import environment
+from ..pages.figures import DIFFERENCE, data_uri, svg
+from .appearance import MOST, Appearance, check_file, lightness
+from .figures import CURVES, Residuals, lobes, probe_of
+from .lanes import rgb_variant
+from .metrics import METRICS
+from .observations import observe
+from .result import Fit
+from .summary import Median, medians, notes, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
 ALIKE = 1.05
 """The ratio of errors up to which two models fit alike."""
-QUALITY = 88
 SCALES = 1, 2, 5, 10, 20, 50, 100
 """The ends of the scale of differences of lightness."""
 
@@ -44,14 +36,6 @@ class Card:
     picture: str = ""
     difference: str = ""
     residuals: str = ""
-
-    @property
-    def notes(self) -> str:
-        return notes(self.fit)
-
-    @property
-    def values(self) -> list[tuple[str, float, float | None]]:
-        return values(self.fit)
 
 
 @dataclass
@@ -71,7 +55,7 @@ class Section:
     """By how many stops pictures are brightened."""
     quantity: str = ""
     """What residuals are of."""
-    lobes: Sequence[tuple[str, Markup]] = ()
+    lobes: Sequence[tuple[str, str]] = ()
 
     @property
     def best(self) -> Fit:
@@ -120,20 +104,15 @@ class Page:
         """Return the page; ``unfinished`` says what it lacks."""
         everything = [[card.fit for card in section.cards] for section in self.sections]
         table: list[Median] = medians(everything) if len(everything) > 1 else []
-        environment = Environment(
-            loader=FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
-        )
-        environment.filters |= {"number": _number, "error": _error, "breakable": _breakable, "name": _name}
-        return environment.get_template("page.html").render(
+        return environment.get_template("fit.html").render(
             sections=self.sections,
             medians=table,
             metrics=METRICS,
             flip=any(it.flip is not None for own in everything for it in own),
             unfinished=unfinished,
-            palette=_gradient(),
             curves=CURVES,
-            version=__version__,
-            mitsuba=mi.__version__,
+            notes=notes,
+            values=values,
         )
 
 
@@ -141,25 +120,24 @@ def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
     cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
-    section.data = _data_uri(shown.data)
+    section.data = data_uri(shown.data)
     at = lightness(shown.data)
     differences = [lightness(picture) - at for picture in shown.fits[:MOST]]
     largest = np.quantile(abs(differences[0]), 0.99)
     section.lightness = next((end for end in SCALES if end >= largest), SCALES[-1])
     for card, picture, difference in zip(cards, shown.fits, differences, strict=False):
-        card.picture = _data_uri(picture)
-        card.difference = _data_uri(colormaps[PALETTE](0.5 + 0.5 * difference / section.lightness)[..., :3])
+        card.picture = data_uri(picture)
+        card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference / section.lightness)[..., :3])
     with rgb_variant():
         probes = [probe_of(card.fit) for card in cards]
         cut = section.best.cut
         pairs = observe(measurement, cut, PAIRS)
         residuals = [Residuals(pairs, card.fit, probe) for card, probe in zip(cards, probes, strict=True)]
-        drawn = lobes(measurement, probes[:CURVES], cut)
-    section.lobes = [(caption, Markup(drawing)) for caption, drawing in drawn]
+        section.lobes = [(caption, svg(it)) for caption, it in lobes(measurement, probes[:CURVES], cut)]
     section.quantity = residuals[0].quantity
     limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
     for card, each in zip(cards, residuals, strict=True):
-        card.residuals = Markup(each.draw(limit))
+        card.residuals = svg(each.draw(limit))
 
 
 def _error(fit: Fit) -> float:
@@ -172,15 +150,6 @@ def _number(value: float | None) -> str:
     return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
-def _name(file: str) -> str:
-    return Path(file).name
-
-
-def _breakable(name: str) -> Markup:
-    """Return the name of a parameter, whose words may be on several lines."""
-    return Markup("_<wbr>").join(name.split("_"))
-
-
 def _told(measurement: Measurement) -> str:
     channels = measurement.data.values.shape[-1]
     kind = "anisotropic" if measurement.data.anisotropic else "isotropic"
@@ -188,14 +157,4 @@ def _told(measurement: Measurement) -> str:
     return ", ".join(word for word in words if word)
 
 
-def _data_uri(picture: Array) -> str:
-    """Return a picture from 0 to 1 as a link that contains it."""
-    stream = BytesIO()
-    Image.fromarray(np.round(255 * picture).astype(np.uint8)).save(stream, "WEBP", quality=QUALITY)
-    return "data:image/webp;base64," + b64encode(stream.getvalue()).decode()
-
-
-def _gradient() -> str:
-    """Return the scale of differences for a style sheet."""
-    colours = colormaps[PALETTE](np.linspace(0, 1, 9), bytes=True)[:, :3]
-    return ", ".join(f"rgb({', '.join(map(str, colour))})" for colour in colours)
+environment.filters |= {"number": _number, "error": _error, "name": lambda file: Path(file).name}
