@@ -1,5 +1,6 @@
 """The package as installed: versions, import time, style."""
 
+import ast
 import importlib.metadata
 import os
 import subprocess
@@ -67,3 +68,32 @@ def test_types():
 
 def test_types_are_shipped():
     assert (Path(mi_brdfs.__file__).parent / "py.typed").exists()
+
+
+TRUNK = {"math", "srgb", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba", "ranges",
+         "variants", "writing", "starting", "preview", "probe", "rendering", "__version__", "info", "doctor"}  # fmt: skip
+MAY_IMPORT = {
+    "measured": set(),
+    "tabulated": {"measured"},
+    "plot": {"measured"},
+    "pages": {"plot"},
+    "validation": {"pages", "plot"},
+    "gallery": {"pages"},
+    "fit": {"measured", "pages", "plot"},
+    "cluster": set(),
+    "bench": set(),
+    "sweep": {"cluster", "fit", "gallery", "measured"},
+    "explorer": {"fit", "measured", "validation"},
+}
+"""The wings, each with those that it stands on besides the trunk."""
+
+
+@pytest.mark.parametrize("wing", MAY_IMPORT)
+def test_wings_stand_on_what_they_may(wing):
+    folder = Path(mi_brdfs.__file__).parent / wing
+    for file in folder.rglob("*.py"):
+        inside = len(file.relative_to(folder).parts)
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == inside + 1:  # out of the wing
+                rooms = {node.module.split(".")[0]} if node.module else {name.name for name in node.names}
+                assert rooms <= TRUNK | MAY_IMPORT[wing], f"{file}: {ast.unparse(node)}"

@@ -97,7 +97,7 @@ class PropertyReader:
         for number in numbers:
             if isinstance(number, bool) or not isinstance(number, (int, float)):
                 raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be {allowed}")
-            at_limit = number in np.float32(limits).tolist()  # as colours are kept, which may be beyond it
+            at_limit = number in np.array(limits, np.float32).tolist()  # as colours are kept, which may be beyond it
             if not math.isfinite(number) or not (limits[0] <= number <= limits[1] or at_limit):
                 raise self.error(name, f"= {shown(value)} is not allowed; it must be {allowed}")
 
