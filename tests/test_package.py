@@ -71,8 +71,27 @@ def test_types_are_shipped():
 
 
 TRUNK = set(
-    "math srgb parameters microfacet lobes model models integrators mitsuba ranges variants writing starting preview "
-    "probe rendering __version__ info doctor".split()
+    [
+        "math",
+        "srgb",
+        "parameters",
+        "microfacet",
+        "lobes",
+        "model",
+        "models",
+        "integrators",
+        "mitsuba",
+        "ranges",
+        "variants",
+        "writing",
+        "starting",
+        "preview",
+        "probe",
+        "rendering",
+        "__version__",
+        "info",
+        "doctor",
+    ]
 )
 MAY_IMPORT = {
     "measured": set(),
