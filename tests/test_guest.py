@@ -1,5 +1,5 @@
-"""A package of somebody else, ``tests/guest``, that brings a model and a distribution by an entry point: nothing in
-the project knows of it."""
+"""A package of somebody else, ``tests/guest``, that brings a model with a kind of parameter, a distribution and a
+sampler by an entry point: nothing in the project knows of it."""
 
 import importlib.metadata
 import subprocess
@@ -11,6 +11,10 @@ import pytest
 from support import call, hemisphere, is_scalar
 
 import mi_brdfs
+from mi_brdfs.explorer.controls import controls_of
+from mi_brdfs.fit import fit
+from mi_brdfs.gallery.sweeps import Sweep, sweeps_of
+from mi_brdfs.mitsuba.registry import find_model
 
 pytestmark = pytest.mark.skipif(
     not importlib.metadata.entry_points(group="mi_brdfs.models", name="guest"),
@@ -63,13 +67,32 @@ def test_it_is_listed_and_has_a_page(tmp_path):
     assert "student-t" in page and "with beckmann, ggx and student-t" not in page
 
 
-@pytest.mark.parametrize("word", ["dust", "kit.xml"])
+@pytest.mark.parametrize("word", ["dust", "vcavity", "bare"])
 def test_it_passes_all_checks(tmp_path, word):
     (tmp_path / "kit.xml").write_text(
         '<bsdf type="microfacet" version="3.0.0"><string name="distribution" value="student-t"/>'
-        '<string name="shadowing" value="vcavity"/></bsdf>'
+        f'<string name="shadowing" value="{word}"/><float name="alpha" value="0.5"/></bsdf>'
     )
-    assert "fail" not in command(tmp_path, "check", word)
+    assert "fail" not in command(tmp_path, "check", word if word == "dust" else "kit.xml")
+
+
+def test_its_sampler_is_that_of_the_lobe(llvm_rgb):
+    """The density is the cosine's, whatever D is."""
+    bsdf = mi.load_dict({"type": "microfacet", "distribution": "student-t", "shadowing": "bare"})
+    wi, wo = hemisphere(1000, 1), hemisphere(1000, 2)
+    np.testing.assert_allclose(call(bsdf.pdf, mi.BSDFContext(), wi, wo)[0][:, 0], wo[:, 2] / np.pi, rtol=1e-6)
+
+
+def test_its_kind_of_parameter_is_known_everywhere(llvm_rgb):
+    """Fits seek it, the explorer has a slider for it, the gallery sweeps it."""
+    model = find_model("dust")
+    wi, wo = hemisphere(2000, 1), hemisphere(2000, 2)
+    f = 0.6 * lommel_seeliger(wi.astype(np.float64), wo.astype(np.float64)) / wo[:, 2]
+    fitted = fit((wi, wo, f[:, None]), "dust", given={"w": 0.6}, starts=2)[0]
+    assert abs(fitted.bsdf["craters"] - 40) < 0.1
+    (control,) = [it for it in controls_of(model, {"type": "dust"}) if it["name"] == "craters"]
+    assert (control["kind"], control["low"], control["high"]) == ("number", 0, 100)
+    assert Sweep("craters", (0.0, 25.0, 50.0, 75.0), {}) in sweeps_of(model)
 
 
 def test_its_energy_is_measured(tmp_path):

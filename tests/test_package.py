@@ -70,29 +70,12 @@ def test_types_are_shipped():
     assert (Path(mi_brdfs.__file__).parent / "py.typed").exists()
 
 
-TRUNK = set(
-    [
-        "math",
-        "srgb",
-        "parameters",
-        "microfacet",
-        "lobes",
-        "model",
-        "models",
-        "integrators",
-        "mitsuba",
-        "ranges",
-        "variants",
-        "writing",
-        "starting",
-        "preview",
-        "probe",
-        "rendering",
-        "__version__",
-        "info",
-        "doctor",
-    ]
-)
+# fmt: off
+TRUNK = {
+    "math", "srgb", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba", "ranges",
+    "variants", "writing", "starting", "preview", "probe", "rendering", "__version__", "info", "doctor",
+}
+# fmt: on
 MAY_IMPORT = {
     "measured": set(),
     "tabulated": {"measured"},

@@ -1,12 +1,43 @@
-"""A model and a distribution of facets, as a package of somebody else brings them."""
+"""A model with a kind of parameter of its own, a distribution of facets, and a shadowing term with a sampler, as a
+package of somebody else brings them."""
 
 import drjit as dr
 import mitsuba as mi
 
 import mi_brdfs
 from mi_brdfs.lobes import Lobe
-from mi_brdfs.microfacet import Distribution
-from mi_brdfs.parameters import Number, Reflectance
+from mi_brdfs.math import clamp
+from mi_brdfs.microfacet import Distribution, Shadowing
+from mi_brdfs.parameters import Number, Parameter, ParameterRow, Quantity, Reflectance
+
+
+class Percent(Parameter):
+    """A share in percent. Evaluated, the share."""
+
+    def __init__(self, default, text):
+        super().__init__(text)
+        self.default, self.limits = default, (0, 100)
+
+    @property
+    def spellings(self):
+        return [(Quantity(self.name, self.limits, self.default, self.text),)]
+
+    @property
+    def tried(self):
+        return 0.0, 25.0, 50.0, 75.0
+
+    def bind(self, reader):
+        texture = reader.number(self.name, self.default, self.limits)
+        return self.replace(textures={self.name: texture}, ranges={self.name: self.limits})
+
+    def evaluate(self, si, active):
+        return 0.01 * clamp(self.textures[self.name].eval_1(si, active), *self.limits)
+
+    def placeholder(self):
+        return mi.Float(0)
+
+    def rows(self):
+        return [ParameterRow(self.name, "number", f"{self.default:g}", "[0, 100] %", self.text)]
 
 
 class LommelSeeliger(mi_brdfs.Model):
@@ -15,7 +46,7 @@ class LommelSeeliger(mi_brdfs.Model):
     H. Seeliger, Zur Photometrie zerstreut reflectirender Substanzen, Sitzungsberichte der königlich bayerischen
     Akademie der Wissenschaften 18, 1888.
 
-        f = w / (4π (cosθ_i + cosθ_o))
+        f = (1 - c) w / (4π (cosθ_i + cosθ_o))
 
     Reciprocal. Energy-conserving. One-sided.
     """
@@ -23,9 +54,10 @@ class LommelSeeliger(mi_brdfs.Model):
     plugins = ("regolith", "dust")
 
     w = Reflectance(0.3, "single-scattering albedo w")
+    craters = Percent(0, "part c of the surface that is black, in percent")
 
     def lobes(self, p):
-        return (LommelLobe(p.w),)
+        return (LommelLobe(p.w * (1 - p.craters)),)
 
 
 class LommelLobe(Lobe):
@@ -70,3 +102,24 @@ class StudentT(Distribution):
 
     def inverse_cdf(self, c, complement, g):
         return (dr.power(dr.maximum(complement, 1e-30), 1 / (1 - self.gamma)) - 1) * (self.gamma - 1) / g
+
+
+class Bare(Shadowing):
+    """G = cosθ_i cosθ_o, of rough facets whose reflections are drawn as from a diffuse surface."""
+
+    word = "bare"
+    parameters = {}
+
+    def __call__(self, facet):
+        return facet.cos_i * facet.cos_o
+
+    def sampler(self, distribution, fresnel, wi, reflect):
+        return CosineDirections()
+
+
+class CosineDirections:
+    def draw(self, u, v):
+        return mi.warp.square_to_cosine_hemisphere(v)
+
+    def pdf(self, facet):
+        return facet.wo.z * dr.inv_pi
