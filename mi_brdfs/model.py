@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
-from math import isfinite
+from math import inf, isfinite
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
@@ -40,6 +41,20 @@ class Energy(NamedTuple):
     other parameters: at most 1 if the model conserves energy, infinite beyond about 100. White means that every colour
     and the Fresnel reflectance are 1, except that a diffuse lobe beside others is black
     (``diffuse_reflectance``)."""
+
+    @classmethod
+    def of_json(cls, stated: Mapping[str, Any]) -> Energy:
+        """Return the albedos as :meth:`to_json` writes them, with lists for tuples and None for infinity."""
+        rows = [
+            ({name: tuple(it) if isinstance(it, list) else it for name, it in given.items()}, inf if a is None else a)
+            for given, a in stated["largest"]
+        ]
+        return cls(stated["default"], rows)
+
+    def to_json(self) -> str:
+        """Return the albedos as JSON, a line for each configuration."""
+        rows = [json.dumps([given, None if albedo == inf else albedo]) for given, albedo in self.largest]
+        return f'{{"default": {self.default}, "largest": [\n    ' + ",\n    ".join(rows) + "\n  ]}"
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return ``(configuration, largest albedo, class)`` for the manual page."""
@@ -157,7 +172,7 @@ class Model(Plugin):
     family: ClassVar[str] = ""
     """With which models it is shown: one of ``FAMILIES`` or another word; those without one come last."""
     energy: ClassVar[Energy | None] = None
-    """The largest albedos; None if they were not measured."""
+    """The largest albedos; None if they were not measured. Those of the pack's models are in ``models/energy.json``."""
     data = False
     """Whether its values are measured data, which may jump."""
     signed = False

@@ -13,8 +13,9 @@ from rich.table import Table
 from rich.text import Text
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
-from ..mitsuba.registry import find_models
+from ..mitsuba.registry import ENERGY, find_models, is_own, own_models
 from ..model import Energy, Model
+from ..writing import write_text
 from .app import command
 from .terminal import Exit, err, fail, out, print_table, progress, stdout_to_stderr
 from .variants import TracingVariant, set_tracing_variant
@@ -44,6 +45,9 @@ def energy(
     check: Annotated[
         bool, typer.Option("--check", help="Compare with what the classes state. Exit with 1 if any of it is wrong.")
     ] = False,
+    write: Annotated[
+        bool, typer.Option("--write", help="Write what is found of the pack's own models to their data file.")
+    ] = False,
     variant: TracingVariant = None,
 ) -> None:
     """Measure the largest albedo of models, by default and in white for each choice, and print the line of code that
@@ -64,6 +68,8 @@ def energy(
     wrong = check and _print_comparison(measured)
     if not check:
         _print_statements(measured)
+    if write:
+        _write(measured)
     err.print(f"{len(models)} measured in {time.perf_counter() - start:.1f} s, {chosen}.")
     if wrong:
         raise typer.Exit(Exit.ERROR)
@@ -110,6 +116,16 @@ def _print_statements(measured: list[Measured]) -> None:
         out.print(model.plugins[0], style="bold")
         print_table(table)
         out.print(f"\n{_statement(stated)}\n")
+
+
+def _write(measured: list[Measured]) -> None:
+    """Write the data file of the pack's own models, with what was found in place of what it says of these."""
+    from ..probe.stated_energy import energy_of
+
+    stated = {model.plugins[0]: model.energy for model in own_models() if model.energy}
+    stated |= {it.model.plugins[0]: energy_of(*it) for it in measured if is_own(it.model)}
+    rows = [f'  "{name}": {energy.to_json()}' for name, energy in sorted(stated.items())]
+    write_text(ENERGY, "{\n" + ",\n".join(rows) + "\n}\n")
 
 
 def _print_comparison(measured: list[Measured]) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import json
 import pkgutil
 import re
 import warnings
@@ -20,7 +21,7 @@ from ..microfacet.distributions import Distribution
 from ..microfacet.fresnel import Fresnel
 from ..microfacet.shadowing import Shadowing
 from ..microfacet.terms import Term
-from ..model import Model, Plugin, full_name
+from ..model import Energy, Model, Plugin, full_name
 from ..models.microfacet import Microfacet
 from ..parameters import published
 from ..parameters.messages import meant
@@ -158,11 +159,17 @@ def is_own(model: type[Model]) -> bool:
     return model.__module__.startswith(f"{models.__name__}.")
 
 
+ENERGY = Path(models.__file__).with_name("energy.json")
+"""The largest albedos of the pack's models, which ``mi-brdfs energy --write`` measures."""
+
+
 def _take_in_own() -> None:
     """Register the models of the files in ``mi_brdfs/models``."""
+    stated = json.loads(ENERGY.read_text(encoding="utf-8"))
     for file in pkgutil.iter_modules(models.__path__):
         for model in models_in(importlib.import_module(f"{models.__name__}.{file.name}")):
             MODELS.update(dict.fromkeys(model.plugins, model))
+            model.energy = Energy.of_json(stated[model.plugins[0]]) if model.plugins[0] in stated else None
 
 
 _take_in_own()

@@ -6,7 +6,7 @@ from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
 from ..microfacet.distributions import AshikhminShirleyNormals
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import AshikhminShirleyShadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Number, Reflectance, Rotation
 
 
@@ -49,8 +49,6 @@ class AshikhminShirley(Model):
     specular_reflectance = Reflectance(0.05, "reflectance Rs of the specular lobe at normal incidence", role="specular")
     exponent = Number(100, (0, 1e6), "exponent n: the higher, the narrower the highlight", anisotropic=True)
     rotation = Rotation()
-
-    energy = Energy(0.509, [({}, 1), ({"diffuse_reflectance": 1.0}, 1)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         specular = MicrofacetLobe(

@@ -8,7 +8,7 @@ from ..microfacet.distributions import Blinn
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, Shadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Preset, Reflectance
 
 
@@ -59,17 +59,6 @@ class BlinnPhong(Model):
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")
     normalization = Choice(("energy", "approximate", "ndf", "none", "original"), "scale of the specular lobe")
     preset = Preset()
-
-    energy = Energy(
-        0.7,
-        [
-            ({"normalization": "energy"}, 1),
-            ({"normalization": "approximate"}, 1.08),
-            ({"normalization": "ndf"}, 4),
-            ({"normalization": "none"}, dr.pi),
-            ({"normalization": "original"}, 2),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         n = p.exponent

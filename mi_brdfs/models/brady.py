@@ -9,7 +9,7 @@ from ..microfacet.distributions import EPD
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Colour, Number, Reflectance
 
 
@@ -56,8 +56,6 @@ class Brady(Model):
     exponent = Number(2, (0.1, 3), "exponent α: the lower, the longer the tail of the lobe")
     beta = Number(0.3, (0.01, 2), "width β of the lobe, the square root of a slope")
     normalization = Choice(("unit", "none"), "scale K")
-
-    energy = Energy(0.56, [({"normalization": "unit"}, 1), ({"normalization": "none"}, 1.13)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = Exponential(dr.square(p.beta), 0.5 * p.exponent, self.normalization == "unit")

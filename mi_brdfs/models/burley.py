@@ -10,7 +10,7 @@ from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import Shadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Number, Reflectance, Rotation
 
 
@@ -79,8 +79,6 @@ class Burley(Model):
     clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; omitted by default")
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
     rotation = Rotation()
-
-    energy = Energy(0.688, [({"metallic": 1.0, "clearcoat": 0.0}, 1), ({}, 1.89)])
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)

@@ -6,7 +6,7 @@ from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..math import clamp
 from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
 from ..microfacet.shadowing import VCavity
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, FresnelSet, Number, Preset, Reflectance
 
 
@@ -58,8 +58,6 @@ class CookTorrance(Model):
     distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")
     normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
     preset = Preset()
-
-    energy = Energy(1, [({"normalization": "modern"}, 1), ({"normalization": "tog82"}, 4)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         α = p.alpha

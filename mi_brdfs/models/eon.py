@@ -8,7 +8,7 @@ import mitsuba as mi
 from ..lobes import Lobe
 from ..lobes.diffuse import RoughDiffuseLobe
 from ..math import Spectrum, sin_theta
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Number, Reflectance
 
 
@@ -47,8 +47,6 @@ class EON(Model):
 
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     roughness = Number(0.5, (0, 1), "roughness r")
-
-    energy = Energy(0.5, [({}, 1)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (EONLobe(p.reflectance, p.roughness),)

@@ -4,7 +4,7 @@ from ..lobes import LambertLobe, Lobe, MicrofacetLobe
 from ..microfacet.distributions import Beckmann
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import KurtShadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Number, PerLobe, Reflectance, Rotation
 
 
@@ -51,8 +51,6 @@ class Kurt(Model):
         kurt_exponent=Number(0.25, (0, 0.5), "exponent κ of lobe i: the higher, the brighter at grazing"),
     )
     rotation = Rotation()
-
-    energy = Energy(0.81, [({"kurt_exponent": 0.0}, 1), ({"kurt_exponent": 0.25}, 3.19), ({}, 16.6)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         glossy = [

@@ -6,7 +6,7 @@ import mitsuba as mi
 from ..lobes import LambertLobe, Lobe, PowerLobe
 from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, Spectrum, clamp, log1p_series, safe_sqrt
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
 
@@ -60,8 +60,6 @@ class Lafortune(Model):
     )
     normalization = Choice(("energy", "none"), "scale of the lobes")
     rotation = Rotation()
-
-    energy = Energy(0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, float("inf"))])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         energy = self.normalization == "energy"

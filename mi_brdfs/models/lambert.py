@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from ..lobes import LambertLobe, Lobe
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Reflectance
 
 
@@ -29,8 +29,6 @@ class Lambert(Model):
     family = "diffuse"
 
     reflectance = Reflectance(0.5, "albedo ρ")
-
-    energy = Energy(0.5, [({}, 1)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (LambertLobe(p.reflectance),)

@@ -13,7 +13,7 @@ from ..microfacet.forward import ForwardDirections
 from ..microfacet.fresnel import Dielectric
 from ..microfacet.laws import PowerLaw
 from ..microfacet.shadowing import VCavity
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Colour, Number, OneOf, Preset, Reflectance
 
 
@@ -69,16 +69,6 @@ class Low(Model):
     normalization: str
     """The choice that goes with microfacet."""
     preset = Preset()
-
-    energy = Energy(
-        0.069,
-        [
-            ({"variant": "microfacet", "normalization": "fit"}, 3.63),
-            ({"variant": "microfacet", "normalization": "paper"}, 11.4),
-            ({"variant": "microfacet", "normalization": "unit"}, 0.995),
-            ({"variant": "smooth"}, 3.02),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Denser(p.int_ior)

@@ -7,7 +7,7 @@ from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
 from ..microfacet.shadowing import SchlickSmith, Shadowing, SmithGGX
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -55,16 +55,6 @@ class MetallicRoughness(Model):
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
     roughness = Number(0.5, (0.01, 1), "roughness r; its square is the facets' α")
     shadowing = Choice(("direct", "ibl", "smith"), "shadowing term")
-
-    energy = Energy(
-        0.529,
-        [
-            ({"metallic": 1.0}, 1),
-            ({"shadowing": "direct"}, 1.11),
-            ({"shadowing": "ibl"}, 1.9),
-            ({"shadowing": "smith"}, 1.93),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))

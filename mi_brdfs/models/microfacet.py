@@ -5,11 +5,9 @@ import mitsuba as mi
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet import shadowing
 from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, HemiEPD
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import FresnelSet, OneTerm, ParameterError, Preset, Reflectance, Rotation
 from ..parameters.messages import listed
-
-NEARLY_ALL = ("beckmann", "ggx", "blinn", "abc", "hepd")
 
 
 class Microfacet(Model):
@@ -100,37 +98,6 @@ class Microfacet(Model):
     fresnel = FresnelSet()
     rotation = Rotation()
     preset = Preset()
-    energy = Energy(
-        1,
-        [
-            ({"shadowing": "smith", "distribution": ("beckmann", "ggx")}, 1),
-            ({"shadowing": "smith", "distribution": "blinn"}, 1.34),
-            ({"shadowing": "smith-correlated", "distribution": ("beckmann", "ggx")}, 1),
-            ({"shadowing": "smith-correlated", "distribution": "blinn"}, 1.75),
-            ({"shadowing": "vcavity"}, 1),
-            ({"shadowing": "schlick", "distribution": "blinn"}, 1),
-            ({"shadowing": "schlick", "distribution": "beckmann"}, 43.3),
-            ({"shadowing": "schlick", "distribution": "ggx"}, 73.8),
-            ({"shadowing": "schlick", "distribution": "gtr"}, float("inf")),
-            ({"shadowing": "schlick", "distribution": "epd"}, float("inf")),
-            ({"shadowing": "implicit"}, 1),
-            ({"shadowing": "kelemen"}, 1),
-            ({"shadowing": ("neumann", "ashikhmin-premoze"), "distribution": NEARLY_ALL}, 1),
-            ({"shadowing": "neumann", "distribution": "gtr"}, 2.84),
-            ({"shadowing": "ashikhmin-premoze", "distribution": "gtr"}, 2.75),
-            ({"shadowing": "neumann", "distribution": "epd"}, 52.8),
-            ({"shadowing": "ashikhmin-premoze", "distribution": "epd"}, 36.7),
-            ({"shadowing": "ashikhmin-shirley", "distribution": ("blinn", "abc", "hepd")}, 1),
-            ({"shadowing": "ashikhmin-shirley", "distribution": "beckmann"}, 1.05),
-            ({"shadowing": "ashikhmin-shirley", "distribution": "ggx"}, 1.69),
-            ({"shadowing": "ashikhmin-shirley", "distribution": "gtr"}, 4.41),
-            ({"shadowing": "ashikhmin-shirley", "distribution": "epd"}, 66.1),
-            ({"shadowing": "kurt", "kurt_exponent": 0.25, "distribution": NEARLY_ALL}, 3.64),
-            ({"shadowing": "kurt", "distribution": NEARLY_ALL}, 20.3),
-            ({"shadowing": "kurt", "distribution": "gtr"}, 35),
-            ({"shadowing": "kurt", "distribution": "epd"}, float("inf")),
-        ],
-    )
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)

@@ -8,7 +8,7 @@ import mitsuba as mi
 from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
 from ..math import Spectrum, safe_sqrt
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -49,15 +49,6 @@ class Minnaert(Model):
     reflectance = Reflectance(0.5, "scale ρ; for k >= 1 the albedo at normal incidence")
     exponent = Number(1.5, (0, 100), "exponent k: above 1 the limb darkens, below it brightens")
     normalization = Choice(("energy", "published", "none"), "the form at grazing angles")
-
-    energy = Energy(
-        0.5,
-        [
-            ({"normalization": "energy"}, 1),
-            ({"normalization": "published"}, float("inf")),
-            ({"normalization": "none"}, 2),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         return (MinnaertLobe(p.reflectance, p.exponent, self.normalization),)

@@ -4,7 +4,7 @@ from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import HemiEPD
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Implicit, VCavity
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import FresnelSet, Number, OneOf, Reflectance
 
 
@@ -58,8 +58,6 @@ class Nishino(Model):
         {"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}},
         "distribution of the facets, or of f itself",
     )
-
-    energy = Energy(1, [({"variant": "microfacet"}, 1), ({"variant": "dsbrdf"}, 1)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = HemiEPD(p.kappa, p.gamma)

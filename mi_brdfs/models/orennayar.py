@@ -8,7 +8,7 @@ import mitsuba as mi
 from ..lobes import Lobe
 from ..lobes.diffuse import RoughDiffuseLobe
 from ..math import EPSILON, Spectrum, sin_theta, square
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Flag, Number, Reflectance, Spelling
 
 
@@ -56,8 +56,6 @@ class OrenNayar(Model):
                    spelling=Spelling("alpha", (0, 2.2), math.sqrt(0.5), "√2 σ, as a Beckmann roughness"))  # fmt: skip
     model = Choice(("qualitative", "full"), "one of the paper's fits")
 
-    energy = Energy(0.498, [({"model": "qualitative"}, 1.02), ({"model": "full"}, 1.05)])
-
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         lobe = FullLobe if self.model == "full" else QualitativeLobe
         return (lobe(p.reflectance, p.sigma),)
@@ -92,8 +90,6 @@ class RoughDiffuse(Model):
     reflectance = Reflectance(0.5, "albedo ρ of the facets")
     alpha = Number(0.2, (0, 2.2), "roughness α of the surface, as of a Beckmann distribution")
     use_fast_approx = Flag(False, "leave out interreflection, and simplify the rest")
-
-    energy = Energy(0.508, [({"use_fast_approx": False}, 1.05), ({"use_fast_approx": True}, 1.02)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         lobe = QualitativeLobe if self.use_fast_approx else FullLobe

@@ -3,7 +3,7 @@ from __future__ import annotations
 import drjit as dr
 
 from ..lobes import LambertLobe, Lobe, PowerLobe, PowerResponseLobe
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -47,10 +47,6 @@ class Phong(Model):
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe", role="specular")
     exponent = Number(30, (0, 1e6), "exponent n: the higher, the narrower the highlight")
     normalization = Choice(("energy", "none", "original"), "scale of the specular lobe")
-
-    energy = Energy(
-        0.7, [({"normalization": "energy"}, 1), ({"normalization": "none"}, dr.pi), ({"normalization": "original"}, 2)]
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         diffuse, n = LambertLobe(p.diffuse_reflectance), p.exponent

@@ -10,7 +10,7 @@ from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Fresnel, Schlick
 from ..microfacet.laws import LARGEST_TAN2
 from ..microfacet.shadowing import SchlickSmith, Shadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance, Rotation
 
 TYPICAL = 0.58
@@ -72,15 +72,6 @@ class Schlick94(Model):
     isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed")
     variant = Choice(("shadowed", "interreflection", "plain"), "treatment of the shadowed light")
     rotation = Rotation()
-
-    energy = Energy(
-        0.457,
-        [
-            ({"variant": "shadowed"}, 6.62),
-            ({"variant": "interreflection"}, float("inf")),
-            ({"variant": "plain"}, float("inf")),
-        ],
-    )
 
     def __init__(self, props: mi.Properties) -> None:
         super().__init__(props)

@@ -7,7 +7,7 @@ from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
 from ..lobes.power import AxisFrame
 from ..math import EPSILON, TINY, Spectrum, choose, leaving, safe_sqrt
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -62,16 +62,6 @@ class Toon(Model):
     specular_threshold = Number(0.9, (0, 1), "cosine ts at which the highlight ends")
     specular_smooth = Number(0.02, (0, 1), "half width ss of its edge, in the cosine; 0 is hard")
     normalization = Choice(("energy", "none"), "scale Z")
-
-    energy = Energy(
-        0.7,
-        [
-            ({"normalization": "energy"}, 1),
-            ({"normalization": "energy", "diffuse_reflectance": 1.0, "specular_reflectance": 0.0}, 1),
-            ({"normalization": "none"}, 2),
-            ({"normalization": "none", "diffuse_reflectance": 1.0, "specular_reflectance": 0.0}, 2),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         lit, highlight = Step(p.diffuse_threshold, p.diffuse_smooth), Step(p.specular_threshold, p.specular_smooth)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
 from ..microfacet.distributions import GGX
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
 
 
@@ -47,8 +47,6 @@ class Walter(Model):
     fresnel = FresnelSet()
     shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")
     rotation = Rotation()
-
-    energy = Energy(0.989, [({}, 1)])
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         facets = GGX(*p.alpha)

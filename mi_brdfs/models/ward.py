@@ -10,7 +10,7 @@ from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Unit
 from ..microfacet.laws import log_complement, tan2_of_versine, versine_of_tan2
 from ..microfacet.shadowing import Kelemen, Shadowing
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Preset, Reflectance, Rotation
 
 
@@ -63,16 +63,6 @@ class Ward(Model):
     variant = Choice(("balanced", "ward", "ward-duer", "approximate"), "scale of the specular lobe")
     rotation = Rotation()
     preset = Preset()
-
-    energy = Energy(
-        0.698,
-        [
-            ({"variant": "balanced"}, 1),
-            ({"variant": "ward"}, 2.36),
-            ({"variant": "ward-duer"}, 65.7),
-            ({"variant": "approximate"}, 4.53),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = ApproximateBeckmann(*p.alpha) if self.variant == "approximate" else Beckmann(*p.alpha)

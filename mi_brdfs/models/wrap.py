@@ -6,7 +6,7 @@ import mitsuba as mi
 from ..lobes import Lobe
 from ..lobes.diffuse import ZonalLobe
 from ..math import TINY, Spectrum
-from ..model import Energy, Model, Values
+from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance
 
 
@@ -59,15 +59,6 @@ class Wrap(Model):
     exponent = Number(2, (0, 100), "exponent n: the higher, the darker the terminator")
     domain = Choice(("hemisphere", "sphere"), "the light that counts")
     normalization = Choice(("energy", "none"), "scale Z")
-
-    energy = Energy(
-        0.5,
-        [
-            ({"normalization": "energy"}, 1),
-            ({"normalization": "none", "domain": "hemisphere"}, 2),
-            ({"normalization": "none", "domain": "sphere"}, 4),
-        ],
-    )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         w, n = p.wrap, p.exponent
