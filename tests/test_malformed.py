@@ -104,6 +104,12 @@ def test_values(model):
     fuzz()
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_limits_are_as_float32_has_them():
+    """In which Mitsuba keeps colours: that of 0.01 is less."""
+    mi.load_dict({"type": "cooktorrance", "eta": {"type": "rgb", "value": (0.01, 100, 1)}, "k": 60.0})
+
+
 # --- Names ----------------------------------------------------------------------------------------------------------
 
 

@@ -88,7 +88,6 @@ FALSE_ALARMS = {
     ),
     "a lobe below the horizon": ({"type": "lafortune", "cx": -0.4, "cy": -1.5, "cz": -1.5}, ["chi2", "pdf"]),
     "a black band": ({"type": "toon", "diffuse_threshold": 1.0, "diffuse_smooth": 0.0}, ["chi2", "pdf"]),
-    "an index at its limit": ({"type": "cooktorrance", "eta": 0.01, "k": 60.0}, ["spectral"]),
     "peaks far narrower than steps": (
         {"type": "schlick", "roughness": 1e-6, "isotropy": 0.01, "rotation": 0.3},
         ["gradients"],

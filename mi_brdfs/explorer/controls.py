@@ -53,8 +53,8 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
                     excludes = parameter.rivals(control["name"])
                     yield control | {"optional": True, "excludes": excludes, "also": also}
         elif False in parameter.words:
-            value, default = bsdf.get(parameter.names[0], next(iter(parameter.words))), next(iter(parameter.words))
-            yield _control(parameter.names[0], parameter.text, "flag", value, default, group)
+            name, default = parameter.names[0], parameter.fit_words[0]
+            yield _control(name, parameter.text, "flag", bsdf.get(name, default), default, group)
         elif parameter.words:
             yield _choice(parameter.names[0], parameter.text, tuple(parameter.words), bsdf, group, parameter.names[1:])
             word = bsdf.get(parameter.names[0], next(iter(parameter.words)))

@@ -160,7 +160,7 @@ def _slot(key: str, model: Any, name: str, value: Any) -> tuple[Slot, Array]:
         numbers = numbers.ravel()
     limits = model.ranges.get(name, (0, 1))
     is_colour, is_rotation = numbers.shape[-1] == 3, name not in model.ranges
-    unknown = unknown_of(Quantity(name, limits, None, "", is_colour, is_rotation))
+    unknown = unknown_of(Quantity(name, limits, None, colour=is_colour, turns=is_rotation))
     on_scale = unknown.to_scale(numbers)
     if numbers.ndim == 3:
         return Slot(key, unknown, type(value), on_scale), np.zeros(numbers.shape[-1])

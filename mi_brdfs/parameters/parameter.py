@@ -30,7 +30,7 @@ class Quantity(NamedTuple):
     name: str
     limits: Range
     default: float | None
-    text: str
+    text: str = ""
     colour: bool = False
     turns: bool = False
     """Whether it is a rotation: whole turns change nothing."""
@@ -49,7 +49,7 @@ class Parameter:
     name: str
     """The attribute that it was assigned to."""
     words: Mapping[Any, Mapping[str, Parameter]] = {}
-    """The words or flags that it may be, the default first, each with the parameters that it has beside it."""
+    """The words or flags that it may be, each with the parameters that it has beside it; of words the default first."""
     implied_words: tuple[str, ...] = ()
     """Those of them that are not given, but follow from which parameters are."""
     role: str | None = None
@@ -109,7 +109,7 @@ class Parameter:
 
     @property
     def fit_words(self) -> tuple[Any, ...]:
-        """Its words in fits, the first where none is given."""
+        """Its words as fits try them: the first where none is given."""
         return tuple(self.words)
 
     @property

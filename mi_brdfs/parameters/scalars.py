@@ -225,7 +225,11 @@ class Flag(Chosen[bool]):
     def __init__(self, default: bool, text: str):
         super().__init__(text)
         self.default = default
-        self.words = {default: {}, not default: {}}
+        self.words = {False: {}, True: {}}
+
+    @property
+    def fit_words(self) -> tuple[bool, bool]:
+        return self.default, not self.default
 
     def bind(self, reader: PropertyReader) -> bool:
         return reader.flag(self.names[0], self.default)

@@ -20,7 +20,7 @@ from scipy.optimize import nnls
 
 from mi_brdfs.measured.observer import to_srgb
 
-FILE = Path(__file__).parents[2] / "mi_brdfs" / "measured" / "basis.py"
+FILE = Path(__file__).parents[2] / "mi_brdfs" / "tabulated" / "basis.py"
 WAVELENGTHS = np.arange(360, 831, 10)
 DIGITS = 5
 HEAD = '''"""Three spectra for linear sRGB values, as tests/calibration/rgb_basis.py computes them."""
