@@ -42,7 +42,7 @@ class Glow(mi_brdfs.Model):
 class Paint(mi_brdfs.Model):
     """Reflects what its choices say times a number between 1/4 and 1/2, and has a black lobe beside."""
 
-    diffuse_reflectance = Reflectance(0.25, "colour of the coat below")
+    diffuse_reflectance = Reflectance(0.25, "colour of the coat below", role="diffuse")
     colour = Reflectance(0.5, "colour")
     depth = Number(0.5, (0.25, 0.5), "depth")
     length = Number(1, (0, float("inf")), "has no effect")
