@@ -4,9 +4,11 @@ from .diffuse import LambertLobe, over_diffuse
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
 from .mixture import Mixture
+from .multiscatter import MULTISCATTER, multiscattering
 from .power import PowerLobe, PowerResponseLobe
 
 __all__ = [
+    "MULTISCATTER",
     "LambertLobe",
     "Lobe",
     "MicrofacetLobe",
@@ -14,5 +16,6 @@ __all__ = [
     "PowerLobe",
     "PowerResponseLobe",
     "WeightedLobe",
+    "multiscattering",
     "over_diffuse",
 ]

@@ -1,0 +1,111 @@
+"""Light that the facets of a lobe reflect more than once."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ..math import EPSILON, Spectrum, clamp
+from ..microfacet.escape import Escape, Tables, textures
+from ..parameters import Choice, ParameterError
+from .lobe import Lobe, WeightedLobe
+from .microfacet import MicrofacetLobe
+
+if TYPE_CHECKING:
+    from ..model import Model
+
+
+class MultipleScattering(Lobe):
+    """f = ρ C (1 - E(wi)) (1 - E(wo)) / (π (1 - Ē)), where E is the albedo of a lobe with F = 1, Ē its mean, and C a
+    colour: with C = 1 all that the lobe loses is reflected (C. Kulla and A. Conty, Revisiting physically based shading
+    at Imageworks, in: Physically based shading in theory and practice, SIGGRAPH 2017 courses). Reciprocal and
+    cosine-sampled."""
+
+    def __init__(self, lobe: MicrofacetLobe, tables: Tables) -> None:
+        self.reflectance, self.fresnel, self.anisotropic = lobe.reflectance, lobe.fresnel, lobe.anisotropic
+        alphas = lobe.shadowing.alpha_u, lobe.shadowing.alpha_v
+        self.of, self.mean = functools.partial(tables.of, *alphas), tables.mean_of(*alphas)
+
+    def colour(self, i: Escape, o: Escape) -> Spectrum:
+        """Return C for what becomes of light from both directions; it is 1 if F is."""
+        raise NotImplementedError(f"{type(self).__name__} does not define colour.")
+
+    def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
+        i, typical = self.of(wi), Escape(self.mean.lost, self.mean.second, self.mean.schlick, self.mean.dip)
+        return self.reflectance * self.colour(i, typical) * i.lost
+
+    def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
+        i, o, pdf = self.of(wi), self.of(wo), wo.z * dr.inv_pi
+        scale = i.lost * o.lost / dr.maximum(self.mean.lost, EPSILON)
+        return self.reflectance * self.colour(i, o) * (scale * pdf), pdf
+
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+        return mi.warp.square_to_cosine_hemisphere(v)
+
+
+class WalkLobe(MultipleScattering):
+    """The colour of a walk that is reflected at wi's end and at wo's by F₁, and in between by F₂, which are means of F,
+    and escapes at the second reflection with probability p, later with q:
+
+        C = F₁(wi) F₁(wo) (p + (1 - p) F₂ q / (1 - F₂ (1 - q))),  p = p(wi) + p(wo) - p̄
+
+    p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk.
+    """
+
+    def colour(self, i: Escape, o: Escape) -> Spectrum:
+        second, between = clamp(i.second + o.second - self.mean.second, 0, 1), self._reflectance(self.mean)
+        later = between * self.mean.third / (1 - between * (1 - self.mean.third))
+        return self._reflectance(i) * self._reflectance(o) * (second + (1 - second) * later)
+
+    def _reflectance(self, facets: Any) -> Spectrum:
+        return self.fresnel.mean(facets.schlick, facets.dip)
+
+
+class KullaContyLobe(MultipleScattering):
+    """Kulla and Conty's colour, a geometric series in the means F̄ = 2 ∫ F cosθ dcosθ and Ē:
+    C = F̄² Ē / (1 - F̄ (1 - Ē))."""
+
+    def colour(self, i: Escape, o: Escape) -> Spectrum:
+        mean, lost = self.fresnel.mean(1 / 21, 1 / 126), self.mean.lost
+        return mean * mean * (1 - lost) / (1 - mean * lost)
+
+
+def turquin(lobe: MicrofacetLobe, tables: Tables) -> Lobe:
+    """Return a lobe scaled by 1 + F(1) (1 - E(wi)) / E(wi), which is not reciprocal (E. Turquin, Practical multiple
+    scattering compensation for microfacet models, 2019)."""
+    of = functools.partial(tables.of, lobe.shadowing.alpha_u, lobe.shadowing.alpha_v)
+
+    def scale(wi: mi.Vector3f, wo: Any = None) -> Spectrum:
+        lost = of(wi).lost
+        return 1 + lobe.fresnel(mi.Float(1)) * (lost / dr.maximum(1 - lost, EPSILON))
+
+    scaled = WeightedLobe(lobe, scale, scale)
+    scaled.reciprocal = False
+    return scaled
+
+
+WAYS: dict[str, Callable[[MicrofacetLobe, Tables], tuple[Lobe, ...]]] = {
+    "none": lambda lobe, tables: (lobe,),
+    "walk": lambda lobe, tables: (lobe, WalkLobe(lobe, tables)),
+    "kulla-conty": lambda lobe, tables: (lobe, KullaContyLobe(lobe, tables)),
+    "turquin": lambda lobe, tables: (turquin(lobe, tables),),
+}
+MULTISCATTER = Choice(tuple(WAYS), "with Smith's shadowing term: light that facets reflect more than once")
+
+
+def multiscattering(model: Model, lobe: MicrofacetLobe) -> tuple[Lobe, ...]:
+    """Return a lobe of a model with what its ``multiscatter`` adds."""
+    if model.multiscatter == "none":
+        return (lobe,)
+    if lobe.shadowing.escape is None:
+        raise ParameterError(
+            f'{model.plugins[0]}: multiscatter = "{model.multiscatter}" is known for Smith\'s shadowing term only; '
+            'take it with that, or leave it out.'
+        )
+    if not model.captured:
+        model.captured += textures(lobe.shadowing.escape)
+    return WAYS[model.multiscatter](lobe, Tables(*model.captured))
