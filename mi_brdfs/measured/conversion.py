@@ -18,6 +18,7 @@ from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
 from .arrays import NUMPY, components, stacked
+from .coordinates import spherical, turned_about_normal
 from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
@@ -232,7 +233,7 @@ def _pairs(count: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(1)
     wi = _lambertian(rng, count)
     tilt, azimuth = np.radians(np.exp(rng.uniform(np.log(0.05), np.log(30), count))), rng.uniform(0, 2 * np.pi, count)
-    h = np.stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)], axis=-1)
+    h = stacked(spherical(tilt, azimuth))
     mirrored = 2 * np.sum(wi * h, axis=-1, keepdims=True) * h - wi
     wo = np.where((np.arange(count) % 2 == 0) & (mirrored[:, 2] > LOWEST), mirrored.T, _lambertian(rng, count).T).T
     return wi, wo
@@ -243,12 +244,9 @@ LOWEST = np.cos(np.radians(BAKED_TO))
 
 def _lambertian(rng: np.random.Generator, count: int) -> Array:
     cosine, phi = np.sqrt(rng.uniform(LOWEST**2, 1, count)), rng.uniform(0, 2 * np.pi, count)
-    sine = np.sqrt(1 - cosine**2)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+    return stacked(spherical(np.arccos(cosine), phi))
 
 
 def _turned(w: Array) -> Array:
     """Return directions turned about the normal, each by another angle."""
-    angle = np.linspace(0, 2 * np.pi, len(w))
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.stack([w[:, 0] * cos - w[:, 1] * sin, w[:, 0] * sin + w[:, 1] * cos, w[:, 2]], axis=-1)
+    return stacked(turned_about_normal(components(w), np.linspace(0, 2 * np.pi, len(w))))
