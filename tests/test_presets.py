@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import mitsuba as mi
@@ -193,7 +191,9 @@ def pairs(name):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("group", COUNTS)
+@pytest.mark.parametrize(
+    "group", ["ngan/cook-torrance", *(pytest.param(it, marks=pytest.mark.slow) for it in COUNTS if "n/cook" not in it)]
+)
 def test_each_evaluates_to_its_formula(group):
     """Within 1e-4 of every channel where f is above 1e-6 of its peak."""
     ctx = mi.BSDFContext()
@@ -210,6 +210,7 @@ def test_each_evaluates_to_its_formula(group):
         np.testing.assert_allclose(value[checked], expected[checked], rtol=1e-4, err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_albedo():
     """Below one up to 89.9°, or as much as the page of the plugin states, for the materials that say so."""
@@ -233,22 +234,20 @@ def test_albedo():
     assert f"the albedo of {len(duer)} materials" in words and f"up to {max(duer.values()):.1f}" in words
 
 
-NARROWEST = [min(of_set(group), key=width) for group in COUNTS]
+NARROWEST = [min(of_set(group), key=width) for group in COUNTS if not group.endswith("e2")]  # as e1 is
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("name", NARROWEST)
-def test_check_of_the_narrowest_of_each_set(name):
+def test_check_of_the_narrowest_of_each_kind(name):
     assert_bsdf(mi_brdfs.preset(name), only=["finite", "support", "eval_pdf", "weight", "albedo"])
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize(
-    "name", ["ngan/ward-duer/gold-metallic-paint", "low/ashikhmin-shirley-e1/aluminium", "low/microfacet/beige-fabric"]
-)
-def test_check(name):
-    assert_bsdf(mi_brdfs.preset(name))
+def test_check():
+    assert_bsdf(mi_brdfs.preset("ngan/ward-duer/gold-metallic-paint"))
 
 
 # --- Names ----------------------------------------------------------------------------------------------------------
@@ -262,11 +261,6 @@ def test_names():
     assert all(mi_brdfs.preset(name)["type"] == "ward" for name in ward)
     origin = provenance("low/smooth/chrome")
     assert "Löw" in origin.source and origin.doi == "10.1145/2077341.2077350" and "cosθ_d" in origin.convention
-
-
-def test_they_are_read_when_used():
-    code = "import mi_brdfs.parameters.published as it; assert not it._data.cache_info().currsize; assert it.names()"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
 def test_presets_are_the_users_own():
@@ -284,11 +278,9 @@ def test_presets_are_the_users_own():
     [
         ("ngan/ward/blu-acrylic", "There is no preset 'ngan/ward/blu-acrylic'; did you mean 'ngan/ward/blue-acrylic'?"),
         ("ngan/wardd/chrome", "did you mean 'ngan/ward/chrome'?"),
-        ("chrome", "did you mean 'ngan/ward/chrome'?"),
         ("ngan/ward/qqq", "There is no preset 'ngan/ward/qqq'; mi_brdfs.presets() lists them."),
         ("ngan/lafortune/chrome", "rounding moves and scales the lobes"),
         ("low/ashikhmin-shirley-e1/white-paint", "the scale of its specular lobe is 1.29, above 1."),
-        ("", "mi_brdfs.presets() lists them."),
     ],
 )
 def test_wrong_names(name, sentence):
@@ -321,17 +313,6 @@ def test_parameter(variant, name):
     assert keys[0] == keys[1] != []
 
 
-def test_xml_with_others_on_top(variant):
-    """Given parameters win: also over what they exclude, but not over the others."""
-    name = "ngan/ward/blue-acrylic"
-    params = mi.traverse(
-        scene(f"""
-        <bsdf type="ward"><string name="preset" value="{name}"/><float name="alpha" value="0.3"/></bsdf>""")
-    )
-    expected = mi.traverse(mi.load_dict(mi_brdfs.preset(name) | {"alpha": 0.3}))
-    assert {key: str(value) for key, value in params} == {key: str(value) for key, value in expected}
-
-
 ON_TOP = [
     ("ngan/ward/chrome", {"alpha_u": 0.3, "alpha_v": 0.2}, ["alpha"]),
     ("ngan/ward/chrome", {"diffuse_reflectance": {"type": "checkerboard"}}, []),
@@ -348,7 +329,7 @@ ON_TOP = [
 
 
 @pytest.mark.parametrize("name, given, replaced", ON_TOP)
-def test_others_on_top(variant, name, given, replaced):
+def test_others_on_top(llvm_rgb, name, given, replaced):
     values = {key: value for key, value in mi_brdfs.preset(name).items() if key not in replaced} | given
     assert described({"type": values["type"], "preset": name, **given}, name) == str(mi.load_dict(values))
 
@@ -361,7 +342,6 @@ def test_others_on_top(variant, name, given, replaced):
             "ngan/ward/chrme",
             'ward: preset = "ngan/ward/chrme" is unknown; did you mean "ngan/ward/chrome"? It ',
         ),
-        ("ward", "chrome", 'is unknown; did you mean "ngan/ward/chrome"? It must be'),
         ("low", "chrome", 'is unknown; did you mean "low/microfacet/chrome"? It must be'),
         (
             "ward",
