@@ -122,16 +122,12 @@ def wide(count):
 ZEMAX_DAMAGE = [
     *any_table(ZEMAX),
     ("a transmission", replaced(ZEMAX, "BRDF", "BTDF"), False),
-    ("an unknown symmetry", replaced(ZEMAX, "PlaneSymmetrical", "Spherical"), False),
-    ("an unknown spectrum", replaced(ZEMAX, "Monochrome", "Hyperspectral"), False),
     ("no radial angles", replaced(ZEMAX, "ScatterRadial 2\n0 30\n", ""), True),
     ("a count of many digits", replaced(ZEMAX, "ScatterRadial 2", "ScatterRadial " + "9" * 5000), True),
-    ("a count of 10 GB", replaced(ZEMAX, "ScatterRadial 2", "ScatterRadial 1250000000"), True),
     ("counts of 10 GB together", ZEMAX.replace("3\n0 90", "3000\n0 90").replace("2\n10", "2000\n10"), True),
     ("too few angles", replaced(ZEMAX, "10 50", "10"), True),
     ("too many angles", replaced(ZEMAX, "10 50", "10 20 50"), True),
     ("an angle twice", replaced(ZEMAX, "10 50", "10 10"), False),
-    ("an angle of incidence of 95 degrees", replaced(ZEMAX, "10 50", "10 95"), False),
     ("an angle that is NaN", replaced(ZEMAX, "10 50", "10 nan"), False),
     ("no data", ZEMAX.partition("DataBegin")[0], True),
     ("TIS within a block", replaced(ZEMAX, "0.1 0.3", "TIS 0.1\n0.1 0.3"), True),
@@ -144,10 +140,8 @@ ZEMAX_DAMAGE = [
 LIGHTTOOLS_DAMAGE = [
     *any_table(LIGHTTOOLS),
     ("only transmission", replaced(LIGHTTOOLS, "Type BRDF", "Type BTDF"), False),
-    ("only the back", replaced(LIGHTTOOLS, "Front", "Back"), False),
     ("two planes of incidence", replaced(LIGHTTOOLS, "AOI 40", "AOI 40\nPOI 90"), False),
     ("an incidence twice", replaced(LIGHTTOOLS, "AOI 40", "AOI 0"), False),
-    ("an incidence of 120 degrees", replaced(LIGHTTOOLS, "AOI 40", "AOI 120"), False),
     ("an incidence that is no number", replaced(LIGHTTOOLS, "AOI 40", "AOI grazing"), True),
     ("counts of 10 GB together", LIGHTTOOLS.replace("3\n90", "3000\n90").replace("2\n0", "2000\n0"), True),
     ("an unknown keyword", replaced(LIGHTTOOLS, "Side Front", "Face Front"), True),
@@ -155,16 +149,13 @@ LIGHTTOOLS_DAMAGE = [
 ]
 CORNELL_DAMAGE = [
     *any_table(CORNELL, counted=False),
-    ("a negative count", replaced(CORNELL, "\n3\n", "\n-3\n"), True),
     ("half a row", CORNELL[: CORNELL.index("0.6 -1")], True),
     ("a count of 10 GB", replaced(CORNELL, "\n3\n", "\n1250000000\n"), True),
     ("a count of none", replaced(CORNELL, "\n3\n", "\n0\n"), True),
     ("a wavelength too many", replaced(CORNELL, "\n600", "\n600 700"), True),
-    ("wavelengths in disorder", replaced(CORNELL, "400 500", "500 400"), True),
     ("a wavelength that is none", replaced(CORNELL, "400", "blue"), True),
     ("a wavelength of NaN", replaced(CORNELL, "400", "nan"), True),
     ("no rows", CORNELL.partition("0.3 0")[0], True),
-    ("an angle in degrees", replaced(CORNELL, "0.3 0 0.6", "17 0 34"), True),
     ("an angle that is NaN", replaced(CORNELL, "0.3 0 0.6", "0.3 0 nan"), True),
 ]
 ALTA_DAMAGE = [
@@ -176,7 +167,6 @@ ALTA_DAMAGE = [
     ("an unknown output", replaced(ALTA, "INV_STERADIAN", "ENERGY"), False),
     ("no output", replaced(ALTA, "#PARAM_OUT", "#PARAM"), False),
     ("a count of many digits", replaced(ALTA, "3 1", "3 " + "9" * 5000), False),
-    ("no dimensions", replaced(ALTA, "#DIM 3 1", "#DIM"), False),
     ("dimensions of another parametrisation", replaced(ALTA, "3 1", "4 1"), False),
     ("outputs without wavelengths", replaced(ALTA, "3 1", "3 5"), False),
     ("a fitted function", replaced(ALTA, "#VS 0", "#TYPE function"), False),
@@ -190,12 +180,10 @@ CSV_DAMAGE = [
     ("no unit", replaced(CSV, "theta_i_deg", "theta_i"), True),
     ("no theta_i", replaced(CSV, "theta_i_deg", "theta_o_rad"), True),
     ("no phi_o", replaced(CSV, "phi_o_deg", "450"), True),
-    ("both phi_o and delta_phi", replaced(CSV, "phi_i_deg", "delta_phi_deg"), True),
     ("of no direction", replaced(CSV, "theta_o_deg", "theta_deg"), True),
     ("an unknown column", replaced(CSV, ",b", ",temperature"), True),
     ("two of the same", replaced(CSV, ",b", ",r"), True),
     ("two wavelengths of the same", replaced(CSV, "r,g,b", "450,450.0,500"), False),
-    ("an infinite wavelength", replaced(CSV, "r,g,b", "450,500," + "9" * 400), True),
     ("a wavelength of 0", replaced(CSV, "r,g,b", "0nm,500,550"), True),
     ("more wavelengths than can be read", wide(4097), False),
     ("f among many wavelengths", replaced(wide(4097), "4096,", "f,"), True),
@@ -204,7 +192,6 @@ CSV_DAMAGE = [
     ("an unknown quantity", "# quantity: reflectance\n" + CSV, True),
     ("a quantity that contradicts", "# quantity: f\n" + CSV.replace("r,g,b", "r_cos,g_cos,b_cos"), True),
     ("no rows", "".join(CSV.splitlines(keepends=True)[:2]), True),
-    ("an angle below the surface", replaced(CSV, "30,0,40", "30,0,140"), True),
     ("an angle that is missing", replaced(CSV, "30,0,40", "30,,40"), True),
 ]
 ENDINGS = {"zemax": "bsdf", "lighttools": "bsdf", "cornell": "brdf", "alta": "dat", "csv": "csv"}

@@ -25,8 +25,6 @@ from .measurement import Grid, Measurement, usable
 from .scattered import as_grid
 from .source import Source, batches
 
-LANES = 1 << 20
-"""Pairs of directions that a BSDF is evaluated for at once."""
 PAIRS = 1 << 15
 BAKED_TO = 80
 """The angle, in degrees, up to which a conversion is judged."""
@@ -116,8 +114,8 @@ def _baked(probe: BSDFProbe) -> Source:
 
     def evaluate(wi: Array, wo: Array) -> Array:
         wi, wo = (stacked(components(w)).astype(np.float32) for w in (wi, wo))
-        batches = [slice(k, k + LANES) for k in range(0, len(wi), LANES)]
-        f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in batches]
+        parts = batches(len(wi), 4)
+        f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in parts]
         return usable(np.concatenate(f))
 
     wi, wo = _pairs(PAIRS)
