@@ -38,17 +38,6 @@ def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path, bsdf):
     assert abs(found - f).max() < 0.01 * f.max() and np.median(abs(found / f - 1)) < 0.005
 
 
-@pytest.mark.slow
-def test_mitsubas_measured_has_the_values_that_were_written_through_another_format(tmp_path):
-    bsdf, path = {"type": "walter"}, tmp_path / "x.bsdf"
-    convert(bsdf, tmp_path / "x.binary")
-    assert convert(tmp_path / "x.binary", path).largest < 0.01
-    wi, wo = (hemisphere(4000, seed, 0.3) for seed in (1, 2))
-    probes = [BSDFProbe(mi.load_dict(it)) for it in (bsdf, {"type": "measured", "filename": str(path)})]
-    f, found = (probe.eval(probe.whole, wi, wo) for probe in probes)
-    assert abs(found - f).max() < 0.01 * f.max() and np.sqrt(np.mean((found - f) ** 2)) < 0.002 * f.max()
-
-
 def test_it_says_what_is_lost(tmp_path):
     lacquer = {"type": "plastic", "diffuse_reflectance": {"type": "checkerboard"}}
     bsdf = {"type": "blendbsdf", "weight": 0.5, "lacquer": lacquer, "glass": {"type": "roughdielectric"}}

@@ -1,7 +1,6 @@
 """Text files that are damaged, or written in another way: one sentence with the file's name and the place, or the same
 values."""
 
-import os
 import re
 import struct
 import time
@@ -10,7 +9,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from mi_brdfs.measured import FileError, convert, read, summarize
+from mi_brdfs.measured import FileError, read, summarize
 
 ZEMAX = """# Made for a test
 Source  Measured
@@ -292,20 +291,6 @@ def test_no_column_controls_a_terminal(tmp_path, header):
     with pytest.raises(FileError) as caught:
         written(tmp_path, header.format(HOSTILE) + "\n1\n", "csv")
     assert str(caught.value).isprintable()
-
-
-@pytest.mark.parametrize("text, ending", [(CSV, "csv"), (struct.pack("<3i3d", 1, 1, 1, 1, 1, 1), "binary")])
-def test_names_need_not_be_utf_8(tmp_path, text, ending):
-    path = tmp_path / os.fsdecode(b"caf\xe9." + ending.encode())
-    path.write_bytes(text.encode() if isinstance(text, str) else text)
-    measurement = read(path)
-    assert measurement.path == path
-    assert summarize(measurement).file.endswith(f"/caf�.{ending}")
-    assert measurement.material == ("a test" if ending == "csv" else "caf�")
-    assert str(convert(measurement, path.with_suffix(".csv.csv"))).startswith(f"{tmp_path}/caf�.csv.csv: CSV.")
-    path.write_bytes(path.read_bytes()[:10])
-    with pytest.raises(FileError, match=f"/caf�.{ending}: "):
-        read(path)
 
 
 def test_latin_1_is_read(tmp_path):

@@ -221,12 +221,6 @@ def test_check_of_the_narrowest_of_each_kind(name):
     assert_bsdf(mi_brdfs.preset(name), only=["finite", "support", "eval_pdf", "weight", "albedo"])
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-def test_check():
-    assert_bsdf(mi_brdfs.preset("ngan/ward-duer/gold-metallic-paint"))
-
-
 # --- Names ----------------------------------------------------------------------------------------------------------
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -48,10 +48,7 @@ def arranged(
     anisotropic = bool(np.ptp(around_zero(phi_i - phi_i[0])) > SAME)
     if not anisotropic:
         phi_o, phi_i = phi_o - phi_i, np.zeros_like(phi_i)
-    delta = np.pi - around_zero(np.pi - phi_o + phi_i)
-    mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
-    columns = theta_i, theta_o, abs(delta) if mirrored else around_zero(delta), around_zero(phi_i)
-    return gathered(columns[: 3 + anisotropic], values, Spherical(mirrored, anisotropic)) or Samples(
+    return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
         stacked(spherical(theta_i, phi_i)), stacked(spherical(theta_o, phi_o)), values, anisotropic
     )
 
@@ -61,10 +58,20 @@ def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return (abs(theta), np.where(theta < 0, phi + np.pi, phi)) if np.any(theta < 0) else (theta, phi)
 
 
-def gathered(columns: Sequence[np.ndarray], values: np.ndarray, coordinates: Spherical) -> Grid | None:
-    """Return the grid that rows fill, None if they do not; the columns are those of its coordinates."""
+def gathered(
+    theta_i: np.ndarray,
+    phi_i: np.ndarray,
+    theta_o: np.ndarray,
+    phi_o: np.ndarray,
+    values: np.ndarray,
+    anisotropic: bool,
+) -> Grid | None:
+    """Return the grid that rows fill, None if they do not."""
+    delta = np.pi - around_zero(np.pi - phi_o + phi_i)
+    mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
+    delta = abs(delta) if mirrored else around_zero(delta)
     nodes, place, size = [], np.zeros(len(values), dtype=np.int64), 1
-    for column in columns:
+    for column in (theta_i, theta_o, delta, *([around_zero(phi_i)] if anisotropic else [])):
         different, rank = nodes_of(column)
         nodes.append(different)
         size *= len(different)
@@ -77,18 +84,18 @@ def gathered(columns: Sequence[np.ndarray], values: np.ndarray, coordinates: Sph
     np.add.at(table, place, values)
     table, count = table.reshape(*shape, -1), count.reshape(*shape, 1)
     for polar in (0, 1):
-        if nodes[polar][0] < SAME and not coordinates.anisotropic:
+        if nodes[polar][0] < SAME and not anisotropic:
             # A row at the pole stands for all azimuths.
             pole = (slice(None),) * polar + (slice(0, 1),)
             table[pole], count[pole] = (each[pole].sum(axis=2, keepdims=True) for each in (table, count))
     if not np.all(count):
         return None
     axes = [Axis(each) for each in nodes]
-    for k in range(3 if coordinates.mirrored else 2, len(axes)):
+    for k in range(3 if mirrored else 2, len(axes)):
         axes[k] = around(nodes[k])
         if k == 2 and axes[k].period is None and shape[k] > 1:
             return None
-    return Grid(coordinates, tuple(axes), table / count)
+    return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
 
 
 def around_zero(angle: np.ndarray) -> np.ndarray:
