@@ -84,41 +84,38 @@ def client(llvm_rgb):
 # --- States -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("state", "sentence"),
-    [
-        ([], "The state of a page is an object"),
-        ({}, "one to 4 subjects"),
-        ({"subjects": []}, "one to 4 subjects"),
-        ({"subjects": [{"bsdf": {"type": "ward"}}] * 5}, "one to 4 subjects"),
-        ({"subjects": [3]}, "A subject is an object"),
-        ({"subjects": [{"bsdf": {"alpha": 1}}]}, "needs a bsdf with a type"),
-        ({"subjects": [{"bsdf": {"type": "tabulated", "filename": "/etc/passwd"}}]}, "filename cannot be a parameter"),
-        ({"subjects": [{"bsdf": {"type": "ward", "alpha": {"type": "bitmap"}}}]}, "alpha must be a number"),
-        ({"subjects": [{"bsdf": {"type": "ward", "alpha": float("nan")}}]}, "alpha must be a number"),
-        ({"subjects": [{"bsdf": {"type": "ward", "x" * 99: 1}}]}, "cannot be a parameter"),
-        ({"subjects": [{"bsdf": {"type": "ward"}}], "theta": "steep"}, "theta is a number"),
-        ({"subjects": [{"bsdf": {"type": "ward"}}], "stage": "moon"}, "stage = 'moon' is unknown"),
-        ({"subjects": [{"bsdf": {"type": "ward"}}], "views": ["xray"]}, "views are picture"),
-        ({"subjects": [{"bsdf": {"type": "ward", "alpha": 10**400}}]}, "alpha must be a number"),
-        ({"subjects": [{"bsdf": {"type": "ward"}}], "stage": {}}, "stage is unknown"),
-    ],
-)
-def test_a_state_that_is_none_is_refused_in_a_sentence(state, sentence):
-    with pytest.raises(StateError, match=re.escape(sentence)):
-        parse(state, STAGES)
+WARD = {"bsdf": {"type": "ward"}}
+NO_STATES = [
+    ([], "The state of a page is an object"),
+    *(({"subjects": it}, "one to 4 subjects") for it in (None, [], [WARD] * 5)),
+    ({"subjects": [3]}, "A subject is an object"),
+    ({"subjects": [{"bsdf": {"alpha": 1}}]}, "needs a bsdf with a type"),
+    ({"subjects": [{"bsdf": {"type": "tabulated", "filename": "/etc/passwd"}}]}, "filename cannot be a parameter"),
+    ({"subjects": [{"bsdf": {"type": "ward", "x" * 99: 1}}]}, "cannot be a parameter"),
+    *(({"subjects": [{"bsdf": {"type": "ward", "alpha": it}}]}, "alpha must be a number")
+      for it in ({"type": "bitmap"}, float("nan"), 1e39, 10**400)),
+    ({"subjects": [WARD], "theta": "steep"}, "theta is a number"),
+    ({"subjects": [WARD], "stage": "moon"}, "stage = 'moon' is unknown"),
+    ({"subjects": [WARD], "views": ["xray"]}, "views are picture"),
+    ({"subjects": [WARD], "stage": {}}, "stage is unknown"),
+]  # fmt: skip
+
+
+def test_a_state_that_is_none_is_refused_in_a_sentence():
+    for state, sentence in NO_STATES:
+        with pytest.raises(StateError, match=re.escape(sentence)):
+            parse(state, STAGES)
 
 
 def test_numbers_beyond_their_range_are_brought_into_it():
-    state = parse({"subjects": [{"bsdf": {"type": "ward"}}], "theta": 200, "size": 1e9}, STAGES)
+    state = parse({"subjects": [WARD], "theta": 200, "size": 1e9}, STAGES)
     assert (state.theta, state.size) == (89, 1024)
 
 
 def test_the_page_is_told_what_is_declared_of_its_state():
     """The defaults are those of a state, within its limits and words."""
     told = json.loads(re.search(r'id="declared">(.*?)</script>', index())[1])
-    subject = {"bsdf": {"type": "ward"}}
-    assert parse({**told["defaults"], "subjects": [subject]}, STAGES) == parse({"subjects": [subject]}, STAGES)
+    assert parse({**told["defaults"], "subjects": [WARD]}, STAGES) == parse({"subjects": [WARD]}, STAGES)
     for name, (low, high) in told["limits"].items():
         assert told["defaults"][name] is None or low <= told["defaults"][name] <= high
     assert all(told["defaults"][name] in words for name, words in told["words"].items())
@@ -233,13 +230,8 @@ def test_a_preset_is_its_plugin_with_its_values(client):
 
 
 def test_the_copied_xml_and_dict_give_the_same_picture(client):
-    bsdf = {
-        "type": "ward",
-        "alpha_u": 0.1,
-        "alpha_v": 0.3,
-        "specular_reflectance": [0.9, 0.5, 0.2],
-        "variant": "ward-duer",
-    }
+    bsdf = {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3, "specular_reflectance": [0.9, 0.5, 0.2]}
+    bsdf["variant"] = "ward-duer"
     found = client.show(bsdf, views=["picture", "polar"], size=64)
     told, picture = of(found, "subject")[0], of(found, "picture")[0]
     stage = client.session._pictures[0][1].stage
@@ -397,35 +389,27 @@ def test_a_measured_file_opens_and_is_fitted(with_file):
     assert of(with_file.show(subject, last["bsdf"], views=["polar"]), "polar", 1)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        b"paint (1).bsdf",
-        b'it\'s "gold" & 100%25;.bsdf',
-        b"<b>.bsdf",
-        b"-$5 \\$(x)`.bsdf",
-        b"line\n\t\x1b[1m--.bsdf",
-        "漆é.bsdf".encode(),
-        b"x.xml.bsdf",
-        b"\xff'\xe4.bsdf",
-    ],
-    ids=ascii,
-)
-def test_what_is_copied_names_a_file_of_any_name(llvm_rgb, tmp_path, monkeypatch, name):
+NAMES = [
+    b"paint (1).bsdf", b'it\'s "gold" & 100%25;.bsdf', b"<b>.bsdf", b"-$5 \\$(x)`.bsdf", b"line\n\t\x1b[1m--.bsdf",
+    "漆é.bsdf".encode(), b"x.xml.bsdf", b"\xff'\xe4.bsdf",
+]  # fmt: skip
+
+
+def test_what_is_copied_names_a_file_of_any_name(llvm_rgb, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    shutil.copy(LOFT, name)
-    (source,) = find_sources(os.fsdecode(name))
-    subject = checked({"type": "tabulated", "file": source.word, "interpolation": "nearest"})
-    told = Materials({source.word: source}).written(subject)
-    *words, _ = subprocess.run(["bash", "-c", f"printf '%s\\0' {told['command']}"], capture_output=True).stdout.split(
-        b"\0"
-    )
-    assert words == [b"mi-brdfs", b"show", os.fsencode(tmp_path / source.word), b"-D", b"interpolation=nearest"]
-    if b"\xff" in name:
-        assert "only names in UTF-8" in told["xml"] and "only names in UTF-8" in told["dict"]
-    else:
-        assert isinstance(mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.BSDF)
-        assert isinstance(mi.load_dict(eval(told["dict"])), mi.BSDF)
+    for name in NAMES:
+        shutil.copy(LOFT, name)
+        (source,) = find_sources(os.fsdecode(name))
+        subject = checked({"type": "tabulated", "file": source.word, "interpolation": "nearest"})
+        told = Materials({source.word: source}).written(subject)
+        printed = subprocess.run(["bash", "-c", f"printf '%s\\0' {told['command']}"], capture_output=True).stdout
+        file = os.fsencode(tmp_path / source.word)
+        assert printed.split(b"\0")[:-1] == [b"mi-brdfs", b"show", file, b"-D", b"interpolation=nearest"]
+        if b"\xff" in name:
+            assert "only names in UTF-8" in told["xml"] and "only names in UTF-8" in told["dict"]
+        else:
+            assert isinstance(mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.BSDF), name
+            assert isinstance(mi.load_dict(eval(told["dict"])), mi.BSDF), name
 
 
 def test_a_fit_is_cancelled(with_file):

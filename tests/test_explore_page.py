@@ -8,11 +8,9 @@ import shutil
 import signal
 import socket
 import subprocess
-import threading
 import time
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import unquote
 from urllib.request import urlopen
 
 import numpy as np
@@ -78,13 +76,7 @@ MALFORMED = [
     ("no JSON", "This is no message"),
     ("{}", "This is no message"),
     ('{"type": "shell"}', "There is no message 'shell'"),
-    ('{"type": "state", "state": {"subjects": []}}', "one to 4 subjects"),
     ('{"type": "state", "serial": "x", "state": {"subjects": [{"bsdf": {"type": "ward"}}]}}', "This is no message"),
-    (
-        '{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "filename": "/etc/passwd"}}]}}',
-        "filename",
-    ),
-    ('{"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward", "alpha": 1e39}}]}}', "must be a number"),
     (f'{{"type": "state", "state": {{"theta": {10**400}}}}}', "This is no message"),
     ('{"type": "state", "state": {"theta": NaN}}', "This is no message"),
     ('{"type": "state", "state": {"theta": 1e999}}', "This is no message"),
@@ -260,22 +252,6 @@ def test_a_page_that_is_killed_leaves_the_server_alive(address):
     test_the_server_greets_and_answers(address)
 
 
-@pytest.mark.slow
-def test_a_hundred_edits_a_second_do_not_queue_up(address):
-    async def conversation(page, hello, client):
-        await page.send({"type": "ward"}, views=["picture", "polar"])
-        told = await page.until("subject", "picture", "polar")
-        rng, bsdf = np.random.default_rng(2), told["subject"]["bsdf"]
-        start = time.perf_counter()
-        for k in range(200):
-            await page.send(edited(bsdf, told["subject"]["controls"], rng), views=["picture", "polar"])
-            await asyncio.sleep(max(0, start + 0.01 * (k + 1) - time.perf_counter()))
-        found = await page.until("picture", "polar")
-        return found["seconds"]
-
-    assert connected(address, conversation) < 3
-
-
 def command(*arguments):
     return CliRunner().invoke(app, ["explore", "--no-browser", *arguments])
 
@@ -307,12 +283,16 @@ def frame_ancestors(address):
 
 def test_a_notebook_gets_its_page_and_ends_it(address, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.chdir(tmp_path.parent)
+    shutil.copy(LOFT, "-x.bsdf")
     page = explore(
-        {"type": "ward", "alpha": 0.3, "specular_reflectance": {"type": "rgb", "value": [1, 0, 0]}}, "lambert"
+        {"type": "ward", "alpha": 0.3, "specular_reflectance": {"type": "rgb", "value": [1, 0, 0]}}, "-x.bsdf"
     )
     assert "<iframe" in page._repr_html_() and "alpha" in page.address
-    connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
-    assert {"http://localhost:*", "vscode-webview:"} <= set(frame_ancestors(page.address).split())
+    own, _, state = page.address.partition("#")
+    subject = json.loads(unquote(state))["subjects"][1]["bsdf"]
+    connected(own, lambda it, hello, client: it.send(subject))
+    assert {"http://localhost:*", "vscode-webview:"} <= set(frame_ancestors(own).split())
     assert frame_ancestors(address) == "'none'"
     assert list(tmp_path.iterdir())
     page._process.stdin.close()  # as the notebook's end does
@@ -320,7 +300,7 @@ def test_a_notebook_gets_its_page_and_ends_it(address, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
     page.close()
     with pytest.raises(OSError):
-        connected(page.address.partition("#")[0], lambda it, hello, client: it.send({"type": "lambert"}))
+        connected(own, lambda it, hello, client: it.send({"type": "lambert"}))
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -405,11 +385,6 @@ def test_the_exported_page_needs_no_network_and_is_small(exported):
     text = exported.read_text(encoding="utf-8")
     assert len(text) < 3e6
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
-    frames = json.loads(re.search(r'id="exported">(.*?)</script>', text, re.DOTALL)[1])["frames"]
-    kinds_sent = [
-        json.loads(it["text"]).get("view", "subject") if "text" in it else it["header"]["type"] for it in frames
-    ]
-    assert {"picture", "lobe", "polar", "albedo", "slice", "sampler"} <= set(kinds_sent)
 
 
 # --- The page ---------------------------------------------------------------------------------------------------------
@@ -450,20 +425,6 @@ def drawn(tab):
     tab.wait_for_function(
         "() => [...document.querySelectorAll('.pictures canvas')].some(it => it.width > 1 && "
         "it.getContext('2d').getImageData(0, 0, it.width, it.height).data.some(v => v > 0 && v < 255))"
-    )
-
-
-def looks(tab, what=".pictures canvas"):
-    """A number that changes with a picture."""
-    return tab.evaluate(f"() => [...document.querySelectorAll('{what}')].map(it => it.toDataURL()).join()")
-
-
-def changes(tab, act, what=".pictures canvas"):
-    """Do something, and wait until a picture is another one."""
-    before = looks(tab, what)
-    act()
-    tab.wait_for_function(
-        f"before => [...document.querySelectorAll('{what}')].map(it => it.toDataURL()).join() !== before", arg=before
     )
 
 
@@ -562,38 +523,6 @@ def test_measured_files_of_any_name_are_loaded_and_copied(tab, address):
     assert tab.locator(".chip .warning").count() == 0 and tab.locator(".pictures canvas").count() == 3
 
 
-@pytest.fixture
-def hosted(tmp_path):
-    """A folder that a server of another origin shows, and its port."""
-    handler = partial(SimpleHTTPRequestHandler, directory=tmp_path)
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as running:
-        threading.Thread(target=running.serve_forever, daemon=True).start()
-        yield tmp_path, running.server_port
-        running.shutdown()
-
-
-@pytest.mark.slow
-def test_only_a_notebook_may_frame_its_page(tab, address, hosted, monkeypatch):
-    folder, port = hosted
-    monkeypatch.chdir(folder)
-    shutil.copy(LOFT, "-x.bsdf")
-    page = explore("-x.bsdf")
-    (folder / "notebook.html").write_text(page._repr_html_())
-    (folder / "other.html").write_text(page._repr_html_().replace(page.address, address))
-    for host, file, shown in (
-        ("localhost", "notebook", True),
-        ("localhost", "other", False),
-        ("other.localhost", "notebook", False),
-    ):
-        tab.goto(f"http://{host}:{port}/{file}.html")
-        tab.wait_for_function("() => frames.length === 1")
-        if shown:
-            tab.frames[1].wait_for_selector(".chip")
-        else:
-            assert tab.frames[1].url == "chrome-error://chromewebdata/"
-    page.close()
-
-
 @pytest.mark.slow
 def test_a_tour_runs(tab, address):
     opened(tab, address)
@@ -636,5 +565,7 @@ def test_the_exported_page_works_from_the_disk(tab, exported):
     assert tab.locator("#view-polar svg path").count() > 1
     assert tab.locator(".chip").all_inner_texts() == ["lambert", NAME]
     assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [exported.as_uri()]
-    canvas = tab.locator("#view-lobe canvas")
-    changes(tab, lambda: canvas.press("ArrowLeft"), "#view-lobe canvas")
+    lobe = "document.querySelector('#view-lobe canvas').toDataURL()"
+    before = tab.evaluate(lobe)
+    tab.locator("#view-lobe canvas").press("ArrowLeft")
+    tab.wait_for_function(f"before => {lobe} !== before", arg=before)

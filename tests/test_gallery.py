@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.gallery import Entry, Row, Shot, gallery, overview, page, sheet, shot
-from mi_brdfs.gallery.families import PORTRAITS, by_family, portrait, rgb, stage_of, year
-from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, shown, sweeps_of
+from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
+from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, sweeps_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import FAMILIES, Model
@@ -79,17 +79,6 @@ def test_sweeps_of_others_models_come_from_their_declarations():
             mi.load_dict(bsdf)
 
 
-def test_a_sweep():
-    two = Sweep("cx, cy", (-1.0, 0.5), {"exponent": 20, "diffuse_reflectance": rgb(0.1, 0.25, 0.4)})
-    assert two.bsdfs("lafortune")[1] == {
-        "type": "lafortune", "cx": 0.5, "cy": 0.5, "exponent": 20,
-        "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.25, 0.4]},
-    }  # fmt: skip
-    assert two.heading("lafortune") == "lafortune: cx, cy, with exponent = 20, diffuse_reflectance = (0.1, 0.25, 0.4)"
-    assert Sweep("b", (1, 2), {}).heading("low") == "low: b"
-    assert [shown(value) for value in (0.0, 0.0625, 100000, "ggx", True)] == ["0", "0.0625", "100000", "ggx", "true"]
-
-
 def test_models_are_shown_by_family_and_year():
     """Families of others come after the pack's, and models without one last."""
 
@@ -112,21 +101,6 @@ def test_models_are_shown_by_family_and_year():
     for family in FAMILIES:
         years = [year(model) for model in ordered if model.family == family]
         assert years == sorted(years)
-
-
-def test_a_family_is_shown_in_one_colour():
-    """Of the model's own parameters, in the table in the order of the gallery, or what the page of a model says."""
-    assert list(PORTRAITS) == [model.plugins[0] for model in by_family(own_models())]
-    for family in FAMILIES:
-        shown = [portrait(model) for model in own_models() if model.family == family]
-        colours = [[value for value in bsdf.values() if isinstance(value, dict)] for bsdf in shown]
-        assert all(colour == colours[0] for colour in colours), family
-    assert {stage_of(find_model(name)) for name in ("lambert", "eon", "toon")} == {"point"}
-    assert {stage_of(find_model(name)) for name in ("ward", "phong", "burley", "low")} == {"studio"}
-    foreign = type(
-        "Foreign", (Model,), {"__doc__": 'Foreign.\n\n{"type": "foreign", "a": 1}', "__module__": "elsewhere"}
-    )
-    assert portrait(foreign) == {"type": "foreign", "a": 1} and stage_of(foreign) == "studio"
 
 
 def test_families_share_a_row_as_far_as_there_is_room():

@@ -108,10 +108,6 @@ def test_a_picture_is_stale_until_it_is_made(drawn):
     assert not picture.is_stale()
     picture.path.unlink()
     assert picture.is_stale()
-
-
-def test_digests_of_pictures_that_are_gone_are_dropped(drawn):
-    picture, _ = drawn
     picture.make()
     made.write_digests(made.read_digests() | {"gone.png": "0"})
     assert set(made.read_digests()) == {"picture.png"}
