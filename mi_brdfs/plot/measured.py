@@ -28,7 +28,7 @@ from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
-from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, calm, incidence, look, new_figure, set_title
+from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, add_bar, calm, incidence, look, new_figure, set_title
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -95,10 +95,7 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     patch = Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1)
     ax.add_patch(patch)
     ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
-    bar = ax.figure.colorbar(ScalarMappable(norm, palette), ax=ax, shrink=0.75, aspect=25, pad=0.02, extend="both")
-    bar.set_label(it.quantity, fontsize=TEXT, color=INK)
-    bar.ax.tick_params(labelsize=SMALL, labelcolor=INK)
-    bar.outline.set_visible(False)
+    add_bar(ScalarMappable(norm, palette), ax, it.quantity, shrink=0.75, extend="both")
     calm(ax)
     ax.grid(False)
     turns = range(0, 91, 30)
