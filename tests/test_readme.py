@@ -31,6 +31,8 @@ SHORTER = {
     "mi-brdfs gallery": " --size 64 --spp 4",
 }
 """What the README names to make commands that take long shorter, and here is added to them."""
+LESS = {"mi-brdfs fit": " --starts 1", "mi-brdfs check": " --only chi2 --only albedo"}
+"""And what is added besides: their own tests ask for all."""
 
 
 def blocks(language):
@@ -42,7 +44,9 @@ def lines():
     without the command that runs them."""
     for line in "".join(blocks("sh")).splitlines():
         parts = [part for part in line.split("  #")[0].rstrip().split(" && ") if not makes_environment(part)]
-        parts = [part + next((more for c, more in SHORTER.items() if part.startswith(c)), "") for part in parts]
+        parts = [
+            part + next((more for c, more in (SHORTER | LESS).items() if part.startswith(c)), "") for part in parts
+        ]
         if parts and not parts[0].startswith("python -m pytest"):
             yield " && ".join(parts)
 
@@ -67,6 +71,7 @@ QUICK = "list", "info", "presets", "doctor", "plot", "convert"
 def test_shell(line, checkout, monkeypatch):
     """In this process, with words and patterns as a shell takes them."""
     monkeypatch.chdir(checkout)
+    monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 4)
     name, *words = shlex.split(line, comments=True)
     done = CliRunner().invoke(
         app, [it for word in words for it in (sorted(glob.glob(word)) if "*" in word else [word])]
