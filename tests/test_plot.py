@@ -477,16 +477,6 @@ def run(*arguments):
     return CliRunner().invoke(app, ["plot", *map(str, arguments)])
 
 
-def test_values_of_parameters():
-    assert command.asked_for(["ward", "phong"], ["a=1,0.5", "b=true", "c=word"]) == [
-        {"type": name, "a": a, "b": True, "c": "word"} for name in ("ward", "phong") for a in (1, 0.5)
-    ]
-    (coloured, linear) = command.asked_for(["lambert"], ["reflectance=#ff8000,0.1;0.2;0.3"])
-    assert coloured["reflectance"] == {"type": "rgb", "value": pytest.approx([1, 0.2158605, 0])}
-    assert linear["reflectance"] == {"type": "rgb", "value": [0.1, 0.2, 0.3]}
-    assert command.asked_for(["<bsdf/>", "a.xml"], []) == ["<bsdf/>", "a.xml"]
-
-
 def test_the_command_passes_on_what_it_is_told(folder, monkeypatch):
     def kind(*bsdfs, angles=(), azimuth=0, scale="both", normalize=False, rgb=False):
         told.append((bsdfs, list(angles), azimuth, scale, normalize, rgb))

@@ -31,7 +31,7 @@ SHORTER = {
     "mi-brdfs gallery": " --size 64 --spp 4",
 }
 """What the README names to make commands that take long shorter, and here is added to them."""
-LESS = {"mi-brdfs fit": " --starts 1", "mi-brdfs check": " --only chi2 --only albedo"}
+LESS = {"mi-brdfs fit": " --starts 1", "mi-brdfs check": " --only albedo"}
 """And what is added besides: their own tests ask for all."""
 
 
@@ -95,7 +95,7 @@ def test_python(tmp_path):
     render = "mi.render(mi.load_dict(mi_brdfs.preview_scene(copper)))"
     assert code.count(render) == 1
     code = code.replace(render, f"{render[:-1]}, spp=4)")
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.splitlines()[-1]) <= 1
     picture = np.array(mi.Bitmap(str(tmp_path / "copper.png")))
