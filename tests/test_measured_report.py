@@ -20,7 +20,7 @@ from mi_brdfs.measured.report.albedo import albedos, coverage, hemisphere
 from mi_brdfs.measured.report.reciprocity import reciprocity_error
 from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.parameters.messages import listed
-from mi_brdfs.plot.lit import LitTable
+from mi_brdfs.plot.measured import LitTable
 
 DIMENSIONS = 30, 30, 60
 REFLECTANCE = np.array([0.2, 0.5, 0.8])
