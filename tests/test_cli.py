@@ -307,7 +307,7 @@ RESUMED = "Interrupted; 0 of 1 fits are finished: the same command goes on from 
         ("mi_brdfs.probe.largest_albedo.default_albedo", ["energy", "lambert"], NOTHING),
         ("mi_brdfs.gallery.gallery", ["gallery"], "Interrupted; nothing is finished, nothing was written."),
         ("mi_brdfs.explorer.materials.Materials.loaded", ["explore", "lambert"], NOTHING),
-        ("mi_brdfs.explorer.running.serve", ["explore", "lambert", "--port", "0"], "Ended."),
+        ("mi_brdfs.explorer.server.serve", ["explore", "lambert", "--port", "0"], "Ended."),
         ("mi_brdfs.explorer.export.page", ["explore", "lambert", "--export", "it.html"], NOTHING),
         ("mi_brdfs.sweep.plan.checked", ["sweep", MEASURED], NOTHING),
         ("mi_brdfs.sweep.plan.observe", ["sweep", MEASURED, "--model", "ward", "--workers", "0"], RESUMED),

@@ -139,18 +139,22 @@ def called(monkeypatch, capfdbinary):
     return called
 
 
+def slow(*values):
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "words, status, sentence",
     [
-        (["measured", f"{BAD}.csv", "--plot", f"{BAD}.png", "--json", f"{BAD}.json"], 0, ""),
+        slow(["measured", f"{BAD}.csv", "--plot", f"{BAD}.png", "--json", f"{BAD}.json"], 0, ""),
         (["check", f"{BAD}.csv", "--only", "finite"], 0, ""),
         (["check", f"{BAD}.xml", "--only", "finite"], 2, REFUSED),
-        (["convert", f"{BAD}.csv", f"{BAD}.bsdf"], 0, ""),
+        slow(["convert", f"{BAD}.csv", f"{BAD}.bsdf"], 0, ""),
         (["render", f"{BAD}.xml", "--spp", "1"], 1, REFUSED),
         (["render", "scene.xml", "--spp", "1", "-o", f"{BAD}.exr"], 0, "1 samples per pixel"),
-        (["fit", f"{BAD}.csv", *FITTED, "--json", f"{BAD}.json", "-o", f"{BAD}.html"], 0, ""),
-        (["sweep", f"{BAD}.csv", *FITTED, "-o", BAD, "--workers", "0", "--render"], 0, ""),
+        slow(["fit", f"{BAD}.csv", *FITTED, "--json", f"{BAD}.json", "-o", f"{BAD}.html"], 0, ""),
+        slow(["sweep", f"{BAD}.csv", *FITTED, "-o", BAD, "--workers", "0", "--render"], 0, ""),
         (["sweep", "gone\udcff.csv"], 1, "gone�.csv: No such file"),
     ],
 )
@@ -168,6 +172,7 @@ def test_names_that_are_not_utf_8_work_or_get_a_sentence(words, status, sentence
         assert b"coat\xff" in out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_a_sweep_keeps_and_prints_such_names(folder, called):
     for _ in range(2):  # fitted, and from the store

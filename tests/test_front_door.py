@@ -10,9 +10,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from support import call, direction
+from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.bench.first import first_picture, in_new_process
+from mi_brdfs.cli import app
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.models.eon import EON
@@ -104,6 +106,7 @@ def fresh(code):
     return done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_a_plugin_of_somebody_else_is_replaced_with_a_warning():
     out, err = fresh(
         """
@@ -121,6 +124,7 @@ def test_a_plugin_of_somebody_else_is_replaced_with_a_warning():
     assert err.count("UserWarning") == 1 and 'replaces the BSDF "microfacet", registered by another package' in err
 
 
+@pytest.mark.slow
 def test_a_reload_changes_nothing():
     """Mitsuba may import a package of plugins anew after each change of variant."""
     out, err = fresh(
@@ -188,44 +192,44 @@ class Lobe(LambertLobe):
 
 
 @pytest.fixture
-def guest(tmp_path):
-    """A file with a model that is right, and one with a model that is not reciprocal."""
-    for name, factor in (("chalk", "1"), ("faulty", "(0.5 + wi.z)")):
-        (tmp_path / f"{name}.py").write_text(GUEST.replace("FAULT", factor))
+def guest(tmp_path, monkeypatch, llvm_rgb):
+    """A file with a model that is right, and one with a model that is not reciprocal, in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "chalk.py").write_text(GUEST.replace("FAULT", "1"))
+    (tmp_path / "faulty.py").write_text(GUEST.replace("FAULT", "(0.5 + wi.z)").replace("Chalk(", "Slate("))
     return tmp_path
 
 
-def command(folder, *arguments):
-    words = [sys.executable, "-m", "mi_brdfs", *map(str, arguments)]
-    return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=180)
+def command(*arguments):
+    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def test_commands_take_in_a_file(guest):
     """Each of them, without a line of the project about the model."""
     option = "--import", "chalk.py"
-    assert "Chalk, which somebody else has written." in command(guest, "list", *option).stdout
-    page = command(guest, "info", "chalk", *option).stdout
+    assert "Chalk, which somebody else has written." in command("list", *option).stdout
+    page = command("info", "chalk", *option).stdout
     assert "reflectance" in page and "Not measured." in page
-    assert command(guest, "plot", "chalk", *option, "-o", "lobes.png").returncode == 0
-    assert command(guest, "gallery", "chalk", *option, "-o", "pictures", "--size", 32, "--spp", 4).returncode == 0
+    assert command("plot", "chalk", *option, "-o", "lobes.png").exit_code == 0
+    assert command("gallery", "chalk", *option, "-o", "pictures", "--size", 32, "--spp", 4).exit_code == 0
     assert {"index.html", "overview.png", "chalk.png"} <= {file.name for file in (guest / "pictures").iterdir()}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_processes_of_the_bench_know_an_imported_file(guest, monkeypatch):
     """Wherever they run."""
-    monkeypatch.chdir(guest)
     guests.import_models("chalk.py")
     monkeypatch.chdir("/")
     assert in_new_process(first_picture, [{"type": "chalk"}]) > 0
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
-    right = command(guest, "check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
-    assert right.returncode == 0, right.stderr
-    wrong = command(guest, "check", "chalk", "--import", "faulty.py", "--only", "reciprocity", "-j", jobs)
-    assert wrong.returncode == 1 and "reciprocity, whole: f from" in wrong.stdout
+    right = command("check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
+    assert right.exit_code == 0, right.stderr
+    wrong = command("check", "slate", "--import", "faulty.py", "--only", "reciprocity", "-j", jobs)
+    assert wrong.exit_code == 1 and "reciprocity, whole: f from" in wrong.stdout
 
 
 @pytest.mark.parametrize(
@@ -238,31 +242,23 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
         (GUEST.replace("Chalk(", "Ward("), 'the name "ward" belongs to mi_brdfs.models.ward.Ward'),
     ],
 )
-def test_wrong_files_are_told_in_a_sentence(tmp_path, text, message):
+def test_wrong_files_are_told_in_a_sentence(tmp_path, monkeypatch, text, message):
+    monkeypatch.chdir(tmp_path)
     if text is not None:
         (tmp_path / "guest.py").write_text(text)
-    done = command(tmp_path, "list", "--import", "guest.py")
-    assert done.returncode == 2 and done.stdout == ""
+    done = command("list", "--import", "guest.py")
+    assert done.exit_code == 2 and done.stdout == ""
     assert message in done.stderr and done.stderr.count("\n") == 1
 
 
-def test_the_page_on_extending_works(pytestconfig, tmp_path):
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_page_on_extending_works(pytestconfig, tmp_path, monkeypatch):
     """Its model has a manual page, and passes checks."""
+    monkeypatch.chdir(tmp_path)
     page = (pytestconfig.rootpath / "docs" / "extending.md").read_text(encoding="utf-8")
     code = "\n".join(re.findall(r"```python\n(.*?)```", page, re.S))
     (tmp_path / "lommel.py").write_text(code, encoding="utf-8")
-    done = command(
-        tmp_path,
-        "check",
-        "lommel",
-        "--import",
-        "lommel.py",
-        "--only",
-        "chi2",
-        "--only",
-        "weight",
-        "--only",
-        "reciprocity",
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "Lommel and Seeliger" in command(tmp_path, "info", "lommel", "--import", "lommel.py").stdout
+    checks = [word for name in ("chi2", "weight", "reciprocity") for word in ("--only", name)]
+    done = command("check", "lommel", "--import", "lommel.py", *checks)
+    assert done.exit_code == 0, done.output
+    assert "Lommel and Seeliger" in command("info", "lommel", "--import", "lommel.py").stdout

@@ -1,7 +1,6 @@
 """The gallery: its sweeps, what it writes, and the pictures in the documentation."""
 
 import html
-import os
 import re
 import signal
 import subprocess
@@ -15,11 +14,13 @@ import pytest
 from generate import models as docs
 from PIL import Image
 from support import is_scalar
+from typer.testing import CliRunner
 
 import mi_brdfs
-from mi_brdfs.gallery import Entry, Row, gallery, overview, page, power_of_4, sheet, shot
-from mi_brdfs.gallery.families import PORTRAITS, by_family, portrait, rgb, stage_of, year
-from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, shown, sweeps_of
+from mi_brdfs.cli import app
+from mi_brdfs.gallery import Entry, Row, Shot, gallery, overview, page, sheet, shot
+from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
+from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, sweeps_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import FAMILIES, Model
@@ -33,22 +34,16 @@ NAMES = [model.plugins[0] for model in own_models()]
 # --- Sweeps and sheets ----------------------------------------------------------------------------------------------
 
 
-def test_every_model_has_sweeps():
-    """Those in the table, in the order of the models, or what its declarations make."""
+@pytest.mark.usefixtures("llvm_rgb")
+def test_every_model_has_a_portrait_and_sweeps():
+    """Those in the table, in the order of the models, or what its declarations make; and all of them load."""
     assert list(SWEEPS) == [name for name in NAMES if name in SWEEPS]
     for model in own_models():
         sweeps = sweeps_of(model)
         parameters = [sweep.parameter for sweep in sweeps]
         assert parameters and len(set(parameters)) == len(parameters), model
         assert all(2 <= len(set(sweep.values)) == len(sweep.values) <= 5 for sweep in sweeps), model
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
-def test_sweeps_load(model):
-    """Their parameters are declared, and the values in the declared ranges."""
-    for sweep in sweeps_of(model):
-        for bsdf in sweep.bsdfs(model.plugins[0]):
+        for bsdf in [portrait(model), *(bsdf for sweep in sweeps for bsdf in sweep.bsdfs(model.plugins[0]))]:
             mi.load_dict(bsdf)
 
 
@@ -84,26 +79,6 @@ def test_sweeps_of_others_models_come_from_their_declarations():
             mi.load_dict(bsdf)
 
 
-def test_a_sweep():
-    two = Sweep("cx, cy", (-1.0, 0.5), {"exponent": 20, "diffuse_reflectance": rgb(0.1, 0.25, 0.4)})
-    assert two.bsdfs("lafortune")[1] == {
-        "type": "lafortune", "cx": 0.5, "cy": 0.5, "exponent": 20,
-        "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.25, 0.4]},
-    }  # fmt: skip
-    assert two.heading("lafortune") == "lafortune: cx, cy, with exponent = 20, diffuse_reflectance = (0.1, 0.25, 0.4)"
-    assert Sweep("b", (1, 2), {}).heading("low") == "low: b"
-    assert [shown(value) for value in (0.0, 0.0625, 100000, "ggx", True)] == ["0", "0.0625", "100000", "ggx", "true"]
-
-
-def test_years():
-    years = {name: year(find_model(name)) for name in ("lambert", "microfacet", "toon", "ward", "eon")}
-    assert years == {"lambert": "1760", "microfacet": "1967", "toon": "2000", "ward": "1992", "eon": "2025"}
-
-
-def test_powers_of_4():
-    assert [power_of_4(spp) for spp in (1, 2, 4, 5, 16, 17, 64, 65)] == [4, 4, 4, 16, 16, 64, 64, 256]
-
-
 def test_models_are_shown_by_family_and_year():
     """Families of others come after the pack's, and models without one last."""
 
@@ -126,27 +101,6 @@ def test_models_are_shown_by_family_and_year():
     for family in FAMILIES:
         years = [year(model) for model in ordered if model.family == family]
         assert years == sorted(years)
-
-
-def test_a_family_is_shown_in_one_colour():
-    """Of the model's own parameters, in the table in the order of the gallery, or what the page of a model says."""
-    assert list(PORTRAITS) == [model.plugins[0] for model in by_family(own_models())]
-    for family in FAMILIES:
-        shown = [portrait(model) for model in own_models() if model.family == family]
-        colours = [[value for value in bsdf.values() if isinstance(value, dict)] for bsdf in shown]
-        assert all(colour == colours[0] for colour in colours), family
-    assert {stage_of(find_model(name)) for name in ("lambert", "eon", "toon")} == {"point"}
-    assert {stage_of(find_model(name)) for name in ("ward", "phong", "burley", "low")} == {"studio"}
-    foreign = type(
-        "Foreign", (Model,), {"__doc__": 'Foreign.\n\n{"type": "foreign", "a": 1}', "__module__": "elsewhere"}
-    )
-    assert portrait(foreign) == {"type": "foreign", "a": 1} and stage_of(foreign) == "studio"
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
-def test_portraits_load(model):
-    mi.load_dict(portrait(model))
 
 
 def test_families_share_a_row_as_far_as_there_is_room():
@@ -223,7 +177,17 @@ def test_a_profile_tells_limb_and_terminator():
     assert (np.diff(profile[left + 15 : right - 20]) < 0).all() and profile[right - 5] < 0.05 * profile.max()
 
 
-@pytest.mark.usefixtures("llvm_rgb")
+@pytest.fixture
+def grey(monkeypatch):
+    """Grey squares in place of pictures."""
+
+    def square(bsdf, stage, size, spp):
+        return Shot(Image.new("RGB", (size, size)), np.ones(size))
+
+    monkeypatch.setattr("mi_brdfs.gallery.shot", square)
+
+
+@pytest.mark.usefixtures("grey")
 def test_what_is_finished_is_kept(tmp_path):
     def press_ctrl_c(type, done, total):
         reported.append((type, done, total))
@@ -240,7 +204,7 @@ def test_what_is_finished_is_kept(tmp_path):
     assert 'alt="wrap: wrap, with reflectance = (0.6, 0.35, 0.2): 0"' in text and 'id="eon"' not in text
 
 
-@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.usefixtures("grey")
 def test_a_wall_of_presets(tmp_path, monkeypatch):
     """Under the names of their sets, half as large; as far as it goes."""
     names = [*mi_brdfs.presets("ward")[:10], "ngan/ward-duer/chrome", "ngan/ward-duer/nickel"]
@@ -256,7 +220,7 @@ def test_a_wall_of_presets(tmp_path, monkeypatch):
     text = (tmp_path / "index.html").read_text()
     assert f'src="lambert_presets.jpg" alt="{", ".join(names[:-1])}"' in text
     entry = Entry(find_model("lambert"), with_presets=True)
-    entry.shots = [shot(entry.bsdfs[0], size=32, spp=4)] * (6 + len(names) - 1)
+    entry.shots = [Shot(Image.new("RGB", (32, 32)), np.ones(32))] * (6 + len(names) - 1)
     rows = entry.wall()
     assert [row.headings for row in rows] == [{0: "ngan/ward"}, {}, {0: "ngan/ward-duer"}]
     assert [caption for row in rows for caption in row.captions] == [name.rpartition("/")[2] for name in names[:-1]]
@@ -264,23 +228,23 @@ def test_a_wall_of_presets(tmp_path, monkeypatch):
     assert width > 8 * 32 and height > 3 * 32
 
 
-def start(*arguments, **options):
-    command = [sys.executable, "-m", "mi_brdfs", "gallery", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+def run(*arguments):
+    return CliRunner().invoke(app, ["gallery", *map(str, arguments)])
 
 
-def run(*arguments, **options):
-    process = start(*arguments, **options)
-    out, err = process.communicate(timeout=180)
-    return process.returncode, out, err
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
-def test_the_command_writes_a_page_and_its_pictures(tmp_path):
-    status, out, err = run("eon", "lambert", "--size", 16, "--spp", 1, "-o", "pictures", cwd=tmp_path)
-    assert status == 0, err
-    assert out == f"{Path('pictures', 'index.html')}\n"
-    assert re.fullmatch(r"12 pictures in \d+ s, \w+_rgb\.\n", err)
-    folder = tmp_path / "pictures"
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_command_writes_a_page_and_its_pictures(folder):
+    done = run("eon", "lambert", "--size", 16, "--spp", 1, "-o", "pictures")
+    assert (done.exit_code, done.stdout) == (0, f"{Path('pictures', 'index.html')}\n"), done.stderr
+    assert re.fullmatch(r"12 pictures in \d+ s, \w+_rgb\.\n", done.stderr)
+    folder = folder / "pictures"
     assert sorted(path.name for path in folder.iterdir()) == ["eon.png", "index.html", "lambert.png", "overview.png"]
 
     text = (folder / "index.html").read_text(encoding="utf-8")
@@ -302,9 +266,13 @@ def test_the_page_has_all_about_a_model():
     assert "64 samples" in text
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
-    process = start("lambert", "burley", "--size", 32, "--variant", "llvm_ad_rgb", cwd=tmp_path)
+    command = [sys.executable, "-m", "mi_brdfs", "gallery", "lambert", "burley", "--size", "32"]
+    process = subprocess.Popen(
+        [*command, "--variant", "llvm_ad_rgb"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     folder = tmp_path / "gallery"
     while not (folder / "lambert.png").exists() and process.poll() is None:
         time.sleep(0.05)
@@ -318,6 +286,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     assert {"index.html", "overview.png", "lambert.png"} <= {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "arguments, status, text",
     [
@@ -326,27 +295,27 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
         (["ward", "--variant", "llvm"], 1, "there is no variant llvm"),
     ],
 )
-def test_an_error_is_one_line(tmp_path, arguments, status, text):
-    (tmp_path / "taken").touch()
-    done, out, err = run(*arguments, cwd=tmp_path)
-    assert done == status and out == ""
-    assert err.startswith(f"mi-brdfs: {text}") and err.count("\n") == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+def test_an_error_is_one_line(folder, arguments, status, text):
+    (folder / "taken").touch()
+    done = run(*arguments)
+    assert done.exit_code == status and done.stdout == ""
+    assert done.stderr.startswith(f"mi-brdfs: {text}") and done.stderr.count("\n") == 1
+    assert [path.name for path in folder.iterdir()] == ["taken"]
 
 
 @pytest.mark.parametrize("package", ["PIL", "mitsuba_oidn", "jinja2"])
-def test_a_missing_package(tmp_path, package):
-    (tmp_path / f"{package}.py").write_text(f"raise ModuleNotFoundError('No module named {package}')")
-    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    status, out, err = run("ward", cwd=tmp_path, env={**os.environ, "PYTHONPATH": path})
-    assert status == 1 and out == ""
-    assert err.startswith("mi-brdfs: ") and "pip install 'mi_brdfs[gallery]'" in err and err.count("\n") == 1
+def test_a_missing_package(monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, "mi_brdfs.gallery")
+    done = run("ward")
+    assert done.exit_code == 1 and done.stdout == "" and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("mi-brdfs: ") and "pip install 'mi_brdfs[gallery]'" in done.stderr
 
 
 # --- The pictures in the documentation ------------------------------------------------------------------------------
 
 STALE = "looks different; if that is meant, run python docs/generate"
-QUICK = ("blinnphong", "ward")
+QUICK = ("ward",)
 THUMBNAILS = [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in NAMES]
 
 
@@ -367,6 +336,7 @@ def test_thumbnails_show_the_models(name):
     assert difference(name) < 4, f"{name} {STALE} {name}"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_thumbnails_tell_lobes_and_models_apart():
     assert difference("ward", diffuse_reflectance=0.03) > 8

@@ -1,16 +1,13 @@
 """BSDFs and measured files in another format: as exact as the format allows, or refused in a sentence."""
 
-import re
-
 import numpy as np
 import pytest
 from support import hemisphere
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
-from mi_brdfs.measured import FileError, Grid, Measurement, Samples, bake, convert, read
+from mi_brdfs.measured import Grid, Measurement, Samples, bake, convert, read
 from mi_brdfs.measured.coordinates import Spherical
-from mi_brdfs.measured.formats import ENDINGS
 from mi_brdfs.measured.measurement import Axis
 from mi_brdfs.probe.bsdf import BSDFProbe
 
@@ -24,9 +21,7 @@ RED = {"type": "rgb", "value": [0.8, 0.2, 0.1]}
 @pytest.mark.parametrize(
     "bsdf",
     [
-        {"type": "walter"},
-        {"type": "ward"},
-        {"type": "burley", "base_color": RED},
+        pytest.param({"type": "burley", "base_color": RED}, marks=pytest.mark.slow),
         {"type": "ward", "alpha": 0.05, "diffuse_reflectance": 0.05, "specular_reflectance": RED},
     ],
     ids=str,
@@ -41,21 +36,6 @@ def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path, bsdf):
     probe = BSDFProbe(mi.load_dict(bsdf))
     f = probe.eval(probe.whole, wi, wo) / wo[:, 2:]
     assert abs(found - f).max() < 0.01 * f.max() and np.median(abs(found / f - 1)) < 0.005
-
-
-@pytest.mark.parametrize(
-    "bsdf, largest", [({"type": "walter"}, 0.01), ({"type": "ward", "alpha_u": 0.15, "alpha_v": 0.3}, 0.04)], ids=str
-)
-def test_mitsubas_measured_has_the_values_that_were_written(tmp_path, bsdf, largest):
-    path = tmp_path / "x.bsdf"
-    assert convert(bsdf, path).largest < largest  # an anisotropic file has a φi each 10°
-    if bsdf["type"] == "walter":  # on the way through another format
-        convert(bsdf, tmp_path / "x.binary")
-        assert convert(tmp_path / "x.binary", path).largest < 0.01
-    wi, wo = (hemisphere(4000, seed, 0.3) for seed in (1, 2))
-    probes = [BSDFProbe(mi.load_dict(it)) for it in (bsdf, {"type": "measured", "filename": str(path)})]
-    f, found = (probe.eval(probe.whole, wi, wo) for probe in probes)
-    assert abs(found - f).max() < largest * f.max() and np.sqrt(np.mean((found - f) ** 2)) < 0.002 * f.max()
 
 
 def test_it_says_what_is_lost(tmp_path):
@@ -74,21 +54,19 @@ def measurement(f, channels, wavelengths=None):
     return Measurement("some file", "test", Grid(Spherical(True), (polar, polar, azimuth), values), wavelengths)
 
 
-def test_a_measurement_keeps_its_values(tmp_path):
-    result = convert(measurement(lambda i, o, d: 1 + np.cos(i) * np.cos(o), 3), tmp_path / "x.binary")
-    assert result.losses == () and result.rms < 0.002 and result.largest < 0.02
-
-
-@pytest.mark.parametrize("name, format", [("x.csv", "CSV"), ("x.bsdf", "Zemax"), ("x.bsdf", "RGL")])
+@pytest.mark.parametrize(
+    "name, format", [("x.csv", "CSV"), ("x.bsdf", "Zemax"), ("x.bsdf", "RGL"), ("x.binary", "MERL")]
+)
 def test_every_format_keeps_a_smooth_measurement(tmp_path, name, format):
-    bands = None if format == "Zemax" else np.array([450.0, 500, 550, 600])
+    bands = None if format in ("Zemax", "MERL") else np.array([450.0, 500, 550, 600])
     given = measurement(lambda i, o, d: 1 + np.cos(i) * np.cos(o), 4 if bands is not None else 3, bands)
     result = convert(given, tmp_path / name, format.lower())
-    assert result.format == format and result.losses == () and result.largest < 0.02
+    assert result.format == format and result.losses == () and result.rms < 0.002 and result.largest < 0.02
     if bands is not None:
         np.testing.assert_allclose(read(tmp_path / name).wavelengths, bands)
 
 
+@pytest.mark.slow
 def test_scattered_samples_are_put_on_a_grid(tmp_path):
     wi, wo = (hemisphere(400, seed, 0.2).astype(np.float64) for seed in (5, 6))
     samples = Samples(wi, wo, np.full((400, 3), 0.25), anisotropic=False)
@@ -96,6 +74,7 @@ def test_scattered_samples_are_put_on_a_grid(tmp_path):
     assert result.losses == () and result.largest < 1e-6
 
 
+@pytest.mark.slow
 def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
     path = tmp_path / "x.binary"
     (loss,) = convert(measurement(lambda i, o, d: 1 + 0 * i, 1, np.array([650.0])), path).losses
@@ -165,17 +144,12 @@ def run(*words):
     return result.exit_code, " ".join(result.output.split())
 
 
-def test_the_help_names_all_endings():
-    _, text = run("-h")
-    assert all(re.search(rf"\{ending}\b", text) for ending in ENDINGS)
-
-
 def test_the_command(tmp_path):
     path = tmp_path / "x.binary"
     status, text = run("phong", path, "-D", "exponent=20")
     assert status == 0 and "MERL" in text and "% of its peak" in text
-    assert run('<bsdf type="lambert"/>', tmp_path / "y.binary")[0] == 0
-    assert run(path, tmp_path / "z.binary")[0] == 0
+    assert run('<bsdf type="lambert"/>', tmp_path / "y.csv")[0] == 0
+    assert run(tmp_path / "y.csv", tmp_path / "z.csv")[0] == 0
     for words, answer in (
         ((path, path), "onto itself"),
         ((path, tmp_path / "y.binary", "-D", "alpha=1"), "no parameter but quantity"),
@@ -191,9 +165,3 @@ def test_the_command(tmp_path):
     path.write_bytes(path.read_bytes()[:1000])
     status, text = run(path, tmp_path / "y.binary")
     assert status == 2 and "at byte 12" in text
-
-
-def test_a_file_that_ends_too_soon_is_named(tmp_path):
-    (tmp_path / "x.binary").write_bytes(b"\0" * 5)
-    with pytest.raises(FileError, match=r"x\.binary: at byte 0"):
-        convert(tmp_path / "x.binary", tmp_path / "y.binary")

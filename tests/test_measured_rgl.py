@@ -132,6 +132,7 @@ def test_reads_as_mitsuba_does(tmp_path, kind):
         agrees(path)
 
 
+@pytest.mark.slow
 def test_reads_real_files_as_mitsuba_does(llvm_rgb):
     """Negative channels, of colours outside sRGB, included."""
     for path in sorted(shared("rgl").glob("*.bsdf")):
@@ -166,7 +167,7 @@ def test_two_azimuths_that_differ_are_interpolated(tmp_path):
     np.testing.assert_allclose(found / (1 + 2 * share), turned / (1 + 2 * others), rtol=1e-5)
 
 
-@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb", "llvm_ad_mono_polarized"])
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
 def test_at_the_poles(tmp_path, variant):
     """Places, scales and their derivatives are finite for directions along the axes, also below the horizon."""
     axes = np.concatenate([np.eye(3), -np.eye(3), [[0.6, 0, 0.8], [-0.6, 0, 0.8], [1e-8, 0, 1], [0.8, 0.6, 1e-7]]])
@@ -222,40 +223,29 @@ FIRST = 18 + 2 + len("description")
 """Where the number of dimensions of the first field stands."""
 MALFORMED = {
     "no magic": (patched(0, b"tenser"), "no known format"),
-    "half of the magic": (lambda: b"tensor_file", "no known format"),
     "nothing behind the magic": (lambda: b"tensor_file\0", "at byte 12, 2 bytes of version numbers"),
     "version": (patched(12, b"\2"), "at byte 12, the version is 2.0"),
     "2^31 fields": (patched(14, struct.pack("<I", 1 << 31)), "at byte 14, 2,147,483,648 fields"),
-    "one field more": (patched(14, struct.pack("<I", 10)), "at byte"),
-    "no fields": (patched(14, struct.pack("<I", 0)), "without 'phi_i'"),
     "long name": (patched(18, b"\xff\xff"), "at byte 20, 65,535 bytes of a field's name"),
     "65535 dimensions": (patched(FIRST, b"\xff\xff"), "at byte 18, field 'description' has 65,535 dimensions"),
     "type": (patched(FIRST + 2, b"\x0c"), "at byte 18, field 'description' is of the unknown type 12"),
     "offset": (patched(FIRST + 3, struct.pack("<Q", 1 << 40)), "at byte 18, field 'description' should lie from"),
-    "offset of 2^64 - 1": (patched(FIRST + 3, struct.pack("<Q", (1 << 64) - 1)), "at byte 18, field 'description'"),
     "10 GB": (patched(FIRST + 11, struct.pack("<Q", 10**10)), "but the file ends at"),
-    "in the contents": (patched(FIRST + 3, struct.pack("<Q", 20)), "at byte 20, field 'description' starts"),
     "overlapping": (lambda: tensor_file(material(), moved=["rgb"]), "field 'rgb' starts, but field 'jacobian'"),
     "overlapping the contents": (lambda: tensor_file(material(), moved=["description"]), "but the table of contents"),
     "cut off": (lambda: tensor_file(material())[:-1], "the file ends at"),
     "cut off in the contents": (lambda: tensor_file(material())[:100], "at byte"),
     "twice the same name": (lambda: tensor_file(material()).replace(b"sigma", b"phi_i"), "a second field 'phi_i'"),
     "no vndf": (spoiled("vndf", lambda field: None), "without 'vndf'"),
-    "no jacobian": (spoiled("jacobian", lambda field: None), "without 'jacobian'"),
     "two jacobians": (spoiled("jacobian", lambda field: np.repeat(field, 2)), "'jacobian' has 2 values"),
     "float64": (spoiled("rgb", lambda field: field.astype("float64")), "'rgb' is of type float64; it must be float32"),
-    "integer nodes": (spoiled("theta_i", lambda field: field.astype("int32")), "'theta_i' is of type int32"),
-    "nodes of two dimensions": (spoiled("theta_i", lambda field: field[None]), "'theta_i' is of shape (1, 4)"),
-    "no nodes": (spoiled("theta_i", lambda field: field[:0]), "'theta_i' is of shape (0,)"),
     "fewer nodes": (spoiled("theta_i", lambda field: field[:3]), "must start with (1, 3"),
-    "more azimuths": (spoiled("phi_i", lambda field: np.float32([-3, -2, -1])), "must start with (3, 4"),
     "NaN node": (spoiled("theta_i", with_value(np.nan, 2)), "'theta_i' has the value nan"),
     "node beyond the horizon": (spoiled("theta_i", with_value(90, 3)), "'theta_i' has the value 90"),
     "decreasing": (spoiled("theta_i", lambda field: field[::-1].copy()), "'theta_i' must increase"),
     "equal nodes": (spoiled("theta_i", with_value(0.5, 2)), "'theta_i' must increase, but 0.5 follows 0.5"),
     "negative ndf": (spoiled("ndf", with_value(-1, 5)), "'ndf' has the value -1"),
     "infinite sigma": (spoiled("sigma", with_value(np.inf)), "'sigma' has the value inf"),
-    "ndf of 0": (spoiled("ndf", lambda field: 0 * field), "'ndf' is 0 everywhere"),
     "vndf of 0 at an angle": (spoiled("vndf", with_value(0, slice(240, 480))), "'vndf' is 0 everywhere"),
     "NaN in vndf": (spoiled("vndf", with_value(np.nan, 700)), "'vndf' has the value nan"),
     "a column": (spoiled("rgb", lambda field: field[..., :1].copy()), "its last two dimensions must be at least 2"),
@@ -306,10 +296,8 @@ def test_missing_values_are_kept(tmp_path):
 
 MODELS = {
     "lambert": {"type": "diffuse"},
-    "walter": {"type": "walter", "alpha": 0.2},
     "walter, narrow": {"type": "walter", "alpha": 0.02},
     "ward": {"type": "ward", "alpha": 0.2},
-    "burley": {"type": "burley"},
     "walter, anisotropic": {"type": "walter", "alpha_u": 0.1, "alpha_v": 0.3},
     "walter, turned": {"type": "walter", "alpha_u": 0.1, "alpha_v": 0.3, "rotation": 0.1},
 }
@@ -324,7 +312,9 @@ def source_of(bsdf):
     )
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", ["ward", *(pytest.param(name, marks=pytest.mark.slow) for name in MODELS if name != "ward")]
+)
 def test_written_files_are_their_source_in_mitsuba(model, tmp_path, llvm_rgb):
     """By its values at random pairs, and by its albedo from its own sampling, whose weights hardly vary."""
     path = tmp_path / "written.bsdf"
@@ -352,46 +342,7 @@ def test_written_files_are_their_source_in_mitsuba(model, tmp_path, llvm_rgb):
     assert sampling_efficiency(weights[1]).min() > 0.98
 
 
-@pytest.mark.parametrize("model", ["lambert", "walter", "ward", "burley"])
-def test_written_files_render_as_their_source(model, tmp_path, llvm_rgb):
-    """Pictures of a sphere, lit by all of the sky and a lamp, in Mitsuba's ``measured``: the z of pixels are those of
-    chance."""
-    path = tmp_path / "written.bsdf"
-    rgl.write(path, source_of(MODELS[model]))
-
-    def pictures(bsdf, first):
-        scene = mi.load_dict(
-            {
-                "type": "scene",
-                "integrator": {"type": "path", "max_depth": 2},
-                "sensor": {
-                    "type": "perspective",
-                    "fov": 30,
-                    "to_world": mi.ScalarTransform4f().look_at([0, -4, 1], [0, 0, 0], [0, 0, 1]),
-                    "film": {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}},
-                },
-                "sphere": {"type": "sphere", "bsdf": bsdf},
-                "sky": {"type": "constant", "radiance": 0.5},
-                "lamp": {
-                    "type": "sphere",
-                    "center": [3, -3, 4],
-                    "radius": 0.5,
-                    "emitter": {"type": "area", "radiance": 20.0},
-                },
-            }
-        )
-        images = [np.array(mi.render(scene, spp=64, seed=seed))[..., 1] for seed in range(first, first + 16)]
-        return np.mean(images, axis=0), np.var(images, axis=0, ddof=1) / len(images)
-
-    (a, variance_a), (b, variance_b) = (
-        pictures(MODELS[model], 0),
-        pictures({"type": "measured", "filename": str(path)}, 100),
-    )
-    z = (b - a) / np.sqrt(variance_a + variance_b + 1e-12)
-    assert np.median(np.sqrt(variance_a) / a) < 0.02
-    assert abs(z).max() < 5 and np.mean(z**2) < 1.5, (abs(z).max(), np.mean(z**2))
-
-
+@pytest.mark.slow
 def test_spectra_are_written(tmp_path):
     wavelengths = np.array([400.0, 480, 560, 700])
 
@@ -413,6 +364,7 @@ def test_spectra_are_written(tmp_path):
     assert abs(found - expected)[steep].max() < 0.012 * expected.max()
 
 
+@pytest.mark.slow
 def test_what_scatters_nothing_back_is_written_too(tmp_path):
     """Its distribution of normals cannot be found from that."""
 
@@ -435,6 +387,7 @@ def test_an_unstated_wavelength_is_grey(tmp_path):
     np.testing.assert_allclose(read(path).data.evaluate(wi, wo), np.full((100, 3), 0.2), rtol=0.05)
 
 
+@pytest.mark.slow
 def test_reading_takes_little_memory_beyond_the_result(tmp_path):
     path = tmp_path / "written.bsdf"
     rgl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), 0.2)))
@@ -446,6 +399,7 @@ def test_reading_takes_little_memory_beyond_the_result(tmp_path):
     assert peak - kept < 2 * path.stat().st_size
 
 
+@pytest.mark.slow
 def test_a_black_file_is_black_in_mitsuba(tmp_path, llvm_rgb):
     rgl.write(tmp_path / "written.bsdf", Source(lambda wi, wo: np.zeros((len(wi), 3)), anisotropic=True), 8)
     probe = BSDFProbe(mi.load_dict({"type": "measured", "filename": str(tmp_path / "written.bsdf")}))

@@ -59,7 +59,9 @@ def test_distance_knows_the_symmetries():
     assert np.all(np.linalg.norm(embedded(wi @ turn, wo @ turn, True) - embedded(wi, wo, True), axis=1) > 0.02)
 
 
-@pytest.mark.parametrize("f, anisotropic, gain", [(glossy, False, 0.5), (streaked, True, 0.75)])
+@pytest.mark.parametrize(
+    "f, anisotropic, gain", [(glossy, False, 0.5), pytest.param(streaked, True, 0.75, marks=pytest.mark.slow)]
+)
 def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
     """Better than from the nearest neighbour; in four dimensions, 2000 samples are few."""
     wi, wo = pairs(2000, 5)
@@ -98,6 +100,7 @@ def test_missing_values_and_few_samples():
         gridded(Samples(wi[3:4], wo[3:4], values[3:4], False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parts", [("cornell", "krylon_blue.brdf"), ("retro", "retro-3M-jaune.dat")])
 def test_left_out_samples(parts):
     """Every tenth sample is predicted better than by its nearest neighbour, by a ninth at least."""
@@ -118,8 +121,8 @@ def test_left_out_samples(parts):
     assert error(grid.evaluate(wi[left], wo[left])) < 0.9 * error(neighbour)
 
 
-@pytest.mark.parametrize("bsdf", [{"type": "walter", "alpha": 0.02}, {"type": "ward", "alpha": 0.02}])
-def test_noise_of_a_goniometers_samples_is_next_to_none(llvm_rgb, tmp_path, bsdf):
+@pytest.mark.slow
+def test_noise_of_a_goniometers_samples_is_next_to_none(llvm_rgb, tmp_path):
     """θi every 10°, as in Cornell's files, and half vectors that fill no grid."""
     rng = np.random.default_rng(1)
     h = np.stack([direction(*it) for it in zip(10 * rng.random(800), 360 * rng.random(800), strict=True)])
@@ -127,7 +130,7 @@ def test_noise_of_a_goniometers_samples_is_next_to_none(llvm_rgb, tmp_path, bsdf
     wo = 2 * np.sum(wi * h, axis=1, keepdims=True) * h - wi
     above = wo[:, 2] > 0.05
     wi, wo = (w[above].astype(np.float32) for w in (wi, wo))
-    (value,) = call(mi.load_dict(bsdf).eval, context(), wi, wo)
+    (value,) = call(mi.load_dict({"type": "walter", "alpha": 0.02}).eval, context(), wi, wo)
     angles = [np.arccos(wi[:, 2]), np.arccos(wo[:, 2]), np.arctan2(wo[:, 1], wo[:, 0])]
     rows = np.column_stack([*angles, value / wo[:, 2:]])
     np.savetxt(
@@ -136,6 +139,7 @@ def test_noise_of_a_goniometers_samples_is_next_to_none(llvm_rgb, tmp_path, bsdf
     assert (efficiencies({"type": "tabulated", "filename": str(path)}, (5, 30, 43, 60, 70, 74, 80)) > 0.94).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "parts, least", [(("cornell", "krylon_blue.brdf"), 0.99), (("retro", "retro-3M-jaune.dat"), 0.96)]
 )

@@ -152,20 +152,6 @@ def anatomy_of_a_microfacet_brdf(names):
     np.testing.assert_allclose(picture[[0, 0, -1, -1], [0, -1, 0, -1]], 1, rtol=1e-5)
 
 
-SAYS = {
-    say.__name__: say
-    for say in (
-        first_light,
-        is_my_sampler_right,
-        recover_a_material,
-        write_your_own_brdf,
-        from_a_goniometer_to_a_picture,
-        which_model_fits,
-        coming_from_mitsuba_06,
-        anatomy_of_a_microfacet_brdf,
-    )
-}
-
 # --- Tests ----------------------------------------------------------------------------------------------------------
 
 
@@ -174,8 +160,8 @@ SAYS = {
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook(path):
     names = run_notebook(path)
-    if path.stem in SAYS:
-        SAYS[path.stem](names)
+    if says := globals().get(path.stem):
+        says(names)
 
 
 def test_a_model_is_written_on_public_names():
@@ -192,33 +178,26 @@ def test_a_model_is_written_on_public_names():
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_committed_form(path):
     """Sources are reviewable as text, and plain Python; all cells were run in order, without errors, and what they show
-    is small and says nothing of the machine."""
+    is small and says nothing of the machine. Solutions of exercises begin with their numbers, and follow one another
+    before the links at the end."""
     text, notebook = path.read_text(encoding="utf-8"), read_notebook(path)
     assert text == json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
     assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
-    for cell in notebook["cells"]:
-        assert "".join(cell["source"]).splitlines(keepends=True) == cell["source"]
     cells = code_cells(notebook)
     assert [cell["execution_count"] for cell in cells] == [*range(1, len(cells) + 1)]
     for cell in cells:
         compile("".join(cell["source"]), cell["id"], "exec")
         for output in cell["outputs"]:
             assert output["output_type"] in ("stream", "display_data", "execute_result")
-            assert output.get("name") != "stderr" and set(output.get("data", {})) <= {
-                "text/plain",
-                "image/png",
-                "image/jpeg",
-            }
+            assert output.get("name") != "stderr"
+            assert set(output.get("data", {})) <= {"text/plain", "image/png", "image/jpeg"}
     assert len(text) < 1_000_000 and not re.search(r"/(home|root|tmp|Users)/|student-t|regolith", text)
 
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_exercises_have_solutions(path):
-    """Each begins with its number; they follow one another before the links at the end."""
-    cells = read_notebook(path)["cells"]
-    (exercises,) = [text for cell in cells if (text := "".join(cell["source"])).startswith("## Exercises\n")]
-    tagged = ["solution" in cell["metadata"].get("tags", ()) for cell in cells]
-    solutions = ["".join(cell["source"]) for cell, is_one in zip(cells, tagged, strict=True) if is_one]
+    texts = ["".join(cell["source"]) for cell in notebook["cells"]]
+    assert [text.splitlines(keepends=True) for text in texts] == [cell["source"] for cell in notebook["cells"]]
+    (exercises,) = [text for text in texts if text.startswith("## Exercises\n")]
+    tagged = ["solution" in cell["metadata"].get("tags", ()) for cell in notebook["cells"]]
+    solutions = [text for text, is_one in zip(texts, tagged, strict=True) if is_one]
     numbers = [re.match(r"\*\*Solution (\d)\.\*\* ", text) for text in solutions]
     assert [found[1] for found in numbers if found] == re.findall(r"^(\d)\. ", exercises, re.MULTILINE) != []
     assert numbers[0] and not any(tagged[tagged.index(True) + len(solutions) :])

@@ -1,6 +1,7 @@
 """The package as installed: versions, import time, style."""
 
 import ast
+import graphlib
 import importlib.metadata
 import os
 import subprocess
@@ -73,7 +74,7 @@ def test_types_are_shipped():
 # fmt: off
 TRUNK = {
     "math", "srgb", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba", "ranges",
-    "variants", "writing", "starting", "preview", "probe", "rendering", "__version__", "info", "doctor",
+    "names", "variants", "writing", "starting", "preview", "probe", "rendering", "__version__", "info", "doctor",
 }
 # fmt: on
 MAY_IMPORT = {
@@ -92,12 +93,24 @@ MAY_IMPORT = {
 """The wings, each with those that it stands on besides the trunk."""
 
 
+def imports_out_of(room):
+    """Yield what a room of the package imports of others, also inside functions: (file, import, rooms)."""
+    for file in [room] if room.is_file() else room.rglob("*.py"):
+        inside = len(file.relative_to(room).parts)
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == inside + 1:
+                rooms = {node.module.split(".")[0]} if node.module else {name.name for name in node.names}
+                yield file, ast.unparse(node), rooms
+
+
 @pytest.mark.parametrize("wing", MAY_IMPORT)
 def test_wings_stand_on_what_they_may(wing):
-    folder = Path(mi_brdfs.__file__).parent / wing
-    for file in folder.rglob("*.py"):
-        inside = len(file.relative_to(folder).parts)
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.level == inside + 1:  # out of the wing
-                rooms = {node.module.split(".")[0]} if node.module else {name.name for name in node.names}
-                assert rooms <= TRUNK | MAY_IMPORT[wing], f"{file}: {ast.unparse(node)}"
+    for file, statement, rooms in imports_out_of(Path(mi_brdfs.__file__).parent / wing):
+        assert rooms <= TRUNK | MAY_IMPORT[wing], f"{file}: {statement}"
+
+
+def test_no_rooms_import_one_another():
+    """Not even in a circle of several."""
+    rooms = [it for it in Path(mi_brdfs.__file__).parent.iterdir() if it.is_dir() or it.suffix == ".py"]
+    graph = {it.stem: set().union(*(found for *_, found in imports_out_of(it))) for it in rooms}
+    graphlib.TopologicalSorter(graph).prepare()

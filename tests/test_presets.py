@@ -1,9 +1,6 @@
 """The published materials: their numbers, their formulas, and how they are named."""
 
-import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import mitsuba as mi
@@ -21,12 +18,7 @@ from mi_brdfs.testing import assert_bsdf
 
 ROOT = Path(__file__).parent.parent
 FITS = Path(os.environ.get("MI_BRDFS_DATA", ROOT.parent / "shared" / "data")) / "fits"
-SETS = {name.rpartition("/")[0]: None for name in mi_brdfs.presets()}
-COUNTS = {
-    "ngan/ward": 86, "ngan/ward-duer": 86, "ngan/blinn-phong": 86, "ngan/cook-torrance": 86,
-    "ngan/ashikhmin-shirley": 86, "low/cook-torrance-e1": 99, "low/cook-torrance-e2": 100,
-    "low/ashikhmin-shirley-e1": 98, "low/ashikhmin-shirley-e2": 99, "low/microfacet": 100, "low/smooth": 100,
-}  # fmt: skip
+SETS = sorted({name.rpartition("/")[0] for name in mi_brdfs.presets()})
 
 
 def of_set(name):
@@ -75,23 +67,6 @@ def test_numbers_are_those_of_the_paper(name):
     lobe = values.pop("a") if "a" in values else values.pop("specular_reflectance")
     np.testing.assert_allclose(lobe, np.multiply(specular, scale_of_lobe), rtol=1e-6)
     np.testing.assert_allclose(sorted(map(float, values.values())), sorted(others), rtol=1e-6)
-
-
-def test_every_material_that_fits_is_there():
-    assert {name: len(of_set(name)) for name in SETS} == COUNTS
-    data = json.loads((ROOT / "mi_brdfs" / "parameters" / "published.json").read_text(encoding="utf-8"))
-    left_out = {
-        f"{name}/{material}": why for name, it in data["sets"].items() for material, why in it["left_out"].items()
-    }
-    assert left_out == {
-        "low/cook-torrance-e1/white-fabric2": "its roughness is 2.094, above 2",
-        "low/ashikhmin-shirley-e1/polyethylene": "the scale of its specular lobe is 1.125, above 1",
-        "low/ashikhmin-shirley-e1/white-paint": "the scale of its specular lobe is 1.29, above 1",
-        "low/ashikhmin-shirley-e2/polyethylene": "the scale of its specular lobe is 1.119, above 1",
-    }
-    assert all(
-        np.allclose(it.get("scale", 1), SCALE if name.startswith("ngan") else 1) for name, it in data["sets"].items()
-    )
 
 
 @pytest.mark.skipif(not FITS.is_dir(), reason="MI_BRDFS_DATA has no fits")
@@ -193,7 +168,9 @@ def pairs(name):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("group", COUNTS)
+@pytest.mark.parametrize(
+    "group", ["ngan/cook-torrance", *(pytest.param(it, marks=pytest.mark.slow) for it in SETS if "n/cook" not in it)]
+)
 def test_each_evaluates_to_its_formula(group):
     """Within 1e-4 of every channel where f is above 1e-6 of its peak."""
     ctx = mi.BSDFContext()
@@ -210,6 +187,7 @@ def test_each_evaluates_to_its_formula(group):
         np.testing.assert_allclose(value[checked], expected[checked], rtol=1e-4, err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_albedo():
     """Below one up to 89.9°, or as much as the page of the plugin states, for the materials that say so."""
@@ -233,22 +211,14 @@ def test_albedo():
     assert f"the albedo of {len(duer)} materials" in words and f"up to {max(duer.values()):.1f}" in words
 
 
-NARROWEST = [min(of_set(group), key=width) for group in COUNTS]
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", NARROWEST)
-def test_check_of_the_narrowest_of_each_set(name):
-    assert_bsdf(mi_brdfs.preset(name), only=["finite", "support", "eval_pdf", "weight", "albedo"])
+NARROWEST = [min(of_set(group), key=width) for group in SETS if not group.endswith("e2")]  # as e1 is
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize(
-    "name", ["ngan/ward-duer/gold-metallic-paint", "low/ashikhmin-shirley-e1/aluminium", "low/microfacet/beige-fabric"]
-)
-def test_check(name):
-    assert_bsdf(mi_brdfs.preset(name))
+@pytest.mark.parametrize("name", NARROWEST)
+def test_check_of_the_narrowest_of_each_kind(name):
+    assert_bsdf(mi_brdfs.preset(name), only=["finite", "support", "eval_pdf", "weight", "albedo"])
 
 
 # --- Names ----------------------------------------------------------------------------------------------------------
@@ -262,11 +232,6 @@ def test_names():
     assert all(mi_brdfs.preset(name)["type"] == "ward" for name in ward)
     origin = provenance("low/smooth/chrome")
     assert "Löw" in origin.source and origin.doi == "10.1145/2077341.2077350" and "cosθ_d" in origin.convention
-
-
-def test_they_are_read_when_used():
-    code = "import mi_brdfs.parameters.published as it; assert not it._data.cache_info().currsize; assert it.names()"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
 def test_presets_are_the_users_own():
@@ -284,11 +249,9 @@ def test_presets_are_the_users_own():
     [
         ("ngan/ward/blu-acrylic", "There is no preset 'ngan/ward/blu-acrylic'; did you mean 'ngan/ward/blue-acrylic'?"),
         ("ngan/wardd/chrome", "did you mean 'ngan/ward/chrome'?"),
-        ("chrome", "did you mean 'ngan/ward/chrome'?"),
         ("ngan/ward/qqq", "There is no preset 'ngan/ward/qqq'; mi_brdfs.presets() lists them."),
         ("ngan/lafortune/chrome", "rounding moves and scales the lobes"),
         ("low/ashikhmin-shirley-e1/white-paint", "the scale of its specular lobe is 1.29, above 1."),
-        ("", "mi_brdfs.presets() lists them."),
     ],
 )
 def test_wrong_names(name, sentence):
@@ -311,7 +274,7 @@ def described(given, name):
     return str(mi.load_dict(given)).replace(f"  preset = {name},\n", "")
 
 
-@pytest.mark.parametrize("name", [of_set(group)[7] for group in COUNTS])
+@pytest.mark.parametrize("name", [of_set(group)[7] for group in SETS])
 def test_parameter(variant, name):
     """A plugin with a preset is the one with its values, in every variant; ``traverse`` has them all."""
     values = mi_brdfs.preset(name)
@@ -319,17 +282,6 @@ def test_parameter(variant, name):
     assert described(given, name) == str(mi.load_dict(values))
     keys = [[*mi.traverse(mi.load_dict(bsdf)).keys()] for bsdf in (given, values)]
     assert keys[0] == keys[1] != []
-
-
-def test_xml_with_others_on_top(variant):
-    """Given parameters win: also over what they exclude, but not over the others."""
-    name = "ngan/ward/blue-acrylic"
-    params = mi.traverse(
-        scene(f"""
-        <bsdf type="ward"><string name="preset" value="{name}"/><float name="alpha" value="0.3"/></bsdf>""")
-    )
-    expected = mi.traverse(mi.load_dict(mi_brdfs.preset(name) | {"alpha": 0.3}))
-    assert {key: str(value) for key, value in params} == {key: str(value) for key, value in expected}
 
 
 ON_TOP = [
@@ -348,7 +300,7 @@ ON_TOP = [
 
 
 @pytest.mark.parametrize("name, given, replaced", ON_TOP)
-def test_others_on_top(variant, name, given, replaced):
+def test_others_on_top(llvm_rgb, name, given, replaced):
     values = {key: value for key, value in mi_brdfs.preset(name).items() if key not in replaced} | given
     assert described({"type": values["type"], "preset": name, **given}, name) == str(mi.load_dict(values))
 
@@ -361,7 +313,6 @@ def test_others_on_top(variant, name, given, replaced):
             "ngan/ward/chrme",
             'ward: preset = "ngan/ward/chrme" is unknown; did you mean "ngan/ward/chrome"? It ',
         ),
-        ("ward", "chrome", 'is unknown; did you mean "ngan/ward/chrome"? It must be'),
         ("low", "chrome", 'is unknown; did you mean "low/microfacet/chrome"? It must be'),
         (
             "ward",

@@ -3,22 +3,14 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import direction, is_scalar, small_picture
+from support import direction, small_picture
 
 import mi_brdfs
-from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.preview import STAGES
 from mi_brdfs.preview.body import ANGLE, AZIMUTH, BEVEL, CENTRE, ELEVATION, RADIUS
 from mi_brdfs.preview.studio import environment
 
 GOLD = {"type": "walter", "material": "Au", "alpha": 0.1}
-
-
-@pytest.mark.parametrize("name", [name for model in own_models() for name in model.plugins])
-def test_preview(name, variant):
-    scene = mi.load_dict(mi_brdfs.preview_scene({"type": name}))
-    if not is_scalar():
-        small_picture(scene)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -1,9 +1,10 @@
 """README.md works as it stands, from top to bottom, and what it says of numbers and of other files is so."""
 
+import glob
 import importlib.util
 import json
-import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -13,8 +14,10 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import mi_brdfs
+from mi_brdfs.cli import app
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -28,6 +31,8 @@ SHORTER = {
     "mi-brdfs gallery": " --size 64 --spp 4",
 }
 """What the README names to make commands that take long shorter, and here is added to them."""
+LESS = {"mi-brdfs fit": " --starts 1", "mi-brdfs check": " --only albedo"}
+"""And what is added besides: their own tests ask for all."""
 
 
 def blocks(language):
@@ -39,7 +44,9 @@ def lines():
     without the command that runs them."""
     for line in "".join(blocks("sh")).splitlines():
         parts = [part for part in line.split("  #")[0].rstrip().split(" && ") if not makes_environment(part)]
-        parts = [part + next((more for c, more in SHORTER.items() if part.startswith(c)), "") for part in parts]
+        parts = [
+            part + next((more for c, more in (SHORTER | LESS).items() if part.startswith(c)), "") for part in parts
+        ]
         if parts and not parts[0].startswith("python -m pytest"):
             yield " && ".join(parts)
 
@@ -48,19 +55,28 @@ def makes_environment(command):
     return command.startswith(("python3 -m venv", ". .venv", "pip install"))
 
 
-def copy_of_checkout(folder):
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory):
     leave_out = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info")
-    return Path(shutil.copytree(ROOT, folder / "checkout", ignore=leave_out))
+    return Path(shutil.copytree(ROOT, tmp_path_factory.mktemp("readme") / "checkout", ignore=leave_out))
 
 
-@pytest.mark.parametrize("line", [*lines()])
-def test_shell(line, tmp_path):
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        ["bash", "-c", line], cwd=copy_of_checkout(tmp_path), env=os.environ | {"PATH": path},
-        capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
+QUICK = "list", "info", "presets", "doctor", "plot", "convert"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    "line", [pytest.param(it, marks=[] if it.split()[1] in QUICK else pytest.mark.slow) for it in lines()]
+)
+def test_shell(line, checkout, monkeypatch):
+    """In this process, with words and patterns as a shell takes them."""
+    monkeypatch.chdir(checkout)
+    monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 4)
+    name, *words = shlex.split(line, comments=True)
+    done = CliRunner().invoke(
+        app, [it for word in words for it in (sorted(glob.glob(word)) if "*" in word else [word])]
+    )
+    assert name == "mi-brdfs" and done.exit_code == 0, done.output
 
 
 def test_no_command_is_left_out():
@@ -71,6 +87,7 @@ def test_no_command_is_left_out():
     assert all(more.strip() in README for more in SHORTER.values())
 
 
+@pytest.mark.slow
 def test_python(tmp_path):
     """All blocks in one process, in order; the picture, of a thirtieth of the samples, is neither dark nor clipped."""
     show = "print(copper['diffuse_reflectance'] + max(copper['specular_reflectance']['value']))"
@@ -78,7 +95,7 @@ def test_python(tmp_path):
     render = "mi.render(mi.load_dict(mi_brdfs.preview_scene(copper)))"
     assert code.count(render) == 1
     code = code.replace(render, f"{render[:-1]}, spp=4)")
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.splitlines()[-1]) <= 1
     picture = np.array(mi.Bitmap(str(tmp_path / "copper.png")))
@@ -240,13 +257,9 @@ def test_every_row_is_tested():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("text", UNCHANGED)
-def test_unchanged_from_06(text):
-    load_06(text)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_includes_of_06(tmp_path):
+def test_unchanged_from_06(tmp_path):
+    for text in UNCHANGED:
+        load_06(text)
     included = '<scene version="0.6.0"><bsdf type="phong" id="a"><spectrum name="diffuseReflectance" value="1"/></bsdf>'
     (tmp_path / "a.xml").write_text(included + "</scene>")
     load_06(f'<include filename="{tmp_path / "a.xml"}"/><shape type="sphere"><ref id="a"/></shape>')

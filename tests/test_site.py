@@ -8,22 +8,23 @@ from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import pytest
+import typer
 from generate import models
 from generate.made import ROOT
 from generate.notebooks import NOTEBOOKS
+from typer.testing import CliRunner
+from website.__main__ import main
+from website.pages import write_pages
 
 import mi_brdfs
 from mi_brdfs.mitsuba.registry import own_models
-
-needs_site = pytest.mark.skipif(
-    any(importlib.util.find_spec(name) is None for name in ("sphinx", "furo", "myst_parser")),
-    reason="the site's extra is not installed: pip install -e '.[site]'",
-)
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the site, built by its command."""
+    if any(importlib.util.find_spec(name) is None for name in ("sphinx", "furo", "myst_parser")):
+        pytest.skip("the site's extra is not installed: pip install -e '.[site]'")
     folder = tmp_path_factory.mktemp("site") / "html"
     command = [sys.executable, ROOT / "docs" / "website", folder]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
@@ -51,7 +52,7 @@ class Page(HTMLParser):
         self.text.append(data)
 
 
-@needs_site
+@pytest.mark.slow
 def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
     pages = {path: Page(path) for path in site.rglob("*.html")}
     assert len(pages) > 45
@@ -68,13 +69,19 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
             assert to.suffix != ".html" or anchor in pages.get(to, page).anchors, (path, target)
 
 
-@needs_site
+@pytest.mark.slow
 def test_nothing_is_fetched_by_styles_or_scripts(site):
     for path in [*site.rglob("*.css"), *site.rglob("*.js")]:
         assert not re.search(r"(url\(|import |src=)[\"']?(https?:)?//", path.read_text(encoding="utf-8")), path
 
 
-@needs_site
+def test_every_page_has_its_source(tmp_path):
+    write_pages(tmp_path)
+    for name in ("index", "gallery", "guide/python", *(f"reference/{model.plugins[0]}" for model in own_models())):
+        assert (tmp_path / f"{name}.md").read_text(encoding="utf-8").lstrip().startswith("#"), name
+
+
+@pytest.mark.slow
 def test_every_part_is_there(site):
     for name in (*(model.plugins[0] for model in own_models()), "tabulated", "shading"):
         assert (site / "reference" / f"{name}.html").is_file()
@@ -85,7 +92,7 @@ def test_every_part_is_there(site):
         assert (site / f"{name}.html").is_file()
 
 
-@needs_site
+@pytest.mark.slow
 def test_wide_tables_name_the_column_in_each_cell_and_links_show_pictures(site):
     """A phone shows a row of such a table as a list, and a picture would else be stored, not shown."""
     pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
@@ -96,32 +103,35 @@ def test_wide_tables_name_the_column_in_each_cell_and_links_show_pictures(site):
         assert not re.search(r'download=""[^>]*\.(jpg|png)"', text), path
 
 
-@needs_site
-@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
-def test_reference_pages_are_the_manual_pages(site, model):
+@pytest.mark.slow
+def test_reference_pages_are_the_manual_pages(site):
     """Word for word, apart from the formulas, which are the same ones in MathML."""
-    shown = re.sub(r"\s+", " ", "".join(Page(site / "reference" / f"{model.plugins[0]}.html").text)).replace("’", "'")
-    for row in models.own_rows(model)[1:]:
-        assert all(cell in shown for cell in row[:4]), row
-    words = re.findall(r"[A-Za-z]{4,}", mi_brdfs.info(model.plugins[0]).split("\nParameters\n")[0])
-    missing = {word for word in words if word not in shown} - {"Example", "Cmax"}
-    assert not missing
-    with_math = (site / "reference" / f"{model.plugins[0]}.html").read_text(encoding="utf-8")
-    assert "<math" in with_math or model.plugins[0] == "roughdiffuse"
+    for model in own_models():
+        path = site / "reference" / f"{model.plugins[0]}.html"
+        shown = re.sub(r"\s+", " ", "".join(Page(path).text)).replace("’", "'")
+        for row in models.own_rows(model)[1:]:
+            assert all(cell in shown for cell in row[:4]), row
+        words = re.findall(r"[A-Za-z]{4,}", mi_brdfs.info(model.plugins[0]).split("\nParameters\n")[0])
+        assert not {word for word in words if word not in shown} - {"Example", "Cmax"}, model
+        assert "<math" in path.read_text(encoding="utf-8") or model.plugins[0] == "roughdiffuse"
+
+
+def command(*arguments):
+    app = typer.Typer()
+    app.command()(main)
+    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def test_a_folder_with_other_files_is_left_alone(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    command = [sys.executable, ROOT / "docs" / "website", tmp_path]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (2, f"{tmp_path} is neither empty nor a site\n")
+    done = command(tmp_path)
+    assert (done.exit_code, done.stderr) == (2, f"{tmp_path} is neither empty nor a site\n")
     assert (tmp_path / "mine.txt").is_file()
 
 
-def test_without_the_extra_the_command_says_so(tmp_path):
-    program = str(ROOT / "docs" / "website")
-    code = (
-        "import runpy, sys; sys.modules['sphinx'] = None; sys.argv = ['website']; runpy.run_path(%r, None, '__main__')"
-    )
-    done = subprocess.run([sys.executable, "-c", code % program], capture_output=True, text=True, cwd=tmp_path)
-    assert done.returncode == 2 and "pip install 'mi_brdfs[site]'" in done.stderr and done.stderr.count("\n") == 1
+def test_without_the_extra_the_command_says_so(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sphinx", None)
+    monkeypatch.setitem(sys.modules, "sphinx.application", None)
+    monkeypatch.delitem(sys.modules, "website.build", raising=False)
+    done = command(tmp_path)
+    assert done.exit_code == 2 and "pip install 'mi_brdfs[site]'" in done.stderr and done.stderr.count("\n") == 1

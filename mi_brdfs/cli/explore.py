@@ -58,7 +58,7 @@ def explore(
     if not chosen.endswith("_rgb"):
         fail(f"this needs an rgb variant, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
 
-    from ..explorer.running import PortError, listening, serve
+    from ..explorer.server import PortError, listening, serve
     from ..explorer.stages import UserScene
 
     file, _, material = (scene or "").partition(".xml:")

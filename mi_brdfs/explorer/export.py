@@ -1,4 +1,4 @@
-"""A page that needs no server: the explorer's own page with the frames of its views in it."""
+"""The files of the page; and a page that needs no server, which has them and the frames of its views in it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,25 @@ from typing import Any
 
 from . import stages
 from .materials import Materials
-from .state import State, StateError
+from .state import State, declared
 from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
 
 SPP = 64
 """Samples per pixel of its pictures."""
 SIZE = 320
 """… and the most pixels of a side."""
+CLIENT = files(__package__) / "client"
+
+
+def client_file(name: str) -> str:
+    """Return a file of the page."""
+    return (CLIENT / name).read_text(encoding="utf-8")
+
+
+def index() -> str:
+    """Return the page, with what :mod:`~mi_brdfs.explorer.state` declares."""
+    data = json.dumps(declared())
+    return client_file("index.html").replace('id="declared">', f'id="declared">{data}')
 
 
 def page(state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any]) -> str:
@@ -59,16 +71,12 @@ def _split(frame: bytes) -> dict[str, Any]:
 
 def _inlined(data: str) -> str:
     """Return the page with its files in it, and the data in front of its scripts."""
-    client = files(__package__) / "client"
 
-    def read(name: str) -> str:
-        return (client / name.rpartition("/")[2]).read_text(encoding="utf-8")
+    def read(path: str) -> str:
+        return client_file(path.rpartition("/")[2])
 
-    source = read("index.html")
-    source = re.sub(r'<link rel="stylesheet" href="([^"]+)"[^>]*>', lambda it: f"<style>{read(it[1])}</style>", source)
+    source = re.sub(r'<link rel="stylesheet" href="([^"]+)"[^>]*>', lambda it: f"<style>{read(it[1])}</style>", index())
     scripts = re.findall(r'<script type="module" src="([^"]+)"></script>', source)
-    if not scripts:
-        raise StateError("The page has no script.")
     merged = "\n".join(_without_imports(read(name)) for name in scripts)
     source = re.sub(r'\s*<script type="module" src="[^"]+"></script>', "", source)
     return source.replace("</body>", f'{data}\n<script type="module">{merged}</script>\n</body>')

@@ -14,9 +14,9 @@ from typing import Any
 import mitsuba as mi
 
 from ..mitsuba.errors import one_line
-from ..mitsuba.names import check_name
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
 from ..model import EnergyWarning
+from ..names import check_name
 from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml

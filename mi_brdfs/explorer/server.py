@@ -1,13 +1,19 @@
-"""The server of the page: HTTP for its files and uploads, a websocket for a session."""
+"""The server of the page: HTTP for its files and uploads, a websocket for a session; from a free port to Ctrl-C or
+SIGTERM."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
+import logging
 import re
+import signal
+import socket
+import sys
 import tempfile
 from collections import ChainMap
-from importlib.resources import files
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -20,19 +26,22 @@ from ..measured import FileError, read
 from ..mitsuba.registry import all_models, presets
 from ..parameters.messages import brief, printable
 from ..probe.sources import BSDFSource, is_measured
-from .engine import Engine
+from .export import CLIENT, client_file, index
 from .materials import Materials, kinds
-from .session import Session
-from .state import SUBJECTS, StateError, checked_request, decoded, parse
+from .session import Engine, Session
+from .stages import UserScene
+from .state import StateError, checked_request, decoded, parse
 from .tours import tours
 from .views import Frame, text
 
+PORT = 8490
+"""Where a page is looked for; if it is taken and none was asked for, any free one does."""
 LARGEST_UPLOAD = 64 << 20
 LARGEST_FRAME = 128 << 20
 """The bytes of a message, too long or not, that are waited for: more end the connection."""
 UPLOADS = 16
 """The most files that a session may hold."""
-CLIENT = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
     "frame-ancestors "
@@ -88,14 +97,13 @@ class Explorer:
         return name in self.hosts or not ANY.isdisjoint(self.hosts)
 
     async def _index(self, request: web.Request) -> web.Response:
-        return web.Response(text=_read("index.html"), content_type="text/html")
+        return web.Response(text=index(), content_type="text/html")
 
     async def _client(self, request: web.Request) -> web.Response:
         name = request.match_info["name"]
-        kind = CLIENT.get(name.rpartition(".")[2])
-        if kind is None or name not in {it.name for it in (files(__package__) / "client").iterdir()}:
+        if name not in {it.name for it in CLIENT.iterdir()}:
             raise web.HTTPNotFound
-        return web.Response(text=_read(name), content_type=kind)
+        return web.Response(text=client_file(name), content_type=KINDS[name.rpartition(".")[2]])
 
     async def _upload(self, request: web.Request) -> web.Response:
         """Keep a measured file that can be read: its bytes are the body, its name is in the address."""
@@ -176,10 +184,10 @@ class Explorer:
             files=named,
             scene=scenes.user.scene.name if scenes.user.scene else None,
             stages=scenes.names,
+            shapes=scenes.shapes,
             models=[model.plugins[0] for model in all_models()],
             metrics=list(METRICS),
             tours=tours(),
-            limits={"subjects": SUBJECTS, "upload": LARGEST_UPLOAD},
             state=self.initial,
         )
 
@@ -196,9 +204,76 @@ async def _write(socket: web.WebSocketResponse, outbox: asyncio.Queue[Frame]) ->
             await (socket.send_bytes(frame) if isinstance(frame, bytes) else socket.send_str(frame))
 
 
-def _read(name: str) -> str:
-    return (files(__package__) / "client" / name).read_text(encoding="utf-8")
-
-
 def _refusal(status: int, sentence: str) -> web.Response:
     return web.json_response({"error": sentence}, status=status)
+
+
+# --- Its life ---------------------------------------------------------------------------------------------------------
+
+
+class PortError(ValueError):
+    """No page can be served at an address."""
+
+
+def listening(host: str, port: int | None) -> socket.socket:
+    """Return a socket that listens.
+
+    Raises:
+        PortError: if the address cannot be had, and why, in a sentence.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for wanted in [port] if port is not None else [PORT, 0]:
+        found = socket.socket(family)
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            found.bind((host, wanted))
+            found.listen()
+            return found
+        except OSError as error:
+            found.close()
+            problem = error
+    if problem.errno == errno.EADDRINUSE:
+        raise PortError(f"port {port} is in use; choose another one, or none")
+    raise PortError(f"{host} port {port}: {problem.strerror or problem}")
+
+
+def _logger() -> logging.Logger:
+    """Return what tells of the server's own failures, not of malformed requests, which have their answer."""
+    logger = logging.getLogger(__name__)
+    logger.addFilter(lambda record: not (record.exc_info and isinstance(record.exc_info[1], MALFORMED)))
+    return logger
+
+
+def serve(
+    on: socket.socket,
+    host: str,
+    variant: str,
+    user: UserScene,
+    sources: list[BSDFSource],
+    initial: dict[str, Any],
+    ready: Callable[[str], None],
+    notebook: bool,
+) -> None:
+    """Serve pages, to a notebook if that asks for them, until Ctrl-C; ``ready`` is called with their address."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    engine = Engine(variant, user)
+    port = on.getsockname()[1]
+    explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])), notebook)
+
+    async def run() -> None:
+        runner = web.AppRunner(explorer.application(), access_log=None, logger=_logger(), auto_decompress=False)
+        await runner.setup()
+        await web.SockSite(runner, on, shutdown_timeout=1).start()
+        ready(f"http://{f'[{host}]' if ':' in host else host}:{port}/")
+        try:
+            while engine.is_alive():
+                await asyncio.sleep(0.5)
+        finally:
+            await runner.cleanup()
+
+    engine.start()
+    try:
+        asyncio.run(run())
+    finally:
+        engine.end()
+        engine.join(10)

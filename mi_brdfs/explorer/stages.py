@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..mitsuba.names import check_name, linked
+from ..names import check_name, linked
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
 from ..rendering.output import tonemap

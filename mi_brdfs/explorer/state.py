@@ -1,5 +1,5 @@
 """What a page sends: its state, which is what it shows, and requests. It comes from a browser, as data, and is checked
-before anything is done."""
+before anything is done. The members of a state are declared here, and the page takes them from :func:`declared`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ..parameters.messages import brief, listed
@@ -16,11 +16,21 @@ SUBJECTS = 4
 """The most subjects of a page."""
 PARAMETERS = 64
 """The most parameters of a subject."""
-SIZES = 64, 1024
-"""The least and the largest side of a picture, in pixels."""
-MOST_OBLIQUE = 89.0
+LIMITS = {"theta": (0, 89), "phi": (-180, 180), "exposure": (-10, 10), "component": (0, 99), "size": (64, 1024),
+          "wipe": (0, 1)}  # fmt: skip
+"""The least and the largest value of members: of ``size`` in pixels, of ``exposure`` in stops, of angles in degrees."""
 VIEWS = "picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"
-CHANNELS = "luminance", "rgb", "red", "green", "blue"
+WORDS = {
+    "channel": ("luminance", "rgb", "red", "green", "blue"),
+    "compare": ("side", "wipe", "difference"),
+    "scale": ("linear", "log"),
+    "lobes": ("over", "side"),
+}
+OF_THE_PAGE: dict[str, Any] = {
+    "compare": "side", "pair": (0, 1), "wipe": 0.5, "scale": "linear", "normalise": False, "dark": None, "tour": None,
+    "lobes": "over", "wire": False,
+}  # fmt: skip
+"""The members that only the page needs, how it shows what it has: it does not send them."""
 SHAPES = "body", "sphere", "scene"
 MEASURED, GIVEN, PRESET = "tabulated", "given", "preset"
 """The types of subjects that are files, materials of the command line, and published materials."""
@@ -62,6 +72,15 @@ class State:
         if self.channel == "rgb":
             return list(colours)
         return [(self.channel, dict(colours).get(self.channel))]
+
+
+def declared() -> dict[str, Any]:
+    """Return what the page has to know of the members of a state."""
+    defaults = {it.name: it.default for it in fields(State) if it.name not in ("subjects", "hidden")}
+    return {
+        "subjects": SUBJECTS, "views": VIEWS, "limits": LIMITS, "words": WORDS, "own": list(OF_THE_PAGE),
+        "defaults": {"subjects": [], **defaults, **OF_THE_PAGE},
+    }  # fmt: skip
 
 
 def decoded(data: str | bytes) -> dict[str, Any]:
@@ -122,14 +141,14 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
     return State(
         subjects=tuple(checked(it.get("bsdf")) for it in subjects),
         hidden=tuple(bool(it.get("hidden")) for it in subjects),
-        theta=_number(data, "theta", 0, MOST_OBLIQUE),
-        phi=_number(data, "phi", -360, 360),
-        channel=_word(data, "channel", CHANNELS),
-        component=None if component is None else int(_number(data, "component", 0, 99)),
+        theta=_number(data, "theta"),
+        phi=_number(data, "phi"),
+        channel=_word(data, "channel", WORDS["channel"]),
+        component=None if component is None else int(_number(data, "component")),
         stage=_word(data, "stage", stages),
         shape=_word(data, "shape", shapes),
-        exposure=_number(data, "exposure", -20, 20),
-        size=int(_number(data, "size", *SIZES)),
+        exposure=_number(data, "exposure"),
+        size=int(_number(data, "size")),
         views=tuple(view for view in VIEWS if view in views),
     )
 
@@ -179,10 +198,11 @@ def _finite(text: str) -> float:
     return number
 
 
-def _number(data: Mapping[str, Any], name: str, low: float, high: float) -> float:
+def _number(data: Mapping[str, Any], name: str) -> float:
     value = data.get(name, getattr(State, name))
     if not _is_number(value):
         raise StateError(f"{name} is a number.")
+    low, high = LIMITS[name]
     return min(max(float(value), low), high)
 
 

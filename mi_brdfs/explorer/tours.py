@@ -33,7 +33,5 @@ def parse(name: str, source: str) -> dict[str, Any]:
 def tours() -> list[dict[str, Any]]:
     """Return the tours of the pack, in the order of the numbers in their names."""
     folder = files(__package__) / "tours"
-    if not folder.is_dir():
-        return []
     found = sorted((it for it in folder.iterdir() if it.name.endswith(".md")), key=lambda it: it.name)
     return [parse(re.sub(r"^\d+-|\.md$", "", it.name), it.read_text(encoding="utf-8")) for it in found]

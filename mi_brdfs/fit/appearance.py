@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..mitsuba.names import tabulated
 from ..model import EnergyWarning
+from ..names import tabulated
 from ..preview import preview_scene
 from ..probe.arrays import Array, luminance
 from ..srgb import decoded, encoded

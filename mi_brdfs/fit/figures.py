@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 from ..measured.measurement import Measurement
 from ..measured.report.summary import azimuths
 from ..pages.figures import DIFFERENCE, SERIES
-from ..plot.lit import LitTable
+from ..plot.measured import LitTable
 from ..plot.planar import THIN
 from ..plot.style import FAINT, GRID, INK, STYLES, calm, new_figure
 from ..probe.bsdf import BSDFProbe

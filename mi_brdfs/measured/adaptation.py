@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 
 from ..probe.arrays import luminance
-from .adaptive import Adaptive, on_phi, on_theta
+from .adaptive import on_phi, on_theta
 from .arrays import NUMPY, stacked
 from .coordinates import TWO_PI, HalfDifference, polar_angle, spherical
 from .measurement import usable
@@ -27,24 +26,10 @@ COSINE_SHARE = 0.05
 ITERATIONS = 10
 
 
-@dataclass(frozen=True)
-class Maps:
-    """What :class:`Adaptive` is made of."""
-
-    phi_i: np.ndarray
-    theta_i: np.ndarray
-    ndf: np.ndarray
-    sigma: np.ndarray
-    vndf: np.ndarray
-
-    @property
-    def coordinates(self) -> Adaptive:
-        return Adaptive(self.phi_i, self.theta_i, self.ndf, self.sigma, self.vndf)
-
-
-def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -> Maps:
-    """Return maps whose ``ndf`` and ``sigma`` take the highlights out of f, so that a table of f cosθo 4 σ/D is smooth,
-    and whose ``vndf`` spends its nodes on directions above the horizon alone.
+def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -> tuple[np.ndarray, ...]:
+    """Return the maps ``(ndf, sigma, vndf)`` of :class:`~mi_brdfs.measured.adaptive.Adaptive`: the first two take the
+    highlights out of f, so that a table of f cosθo 4 σ/D is smooth, and ``vndf`` spends its nodes on directions above
+    the horizon alone.
 
     ``vndf`` need not be that of the visible normals: any density will do that is the same for sampling and inverting.
     Here u2 is the azimuth of the half vector, and the end of u1 is the horizon, where 2 (wi·h) h - wi has no height:
@@ -66,7 +51,7 @@ def adapted(source: Source, phi_i: np.ndarray, theta_i: np.ndarray, rows: int) -
             even, total = above / area(above), area(seen)
             followed = np.divide(seen, total, out=even.copy(), where=total > 0)
             vndf[p, t] = NORMALS_SHARE * followed + (1 - NORMALS_SHARE) * even
-    return Maps(phi_i, theta_i, ndf, sigma, vndf)
+    return ndf, sigma, vndf
 
 
 def normals(source: Source) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..math import EPSILON
+from .arrays import vector
 from .coordinates import TWO_PI, Coordinates, azimuth_of, polar_angle, spherical
 from .warp import Map, MitsubaMap, MitsubaWarp, Warp
 
@@ -55,8 +56,8 @@ class Adaptive(Coordinates):
         vndf = np.maximum(vndf, (FLOOR * mean).astype(np.float32))
         self._tables = ndf, sigma, vndf if len(phi_i) > 1 else vndf[0]
         self._warp: Any = Warp(self._tables[2], self._nodes)
-        self._ndf: Map | MitsubaMap = Map(ndf)
-        self._sigma: Map | MitsubaMap = Map(sigma)
+        self._ndf: Any = Map(ndf)
+        self._sigma: Any = Map(sigma)
         self.names = ("phi_i", "theta_i", "u1", "u2")[2 - len(self._nodes) :]
 
     def prepared(self) -> Adaptive:
@@ -67,16 +68,15 @@ class Adaptive(Coordinates):
 
     @property
     def captured(self) -> list[Any]:
-        looked_up = self._warp, self._ndf, self._sigma
-        return [it.table for it in looked_up if isinstance(it, (MitsubaWarp, MitsubaMap))]
+        return [self._warp.table, self._ndf.table, self._sigma.table]
 
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         return self.locate_scaled(wi, wo, xp)[0]
 
     def locate_scaled(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[tuple[Any, ...], Any]:
         x, y = wi.x + wo.x, wi.y + wo.y
-        normal = SimpleNamespace(x=x, y=y, z=wi.z + wo.z)
-        theta_i, phi_i, theta_m = polar_angle(wi, xp), xp.atan2(wi.y, wi.x), polar_angle(normal, xp)
+        theta_i, phi_i = polar_angle(wi, xp), xp.atan2(wi.y, wi.x)
+        theta_m = polar_angle(vector(x, y, wi.z + wo.z), xp)
         if self._symmetry >= 2:
             flip_y = xp.select(wi.y < 0, 1.0, -1.0)
             flip_x = xp.select(wi.x < 0, 1.0, -1.0) if self._symmetry == 4 else flip_y
@@ -96,7 +96,7 @@ class Adaptive(Coordinates):
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         wi, m, cosine, _ = self._normals(*places)
-        return wi, SimpleNamespace(x=2 * cosine * m.x - wi.x, y=2 * cosine * m.y - wi.y, z=2 * cosine * m.z - wi.z)
+        return wi, vector(2 * cosine * m.x - wi.x, 2 * cosine * m.y - wi.y, 2 * cosine * m.z - wi.z)
 
     def solid_angle(self, *places: np.ndarray) -> np.ndarray:
         """Return |∂ωo/∂(u1, u2)|."""

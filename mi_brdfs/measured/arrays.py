@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from ..math import EPSILON, TINY
@@ -18,7 +19,9 @@ NUMPY = SimpleNamespace(
     atan2=np.arctan2,
     select=np.where,
     maximum=np.maximum,
+    minimum=np.minimum,
     floor=np.floor,
+    integer=lambda x: x.astype(np.int64),
 )
 
 
@@ -33,7 +36,9 @@ DRJIT = SimpleNamespace(
     atan2=_atan2,
     select=dr.select,
     maximum=dr.maximum,
+    minimum=dr.minimum,
     floor=dr.floor,
+    integer=lambda x: mi.UInt32(x),  # that of the variant that is active then
 )
 
 

@@ -18,14 +18,13 @@ from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
 from .arrays import NUMPY, components, stacked
+from .coordinates import spherical, turned_about_normal
 from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
 from .scattered import as_grid
 from .source import Source, batches
 
-LANES = 1 << 20
-"""Pairs of directions that a BSDF is evaluated for at once."""
 PAIRS = 1 << 15
 BAKED_TO = 80
 """The angle, in degrees, up to which a conversion is judged."""
@@ -115,8 +114,8 @@ def _baked(probe: BSDFProbe) -> Source:
 
     def evaluate(wi: Array, wo: Array) -> Array:
         wi, wo = (stacked(components(w)).astype(np.float32) for w in (wi, wo))
-        batches = [slice(k, k + LANES) for k in range(0, len(wi), LANES)]
-        f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in batches]
+        parts = batches(len(wi), 4)
+        f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in parts]
         return usable(np.concatenate(f))
 
     wi, wo = _pairs(PAIRS)
@@ -232,7 +231,7 @@ def _pairs(count: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(1)
     wi = _lambertian(rng, count)
     tilt, azimuth = np.radians(np.exp(rng.uniform(np.log(0.05), np.log(30), count))), rng.uniform(0, 2 * np.pi, count)
-    h = np.stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)], axis=-1)
+    h = stacked(spherical(tilt, azimuth))
     mirrored = 2 * np.sum(wi * h, axis=-1, keepdims=True) * h - wi
     wo = np.where((np.arange(count) % 2 == 0) & (mirrored[:, 2] > LOWEST), mirrored.T, _lambertian(rng, count).T).T
     return wi, wo
@@ -243,12 +242,9 @@ LOWEST = np.cos(np.radians(BAKED_TO))
 
 def _lambertian(rng: np.random.Generator, count: int) -> Array:
     cosine, phi = np.sqrt(rng.uniform(LOWEST**2, 1, count)), rng.uniform(0, 2 * np.pi, count)
-    sine = np.sqrt(1 - cosine**2)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+    return stacked(spherical(np.arccos(cosine), phi))
 
 
 def _turned(w: Array) -> Array:
     """Return directions turned about the normal, each by another angle."""
-    angle = np.linspace(0, 2 * np.pi, len(w))
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.stack([w[:, 0] * cos - w[:, 1] * sin, w[:, 0] * sin + w[:, 1] * cos, w[:, 2]], axis=-1)
+    return stacked(turned_about_normal(components(w), np.linspace(0, 2 * np.pi, len(w))))

@@ -14,21 +14,16 @@ from ..parameters.messages import printable
 from .measurement import FileError
 
 
-def located(path: str | Path) -> Path:
-    """Return the path of a file, in the folder of the environment variable MI_BRDFS_MERL_DIR if only that has it."""
-    path, folder = Path(path), os.environ.get("MI_BRDFS_MERL_DIR")
-    if folder and not path.exists() and (Path(folder) / path).is_file():
-        return Path(folder) / path
-    return path
-
-
 def checked(path: str | Path) -> Path:
-    """Return the path of a file that is :func:`located`, can be read, is a file and has something in it.
+    """Return the path of a file, in the folder of the environment variable MI_BRDFS_MERL_DIR if only that has it. It
+    can be read, is a file and has something in it.
 
     Raises:
         FileError: if not.
     """
-    path = located(path)
+    path, folder = Path(path), os.environ.get("MI_BRDFS_MERL_DIR")
+    if folder and not path.exists() and (Path(folder) / path).is_file():
+        path = Path(folder) / path
     try:
         status = path.stat()
     except (OSError, ValueError) as error:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -56,22 +58,41 @@ class Axis:
         """The nodes, and behind them the first one, a period later, if the axis goes round."""
         return self.nodes if self.period is None else np.append(self.nodes, self.nodes[0] + self.period)
 
-    def steps(self, x: np.ndarray, interpolation: Interpolation) -> list[tuple[np.ndarray, np.ndarray]]:
+    def steps(self, x: Any, interpolation: Interpolation, xp: SimpleNamespace = NUMPY) -> list[tuple[Any, Any]]:
         """Return ``(index, share)`` of the two nodes that places are interpolated between, or of the nearest one."""
-        nodes = self.looped
+        last = len(self.looped) - 1
         if self.period is not None:
-            x = nodes[0] + np.mod(x - nodes[0], self.period)
-        position = np.interp(x, nodes, np.arange(len(nodes)))
-        if interpolation == "nearest" or len(nodes) == 1:
-            return [((position + 0.5).astype(np.int64) % len(self.nodes), np.ones(np.shape(position)))]
-        k = np.minimum(position.astype(np.int64), len(nodes) - 2)
-        return [(k, k + 1 - position), ((k + 1) % len(self.nodes), position - k)]
+            x = x - self.period * xp.floor((x - self.nodes[0]) * (1 / self.period))
+        position = self._position(x)
+        if interpolation == "nearest" or not last:
+            return [(self._index(xp.integer(xp.floor(position + 0.5)), xp), 1.0)]
+        below = xp.minimum(xp.floor(position), last - 1)
+        k, share = xp.integer(below), position - below
+        return [(k, 1 - share), (self._index(k + 1, xp), share)]
 
-    def measured(self, x: np.ndarray) -> np.ndarray:
+    def _position(self, x: Any) -> Any:
+        """Return where values lie among the looped nodes, counted in them."""
+        return np.interp(x, self.looped, np.arange(len(self.looped)))
+
+    def _index(self, k: Any, xp: SimpleNamespace) -> Any:
+        """Return the index of a looped node."""
+        return xp.select(k == len(self.nodes), 0, k) if self.period is not None else k
+
+    def measured(self, x: Any) -> Any:
         """Return whether values lie in the measured range, up to rounding."""
-        if self.period is not None:
-            return np.ones(np.shape(x), dtype=bool)
-        return (x >= self.low - MARGIN) & (x <= self.high + MARGIN)
+        return True if self.period is not None else (x >= self.low - MARGIN) & (x <= self.high + MARGIN)
+
+
+def corners(
+    places: Iterable[tuple[Axis, Any]], interpolation: Interpolation = "trilinear", xp: SimpleNamespace = NUMPY
+) -> list[tuple[Any, Any]]:
+    """Return ``(index, weight)`` of the nodes that the value at a place on each axis is the sum of; indices are those
+    into the flat array."""
+    found: list[tuple[Any, Any]] = [(0, 1.0)]
+    for axis, place in places:
+        steps = axis.steps(place, interpolation, xp)
+        found = [(index * len(axis.nodes) + k, weight * share) for index, weight in found for k, share in steps]
+    return found
 
 
 MOST_CHANNELS = 4096
@@ -219,20 +240,18 @@ class Grid:
         that f is the sum of."""
         places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
         grid = self if interpolation == "nearest" else self.closed
-        values, inside = grid.usable, np.ones((), dtype=bool)
-        corners: list[tuple[Any, Any]] = [(0, 1.0)]
-        kept = 0
+        values, inside, varying = grid.usable, np.ones((), dtype=bool), []
         for axis, place in zip(grid.axes, places, strict=True):
             inside = inside & axis.measured(place)
-            steps = axis.steps(place, interpolation)
-            if np.ndim(place) == 0:  # the same for all: one interpolation of the whole grid
-                values = sum(share * values.take(k, axis=kept) for k, share in steps)
-                continue
-            kept += 1
-            corners = [(index * len(axis.nodes) + k, weight * share) for index, weight in corners for k, share in steps]
+            if np.ndim(place):
+                varying.append((axis, place))
+            else:  # the same for all: one interpolation of the whole grid
+                steps = axis.steps(place, interpolation)
+                values = sum(share * values.take(k, axis=len(varying)) for k, share in steps)
         if extrapolate == "zero":
             scale = np.where(inside, scale, 0)
-        return values.reshape(-1, values.shape[-1]), [(index, np.asarray(weight * scale)) for index, weight in corners]
+        weighed = [(index, np.asarray(weight * scale)) for index, weight in corners(varying, interpolation)]
+        return values.reshape(-1, values.shape[-1]), weighed
 
 
 @dataclass(frozen=True)

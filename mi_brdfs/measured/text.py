@@ -96,6 +96,22 @@ class TextFile:
             raise self.error("the file ends without a row of numbers")
         return np.frombuffer(numbers).reshape(-1, columns)
 
+    def list_of(self, rows: Iterable[Sequence[str]], count: int, what: str, each: str) -> np.ndarray:
+        """Return as many numbers as are announced, from as many rows as they fill.
+
+        Raises:
+            FileError: if there are fewer or more; ``what`` says in plural what they are, and ``each`` what one is.
+        """
+        self.expect(count, what)
+        found: list[float] = []
+        for row in rows:
+            found += self.numbers(row, each).tolist()
+            if len(found) > count:
+                raise self.error(f"there are {len(found)} {what}, but {count} were announced")
+            if len(found) == count:
+                return np.array(found)
+        raise self.error(f"the file ends after {len(found)} of {count} {what}")
+
     def expect(self, count: int, what: str) -> None:
         """Refuse a count of numbers for which the file is too small: a digit and a separator each.
 

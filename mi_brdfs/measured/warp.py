@@ -9,6 +9,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from .measurement import Axis, corners
+
 
 class Warp:
     """Map the unit square onto itself so that uniform points get a density that is bilinear between its values on a
@@ -29,7 +31,7 @@ class Warp:
             table /= total[..., None]
         columns /= total
         self._density, self._rows, self._columns = slices, rows, columns
-        self._nodes = nodes
+        self._axes = [Axis(each) for each in nodes]
 
     def invert(self, x: np.ndarray, y: np.ndarray, parameters: Sequence[Any]) -> tuple[np.ndarray, np.ndarray]:
         """Return the uniform point that is mapped to (x, y)."""
@@ -59,18 +61,8 @@ class Warp:
 
     def _interpolated(self, parameters: Sequence[Any]) -> Callable[..., Any]:
         """Return a look-up in tables of all slices at an index, interpolated between the slices."""
-        corners: list[tuple[Any, Any]] = [(0, 1.0)]
-        for nodes, value in zip(self._nodes, parameters, strict=True):
-            position = np.interp(value, nodes, np.arange(len(nodes)))
-            below = np.minimum(position.astype(np.int64), max(len(nodes) - 2, 0))
-            above = np.minimum(below + 1, len(nodes) - 1)
-            share = position - below
-            corners = [
-                (index * len(nodes) + k, weight * part)
-                for index, weight in corners
-                for k, part in ((below, 1 - share), (above, share))
-            ]
-        return lambda table, *index: sum(weight * getitem(table, (slice, *index)) for slice, weight in corners)
+        slices = corners(zip(self._axes, parameters, strict=True))
+        return lambda table, *index: sum(weight * getitem(table, (slice, *index)) for slice, weight in slices)
 
     @staticmethod
     def _across(look: Callable[..., Any], table: np.ndarray, row: Any, y: Any) -> Callable[[Any], Any]:

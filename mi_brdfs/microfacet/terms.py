@@ -83,7 +83,7 @@ class Distribution(Term):
 
     def eval(self, facet: Facet) -> mi.Float:
         """D(h)."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define eval.")
 
     def density(self, facet: Facet, g: mi.Float) -> mi.Float:
         """q(h); by default D cosθ_h."""
@@ -92,11 +92,11 @@ class Distribution(Term):
     def cdf(self, tan2: mi.Float, g: mi.Float) -> tuple[mi.Float, mi.Float]:
         """``(C, 1 - C)``: the cumulative distribution in t on the line, to 1e-7, and its complement with digits of its
         own."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define cdf.")
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         """The t of a ``cdf`` value."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define inverse_cdf.")
 
 
 class Isotropic(Distribution):

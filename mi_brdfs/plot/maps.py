@@ -17,23 +17,9 @@ from matplotlib.patheffects import withStroke
 
 from ..probe import curves as lobes
 from ..probe.curves import largest
+from . import style
 from .given import channels_of, check_angles, constants, named, quantity, with_smooth_part
-from .style import (
-    CHANNELS,
-    FAINT,
-    INK,
-    LETTERS,
-    QUANTITY,
-    SMALL,
-    TEXT,
-    WIDTH,
-    add_legend,
-    calm,
-    incidence,
-    look,
-    new_figure,
-    set_title,
-)  # fmt: skip
+from .style import CHANNELS, FAINT, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
 DOTTED = 0, (1, 2)
 # Beside what they mark: their tips touch it.
@@ -68,7 +54,7 @@ def hemisphere(
                                                                         picture[:, resolution // 2])]  # fmt: skip
     norm = LogNorm(np.clip(lobes.dim(middles), 1e-5 * top, 1e-2 * top), top)
     size = min((WIDTH - 0.8) / len(angles), 3)
-    figure = new_figure(size * len(angles) + 0.8, (size + 0.1) * len(rows) + 0.6)
+    figure = style.new_figure(size * len(angles) + 0.8, (size + 0.1) * len(rows) + 0.6)
     axes = figure.subplots(len(rows), len(angles), squeeze=False)
     for (it, side), line, row in zip(rows, axes, pictures, strict=True):
         for ax, theta, picture in zip(line, angles, row, strict=True):
@@ -79,13 +65,10 @@ def hemisphere(
     for ax, theta in zip(axes[0], angles, strict=True):
         ax.set_title(incidence(theta), fontsize=TEXT, color=INK)
     if len(rows) == 1:
-        set_title(figure, found[0].label)
-    bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, shrink=0.8, aspect=25, pad=0.02)
-    bar.set_label(quantity(QUANTITY), fontsize=TEXT, color=INK)
-    bar.ax.tick_params(labelsize=SMALL, labelcolor=INK)
-    bar.outline.set_visible(False)
+        style.set_title(figure, found[0].label)
+    style.add_bar(ScalarMappable(norm, "viridis"), axes, quantity(QUANTITY), shrink=0.8)
     marks = [Line2D([], [], linestyle="", color=INK, **mark) for mark in (WI, MIRROR)]
-    add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
+    style.add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
     return figure
 
 
@@ -99,7 +82,7 @@ def albedo(
     reflected and transmitted light, delta functions included. It is the mean weight of 8192 samples of the BSDF's own
     sampler, with the same variates at each angle. Everything else is as in :func:`polar`."""
     found = named(bsdfs, labels)
-    figure = new_figure(6, 3.8)
+    figure = style.new_figure(6, 3.8)
     ax = figure.subplots()
     handles = []
     for k, it in enumerate(found):
@@ -108,7 +91,7 @@ def albedo(
             curve = lobes.albedo(it.probe, azimuth, channel)
             handles += ax.plot(*curve, label=label, **look(k, CHANNELS.get(name)))
     frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
-    add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
+    style.add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
     return figure
 
 
@@ -116,7 +99,7 @@ def frame_albedo(ax: Axes, text: str) -> None:
     """Set the axes of albedo curves that are drawn, with a line at 1 unless they are far below."""
     top = largest(curve.get_ydata() for curve in ax.get_lines())
     ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
-    calm(ax)
+    style.calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])
     ax.set_ylim(0, 1.05 * (top if top < DARK else max(1, top)))

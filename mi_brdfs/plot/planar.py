@@ -14,23 +14,9 @@ from matplotlib.ticker import MaxNLocator
 
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
+from . import style
 from .given import channels_of, check_angles, constants, named, quantity, scales_of, with_smooth_part
-from .style import (
-    CHANNELS,
-    FAINT,
-    GRID,
-    INK,
-    QUANTITY,
-    SMALL,
-    TEXT,
-    WIDTH,
-    add_legend,
-    calm,
-    incidence,
-    look,
-    new_figure,
-    set_title,
-)  # fmt: skip
+from .style import CHANNELS, FAINT, GRID, INK, QUANTITY, SMALL, TEXT, WIDTH, incidence, look
 
 MIRROR = {"marker": "v", "markersize": 5}
 THIN = {"linewidth": 0.8}
@@ -125,8 +111,8 @@ def _planar(
                 curve = lobes.in_plane_of_incidence(it.probe, theta, azimuth, channel)
                 if normalize:
                     curve = curve._replace(value=curve.value / largest([curve.value]))
-                style = look(k if by_angle else at, CHANNELS.get(name))
-                curves.append(LabelledCurve(own if by_angle else incidence(theta), theta, curve, style))
+                own_look = look(k if by_angle else at, CHANNELS.get(name))
+                curves.append(LabelledCurve(own if by_angle else incidence(theta), theta, curve, own_look))
         return curves
 
     each = [lines(theta, k) for k, theta in enumerate(angles)]
@@ -136,25 +122,25 @@ def _planar(
         panels = {found[0].label: [only for (only,) in each]}
     width = WIDTH if len(scales) > 1 else 0.6 * WIDTH
     height = width / len(scales) * heights[whole]
-    figure = new_figure(width, height * len(panels) + 0.8)
+    figure = style.new_figure(width, height * len(panels) + 0.8)
     axes = figure.subplots(len(panels), len(scales), squeeze=False)
     text = quantity(QUANTITY, normalize=normalize, rgb=rgb)
     for k, (title, curves) in enumerate(panels.items()):
         for ax, name in zip(axes[k], scales, strict=True):
-            calm(ax)
+            style.calm(ax)
             draw(ax, curves, name == "log", whole, text)
             if len(panels) > 1:
                 ax.set_title(title, fontsize=TEXT, color=INK, pad=10)
             if k < len(panels) - 1:
                 ax.set_xlabel("")
     if len(panels) == 1:
-        set_title(figure, title)
+        style.set_title(figure, title)
     marks = {"mirror direction": Line2D([], [], linestyle="", **MIRROR, color=FAINT)}
     if draw is _draw_polar:
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
     handles = [Line2D([], [], **curve.look) for curve in curves]
     names = [curve.label for curve in curves]
-    add_legend(figure, [*handles, *marks.values()], [*names, *marks], constants(bsdfs))
+    style.add_legend(figure, [*handles, *marks.values()], [*names, *marks], constants(bsdfs))
     return figure
 
 

@@ -8,7 +8,9 @@ from io import BytesIO
 from textwrap import fill
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow, too pale for lines.
@@ -61,6 +63,14 @@ def add_legend(figure: Figure, handles: list, labels: list[str], constants: Sequ
     added = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=TEXT,
                           labelcolor=INK, title=heading or None, title_fontsize=TEXT)  # fmt: skip
     added.get_title().set_color(INK)
+
+
+def add_bar(colours: ScalarMappable, axes: Any, text: str, **options: Any) -> None:
+    """Add a scale of colours beside axes."""
+    bar = np.ravel(axes)[0].figure.colorbar(colours, ax=axes, aspect=25, pad=0.02, **options)
+    bar.set_label(text, fontsize=TEXT, color=INK)
+    bar.ax.tick_params(labelsize=SMALL, labelcolor=INK)
+    bar.outline.set_visible(False)
 
 
 def look(k: int, colour: str | None = None) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..mitsuba.names import check_name, tabulated
+from ..names import check_name, tabulated
 from ..srgb import decoded
 from .bsdf import BSDFProbe, contained
 from .directions import direction, on_side

@@ -12,7 +12,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..mitsuba.names import check_name
+from ..names import check_name
 
 RESERVED = ("config", "filename")
 """Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""

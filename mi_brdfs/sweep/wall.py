@@ -15,7 +15,7 @@ from PIL import Image
 from ..cluster import Failed, run
 from ..gallery import shot
 from ..gallery.sheet import Row, sheet
-from ..mitsuba.names import tabulated
+from ..names import tabulated
 from ..parameters.messages import printable
 from ..rendering.output import write
 from .plan import Outcome, Sweep, check_content, digest, versions

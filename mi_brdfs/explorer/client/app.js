@@ -1,6 +1,6 @@
 // The page: its cards, its bars, and what is drawn when.
 import { byId, element, format } from "./util.js";
-import { VIEWS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
+import { LIMITS, VIEWS, WORDS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
 import { connect, post, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
 import { colourOf } from "./drawing.js";
@@ -80,9 +80,14 @@ const showFlag = (field, value) => (field.checked = value);
 
 function startBars() {
   for (const name of ["theta", "phi", "exposure"]) {
-    tie(`${name}-slider`, name, asNumber);
-    tie(`${name}-field`, name, asNumber);
+    for (const id of [`${name}-slider`, `${name}-field`]) {
+      const [low, high] = LIMITS[name];
+      byId(id).min ||= low;
+      byId(id).max ||= high;
+      tie(id, name, asNumber);
+    }
   }
+  for (const name of ["channel", "scale", "compare"]) setWords(name, WORDS[name], { side: "side by side" });
   for (const name of ["channel", "stage", "shape", "scale", "compare"]) tie(name, name);
   tie(
     "component",
@@ -142,17 +147,16 @@ const setOptions = (field, pairs) => {
   field.replaceChildren(...pairs.map(([value, text]) => element("option", { value }, text)));
 };
 
+const setWords = (id, words, told = {}) =>
+  setOptions(
+    byId(id),
+    words.map((word) => [word, told[word] ?? word]),
+  );
+
 function drawBars() {
   const { state, hello, info } = session;
-  setOptions(
-    byId("stage"),
-    (hello?.stages ?? [state.stage]).map((name) => [name, name]),
-  );
-  setOptions(byId("shape"), [
-    ["body", "body"],
-    ["sphere", "sphere"],
-    ...(hello?.scene ? [["scene", hello.scene]] : []),
-  ]);
+  setWords("stage", hello?.stages ?? [state.stage]);
+  setWords("shape", hello?.shapes ?? [state.shape], { scene: hello?.scene });
   setOptions(byId("component"), [
     ["", "all components"],
     ...(info[session.selected]?.components ?? []).map((name, k) => [k, name]),

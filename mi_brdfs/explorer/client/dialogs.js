@@ -1,6 +1,6 @@
 // Data out, and fits: "Save and copy" and "Fit this".
 import { byId, element } from "./util.js";
-import { addSubject, emit, fragment, on, session } from "./session.js";
+import { addSubject, fragment, hasRoom, on, session, tellFull } from "./session.js";
 import { post } from "./link.js";
 import { cards } from "./card.js";
 
@@ -95,8 +95,7 @@ function startFit() {
     running(false);
     byId("fit-told").textContent = error ?? text ?? "";
     if (!bsdf) return;
-    if (session.state.subjects.length >= 4)
-      emit("error", "There is room for four subjects: remove one, then fit again.");
-    else addSubject(bsdf, `${bsdf.type}, fitted`);
+    if (hasRoom()) addSubject(bsdf, `${bsdf.type}, fitted`);
+    else tellFull("and fit again");
   });
 }

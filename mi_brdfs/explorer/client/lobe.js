@@ -304,7 +304,7 @@ function listen() {
     event.preventDefault();
     if (!event.shiftKey) return turn(way[0] * 0.1, way[1] * 0.1);
     const { theta, phi } = session.state;
-    if (!session.exported) change({ theta: clamp(theta - 2 * way[1], 0, 89), phi: wrapped(phi + 5 * way[0]) });
+    if (!session.exported) change({ theta: theta - 2 * way[1], phi: wrapped(phi + 5 * way[0]) });
   });
   canvas.addEventListener("pointerleave", () => tell(cards.lobe, []));
 }
@@ -341,7 +341,7 @@ function aim([x, y], [left, top, width, height]) {
   const theta = degrees(Math.atan2(Math.hypot(way[0], way[1]), Math.max(way[2], 0.001)));
   const phi = degrees(Math.atan2(way[1], way[0]));
   change({
-    theta: Math.round(clamp(theta, 0, 89) * 10) / 10,
+    theta: Math.round(theta * 10) / 10,
     phi: theta < 1 ? session.state.phi : Math.round(phi * 10) / 10,
   });
 }

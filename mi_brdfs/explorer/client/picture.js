@@ -4,7 +4,7 @@ import { change, session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { colourOf } from "./drawing.js";
 
-const SIZES = [128, 192, 256, 384, 512, 640, 768, 1024];
+const SIZES = [128, 192, 256, 384, 512];
 const canvases = new Map();
 let stack, handle;
 
@@ -40,11 +40,10 @@ function slideTo(share) {
   drawPicture();
 }
 
-/** Return the size in pixels to ask for: what the layout shows, at most 512 unless the window is very large. */
+/** Return the size in pixels to ask for: what the layout shows, as far as pictures can follow edits. */
 export function wantedSize() {
   const shown = stack?.querySelector(".frame")?.clientWidth || 256;
-  const sharp = Math.min(shown * (window.devicePixelRatio || 1), 512);
-  return SIZES.findLast((size) => size <= sharp * 1.05) ?? SIZES[0];
+  return SIZES.findLast((size) => size <= shown * (window.devicePixelRatio || 1) * 1.05) ?? SIZES[0];
 }
 
 const modeOf = () => (visible().length < 2 ? "side" : session.state.compare);

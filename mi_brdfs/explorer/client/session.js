@@ -1,38 +1,11 @@
 // What the page shows: its state, the server's answers, and who listens.
-import { clamp } from "./util.js";
+import { PALETTE, clamp } from "./util.js";
 
-export const VIEWS = ["picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"];
-export const MOST_SUBJECTS = 4;
-
-export const DEFAULTS = {
-  subjects: [],
-  theta: 45,
-  phi: 0,
-  channel: "luminance",
-  component: null,
-  stage: "studio",
-  shape: "body",
-  exposure: 0,
-  size: 256,
-  views: ["picture", "lobe", "polar", "albedo"],
-  compare: "side",
-  pair: [0, 1],
-  wipe: 0.5,
-  scale: "linear",
-  normalise: false,
-  dark: null,
-  tour: null,
-  lobes: "over",
-  wire: false,
-};
-/** What the server needs not know. */
-const OWN = ["compare", "pair", "wipe", "scale", "normalise", "dark", "tour", "lobes", "wire"];
-const WORDS = {
-  compare: ["side", "wipe", "difference"],
-  scale: ["linear", "log"],
-  lobes: ["over", "side"],
-  channel: ["luminance", "rgb", "red", "green", "blue"],
-};
+const DECLARED = JSON.parse(document.getElementById("declared").textContent);
+/** Views in their usual order, and the limits and words of members of the state, as the server declares them. */
+export const { views: VIEWS, limits: LIMITS, words: WORDS } = DECLARED;
+/** `own` are the members that the server needs not know. */
+const { subjects: MOST_SUBJECTS, own: OWN, defaults: DEFAULTS } = DECLARED;
 
 export const session = {
   state: structuredClone(DEFAULTS),
@@ -115,14 +88,18 @@ export function goTo(patch, push) {
   arrange(subjects, former, patch, push);
 }
 
+/** Return whether there is room for another subject. */
+export const hasRoom = () => session.state.subjects.length < MOST_SUBJECTS;
+
+/** Say that there is none, and what to do after removing a subject. */
+export const tellFull = (then = "first") =>
+  emit("error", `There is room for ${MOST_SUBJECTS} subjects: remove one ${then}.`);
+
 export function addSubject(bsdf, name) {
+  if (!hasRoom()) return tellFull();
   const { subjects } = session.state;
-  if (subjects.length >= MOST_SUBJECTS) {
-    emit("error", "There is room for four subjects: remove one first.");
-    return;
-  }
   const taken = subjects.map((subject) => subject.colour);
-  const colour = [0, 1, 2, 3].find((k) => !taken.includes(k));
+  const colour = [...PALETTE.keys()].find((k) => !taken.includes(k));
   session.selected = subjects.length;
   arrange([...subjects, { bsdf, name, hidden: false, colour }], [...subjects.keys(), -1]);
 }
@@ -161,16 +138,14 @@ export function clean(given) {
       bsdf,
       name: String(name ?? bsdf.name ?? bsdf.type),
       hidden: hidden === true,
-      colour: Number.isInteger(colour) && colour >= 0 && colour < 4 ? colour : k,
+      colour: Number.isInteger(colour) && colour in PALETTE ? colour : k,
     }));
-  state.theta = clamp(state.theta, 0, 89);
-  state.phi = clamp(state.phi, -180, 180);
-  state.wipe = clamp(state.wipe, 0, 1);
-  state.exposure = clamp(state.exposure, -10, 10);
+  if (!Number.isInteger(state.component)) state.component = null;
+  for (const [name, limits] of Object.entries(LIMITS))
+    if (state[name] !== null) state[name] = clamp(state[name], ...limits);
   state.views = [...new Set(state.views)].filter((view) => VIEWS.includes(view));
   const last = Math.max(state.subjects.length - 1, 0);
   state.pair = [0, 1].map((k) => (Number.isInteger(state.pair[k]) ? clamp(state.pair[k], 0, last) : Math.min(k, last)));
-  if (!Number.isInteger(state.component)) state.component = null;
   if (typeof state.dark !== "boolean") state.dark = null;
   if (typeof state.tour?.name !== "string") state.tour = null;
   return state;

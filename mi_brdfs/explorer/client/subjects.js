@@ -1,6 +1,6 @@
 // The subjects: chips, the editor's head, and the dialog that adds one.
 import { PALETTE, byId, element } from "./util.js";
-import { MOST_SUBJECTS, addSubject, change, changeSubject, emit, on, removeSubject, session } from "./session.js";
+import { addSubject, change, changeSubject, emit, hasRoom, on, removeSubject, session, tellFull } from "./session.js";
 import { colourOf } from "./drawing.js";
 import { drawControls, resetAll } from "./controls.js";
 
@@ -53,7 +53,7 @@ export function drawSubjects() {
     ),
   );
   if (focused) byId("chips").children[focused]?.focus();
-  byId("add").hidden = session.exported || subjects.length >= MOST_SUBJECTS;
+  byId("add").hidden = session.exported || !hasRoom();
   const subject = subjects[session.selected];
   byId("editor").hidden = !subject;
   if (!subject) return;
@@ -63,7 +63,7 @@ export function drawSubjects() {
   byId("colour").style.setProperty("--mark", colourOf(session.selected));
   byId("hide").textContent = subject.hidden ? "Show" : "Hide";
   byId("solo").disabled = byId("remove").disabled = subjects.length < 2;
-  byId("double").disabled = subjects.length >= MOST_SUBJECTS;
+  byId("double").disabled = !hasRoom();
   byId("fit").hidden = subject.bsdf.type !== "tabulated" || !session.hello?.models?.length;
   drawControls();
 }
@@ -185,8 +185,7 @@ function startDrop() {
 async function uploadAll(files) {
   byId("add-dialog").close();
   for (const file of files) {
-    if (session.state.subjects.length >= MOST_SUBJECTS)
-      return emit("error", "There is room for four subjects: remove one first.");
+    if (!hasRoom()) return tellFull();
     emit("busy", { text: `Uploading ${file.name} …` });
     try {
       const response = await fetch(`upload?${new URLSearchParams({ name: file.name })}`, {

@@ -35,19 +35,13 @@ def read(path: Path) -> Measurement:
     count = whole(first[0])
     if len(first) != 1 or not count:
         raise file.error("the number of wavelengths should stand alone")
-    file.expect(count, "wavelengths")
-    wavelengths: list[float] = []
-    while len(wavelengths) < count:
-        row = next(rows, None)
-        if row is None:
-            raise file.error(f"the file ends after {len(wavelengths)} of {count} wavelengths")
-        wavelengths += list(file.numbers(row, "a wavelength"))
-    if len(wavelengths) > count or not np.all(np.diff(wavelengths) > 0) or not wavelengths[0] > 0:
-        raise file.error(f"there should be {count} growing wavelengths, but there are {len(wavelengths)}")
+    wavelengths = file.list_of(rows, count, "wavelengths", "a wavelength")
+    if not np.all(np.diff(wavelengths) > 0) or not wavelengths[0] > 0:
+        raise file.error(f"there should be {count} growing wavelengths")
     end = next((k for k, comment in enumerate(file.comments) if "wl" in comment.lower()), 0)
     material = " ".join(comment for comment in file.comments[:end] if "university" not in comment.lower())
     table = file.table(rows, 4 + count, f"four angles and {count} values")
     theta_i, phi_i, theta_o, phi_o = table[:, :4].T
     checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
     data = arranged(theta_i, phi_i, theta_o, phi_o, table[:, 4:])
-    return Measurement(path, NAME, data, np.array(wavelengths), material=material or path.stem)
+    return Measurement(path, NAME, data, wavelengths, material=material or path.stem)

@@ -147,7 +147,8 @@ class Columns:
         if set(kinds) == set("rgb"):
             found.sort(key=lambda each: "rgb".index(each[0]))
         elif kinds == ["f"]:
-            self.wavelengths = np.array([self._number("wavelength")])
+            stated = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", self.stated("wavelength"))
+            self.wavelengths = np.array([float(stated.group(1)) if stated else np.nan])
         elif not set(kinds) & set("rgbf"):
             found.sort(key=lambda each: float(each[0]))
             self.wavelengths = np.array([float(kind) for kind, _, _ in found])
@@ -171,10 +172,6 @@ class Columns:
         """Return what a comment ``# name: …`` says."""
         matches = (re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment) for comment in self.file.comments)
         return next((match.group(1) for match in matches if match), "")
-
-    def _number(self, name: str) -> float:
-        match = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", self.stated(name))
-        return float(match.group(1)) if match else np.nan
 
     def _quantity(self, cosines: set[bool], unstated: Quantity) -> Literal["f", "f cos"]:
         stated = re.sub(r"[\s_*·]+", " ", self.stated("quantity").lower())

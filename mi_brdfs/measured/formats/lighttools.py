@@ -11,7 +11,7 @@ import numpy as np
 from ..coordinates import Spherical
 from ..measurement import FileError, Grid, Measurement
 from ..text import TextFile, is_number, opening, shortened
-from .zemax import Header, Ordered, Round, has_incidence_lines, is_table, srgb_of
+from .zemax import Header, has_incidence_lines, is_table, ordered, srgb_of, turning
 
 NAME = "LightTools"
 DESCRIPTION = "as Zemax, with the lines AOI, POI, Side above each block of data"
@@ -52,17 +52,17 @@ def read(path: Path) -> Measurement:
     table = {(block.incidence, block.channel): block for block in front}
     if len(table) < len(front) or len(table) < len(header.angles["AOI"]) * len(channels):
         raise FileError(f"{path}: not every AOI has just one block for each wavelength or tristimulus value.")
-    theta_i, theta_o = Ordered(header, "AOI", most=90), Ordered(header, "ScatterRadial", most=90)
+    (theta_i, i), (theta_o, o) = ordered(header, "AOI", most=90), ordered(header, "ScatterRadial", most=90)
 
     turned = (azimuths + 90) % 360 - 180  # Δφ in [-180°, 180°)
     one_side = np.all(turned <= 0) or np.all((turned >= 0) | (turned == -180))
     mirrored = bool(one_side) and symmetry == "PlaneSymmetrical"
     header.angles["ScatterAzimuth"] = abs(turned) if mirrored else turned
-    delta = Ordered(header, "ScatterAzimuth", most=180) if mirrored else Round(header, "ScatterAzimuth")
+    delta, d = ordered(header, "ScatterAzimuth", most=180) if mirrored else turning(header, "ScatterAzimuth")
 
     each = [[table[incidence, channel].values for channel in channels] for incidence in header.angles["AOI"]]
     values = np.array(each).reshape(len(each), len(channels), len(azimuths), len(radials)).transpose(0, 3, 2, 1)
-    values = values[np.ix_(theta_i.order, theta_o.order, delta.order)]
+    values = values[np.ix_(i, o, d)]
     luminance = channels[1 if content == "XYZ" else 0]
     stated = [table[incidence, luminance].tis for incidence in header.angles["AOI"]]
     wavelengths = np.array([wavelength or np.nan for _, wavelength in channels])
@@ -71,11 +71,11 @@ def read(path: Path) -> Measurement:
     return Measurement(
         path,
         NAME,
-        Grid(Spherical(mirrored), (theta_i.axis, theta_o.axis, delta.axis), values),
+        Grid(Spherical(mirrored), (theta_i, theta_o, delta), values),
         None if content == "XYZ" else np.where(np.isnan(wavelengths), header.wavelength, wavelengths),
         material=header.comment("sample", "model.*", "material"),
         stated_albedos={
-            float(theta): [tis] for theta, tis in zip(theta_i.axis.nodes, stated, strict=True) if np.isfinite(tis)
+            float(theta): [tis] for theta, tis in zip(theta_i.nodes, stated, strict=True) if np.isfinite(tis)
         },
         notes=header.notes,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from ..arrays import stacked
 from ..coordinates import Coordinates, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
 from ..report.albedo import hemisphere
+from ..rows import around
 from ..source import Source
 from ..text import TextFile, first_words, is_number, opening, shortened, whole
 
@@ -76,17 +78,16 @@ def read(path: Path) -> Measurement:
     content, symmetry = header.content(), header.symmetry(("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"))
     values, stated = blocks(file, rows, CHANNELS[content], tuple(len(header.require(file, name)) for name in ANGLES))
 
-    theta_i = Ordered(header, "AngleOfIncidence", most=90)
-    radial = Ordered(header, "ScatterRadial", most=180)
+    theta_i, i = ordered(header, "AngleOfIncidence", most=90)
+    radial, r = ordered(header, "ScatterRadial", most=180)
     half = np.all((angles["ScatterAzimuth"] >= 0) & (angles["ScatterAzimuth"] <= 180))
     mirrored = bool(half) and not symmetry.startswith("ASym")
-    azimuth = Ordered(header, "ScatterAzimuth", most=180) if mirrored else Round(header, "ScatterAzimuth")
-    phi_i = Round(header, "SampleRotation", start=90, sense=-1)
-    places = (theta_i, azimuth, radial, phi_i)
-    values = np.moveaxis(values, (1, 2, 3, 0), (0, 1, 2, 3))[np.ix_(*(place.order for place in places))]
-    stated = stated[np.ix_(phi_i.order, theta_i.order)][..., {"Monochrome": 0, "XYZ": 1, "RGB": 0}[content]]
-    axes = tuple(place.axis for place in places)
-    anisotropic = len(phi_i.order) > 1
+    azimuth, a = ordered(header, "ScatterAzimuth", most=180) if mirrored else turning(header, "ScatterAzimuth")
+    phi_i, k = turning(header, "SampleRotation", start=90, sense=-1)
+    axes: tuple[Axis, ...] = (theta_i, azimuth, radial, phi_i)
+    values = np.moveaxis(values, (1, 2, 3, 0), (0, 1, 2, 3))[np.ix_(i, a, r, k)]
+    stated = stated[np.ix_(k, i)][..., {"Monochrome": 0, "XYZ": 1, "RGB": 0}[content]]
+    anisotropic = len(k) > 1
     if not anisotropic:
         axes, values = axes[:3], values[..., 0, :]
     coordinates = SpecularPolar(mirrored, anisotropic)
@@ -100,7 +101,7 @@ def read(path: Path) -> Measurement:
         Grid(coordinates, axes, values),
         np.array([header.wavelength]) if content == "Monochrome" else None,
         material=header.comment("sample", "model.*", "material"),
-        stated_albedos=dict(zip(theta_i.axis.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
+        stated_albedos=dict(zip(theta_i.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
         notes=header.notes,
     )
 
@@ -240,31 +241,25 @@ class Header:
         return {name: said for name, said in pairs if said and re.fullmatch(r"[A-Z][\w ()#']*", name)}
 
 
-class Ordered:
-    """Angles of a header, in degrees, as an increasing axis: ``order`` lists where its nodes are in the file."""
-
-    def __init__(self, header: Header, name: str, most: float) -> None:
-        angles = header.angles[name]
-        if not np.all((angles >= 0) & (angles <= most)):
-            raise FileError(f"{header.path}: {name} must lie between 0 and {most} degrees.")
-        self.order = np.argsort(angles, kind="stable")
-        if len(np.unique(angles)) < len(angles):
-            raise FileError(f"{header.path}: {name} lists an angle twice.")
-        self.axis = Axis(np.radians(angles[self.order]))
+def ordered(header: Header, name: str, most: float) -> tuple[Axis, np.ndarray]:
+    """Return angles of a header, which are in degrees, as an increasing axis, and where its nodes are in the file."""
+    angles = header.angles[name]
+    if not np.all((angles >= 0) & (angles <= most)):
+        raise FileError(f"{header.path}: {name} must lie between 0 and {most} degrees.")
+    if len(np.unique(angles)) < len(angles):
+        raise FileError(f"{header.path}: {name} lists an angle twice.")
+    order = np.argsort(angles)
+    return Axis(np.radians(angles[order])), order
 
 
-class Round:
-    """Angles of a header, in degrees, as an axis that goes round, if they do. Of angles that a turn makes equal, as 0
-    and 360, the first counts."""
-
-    def __init__(self, header: Header, name: str, start: float = 0, sense: int = 1) -> None:
-        angles = header.angles[name]
-        if not np.all(np.isfinite(angles)):
-            raise FileError(f"{header.path}: {name} must be numbers.")
-        nodes, self.order = np.unique(np.round(wrapped(start + sense * angles, 360.0), 6), return_index=True)
-        gaps = np.diff(np.append(nodes, nodes[0] + 360))
-        closed = len(nodes) > 1 and gaps[-1] <= 1.5 * max(gaps[:-1])
-        self.axis = Axis(np.radians(nodes), period=2 * np.pi if closed else None)
+def turning(header: Header, name: str, start: float = 0, sense: int = 1) -> tuple[Axis, np.ndarray]:
+    """Return the same as an axis that goes round, if the angles do. Of angles that a turn makes equal, as 0 and 360,
+    the first counts."""
+    angles = header.angles[name]
+    if not np.all(np.isfinite(angles)):
+        raise FileError(f"{header.path}: {name} must be numbers.")
+    nodes, order = np.unique(np.round(wrapped(start + sense * angles, 360.0), 6), return_index=True)
+    return around(np.radians(nodes)), order
 
 
 def announced(file: TextFile, rows: Iterator[list[str]], words: list[str]) -> np.ndarray:
@@ -273,16 +268,8 @@ def announced(file: TextFile, rows: Iterator[list[str]], words: list[str]) -> np
     count = whole(words[1]) if len(words) > 1 else 0
     if not 0 < count <= MOST_ANGLES:
         raise file.error(f"{name} must be followed by the number of its angles, from 1 to {MOST_ANGLES}")
-    file.expect(count, "angles")
-    found = list(file.numbers(words[2:], "an angle"))
-    while len(found) < count:
-        row = next(rows, None)
-        if row is None:
-            raise file.error(f"the file ends after {len(found)} of {count} angles of {name}")
-        found += list(file.numbers(row, f"an angle: {count} of {name} were announced in line {line}"))
-    if len(found) > count:
-        raise file.error(f"there are {len(found)} angles of {name}, but {count} were announced")
-    return np.array(found)
+    rows = itertools.chain([words[2:]], rows)
+    return file.list_of(rows, count, f"angles of {name}", f"an angle: {count} of {name} were announced in line {line}")
 
 
 def blocks(

@@ -42,43 +42,34 @@ class Counts:
 class Census:
     """What :func:`census` counts."""
 
-    above: Counts = Counts()
+    above: Counts
     """Pairs of directions that are both above the horizon."""
-    below: Counts = Counts()
+    below: Counts
     """The others, also those in the horizon: grids have nodes there, where files hold anything."""
-    least: float = math.inf
-    most: float = -math.inf
+    least: float
+    most: float
     """The least and the largest finite value above the horizon."""
-    theta_i: Range = (math.inf, -math.inf)
-    theta_o: Range = (math.inf, -math.inf)
+    theta_i: Range
+    theta_o: Range
     """The least and the largest angle to the normal, in degrees, of finite values above the horizon."""
-
-    def __add__(self, other: Census) -> Census:
-        return Census(
-            self.above + other.above,
-            self.below + other.below,
-            min(self.least, other.least),
-            max(self.most, other.most),
-            _joined(self.theta_i, other.theta_i),
-            _joined(self.theta_o, other.theta_o),
-        )
 
 
 def census(data: Grid | Samples) -> Census:
-    """Count the values of a measurement."""
-    total = Census()
+    """Count the values of a measurement. Where none is finite, the least is above the largest."""
+    upper = lower = Counts()
+    ranges = [(math.inf, -math.inf)] * 3
     for wi, wo, values in batches(data):
         # A node in the horizon is a rounding error above or below it.
         above = (wi[:, 2] > HORIZON) & (wo[:, 2] > HORIZON)
-        finite = above & np.isfinite(values).any(axis=1)
-        part = Census(Counts.of(values[above]), Counts.of(values[~above]))
-        if finite.any():
-            numbers = values[above][np.isfinite(values[above])]
-            angles = [np.degrees(polar_angle(components(w[finite]))) for w in (wi, wo)]
-            (i, o) = ((float(angle.min()), float(angle.max())) for angle in angles)
-            part = Census(part.above, part.below, float(numbers.min()), float(numbers.max()), i, o)
-        total += part
-    return total
+        upper, lower = upper + Counts.of(values[above]), lower + Counts.of(values[~above])
+        known = above & np.isfinite(values).any(axis=1)
+        numbers, angles = values[known], [np.degrees(polar_angle(components(w[known]))) for w in (wi, wo)]
+        ranges = [
+            (float(found.min(initial=low)), float(found.max(initial=high)))
+            for (low, high), found in zip(ranges, (numbers[np.isfinite(numbers)], *angles), strict=True)
+        ]
+    (least, most), theta_i, theta_o = ranges
+    return Census(upper, lower, least, most, theta_i, theta_o)
 
 
 def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -88,7 +79,3 @@ def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.n
     count = math.prod(data.values.shape[:-1])
     for start in range(0, count, AT_ONCE):
         yield data.pairs(slice(start, start + AT_ONCE))
-
-
-def _joined(one: Range, other: Range) -> Range:
-    return min(one[0], other[0]), max(one[1], other[1])
