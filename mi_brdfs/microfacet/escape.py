@@ -75,8 +75,8 @@ class Tables:
 
     def mean_of(self, alpha_u: mi.Float, alpha_v: mi.Float) -> MeanEscape:
         at = [_texel(_compressed(alpha), self.mean.shape[0]) for alpha in (alpha_v, alpha_u)]
-        lost, second, third, schlick, dip, *_ = self.mean.eval(mi.Point2f(*at))
-        return MeanEscape(lost, second, third, schlick, dip)
+        root, second, third, schlick, dip, *_ = self.mean.eval(mi.Point2f(*at))
+        return MeanEscape(dr.square(root), second, third, schlick, dip)
 
 
 def textures(name: str) -> list[Any]:

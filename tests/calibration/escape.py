@@ -13,7 +13,7 @@ import itertools
 import sys
 from harness import parser
 from scipy.interpolate import RegularGridInterpolator
-from scipy.special import erfc
+from scipy.special import erfc, erfinv
 
 from mi_brdfs.microfacet.escape import FILE, ROUGHEST
 
@@ -51,7 +51,7 @@ def direction(cos: np.ndarray, along: np.ndarray, across: np.ndarray, rho2: floa
 # --- The first reflection -------------------------------------------------------------------------------------------
 
 
-NODES, WEIGHTS = ((1 + x) / 2 if k == 0 else x / 2 for k, x in enumerate(np.polynomial.legendre.leggauss(48)))
+NODES, WEIGHTS = ((1 + x) / 2 if k == 0 else x / 2 for k, x in enumerate(np.polynomial.legendre.leggauss(64)))
 
 
 def along_slopes(low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,8 +69,7 @@ def ggx_slopes(low: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def beckmann_slopes(low: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     x, weight = along_slopes(low)
-    y, share = np.polynomial.hermite.hermgauss(32)
-    return x, y + 0 * x, weight * np.exp(-x * x) / np.sqrt(np.pi) * share / np.sqrt(np.pi)
+    return x, erfinv(2 * NODES - 1) + 0 * x, weight * np.exp(-x * x) / np.sqrt(np.pi) * WEIGHTS
 
 
 def ggx_lambda(tan: np.ndarray) -> np.ndarray:
@@ -281,7 +280,8 @@ def tables_of(
 
 
 def mean_table(shape: str, first: np.ndarray, walked: dict[str, RegularGridInterpolator]) -> np.ndarray:
-    """Return means over the hemisphere for αu and αv, shape (αu, αv, 8); for Blinn's facets, (α, 1, 8)."""
+    """Return means over the hemisphere for αu and αv, the root of 1 - E first, which is nearly
+    proportional to α: shape (αu, αv, 8); for Blinn's facets, (α, 1, 8)."""
     phi = np.pi / 2 * (np.arange(8) + 0.5) / 8
     axes = [np.linspace(0, 1, count) for count in first.shape[:2]]
     if shape == "blinn":
@@ -307,8 +307,8 @@ def mean_table(shape: str, first: np.ndarray, walked: dict[str, RegularGridInter
             return start + rho2 * slope
 
         left = lost * along_line("left")
-        later = along_line("third"), along_line("between", 0), along_line("between", 1)
-        result[i, j, :2] = np.sum(lost), np.sum(lost * along_line("second")) / np.sum(lost)
+        later = np.clip(along_line("third"), 0, 1), along_line("between", 0), along_line("between", 1)
+        result[i, j, :2] = np.sqrt(np.sum(lost)), np.sum(lost * np.clip(along_line("second"), 0, 1)) / np.sum(lost)
         result[i, j, 2:5] = [np.sum(left * each) / np.sum(left) for each in later]
     return result
 
