@@ -53,7 +53,8 @@ class OneOf(Chosen[str]):
         word = self._word(reader)
         own = BoundParameters(self.words[word].values(), reader)
         chosen = own.chosen if word in self.implied_words else {self.name: word, **own.chosen}
-        return self.replace(word=word, own=own, textures=own.textures, ranges=own.ranges, chosen=chosen)
+        bound = {"textures": own.textures, "ranges": own.ranges, "roles": own.roles, "chosen": chosen}
+        return self.replace(word=word, own=own, **bound)
 
     def _word(self, reader: PropertyReader) -> str:
         return self._given(reader, tuple(self.words))
@@ -148,11 +149,11 @@ class PerLobe(Parameter):
 
     def bind(self, reader: PropertyReader) -> PerLobe:
         lobes = [BoundParameters(self.lobe(number), reader) for number in self._given(reader)]
-        return self.replace(
-            lobes=lobes,
-            textures={name: texture for lobe in lobes for name, texture in lobe.textures.items()},
-            ranges={name: limits for lobe in lobes for name, limits in lobe.ranges.items()},
-        )
+        bound = {
+            of: {name: value for lobe in lobes for name, value in getattr(lobe, of).items()}
+            for of in ("textures", "ranges", "roles")
+        }
+        return self.replace(lobes=lobes, **bound)
 
     def _given(self, reader: PropertyReader) -> list[str]:
         """Return the numbers of the lobes that exist, and raise if they are not in order."""
