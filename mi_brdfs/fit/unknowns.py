@@ -189,14 +189,13 @@ def configurations(
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
     tied = {key: value for key, value in tied.items() if {key, value} <= known}
-    words = {choice: allowed[:1] for choice, allowed in _choices(model.declared())}
+    words = dict[str, tuple[Any, ...]]()
     for choice, allowed in _choices(model.declared()):
-        if choice in given:
-            wanted = given[choice] if isinstance(given[choice], tuple) else (given[choice],)
-            for word in wanted:
-                if word not in allowed:
-                    raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
-            words[choice] = wanted
+        wanted = given.get(choice, allowed[0])
+        words[choice] = wanted if isinstance(wanted, tuple) else (wanted,)
+        for word in words[choice]:
+            if word not in allowed:
+                raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
     fixed = {key: value for key, value in given.items() if key not in words}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
     found = []

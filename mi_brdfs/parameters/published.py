@@ -44,7 +44,10 @@ def preset(name: str) -> dict[str, Any]:
     """
     entry, material = _find(name)
     values = zip(entry["parameters"], entry["materials"][material], strict=True)
-    return dict(entry["plugin"]) | {parameter: _value(value) for parameter, value in values}
+    return dict(entry["plugin"]) | {
+        parameter: {"type": "rgb", "value": list(value)} if isinstance(value, list) else value
+        for parameter, value in values
+    }
 
 
 def provenance(name: str) -> Provenance:
@@ -55,10 +58,6 @@ def provenance(name: str) -> Provenance:
     """
     entry, _ = _find(name)
     return Provenance(*(entry[field] for field in Provenance._fields))
-
-
-def _value(value: Any) -> Any:
-    return {"type": "rgb", "value": list(value)} if isinstance(value, list) else value
 
 
 def _find(name: str) -> tuple[dict[str, Any], str]:
@@ -103,16 +102,16 @@ class Preset(Parameter):
             return
         values = self._values(reader)
         # The same word takes no place of another parameter.
-        given = {name for name in reader.props.keys() if not self._is(reader.props[name], values.get(name))}
+        given = {
+            name
+            for name in reader.props.keys()
+            if not isinstance(reader.props[name], str) or reader.props[name] != values.get(name)
+        }
         for parameter in declared:
             for name in parameter.names:
                 if name in values and name not in reader and given.isdisjoint(parameter.rivals(name)):
                     value = values[name]
                     reader.props[name] = mi.ScalarColor3d(value["value"]) if isinstance(value, dict) else value
-
-    @staticmethod
-    def _is(given: Any, value: Any) -> bool:
-        return isinstance(given, str) and given == value
 
     def _values(self, reader: PropertyReader) -> dict:
         name, plugin = reader.text(self.name), reader.plugin
