@@ -13,7 +13,7 @@ import pytest
 from mutants import MUTANTS
 
 from mi_brdfs.probe.directions import direction, on_side
-from mi_brdfs.probe.partition import partition
+from mi_brdfs.probe.partition import partitions
 from mi_brdfs.validation import Finding, Report, check
 from mi_brdfs.validation.html import page
 from mi_brdfs.validation.incidents import Incident
@@ -71,7 +71,7 @@ def lobe(width: float, turn: float = 0, theta: float = 60, side: int = 1) -> tup
     def pdf(wo):
         return np.exp(-kappa * 0.5 * ((wo - axis) ** 2).sum(axis=1)) * kappa / (2 * np.pi * -np.expm1(-2 * kappa))
 
-    cells = partition(pdf, w, wi, COUNT)
+    (cells,) = partitions(lambda _, wo: pdf(wo), [w], [wi], COUNT)
     return Trial("whole", Incident("60°", wi), cells, cells.histogram(w)), w
 
 
@@ -296,7 +296,7 @@ def test_impossible_densities_are_marked(below):
 
     trial, w = lobe(1)
     with np.errstate(all="ignore"):
-        cells = partition(pdf, w[w[:, 2] > 0], trial.incident.wi, COUNT)
+        (cells,) = partitions(lambda _, wo: pdf(wo), [w[w[:, 2] > 0]], [trial.incident.wi], COUNT)
         impossible = replace(trial, partition=cells, counts=cells.histogram(w[w[:, 2] > 0]))
         p = impossible.test.p_value
     with np.errstate(all="raise", under="ignore"):

@@ -22,8 +22,7 @@ from mi_brdfs.probe.arrays import interaction, vectors
 from mi_brdfs.probe.sources import find_sources, value_of
 from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
-from mi_brdfs.validation.junit import junit
-from mi_brdfs.validation.text import block
+from mi_brdfs.validation.formats import block, junit
 
 BRIGHT = {"diffuse_reflectance": 0.8, "specular_reflectance": 0.8}
 PHONG = (

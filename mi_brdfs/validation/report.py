@@ -11,8 +11,6 @@ from .trial import Trial
 
 Verdict = Literal["fail", "note", "pass", "skip", "info"]
 """The gravest first."""
-
-
 INSTEAD = "Check a rough BSDF in its place, as roughconductor is for conductor."
 """What to do where a BSDF has delta functions only."""
 
@@ -95,6 +93,13 @@ class Report:
         """Return the gravest verdict of a check, or None if it was not made."""
         found = [finding.verdict for finding in self.of(check)]
         return next((verdict for verdict in get_args(Verdict) if verdict in found), None)
+
+    @property
+    def by_verdict(self) -> list[tuple[Verdict, list[str]]]:
+        """The names of the checks by their verdicts, the gravest first."""
+        checks = dict.fromkeys(finding.check for finding in self.findings)
+        every = ((verdict, [it for it in checks if self.verdict(it) == verdict]) for verdict in get_args(Verdict))
+        return [(verdict, named) for verdict, named in every if named]
 
     def of(self, check: str) -> list[Finding]:
         """Return the findings of one check."""

@@ -15,7 +15,7 @@ from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import angles_of, hemisphere, on_side
 from ..probe.variates import random
 from . import sampling, values
-from .outcome import Findings, Outcome, told
+from .outcome import Findings, Outcome, relative, told
 from .report import Finding
 from .run import Run
 
@@ -157,8 +157,7 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
 
 def _error(got: Array, expected: Array) -> tuple[Array, float]:
     """Return the relative errors, and what 99 of 100 do not exceed."""
-    scale = np.maximum(abs(expected), 1e-6 * abs(expected).max() + 1e-12)
-    error = np.nan_to_num(abs(got - expected) / scale, nan=np.inf)
+    error = relative(got, expected, 1e-6)
     return error, float(np.quantile(error, 0.99))
 
 

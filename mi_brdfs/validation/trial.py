@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -116,17 +115,8 @@ class Trial:
         )
 
 
-class Trials(NamedTuple):
-    """The trials of a part."""
-
-    asked: list[Trial]
-    """Those for the directions of incidence that were asked for."""
-    at_random: list[Trial]
-    """Those for some at random."""
-
-
-def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> Trials:
-    """Make a trial of a part for each direction of incidence, those that were asked for and some at random."""
+def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> list[Trial]:
+    """Make a trial of a part for each direction of incidence, those that were asked for and then some at random."""
     found = _trials(probe, part, asked, COUNT, CELLS)
     if at_random:
         found += _trials(probe, part, at_random, RANDOM_COUNT, RANDOM_CELLS)
@@ -137,7 +127,7 @@ def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random
         if confirmed < CONFIRMED:
             (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, pilot=1, turn=0.6)
             confirmed += found[k].is_wrong
-    return Trials(found[: len(asked)], found[len(asked) :])
+    return found
 
 
 def _trials(
