@@ -12,6 +12,7 @@ from mi_brdfs.mitsuba import integrator as adapter
 from mi_brdfs.mitsuba.integrator import LANES
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("lanes", "opacity", "keys"),
@@ -59,6 +60,7 @@ def test_differentiable(lanes, opacity, keys, monkeypatch):
         assert abs(gradients[key]) > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("kind", "around", "lanes"),
@@ -102,6 +104,7 @@ def test_frozen_pictures(kind, around, lanes, monkeypatch):
     assert frozen.n_recordings < 4
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_pictures_made_in_several_threads(monkeypatch):
     """At the same time, each of a scene of its own, in several passes."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +13,7 @@ from ..probe.bsdf import Part
 from ..probe.directions import direction, on_side
 from ..probe.variates import SHIFTS, lattice, sampling_efficiency
 from . import sampling
-from .incidents import Incident, named
+from .incidents import named
 from .outcome import Findings, Outcome
 from .report import Finding
 from .run import Run
@@ -35,7 +34,9 @@ def albedo(run: Run) -> Findings:
     for part in run.probe.parts:
         outcome, found = Outcome("albedo", part.name), []
         added = limits.diffuse if part.component is None else 0
-        for name, wi, _ in _white_furnace(run, part):
+        angles = sorted({*run.angles, 0, 45, 70, 85, 89, 89.9})
+        for side, theta in ((side, theta) for side in part.sides for theta in angles):
+            name, wi = named(theta, side), on_side(direction(theta, 17), side)
             samples = run.probe.sample(part, wi, points)
             weights = samples.weight * np.where(samples.weight.any(axis=1), samples.eta, 1)[:, None] ** 2
             copies = weights.reshape(SHIFTS, -1, weights.shape[1]).mean(axis=1)
@@ -101,12 +102,6 @@ def _judged(part: Part, outcome: Outcome, found: list[Reflected], limits: Limits
     finding = outcome.finding(message, limits.sums if is_whole else "")
     noted = is_whole and (gains or limits.sums) and not outcome.faults
     return replace(finding, verdict="note") if noted else finding
-
-
-def _white_furnace(run: Run, part: Part) -> Iterator[Incident]:
-    for side in part.sides:
-        for theta in sorted({*run.angles, 0, 45, 70, 85, 89, 89.9}):
-            yield Incident(named(theta, side), on_side(direction(theta, 17), side))
 
 
 def efficiency(run: Run) -> Findings:

@@ -46,6 +46,7 @@ class Outcome:
         wo: Array,
         *,
         expected: Array | None = None,
+        uv: Array | None = None,
         seed: int | None = None,
         digits: int = 4,
     ) -> None:
@@ -58,6 +59,7 @@ class Outcome:
             why: what is wrong with that, or what is ``expected`` if that is given.
             wi: the directions of incidence, shape (3,) or (N, 3).
             wo: the others.
+            uv: the texture coordinates, shape (N, 2), if they matter.
         """
         if not np.any(lanes):
             return
@@ -71,6 +73,7 @@ class Outcome:
             wanted = np.atleast_1d(expected[k])
             channel = np.argmax(abs(values - wanted))
             why = f"but {wanted[channel]:.{digits}g} {why}"
+        name = name if uv is None else f"at uv = ({uv[k, 0]:.3g}, {uv[k, 1]:.3g}) {name}"
         told = f"{name} is {values[channel]:.{digits}g} for light from {angles_of(wi)} towards {angles_of(wo)}, {why}"
         self.fault(told, float(np.sum(lanes)), wi=wi, wo=wo, seed=seed)
 

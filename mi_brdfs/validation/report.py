@@ -80,11 +80,6 @@ class Report:
         return " ".join(["Nothing was judged.", *told])
 
     @property
-    def notable(self) -> list[Finding]:
-        """The findings that a user should read: failures first, then notes."""
-        return [*self.failures, *(finding for finding in self.findings if finding.verdict == "note")]
-
-    @property
     def outcome(self) -> str:
         """The verdict on the BSDF in a word or two."""
         return "passed" if self.passed else "FAILED" if self.judged else "not judged"
@@ -108,7 +103,8 @@ class Report:
     @property
     def sentences(self) -> list[str]:
         """What a user should read: failures with what reproduces them, notes, and why nothing was judged."""
-        told = [f"{finding.check}, {finding.subject}: {finding.sentence}" for finding in self.notable]
+        notable = [*self.failures, *(finding for finding in self.findings if finding.verdict == "note")]
+        told = [f"{finding.check}, {finding.subject}: {finding.sentence}" for finding in notable]
         return [*told, *([self.why_not_judged] if self.why_not_judged else [])]
 
     def to_dict(self) -> dict[str, Any]:

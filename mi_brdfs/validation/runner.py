@@ -158,8 +158,9 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
         k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
         if error[k, channel] > largest or (scale.any() and not largest):
             largest = float(error[k, channel])
+            light = incident.name if incident.wi.ndim == 1 else angles_of(incident.vector(lanes[k]))
             words = (
-                f"the largest relative difference is {largest:.2g}, for light from {incident.of(lanes[k])} towards "
+                f"the largest relative difference is {largest:.2g}, for light from {light} towards "
                 f"{angles_of(wo[k])}: {ours[k, channel]:.6g}, but {theirs[k, channel]:.6g} of {name}"
             )
             at = {"wi": incident.vector(lanes[k]), "wo": wo[k]}

@@ -95,15 +95,9 @@ class Trial:
         worst = np.argsort(excess)[-DOUBTFUL:]
         return worst[excess[worst] > 6]
 
-    @property
-    def is_suspect(self) -> bool:
-        """Whether it may fail, though perhaps by chance or for want of precision."""
-        return not (self.test.p_value > 1e-3 and abs(self.integral - self.share) < 5e-4)
-
-    @property
-    def is_wrong(self) -> bool:
-        """Whether it fails, whatever the significance."""
-        return not (self.test.p_value > 1e-6 and abs(self.integral - self.share) < 2e-3)
+    def fails(self, p_value: float, error: float) -> bool:
+        """Return whether it fails for a significance and a tolerance of the integral."""
+        return not (self.test.p_value > p_value and abs(self.integral - self.share) < error)
 
     @property
     def deviation(self) -> str:
@@ -123,10 +117,10 @@ def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random
     # What is narrow, or jumps close to a line of the cells, may escape the quadrature: suspects get cells across that
     # line, made by as many samples as are counted, until some fail.
     confirmed = 0
-    for k in [k for k, trial in enumerate(found) if trial.is_suspect]:
+    for k in [k for k, trial in enumerate(found) if trial.fails(1e-3, 5e-4)]:
         if confirmed < CONFIRMED:
             (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, pilot=1, turn=0.6)
-            confirmed += found[k].is_wrong
+            confirmed += found[k].fails(1e-6, 2e-3)
     return found
 
 
