@@ -288,24 +288,94 @@ def sampled(**fields):
     return Mutant
 
 
+def adapted(**methods):
+    """An adapter with other methods: each a function of the adapter's own, of the BSDF and of what is given."""
+
+    def method(name, change):
+        own = getattr(adapter.ModelBSDF, name)
+        return lambda self, *given: change(own, self, *given)
+
+    return type("Mutant", (adapter.ModelBSDF,), {name: method(name, change) for name, change in methods.items()})
+
+
 def masked(name, mask=lambda active: True):
     """An adapter one of whose methods has another mask: by default none."""
-
-    def method(self, *given):
-        *given, active = given
-        return getattr(adapter.ModelBSDF, name)(self, *given, mask(active))
-
-    return type("Mutant", (adapter.ModelBSDF,), {name: method})
+    return adapted(**{name: lambda own, self, *given: own(self, *given[:-1], mask(given[-1]))})
 
 
 def reflectance(change, at=lambda si: si):
     """An adapter whose ``eval_diffuse_reflectance`` is changed, or that of another point."""
+    return adapted(eval_diffuse_reflectance=lambda own, self, si, active: change(own(self, at(si), active)))
 
-    class Mutant(adapter.ModelBSDF):
-        def eval_diffuse_reflectance(self, si, active=True):
-            return change(adapter.ModelBSDF.eval_diffuse_reflectance(self, at(si), active))
 
-    return Mutant
+def ignored_masks(own, self, ctx, si, active):
+    return own(self, mi.BSDFContext(), si, active)
+
+
+def cosine_twice(own, self, ctx, si, wo, active):
+    """eval has another cosine, sample's weight has not."""
+    value, pdf = own(self, ctx, si, wo, active)
+    return value * dr.maximum(wo.z, 0), pdf
+
+
+def cosine_forgotten(own, self, ctx, si, wo, active):
+    value, pdf = own(self, ctx, si, wo, active)
+    return value / dr.maximum(wo.z, 0.01), pdf
+
+
+PairDisagrees = adapted(
+    eval_pdf=cosine_forgotten,
+    eval=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[0],
+    pdf=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[1],
+)
+
+
+def half_floats(own, self, *given):
+    """eval returns eleven bits."""
+    return mi.Color3f([mi.Float(dr.llvm.ad.Float16(channel)) for channel in own(self, *given)])
+
+
+def shines_through(own, self, ctx, si, wo, active):
+    """Takes the cosine's absolute value where it should be zero below the horizon."""
+    return own(self, ctx, si, mi.Vector3f(wo.x, wo.y, abs(wo.z)), active)
+
+
+def exchanged_variates(own, self, ctx, si, wo, sample1, sample2, active):
+    return own(self, ctx, si, wo, sample1, mi.Point2f(sample2.y, sample2.x), active)
+
+
+def one_variate_for_both(own, self, ctx, si, sample1, sample2, active):
+    """The lobe is chosen by a variate that also chooses the direction."""
+    return own(self, ctx, si, sample2.x, sample2, active)
+
+
+def exchanged_keys(own, self, callback):
+    """Shows its parameters under each other's names."""
+    names = list(self.textures)
+    for name, other in zip(names, reversed(names), strict=True):
+        callback.put(name, self.textures[other], mi.ParamFlags.Differentiable)
+
+
+def leaked_derivative(own, self, ctx, si, wo, active):
+    """Inactive lanes get no light, but parameters get their derivatives."""
+    value, pdf = own(self, ctx, si, wo, active)
+    every = own(self, ctx, si, wo, True)[0]
+    return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
+
+
+def ignored_mode(own, self, ctx, si, active):
+    """Reflects light from an emitter as light from the camera."""
+    radiance = mi.BSDFContext()
+    radiance.component, radiance.type_mask = ctx.component, ctx.type_mask
+    return own(self, radiance, si, active)
+
+
+def cosines_in_light_tracing(own, self, ctx, si, wo, active):
+    """Corrects for shading normals that there are none of."""
+    value, pdf = own(self, ctx, si, wo, active)
+    if ctx.mode == mi.TransportMode.Importance:
+        value = value * abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3)
+    return value, pdf
 
 
 def flagged(change):
@@ -338,43 +408,6 @@ def off_in_the_yellow(bs, weight, si, u):
     return weight * dr.select(yellow, 0.9, 1)
 
 
-class IgnoresMasks(adapter.ModelBSDF):
-    def _mixture(self, ctx, si, active):
-        return adapter.ModelBSDF._mixture(self, mi.BSDFContext(), si, active)
-
-
-class CosineTwice(adapter.ModelBSDF):
-    """eval has another cosine, sample's weight has not."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        return value * dr.maximum(wo.z, 0), pdf
-
-    def eval(self, ctx, si, wo, active=True):
-        return self.eval_pdf(ctx, si, wo, active)[0]
-
-
-class HalfFloats(adapter.ModelBSDF):
-    """eval returns eleven bits."""
-
-    def eval(self, ctx, si, wo, active=True):
-        return mi.Color3f([mi.Float(dr.llvm.ad.Float16(channel)) for channel in self.eval_pdf(ctx, si, wo, active)[0]])
-
-
-class PairDisagrees(adapter.ModelBSDF):
-    """eval_pdf alone forgets the cosine."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        return value / dr.maximum(wo.z, 0.01), pdf
-
-    def eval(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)[0]
-
-    def pdf(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)[1]
-
-
 class SumOfDensities(adapter.ModelBSDF):
     """The mixture's density leaves out the lobes' probabilities."""
 
@@ -382,13 +415,6 @@ class SumOfDensities(adapter.ModelBSDF):
     def _eval_pdf(valid, mixture, frame, wo):
         value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
         return value, pdf * len(mixture.lobes)
-
-
-class ShinesThrough(adapter.ModelBSDF):
-    """Takes the cosine's absolute value where it should be zero below the horizon."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, mi.Vector3f(wo.x, wo.y, abs(wo.z)), active)
 
 
 class SeenFromBehind(adapter.ModelBSDF):
@@ -409,13 +435,6 @@ class SeenFromBehind(adapter.ModelBSDF):
     def eval_pdf(self, ctx, si, wo, active=True):
         turned, side = self._turned(si)
         return adapter.ModelBSDF.eval_pdf(self, ctx, turned, mi.Vector3f(wo.x, wo.y, wo.z * side), active)
-
-
-class VariateUsedTwice(adapter.ModelBSDF):
-    """The lobe is chosen by a variate that also chooses the direction."""
-
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        return adapter.ModelBSDF.sample(self, ctx, si, sample2.x, sample2, active)
 
 
 class OtherSharesDrawn(adapter.ModelBSDF):
@@ -445,51 +464,6 @@ class ShareForgottenInOne(adapter.ModelBSDF):
         return value, pdf + dr.select(valid & (wo.z > 0), second, 0)
 
 
-class AllVariatesTwice(adapter.ModelBSDF):
-    """eval_pdf_sample draws with exchanged variates."""
-
-    def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
-        other = mi.Point2f(sample2.y, sample2.x)
-        return adapter.ModelBSDF.eval_pdf_sample(self, ctx, si, wo, sample1, other, active)
-
-
-class ExchangedKeys(adapter.ModelBSDF):
-    """Shows its parameters under each other's names."""
-
-    def traverse(self, callback):
-        names = list(self.textures)
-        for name, other in zip(names, reversed(names), strict=True):
-            callback.put(name, self.textures[other], mi.ParamFlags.Differentiable)
-
-
-class LeaksDerivative(adapter.ModelBSDF):
-    """Inactive lanes get no light, but parameters get their derivatives."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        every = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, True)[0]
-        return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
-
-
-class IgnoresMode(adapter.ModelBSDF):
-    """Reflects light from an emitter as light from the camera."""
-
-    def _mixture(self, ctx, si, active):
-        radiance = mi.BSDFContext()
-        radiance.component, radiance.type_mask = ctx.component, ctx.type_mask
-        return adapter.ModelBSDF._mixture(self, radiance, si, active)
-
-
-class CosinesInLightTracing(adapter.ModelBSDF):
-    """Corrects for shading normals that there are none of."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        if ctx.mode == mi.TransportMode.Importance:
-            value = value * abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3)
-        return value, pdf
-
-
 def over_attached_density(bs, weight, si, u):
     return weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
 
@@ -506,9 +480,6 @@ class Mutant:
     model: type
     methods: type = adapter.ModelBSDF
     given: tuple = ()
-
-    def __str__(self):
-        return self.name
 
     def register(self) -> dict:
         """Make it a plugin of the active variant and of what checks load besides; its dict."""
@@ -527,6 +498,7 @@ def mutant(name, caught_by, model, methods=adapter.ModelBSDF, **given):
 
 
 UNLIMITED = Colour(0.5, (0, 10), "a colour without a limit to speak of")
+TWO = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.5}
 RED = {"type": "rgb", "value": (0.6, 0.3, 0.1)}
 
 MUTANTS = [
@@ -557,9 +529,14 @@ MUTANTS = [
     ),
     mutant("lobe probability omitted", "pdf components", phong(PowerLobe), SumOfDensities),
     mutant("weight not divided", "weight", Phong, sampled(weight=lambda bs, w, si, u: w * bs.pdf)),
-    mutant("weight without eval's second cosine", "weight", Ward, CosineTwice),
+    mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
-    mutant("mask forgotten", "components", Ward, IgnoresMasks),
+    mutant(
+        "mask forgotten",
+        "components",
+        Ward,
+        adapted(_mixture=ignored_masks),
+    ),
     mutant("wrong component", "components", Ward, sampled(sampled_component=lambda bs, w, si, u: mi.UInt32(0))),
     mutant(
         "wrong type",
@@ -582,7 +559,7 @@ MUTANTS = [
     mutant("mean of a texture", "textures", colour(lambda texture, si, active: texture.mean())),
     mutant("texture at a fixed point", "textures", elsewhere(lambda uv: mi.Point2f(0))),
     mutant("density zero where light is", "support", diffuse(density=where(lambda wi, wo: wo.z > 0.2, 1, 0))),
-    mutant("shines through", "horizon", Lambert, ShinesThrough),
+    mutant("shines through", "horizon", Lambert, adapted(eval_pdf=shines_through)),
     mutant(
         "samples below the horizon",
         "horizon",
@@ -650,8 +627,15 @@ MUTANTS = [
         Ward,
         sampled(pdf=lambda bs, w, si, u: bs.pdf * where(lambda wi, _: between(82, 88)(wi), 1.02)(si.wi, 0)),
     ),
-    mutant("half floats", "weight eval_pdf", Ward, HalfFloats),
-    mutant("variate used twice", "chi2", Phong, VariateUsedTwice, diffuse_reflectance=0.4, specular_reflectance=0.5),
+    mutant("half floats", "weight eval_pdf", Ward, adapted(eval=half_floats)),
+    mutant(
+        "variate used twice",
+        "chi2",
+        Phong,
+        adapted(sample=one_variate_for_both),
+        diffuse_reflectance=0.4,
+        specular_reflectance=0.5,
+    ),
     mutant("lobes drawn by other shares", "chi2", Phong, OtherSharesDrawn),
     mutant("probability omitted of one lobe", "pdf chi2", Phong, ShareForgottenInOne),
     mutant("turned by a degree", "chi2", phong(drawn(PowerLobe, turned(math.radians(1)))), exponent=300.0),
@@ -663,7 +647,7 @@ MUTANTS = [
         alpha_u=0.3,
         alpha_v=0.31,
     ),
-    mutant("eval_pdf_sample exchanges variates", "eval_pdf", Ward, AllVariatesTwice),
+    mutant("eval_pdf_sample exchanges variates", "eval_pdf", Ward, adapted(eval_pdf_sample=exchanged_variates)),
     mutant("v ignored", "textures", elsewhere(lambda uv: mi.Point2f(uv.x, 0.5))),
     mutant("u and v exchanged", "textures", elsewhere(lambda uv: mi.Point2f(uv.y, uv.x))),
     mutant("clamped to the unit square", "textures", elsewhere(lambda uv: dr.clip(uv, 0, 1))),
@@ -698,7 +682,7 @@ MUTANTS = [
     mutant("inactive lanes evaluated and sampled at once", "active", Lambert, masked("eval_pdf_sample")),
     mutant("reflectance of inactive lanes", "active", Lambert, masked("eval_diffuse_reflectance")),
     mutant("active lanes dropped", "active", Lambert, masked("eval_pdf", lambda active: dr.all(mi.Bool(active)))),
-    mutant("derivatives of inactive lanes", "active", Lambert, LeaksDerivative),
+    mutant("derivatives of inactive lanes", "active", Lambert, adapted(eval_pdf=leaked_derivative)),
     mutant(
         "stuck beyond a limit", "gradients", colour(lambda texture, si, active: dr.clip(texture.eval(si, active), 0, 1))
     ),
@@ -718,10 +702,17 @@ MUTANTS = [
         in_spectra(lambda value, nm: type(value)(value[1], value[0], value[2], value[3])),
     ),
     mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
-    mutant("keys exchanged", "updates", Phong, ExchangedKeys, diffuse_reflectance=0.4, specular_reflectance=0.5),
+    mutant(
+        "keys exchanged",
+        "updates",
+        Phong,
+        adapted(traverse=exchanged_keys),
+        diffuse_reflectance=0.4,
+        specular_reflectance=0.5,
+    ),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
-    mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), IgnoresMode),
-    mutant("cosines in light tracing", "mode", Lambert, CosinesInLightTracing),
+    mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
+    mutant("cosines in light tracing", "mode", Lambert, adapted(eval_pdf=cosines_in_light_tracing)),
     mutant("twice the reflectance", "reflectance", Ward, reflectance(lambda value: 2 * value)),
     mutant("reflectance over pi", "reflectance", Lambert, reflectance(lambda value: value * dr.inv_pi)),
 ]

@@ -98,6 +98,7 @@ def text(reports) -> str:
     return page(reports)
 
 
+@pytest.mark.slow
 def test_the_page_is_complete(reports, text):
     """Verdicts, sentences, and for each part its pictures, described."""
     parsed = Page(text)
@@ -126,6 +127,7 @@ def test_all_faults_are_told_once():
     assert text.count("one is 1") == 1 and text.count("one is 2") == text.count("one is 2 (and 1 more like it).") == 2
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_else(text):
     parsed = Page(text)
     ids = parsed.attributes("id")
@@ -139,8 +141,7 @@ def test_the_page_needs_nothing_else(text):
     assert not re.search(r"https?:|file:|@import", re.sub(r"base64,[\w+/=]+", "", text))
 
 
-@pytest.mark.slow
-def test_hostile_words_are_harmless(reports):
+def test_hostile_words_are_harmless():
     """Wherever they come from."""
     finding = Finding(HOSTILE, HOSTILE, "fail", HOSTILE, {"faults": [HOSTILE, f"2 {HOSTILE}"]})
     trial, _ = lobe(1)
@@ -175,6 +176,7 @@ def images(text: str) -> list[np.ndarray]:
     return found
 
 
+@pytest.mark.slow
 def test_pictures_are_sound(reports, text):
     """And small, and the hemisphere stands out from what is around it."""
     pictures = images(text)
