@@ -67,8 +67,17 @@ def diffuse_value(alter):
     return lambert(altered(LambertLobe, lambda self, wi, wo, f, pdf: (alter(f, self.reflectance), pdf)))
 
 
-def where(condition, factor=1.05, otherwise=1.0):
-    return lambda wi, wo: dr.select(condition(wi, wo), mi.Float(factor), otherwise)
+def where(condition, factor):
+    return lambda wi, wo: dr.select(condition(wi, wo), mi.Float(factor), 1)
+
+
+def lit(region, factor=1.05):
+    """A factor for light from a region."""
+    return where(lambda wi, wo: region(wi), factor)
+
+
+def towards(region, factor=1.05):
+    return where(lambda wi, wo: region(wo), factor)
 
 
 def between(low, high):
@@ -468,6 +477,38 @@ def over_attached_density(bs, weight, si, u):
     return weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
 
 
+def of_others(name, albedo=0.5, side=1, traverse=lambda self, callback: None):
+    """The dict of a Lambertian BSDF that knows nothing of this package, and is seen from one side."""
+
+    class Matte(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            seen = mi.BSDFFlags.FrontSide if side > 0 else mi.BSDFFlags.BackSide
+            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | seen)]
+            self.m_flags = self.m_components[0]
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo = side * mi.warp.square_to_cosine_hemisphere(sample2)
+            bs.pdf = self.pdf(ctx, si, bs.wo, active)
+            bs.eta, bs.sampled_type, bs.sampled_component = 1.0, int(mi.BSDFFlags.DiffuseReflection), 0
+            return bs, dr.select(bs.pdf > 0, mi.Spectrum(albedo), 0)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            pdf = dr.select(active & (side * si.wi.z > 0) & (side * wo.z > 0), side * wo.z * dr.inv_pi, 0)
+            return mi.Spectrum(albedo * pdf), pdf
+
+        def eval(self, *given):
+            return self.eval_pdf(*given)[0]
+
+        def pdf(self, *given):
+            return self.eval_pdf(*given)[1]
+
+    Matte.traverse = traverse
+    mi.register_bsdf(name, Matte)
+    return {"type": name}
+
+
 # --- The catalogue --------------------------------------------------------------------------------------------------
 
 
@@ -531,12 +572,7 @@ MUTANTS = [
     mutant("weight not divided", "weight", Phong, sampled(weight=lambda bs, w, si, u: w * bs.pdf)),
     mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
-    mutant(
-        "mask forgotten",
-        "components",
-        Ward,
-        adapted(_mixture=ignored_masks),
-    ),
+    mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),
     mutant("wrong component", "components", Ward, sampled(sampled_component=lambda bs, w, si, u: mi.UInt32(0))),
     mutant(
         "wrong type",
@@ -558,7 +594,7 @@ MUTANTS = [
     mutant("cut at grazing", "continuity", diffuse(where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 4e-4, 1e-4))),
     mutant("mean of a texture", "textures", colour(lambda texture, si, active: texture.mean())),
     mutant("texture at a fixed point", "textures", elsewhere(lambda uv: mi.Point2f(0))),
-    mutant("density zero where light is", "support", diffuse(density=where(lambda wi, wo: wo.z > 0.2, 1, 0))),
+    mutant("density zero where light is", "support", diffuse(density=towards(lambda w: w.z < 0.2, 0))),
     mutant("shines through", "horizon", Lambert, adapted(eval_pdf=shines_through)),
     mutant(
         "samples below the horizon",
@@ -571,28 +607,18 @@ MUTANTS = [
         "gradient not a number", "gradients", diffuse_value(lambda f, r: f * (1 + 0.01 * dr.sqrt(dr.square(r - 0.5))))
     ),
     mutant("parameter baked in", "recompiles", BakedIn),
-    mutant(
-        "density off for a quarter of the azimuths", "pdf", diffuse(density=where(lambda wi, wo: third_quadrant(wi)))
-    ),
+    mutant("density off for a quarter of the azimuths", "pdf", diffuse(density=lit(third_quadrant))),
     mutant("density off towards a quarter of the azimuths", "chi2", diffuse(density=shifted_between_quadrants)),
-    mutant(
-        "density off from 40 to 50 degrees", "pdf", diffuse(density=where(lambda wi, wo: between(40, 50)(wi), 1.01))
-    ),
-    mutant("density off towards 40 to 50 degrees", "chi2", diffuse(density=where(lambda wi, wo: between(40, 50)(wo)))),
-    mutant("density off above 81 degrees", "pdf", diffuse(density=where(lambda wi, wo: between(81, 90)(wi), 1.01))),
-    mutant(
-        "density off towards more than 81 degrees",
-        "pdf",
-        diffuse(density=where(lambda wi, wo: between(81, 90)(wo), 1.1)),
-    ),
+    mutant("density off from 40 to 50 degrees", "pdf", diffuse(density=lit(between(40, 50), 1.01))),
+    mutant("density off towards 40 to 50 degrees", "chi2", diffuse(density=towards(between(40, 50)))),
+    mutant("density off above 81 degrees", "pdf", diffuse(density=lit(between(81, 90), 1.01))),
+    mutant("density off towards more than 81 degrees", "pdf", diffuse(density=towards(between(81, 90), 1.1))),
     mutant("samples lost from 40 to 50 degrees", "pdf", lambert(drawn(LambertLobe, lost_at_forty_five))),
-    mutant(
-        "one way for a quarter of the azimuths", "reciprocity", diffuse(where(lambda wi, wo: third_quadrant(wi), 1.02))
-    ),
+    mutant("one way for a quarter of the azimuths", "reciprocity", diffuse(lit(third_quadrant, 1.02))),
     mutant(
         "density off for two directions of a thousand",
         "chi2",
-        diffuse(density=where(lambda wi, wo: dr.square(wo.z) > 0.998, 1.5)),
+        diffuse(density=towards(lambda w: dr.square(w.z) > 0.998, 1.5)),
     ),
     mutant("energy gained in blue", "albedo", diffuse(lambda wi, wo: mi.Color3f(1, 1, 1.2)), reflectance=0.9),
     mutant("energy gained at grazing", "albedo", diffuse(lambda wi, wo: 1 + dr.power(1 - wi.z, 20)), reflectance=0.7),
@@ -625,17 +651,10 @@ MUTANTS = [
         "density of sample off at grazing",
         "weight",
         Ward,
-        sampled(pdf=lambda bs, w, si, u: bs.pdf * where(lambda wi, _: between(82, 88)(wi), 1.02)(si.wi, 0)),
+        sampled(pdf=lambda bs, w, si, u: bs.pdf * lit(between(82, 88), 1.02)(si.wi, 0)),
     ),
     mutant("half floats", "weight eval_pdf", Ward, adapted(eval=half_floats)),
-    mutant(
-        "variate used twice",
-        "chi2",
-        Phong,
-        adapted(sample=one_variate_for_both),
-        diffuse_reflectance=0.4,
-        specular_reflectance=0.5,
-    ),
+    mutant("variate used twice", "chi2", Phong, adapted(sample=one_variate_for_both), **TWO),
     mutant("lobes drawn by other shares", "chi2", Phong, OtherSharesDrawn),
     mutant("probability omitted of one lobe", "pdf chi2", Phong, ShareForgottenInOne),
     mutant("turned by a degree", "chi2", phong(drawn(PowerLobe, turned(math.radians(1)))), exponent=300.0),
@@ -702,14 +721,7 @@ MUTANTS = [
         in_spectra(lambda value, nm: type(value)(value[1], value[0], value[2], value[3])),
     ),
     mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
-    mutant(
-        "keys exchanged",
-        "updates",
-        Phong,
-        adapted(traverse=exchanged_keys),
-        diffuse_reflectance=0.4,
-        specular_reflectance=0.5,
-    ),
+    mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
     mutant("cosines in light tracing", "mode", Lambert, adapted(eval_pdf=cosines_in_light_tracing)),

@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from mutants import MUTANTS, TWO, Mutant, changed, lambert
+from mutants import MUTANTS, TWO, Mutant, changed, lambert, of_others
 from support import shared
 from typer.testing import CliRunner
 
@@ -178,36 +178,14 @@ def test_bitmaps_are_not_used_up():
 def test_parameters_that_are_no_numbers():
     """Nor any numbers at all."""
 
-    class Odd(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.m_flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.BackSide
-            self.m_components = [self.m_flags]
-            self.matrix, self.nothing = mi.Matrix3f(1), mi.Float()
+    matrix, nothing = mi.Matrix3f(1), mi.Float()
 
-        def traverse(self, callback):
-            callback.put("matrix", self.matrix, mi.ParamFlags.Differentiable)
-            callback.put("nothing", self.nothing, mi.ParamFlags.Differentiable)
+    def traverse(self, callback):
+        callback.put("matrix", matrix, mi.ParamFlags.Differentiable)
+        callback.put("nothing", nothing, mi.ParamFlags.Differentiable)
 
-        def eval_pdf(self, ctx, si, wo, active=True):
-            density = dr.select(active & (si.wi.z < 0) & (wo.z < 0), -wo.z * dr.inv_pi, 0)
-            return mi.Color3f(0.5 * density), density
-
-        def eval(self, ctx, si, wo, active=True):
-            return self.eval_pdf(ctx, si, wo, active)[0]
-
-        def pdf(self, ctx, si, wo, active=True):
-            return self.eval_pdf(ctx, si, wo, active)[1]
-
-        def sample(self, ctx, si, sample1, sample2, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo = -mi.warp.square_to_cosine_hemisphere(sample2)
-            bs.pdf, bs.eta = self.pdf(ctx, si, bs.wo, active), 1
-            bs.sampled_type = mi.UInt32(int(mi.BSDFFlags.DiffuseReflection))
-            return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
-
-    mi.register_bsdf("odd", Odd)
-    report = check({"type": "odd"}, only=["gradients", "updates", "recompiles", "reflectance"])
+    odd = of_others("odd", side=-1, traverse=traverse)
+    report = check(odd, only=["gradients", "updates", "recompiles", "reflectance"])
     assert not report.failures, report
 
 

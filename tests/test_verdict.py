@@ -8,11 +8,10 @@ import warnings
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from mutants import MUTANTS
+from mutants import MUTANTS, of_others
 from typer.testing import CliRunner
 
 import mi_brdfs
@@ -88,41 +87,11 @@ def test_radiance_that_is_refracted_gains_none():
     assert 0.85 < max(each["albedo"] for name, each in report.findings[0].data.items() if "behind" in name) <= 1.001
 
 
-def third_party(albedo):
-    """A Lambertian BSDF that knows nothing of this package."""
-
-    class Bright(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)]
-            self.m_flags = self.m_components[0]
-
-        def sample(self, ctx, si, sample1, sample2, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo = mi.warp.square_to_cosine_hemisphere(sample2)
-            bs.pdf = mi.warp.square_to_cosine_hemisphere_pdf(bs.wo)
-            bs.eta, bs.sampled_type, bs.sampled_component = 1.0, self.m_flags, 0
-            return bs, dr.select(active & (si.wi.z > 0) & (bs.pdf > 0), mi.Spectrum(albedo), 0)
-
-        def eval_pdf(self, ctx, si, wo, active=True):
-            pdf = dr.select(active & (si.wi.z > 0) & (wo.z > 0), wo.z * dr.inv_pi, 0)
-            return mi.Spectrum(albedo * pdf), pdf
-
-        def eval(self, *given):
-            return self.eval_pdf(*given)[0]
-
-        def pdf(self, *given):
-            return self.eval_pdf(*given)[1]
-
-    mi.register_bsdf(f"bright{albedo:g}", Bright)
-    return {"type": f"bright{albedo:g}"}
-
-
 @pytest.mark.usefixtures("llvm_rgb")
 def test_a_bsdf_of_others_may_gain_nothing():
     options = {"only": ["albedo", "weight", "pdf", "finite", "support"], "angles": (30,)}
-    assert check(third_party(1.0), **options).passed
-    report = check(third_party(1.6), **options)
+    assert check(of_others("white", 1.0), **options).passed
+    report = check(of_others("bright", 1.6), **options)
     assert [finding.check for finding in report.failures] == ["albedo"]
     assert "it gains energy: light from 0° is reflected 1.6 times" in report.failures[0].message
 
