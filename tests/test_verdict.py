@@ -55,6 +55,7 @@ def test_what_gains_energy_fails():
     assert found.verdict == "fail" and "reflected 1.1 times in channel 1" in found.message
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_what_gains_as_much_as_its_page_says_is_noted():
     """Also on two sides. Unless energy is to be conserved."""
