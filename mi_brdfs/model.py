@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
-from .parameters import Parameter, ParameterRow, PropertyReader, nested
+from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
 
 ENERGY_NOTE = """\
@@ -203,8 +203,7 @@ class Model(Plugin):
 
     def named(self, *roles: str) -> list[str]:
         """Return the names of the textures whose parameters have one of some roles."""
-        names = [name for it in nested(self.declared()) if it.role in roles for name in it.names]
-        return [name for name in self.textures if name in names]
+        return [name for name, role in self.parameters.roles.items() if role in roles]
 
     def excess(self, colours: Mapping[str, Sequence[float]]) -> str:
         """Return what is wrong with constant colours, by property name, that add to more than 1 in a channel, or

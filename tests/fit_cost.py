@@ -26,7 +26,7 @@ import numpy as np
 from fits import MODELS, measured
 
 from mi_brdfs.fit import METRICS, Observations, fit, observe
-from mi_brdfs.fit.isotropy import isotropic
+from mi_brdfs.fit.lanes import isotropic
 from mi_brdfs.fit.problem import Problem
 from mi_brdfs.fit.unknowns import configurations
 from mi_brdfs.mitsuba.registry import find_model

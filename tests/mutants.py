@@ -26,126 +26,58 @@ from mi_brdfs.models.walter import Walter
 from mi_brdfs.models.ward import Ward
 from mi_brdfs.parameters import Colour
 
-# --- Diffuse lobes --------------------------------------------------------------------------------------------------
+# --- Lobes ----------------------------------------------------------------------------------------------------------
 
 
-class TimesPi(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * dr.pi, pdf
+def altered(lobe, alter):
+    """A lobe whose value and density are what a function of it, the directions and these makes of them."""
 
+    class Mutant(lobe):
+        def eval_pdf(self, wi, wo):
+            return alter(self, wi, wo, *super().eval_pdf(wi, wo))
 
-class OverPi(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * dr.inv_pi, pdf
-
-
-class NoCosine(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        return self.reflectance * dr.inv_pi, super().eval_pdf(wi, wo)[1]
-
-
-class UniformDensity(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        return super().eval_pdf(wi, wo)[0], mi.Float(dr.inv_two_pi)
-
-
-class UniformSampler(LambertLobe):
-    def sample(self, wi, u, v):
-        return mi.warp.square_to_uniform_hemisphere(v)
-
-
-class DensityWithoutPi(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        return super().eval_pdf(wi, wo)[0], wo.z
-
-
-class OneVariate(LambertLobe):
-    def sample(self, wi, u, v):
-        return super().sample(wi, u, mi.Point2f(v.x, 0.3))
-
-
-class NotANumber(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (dr.sqrt(wo.z - 0.01) / dr.sqrt(wo.z - 0.01)), pdf
-
-
-class Negative(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (1 - 1.1 * dr.square(dr.square(1 - wo.z))), pdf
-
-
-class BlackAtNormal(LambertLobe):
-    """A guard of a division by sinθ that leaves nothing."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return dr.select(dr.maximum(wi.z, wo.z) == 1, 0, value), pdf
-
-
-class HalfAzimuth(LambertLobe):
-    """A function of half the azimuth, which jumps where azimuths start again."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (1 - 0.1 * dr.sin(dr.atan2(wi.y, wi.x) / 2) * dr.sin(dr.atan2(wo.y, wo.x) / 2)), pdf
-
-
-class CutAtGrazing(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return dr.select(dr.minimum(wi.z, wo.z) < 4e-4, 1e-4 * value, value), pdf
-
-
-class MissingDensity(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value, dr.select(wo.z > 0.2, pdf, 0)
-
-
-class OneWay(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (0.5 + 0.5 * wo.z), pdf
-
-
-class OneWayAndSaysSo(OneWay):
-    reciprocal = False
-
-
-class Detached(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return dr.detach(value), pdf
-
-
-class RootOfSquare(LambertLobe):
-    """The absolute value as √x², which has the derivative 0·∞ at x = 0."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (1 + 0.01 * dr.sqrt(dr.square(self.reflectance - 0.5))), pdf
-
-
-# --- Faults at some directions only ---------------------------------------------------------------------------------
+    return Mutant
 
 
 def changed(lobe, value=None, density=None):
     """A lobe with a factor on its value or its density, of wi and wo."""
 
+    def alter(self, wi, wo, f, pdf):
+        return f * value(wi, wo) if value else f, pdf * density(wi, wo) if density else pdf
+
+    return altered(lobe, alter)
+
+
+def drawn(lobe, alter):
+    """A lobe whose samples are what a function of wi, wo and the variates makes of them."""
+
     class Mutant(lobe):
-        def eval_pdf(self, wi, wo):
-            f, pdf = super().eval_pdf(wi, wo)
-            return f * value(wi, wo) if value else f, pdf * density(wi, wo) if density else pdf
+        def sample(self, wi, u, v):
+            return alter(wi, super().sample(wi, u, v), u, v)
 
     return Mutant
 
 
-def where(condition, factor=1.05, otherwise=1.0):
-    return lambda wi, wo: dr.select(condition(wi, wo), mi.Float(factor), otherwise)
+def diffuse(value=None, density=None):
+    return lambert(changed(LambertLobe, value, density))
+
+
+def diffuse_value(alter):
+    """A Lambertian whose value is what a function of it and its reflectance makes of it."""
+    return lambert(altered(LambertLobe, lambda self, wi, wo, f, pdf: (alter(f, self.reflectance), pdf)))
+
+
+def where(condition, factor):
+    return lambda wi, wo: dr.select(condition(wi, wo), mi.Float(factor), 1)
+
+
+def lit(region, factor=1.05):
+    """A factor for light from a region."""
+    return where(lambda wi, wo: region(wi), factor)
+
+
+def towards(region, factor=1.05):
+    return where(lambda wi, wo: region(wo), factor)
 
 
 def between(low, high):
@@ -161,79 +93,67 @@ def first_quadrant(w):
     return (w.x > 0) & (w.y > 0)
 
 
-def blue(wi, wo):
-    return mi.Color3f(1, 1, 1.2)
+def turned(angle):
+    """A sampler turned about the normal, by radians."""
 
-
-class LostAtFortyFive(LambertLobe):
-    def sample(self, wi, u, v):
-        wo = super().sample(wi, u, v)
-        return dr.select((v.y < 0.02) & between(40, 50)(wi), -wo, wo)
-
-
-class NotANumberStraightBack(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        d2 = dr.squared_norm(wi - wo)
-        return value * (d2 / d2), pdf
-
-
-class DoubleDerivative(LambertLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return 2 * value - dr.detach(value), pdf
-
-
-class RootAtNormal(LambertLobe):
-    """sinθ as √(1 - cos²θ), of which the derivative is infinite at normal incidence."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value * (
-            1 + 0.01 * dr.sqrt(dr.maximum(1 - wi.z * wi.z, 0)) * dr.sqrt(dr.maximum(1 - wo.z * wo.z, 0))
-        ), pdf
-
-
-class UndirectedDensity(LambertLobe):
-    """The same in the density alone."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value, pdf * dr.sqrt(dr.maximum(1 - wi.z * wi.z, 0)) / dr.sqrt(dr.maximum(1 - wi.z * wi.z, 0))
-
-
-# --- Glossy lobes ---------------------------------------------------------------------------------------------------
-
-
-class SkewedPower(PowerLobe):
-    def sample(self, wi, u, v):
-        wo = super().sample(wi, u, v)
-        sin, cos = dr.sincos(0.1)
+    def alter(wi, wo, u, v):
+        sin, cos = dr.sincos(mi.Float(angle))
         return mi.Vector3f(cos * wo.x - sin * wo.y, cos * wo.y + sin * wo.x, wo.z)
+
+    return alter
+
+
+def root_at_normal(w):
+    """sinθ as √(1 - cos²θ), of which the derivative is infinite at normal incidence."""
+    return dr.sqrt(dr.maximum(1 - w.z * w.z, 0))
+
+
+def nothing_over_nothing(wi, wo):
+    return dr.squared_norm(wi - wo) / dr.squared_norm(wi - wo)
+
+
+def half_azimuths(wi, wo):
+    """A function of half the azimuth, which jumps where azimuths start again."""
+    return 1 - 0.1 * dr.sin(dr.atan2(wi.y, wi.x) / 2) * dr.sin(dr.atan2(wo.y, wo.x) / 2)
+
+
+def half_vector(wi, wo):
+    """What makes the density that of the half vector, without the Jacobian 1/(4 cosθ_d) of its reflection."""
+    return 4 * Facet.between(wi, wo).cos_d
+
+
+def half_vector_if_anisotropic(self, wi, wo, value, pdf):
+    """The Jacobian is missing in the branch of different alphas."""
+    d = self.distribution
+    return value, pdf * dr.select(d.alpha_u == d.alpha_v, 1, half_vector(wi, wo))
+
+
+def lost_at_forty_five(wi, wo, u, v):
+    return dr.select((v.y < 0.02) & between(40, 50)(wi), -wo, wo)
+
+
+def warped(v):
+    return mi.warp.square_to_cosine_hemisphere(v)
+
+
+def off_by_one(self, wi, wo, value, pdf):
+    return value, pdf * (self.exponent + 1) / (self.exponent + 2)
+
+
+def shifted_between_quadrants(wi, wo):
+    return dr.select(third_quadrant(wo), 1.04, mi.Float(1)) - dr.select(first_quadrant(wo), 0.04, mi.Float(0))
+
+
+UniformDensity = altered(LambertLobe, lambda self, wi, wo, f, pdf: (f, mi.Float(dr.inv_two_pi)))
+UniformSampler = drawn(LambertLobe, lambda wi, wo, u, v: mi.warp.square_to_uniform_hemisphere(v))
+
+
+class OneWayAndSaysSo(changed(LambertLobe, lambda wi, wo: 0.5 + 0.5 * wo.z)):
+    reciprocal = False
 
 
 class PowerFlaggedDiffuse(PowerLobe):
     glossy = False
-
-
-class UnnormalisedPower(PowerLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value, pdf * (self.exponent + 1) / (self.exponent + 2)
-
-
-class HalfVectorDensity(MicrofacetLobe):
-    """The density of the half vector, without the Jacobian 1/(4 cosθ_d) of its reflection."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return value, pdf * 4 * Facet.between(wi, wo).cos_d
-
-
-class WithoutFour(MicrofacetLobe):
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        return 4 * value, pdf
 
 
 class SwappedDensity(MicrofacetLobe):
@@ -252,30 +172,6 @@ class SwappedBeyond(SwappedDensity):
     def eval_pdf(self, wi, wo):
         value, pdf = MicrofacetLobe.eval_pdf(self, wi, wo)
         return value, dr.select(third_quadrant(wi), super().eval_pdf(wi, wo)[1], pdf)
-
-
-class HalfVectorIfAnisotropic(MicrofacetLobe):
-    """The Jacobian 1/(4 cosθ_d) is missing in the branch of different alphas."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = super().eval_pdf(wi, wo)
-        d = self.distribution
-        return value, pdf * dr.select(d.alpha_u == d.alpha_v, 1, 4 * Facet.between(wi, wo).cos_d)
-
-
-class TurnedByADegree(PowerLobe):
-    def sample(self, wi, u, v):
-        wo = super().sample(wi, u, v)
-        sin, cos = dr.sincos(mi.Float(math.radians(1)))
-        return mi.Vector3f(cos * wo.x - sin * wo.y, cos * wo.y + sin * wo.x, wo.z)
-
-
-class LostHalf(MicrofacetLobe):
-    """Throws away every other direction that it draws, which the density does not know."""
-
-    def sample(self, wi, u, v):
-        wo = super().sample(wi, u, v)
-        return dr.select(v.x < 0.5, wo, -wo)
 
 
 class UnnormalisedGGX(GGX):
@@ -329,6 +225,9 @@ def ward(lobe):
     return Mutant
 
 
+# --- Parameters -----------------------------------------------------------------------------------------------------
+
+
 class BakedIn(Lambert):
     """Makes a number of Python of its texture's: a literal in the kernel."""
 
@@ -336,153 +235,186 @@ class BakedIn(Lambert):
         return (LambertLobe(float(mi.traverse(self.textures["reflectance"])["value"][0])),)
 
 
-class AverageColour(Lambert):
-    def evaluate(self, si, active):
-        return SimpleNamespace(reflectance=self.textures["reflectance"].mean())
+def colour(evaluate, **members):
+    """A Lambertian whose reflectance is what a function of its texture, the surface point and the mask says."""
+
+    def values(self, si, active):
+        return SimpleNamespace(reflectance=evaluate(self.textures["reflectance"], si, active))
+
+    return type("Mutant", (Lambert,), {"evaluate": values, **members})
 
 
-class FixedPoint(Lambert):
-    """Looks at its texture in the sampler and elsewhere alike, but always at the same point."""
+def in_spectra(change, **members):
+    """A Lambertian whose colours are changed in spectral variants, by a function of them and the wavelengths."""
 
-    def evaluate(self, si, active):
-        return super().evaluate(dr.zeros(mi.SurfaceInteraction3f), active)
+    def evaluate(texture, si, active):
+        value = texture.eval(si, active)
+        return change(value, si.wavelengths) if mi.is_spectral else value
 
-
-class Stuck(Lambert):
-    """Limits its parameter by a function without a derivative beyond."""
-
-    def evaluate(self, si, active):
-        return SimpleNamespace(reflectance=dr.clip(self.textures["reflectance"].eval(si, active), 0, 1))
+    return colour(evaluate, **members)
 
 
-class Unlimited(Lambert):
-    def evaluate(self, si, active):
-        return SimpleNamespace(reflectance=self.textures["reflectance"].eval(si, active))
+def elsewhere(moved):
+    """A Lambertian that looks its texture up at another point."""
+
+    class Mutant(Lambert):
+        def evaluate(self, si, active):
+            other = mi.SurfaceInteraction3f(si)
+            other.uv = moved(si.uv)
+            return super().evaluate(other, active)
+
+    return Mutant
 
 
-class Outwards(Lambert):
+def red_and_blue_exchanged(texture, si, active):
+    value = texture.eval(si, active)
+    return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
+
+
+def outwards(texture, si, active):
     """Derivatives beyond a limit are those at it, also where they lead further out."""
-
-    def evaluate(self, si, active):
-        value = self.textures["reflectance"].eval(si, active)
-        return SimpleNamespace(reflectance=dr.replace_grad(dr.clip(value, 0, 1), value))
-
-
-class ClippedSpectrum(Lambert):
-    """Limits colours to 1 where they are spectra."""
-
-    reflectance = Colour(0.5, (0, 10), "a colour without a limit to speak of")
-
-    def evaluate(self, si, active):
-        p = super().evaluate(si, active)
-        return SimpleNamespace(reflectance=dr.minimum(p.reflectance, 1) if mi.is_spectral else p.reflectance)
-
-
-class BrighterSpectrum(Lambert):
-    """Scales spectra by two hundredths too much."""
-
-    def evaluate(self, si, active):
-        p = super().evaluate(si, active)
-        return SimpleNamespace(reflectance=p.reflectance * (1.02 if mi.is_spectral else 1))
-
-
-class BrighterInTheBlue(Lambert):
-    """Scales what is below 420 nm."""
-
-    def evaluate(self, si, active):
-        p = super().evaluate(si, active)
-        return SimpleNamespace(
-            reflectance=p.reflectance * (dr.select(si.wavelengths < 420, 1.3, 1) if mi.is_spectral else 1)
-        )
-
-
-class WavelengthsExchanged(Lambert):
-    def evaluate(self, si, active):
-        r = super().evaluate(si, active).reflectance
-        return SimpleNamespace(reflectance=mi.UnpolarizedSpectrum(r[1], r[0], r[2], r[3]) if mi.is_spectral else r)
-
-
-class RedAndBlueExchanged(Lambert):
-    def evaluate(self, si, active):
-        r = super().evaluate(si, active).reflectance
-        return SimpleNamespace(reflectance=mi.Color3f(r.z, r.y, r.x) if mi.is_rgb else r)
-
-
-class TexturePoint(Lambert):
-    """Looks its texture up elsewhere."""
-
-    def evaluate(self, si, active):
-        moved = mi.SurfaceInteraction3f(si)
-        moved.uv = self.moved(si.uv)
-        return super().evaluate(moved, active)
-
-
-class IgnoresV(TexturePoint):
-    def moved(self, uv):
-        return mi.Point2f(uv.x, 0.5)
-
-
-class ClampsUV(TexturePoint):
-    def moved(self, uv):
-        return dr.clip(uv, 0, 1)
-
-
-class ExchangesUV(TexturePoint):
-    def moved(self, uv):
-        return mi.Point2f(uv.y, uv.x)
-
-
-class HalfATexel(TexturePoint):
-    """Of a bitmap of three columns."""
-
-    def moved(self, uv):
-        return mi.Point2f(uv.x + 0.5 / 3, uv.y)
+    value = texture.eval(si, active)
+    return dr.replace_grad(dr.clip(value, 0, 1), value)
 
 
 # --- Adapters -------------------------------------------------------------------------------------------------------
 
 
-class IgnoresMasks(adapter.ModelBSDF):
-    def _mixture(self, ctx, si, active):
-        return adapter.ModelBSDF._mixture(self, mi.BSDFContext(), si, active)
+def sampled(**fields):
+    """An adapter whose samples have other fields, or another weight: each a function of the sample, the weight, the
+    surface point and the first variate."""
+
+    class Mutant(adapter.ModelBSDF):
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
+            for name, of in fields.items():
+                if name == "weight":
+                    weight = of(bs, weight, si, sample1)
+                else:
+                    setattr(bs, name, of(bs, weight, si, sample1))
+            return bs, weight
+
+    return Mutant
 
 
-class WeightNotDivided(adapter.ModelBSDF):
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
-        return bs, weight * bs.pdf
+def adapted(**methods):
+    """An adapter with other methods: each a function of the adapter's own, of the BSDF and of what is given."""
+
+    def method(name, change):
+        own = getattr(adapter.ModelBSDF, name)
+        return lambda self, *given: change(own, self, *given)
+
+    return type("Mutant", (adapter.ModelBSDF,), {name: method(name, change) for name, change in methods.items()})
 
 
-class CosineTwice(adapter.ModelBSDF):
+def masked(name, mask=lambda active: True):
+    """An adapter one of whose methods has another mask: by default none."""
+    return adapted(**{name: lambda own, self, *given: own(self, *given[:-1], mask(given[-1]))})
+
+
+def reflectance(change, at=lambda si: si):
+    """An adapter whose ``eval_diffuse_reflectance`` is changed, or that of another point."""
+    return adapted(eval_diffuse_reflectance=lambda own, self, si, active: change(own(self, at(si), active)))
+
+
+def ignored_masks(own, self, ctx, si, active):
+    return own(self, mi.BSDFContext(), si, active)
+
+
+def cosine_twice(own, self, ctx, si, wo, active):
     """eval has another cosine, sample's weight has not."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        return value * dr.maximum(wo.z, 0), pdf
-
-    def eval(self, ctx, si, wo, active=True):
-        return self.eval_pdf(ctx, si, wo, active)[0]
+    value, pdf = own(self, ctx, si, wo, active)
+    return value * dr.maximum(wo.z, 0), pdf
 
 
-class HalfFloats(adapter.ModelBSDF):
+def cosine_forgotten(own, self, ctx, si, wo, active):
+    value, pdf = own(self, ctx, si, wo, active)
+    return value / dr.maximum(wo.z, 0.01), pdf
+
+
+PairDisagrees = adapted(
+    eval_pdf=cosine_forgotten,
+    eval=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[0],
+    pdf=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[1],
+)
+
+
+def half_floats(own, self, *given):
     """eval returns eleven bits."""
-
-    def eval(self, ctx, si, wo, active=True):
-        return mi.Color3f([mi.Float(dr.llvm.ad.Float16(channel)) for channel in self.eval_pdf(ctx, si, wo, active)[0]])
+    return mi.Color3f([mi.Float(dr.llvm.ad.Float16(channel)) for channel in own(self, *given)])
 
 
-class PairDisagrees(adapter.ModelBSDF):
-    """eval_pdf alone forgets the cosine."""
+def shines_through(own, self, ctx, si, wo, active):
+    """Takes the cosine's absolute value where it should be zero below the horizon."""
+    return own(self, ctx, si, mi.Vector3f(wo.x, wo.y, abs(wo.z)), active)
 
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        return value / dr.maximum(wo.z, 0.01), pdf
 
-    def eval(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)[0]
+def exchanged_variates(own, self, ctx, si, wo, sample1, sample2, active):
+    return own(self, ctx, si, wo, sample1, mi.Point2f(sample2.y, sample2.x), active)
 
-    def pdf(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)[1]
+
+def one_variate_for_both(own, self, ctx, si, sample1, sample2, active):
+    """The lobe is chosen by a variate that also chooses the direction."""
+    return own(self, ctx, si, sample2.x, sample2, active)
+
+
+def exchanged_keys(own, self, callback):
+    """Shows its parameters under each other's names."""
+    names = list(self.textures)
+    for name, other in zip(names, reversed(names), strict=True):
+        callback.put(name, self.textures[other], mi.ParamFlags.Differentiable)
+
+
+def leaked_derivative(own, self, ctx, si, wo, active):
+    """Inactive lanes get no light, but parameters get their derivatives."""
+    value, pdf = own(self, ctx, si, wo, active)
+    every = own(self, ctx, si, wo, True)[0]
+    return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
+
+
+def ignored_mode(own, self, ctx, si, active):
+    """Reflects light from an emitter as light from the camera."""
+    radiance = mi.BSDFContext()
+    radiance.component, radiance.type_mask = ctx.component, ctx.type_mask
+    return own(self, radiance, si, active)
+
+
+def cosines_in_light_tracing(own, self, ctx, si, wo, active):
+    """Corrects for shading normals that there are none of."""
+    value, pdf = own(self, ctx, si, wo, active)
+    if ctx.mode == mi.TransportMode.Importance:
+        value = value * abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3)
+    return value, pdf
+
+
+def flagged(change):
+    """An adapter with other flags of its components, and of the whole."""
+
+    class Mutant(adapter.ModelBSDF):
+        def __init__(self, props):
+            adapter.ModelBSDF.__init__(self, props)
+            self.m_components, self.m_flags = change([int(it) for it in self.m_components], int(self.m_flags))
+
+    return Mutant
+
+
+def flagged_for_both_sides(components, flags):
+    both = [it | int(mi.BSDFFlags.DiffuseTransmission) for it in components]
+    return both, both[0]
+
+
+def anisotropy_not_flagged(components, flags):
+    other = ~int(mi.BSDFFlags.Anisotropic)
+    return [it & other for it in components], flags & other
+
+
+def exchanged_in_part(bs, weight, si, u):
+    return dr.select(between(65, 75)(si.wi), 1 - bs.sampled_component, bs.sampled_component)
+
+
+def off_in_the_yellow(bs, weight, si, u):
+    yellow = (si.wavelengths > 560) & (si.wavelengths < 590) if mi.is_spectral else False
+    return weight * dr.select(yellow, 0.9, 1)
 
 
 class SumOfDensities(adapter.ModelBSDF):
@@ -492,27 +424,6 @@ class SumOfDensities(adapter.ModelBSDF):
     def _eval_pdf(valid, mixture, frame, wo):
         value, pdf = adapter.ModelBSDF._eval_pdf(valid, mixture, frame, wo)
         return value, pdf * len(mixture.lobes)
-
-
-class WrongComponent(adapter.ModelBSDF):
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
-        bs.sampled_component = mi.UInt32(0)
-        return bs, weight
-
-
-class WrongType(adapter.ModelBSDF):
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
-        bs.sampled_type = mi.UInt32(int(mi.BSDFFlags.DiffuseReflection))
-        return bs, weight
-
-
-class ShinesThrough(adapter.ModelBSDF):
-    """Takes the cosine's absolute value where it should be zero below the horizon."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, mi.Vector3f(wo.x, wo.y, abs(wo.z)), active)
 
 
 class SeenFromBehind(adapter.ModelBSDF):
@@ -533,74 +444,6 @@ class SeenFromBehind(adapter.ModelBSDF):
     def eval_pdf(self, ctx, si, wo, active=True):
         turned, side = self._turned(si)
         return adapter.ModelBSDF.eval_pdf(self, ctx, turned, mi.Vector3f(wo.x, wo.y, wo.z * side), active)
-
-
-class Sampled(adapter.ModelBSDF):
-    """Changes what ``sample`` returns."""
-
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
-        return self.altered(bs, weight, si)
-
-
-class NoEta(Sampled):
-    def altered(self, bs, weight, si):
-        bs.eta = mi.Float(0)
-        return bs, weight
-
-
-class EtaOfGlass(Sampled):
-    def altered(self, bs, weight, si):
-        bs.eta = mi.Float(1.5)
-        return bs, weight
-
-
-class OtherComponentAtSome(Sampled):
-    def altered(self, bs, weight, si):
-        bs.sampled_component = dr.select(between(65, 75)(si.wi), 1 - bs.sampled_component, bs.sampled_component)
-        return bs, weight
-
-
-class WeightAtMostOne(Sampled):
-    def altered(self, bs, weight, si):
-        return bs, dr.minimum(weight, 1)
-
-
-class WeightOfOtherChannels(Sampled):
-    def altered(self, bs, weight, si):
-        return bs, mi.Color3f(weight.z, weight.x, weight.y)
-
-
-class DetachedWeight(Sampled):
-    def altered(self, bs, weight, si):
-        return bs, dr.detach(weight)
-
-
-class WeightOverAttachedDensity(Sampled):
-    def altered(self, bs, weight, si):
-        return bs, weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
-
-
-class WeightOffInTheYellow(Sampled):
-    def altered(self, bs, weight, si):
-        if not mi.is_spectral:
-            return bs, weight
-        return bs, weight * dr.select((si.wavelengths > 560) & (si.wavelengths < 590), 0.9, 1)
-
-
-class SampleDensityAtGrazing(Sampled):
-    """The density that ``sample`` says is another where no angle is asked for."""
-
-    def altered(self, bs, weight, si):
-        bs.pdf = dr.select(between(82, 88)(si.wi), 1.02 * bs.pdf, bs.pdf)
-        return bs, weight
-
-
-class VariateUsedTwice(adapter.ModelBSDF):
-    """The lobe is chosen by a variate that also chooses the direction."""
-
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        return adapter.ModelBSDF.sample(self, ctx, si, sample2.x, sample2, active)
 
 
 class OtherSharesDrawn(adapter.ModelBSDF):
@@ -630,122 +473,40 @@ class ShareForgottenInOne(adapter.ModelBSDF):
         return value, pdf + dr.select(valid & (wo.z > 0), second, 0)
 
 
-class AllVariatesTwice(adapter.ModelBSDF):
-    """eval_pdf_sample draws with exchanged variates."""
-
-    def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
-        other = mi.Point2f(sample2.y, sample2.x)
-        return adapter.ModelBSDF.eval_pdf_sample(self, ctx, si, wo, sample1, other, active)
+def over_attached_density(bs, weight, si, u):
+    return weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
 
 
-class NeverInactive(adapter.ModelBSDF):
-    def eval_pdf(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, True)
+def of_others(name, albedo=0.5, side=1, traverse=lambda self, callback: None):
+    """The dict of a Lambertian BSDF that knows nothing of this package, and is seen from one side."""
 
+    class Matte(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            seen = mi.BSDFFlags.FrontSide if side > 0 else mi.BSDFFlags.BackSide
+            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | seen)]
+            self.m_flags = self.m_components[0]
 
-class AllMethodsInOneInactive(adapter.ModelBSDF):
-    def eval_pdf_sample(self, ctx, si, wo, sample1, sample2, active=True):
-        return adapter.ModelBSDF.eval_pdf_sample(self, ctx, si, wo, sample1, sample2, True)
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo = side * mi.warp.square_to_cosine_hemisphere(sample2)
+            bs.pdf = self.pdf(ctx, si, bs.wo, active)
+            bs.eta, bs.sampled_type, bs.sampled_component = 1.0, int(mi.BSDFFlags.DiffuseReflection), 0
+            return bs, dr.select(bs.pdf > 0, mi.Spectrum(albedo), 0)
 
+        def eval_pdf(self, ctx, si, wo, active=True):
+            pdf = dr.select(active & (side * si.wi.z > 0) & (side * wo.z > 0), side * wo.z * dr.inv_pi, 0)
+            return mi.Spectrum(albedo * pdf), pdf
 
-class ReflectanceInactive(adapter.ModelBSDF):
-    def eval_diffuse_reflectance(self, si, active=True):
-        return adapter.ModelBSDF.eval_diffuse_reflectance(self, si, True)
+        def eval(self, *given):
+            return self.eval_pdf(*given)[0]
 
+        def pdf(self, *given):
+            return self.eval_pdf(*given)[1]
 
-class ExchangedKeys(adapter.ModelBSDF):
-    """Shows its parameters under each other's names."""
-
-    def traverse(self, callback):
-        names = list(self.textures)
-        for name, other in zip(names, reversed(names), strict=True):
-            callback.put(name, self.textures[other], mi.ParamFlags.Differentiable)
-
-
-class FlaggedForBothSides(adapter.ModelBSDF):
-    def __init__(self, props):
-        adapter.ModelBSDF.__init__(self, props)
-        self.m_components = [int(component | mi.BSDFFlags.DiffuseTransmission) for component in self.m_components]
-        self.m_flags = self.m_components[0]
-
-
-class SamplesInactive(adapter.ModelBSDF):
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        return adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, True)
-
-
-class AllOrNone(adapter.ModelBSDF):
-    """Switches all lanes off if one is."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        return adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, dr.all(mi.Bool(active)))
-
-
-class LeaksDerivative(adapter.ModelBSDF):
-    """Inactive lanes get no light, but parameters get their derivatives."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        every = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, True)[0]
-        return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
-
-
-class IgnoresMode(adapter.ModelBSDF):
-    """Reflects light from an emitter as light from the camera."""
-
-    def _mixture(self, ctx, si, active):
-        radiance = mi.BSDFContext()
-        radiance.component, radiance.type_mask = ctx.component, ctx.type_mask
-        return adapter.ModelBSDF._mixture(self, radiance, si, active)
-
-
-class CosinesInLightTracing(adapter.ModelBSDF):
-    """Corrects for shading normals that there are none of."""
-
-    def eval_pdf(self, ctx, si, wo, active=True):
-        value, pdf = adapter.ModelBSDF.eval_pdf(self, ctx, si, wo, active)
-        if ctx.mode == mi.TransportMode.Importance:
-            value = value * abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3)
-        return value, pdf
-
-
-class DoubleReflectance(adapter.ModelBSDF):
-    def eval_diffuse_reflectance(self, si, active=True):
-        return 2 * adapter.ModelBSDF.eval_diffuse_reflectance(self, si, active)
-
-
-class ReflectanceOverPi(adapter.ModelBSDF):
-    def eval_diffuse_reflectance(self, si, active=True):
-        return adapter.ModelBSDF.eval_diffuse_reflectance(self, si, active) * dr.inv_pi
-
-
-class ReflectanceAtOnePoint(adapter.ModelBSDF):
-    def eval_diffuse_reflectance(self, si, active=True):
-        return adapter.ModelBSDF.eval_diffuse_reflectance(self, dr.zeros(mi.SurfaceInteraction3f), active)
-
-
-class SamplesBelow(adapter.ModelBSDF):
-    """A tenth of the samples leaves below the horizon, with its weight."""
-
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs, weight = adapter.ModelBSDF.sample(self, ctx, si, sample1, sample2, active)
-        bs.wo = dr.select(sample1 < 0.1, mi.Vector3f(bs.wo.x, bs.wo.y, -bs.wo.z), bs.wo)
-        return bs, weight
-
-
-class NoAnisotropicFlag(adapter.ModelBSDF):
-    def __init__(self, props):
-        adapter.ModelBSDF.__init__(self, props)
-        self.m_components = [c & ~int(mi.BSDFFlags.Anisotropic) for c in self.m_components]
-        self.m_flags = int(self.m_flags) & ~int(mi.BSDFFlags.Anisotropic)
-
-
-class FlagsDisagree(adapter.ModelBSDF):
-    """The flags of the whole leave a component out."""
-
-    def __init__(self, props):
-        adapter.ModelBSDF.__init__(self, props)
-        self.m_flags = self.m_components[0]
+    Matte.traverse = traverse
+    mi.register_bsdf(name, Matte)
+    return {"type": name}
 
 
 # --- The catalogue --------------------------------------------------------------------------------------------------
@@ -761,13 +522,10 @@ class Mutant:
     methods: type = adapter.ModelBSDF
     given: tuple = ()
 
-    def __str__(self):
-        return self.name
-
     def register(self) -> dict:
-        """Make it a plugin of the active variant; its dict."""
+        """Make it a plugin of the active variant and of what checks load besides; its dict."""
         plugin = "mutant_" + self.name.replace(" ", "_")
-        for variant in {mi.variant(), "scalar_rgb"}:
+        for variant in {mi.variant(), "scalar_rgb", "llvm_ad_spectral"}:
             module = importlib.import_module(f"mitsuba.{variant}")
             members = {k: v for base in reversed(self.methods.__mro__[:-1]) for k, v in vars(base).items()}
             members = {k: v for k, v in members.items() if k not in ("__dict__", "__weakref__")}
@@ -780,157 +538,193 @@ def mutant(name, caught_by, model, methods=adapter.ModelBSDF, **given):
     return Mutant(name, tuple(caught_by.split()), model, methods, tuple(given.items()))
 
 
+UNLIMITED = Colour(0.5, (0, 10), "a colour without a limit to speak of")
+TWO = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.5}
 RED = {"type": "rgb", "value": (0.6, 0.3, 0.1)}
 
 MUTANTS = [
-    mutant("pi forgotten in the denominator", "albedo", lambert(TimesPi)),
-    mutant("pi twice in the denominator", "albedo", lambert(OverPi)),
-    mutant("missing cosine", "reciprocity", lambert(NoCosine)),
-    mutant("missing factor four", "albedo", walter(WithoutFour), alpha=0.3),
+    mutant("pi forgotten in the denominator", "albedo", diffuse(lambda wi, wo: dr.pi)),
+    mutant("pi twice in the denominator", "albedo", diffuse(lambda wi, wo: dr.inv_pi)),
+    mutant("missing cosine", "reciprocity", diffuse(lambda wi, wo: 1 / wo.z)),
+    mutant("missing factor four", "albedo", walter(changed(MicrofacetLobe, lambda wi, wo: 4)), alpha=0.3),
     mutant("unnormalised D", "pdf", walter(distribution=UnnormalisedGGX), alpha=0.05),
-    mutant("density without pi", "pdf chi2", lambert(DensityWithoutPi)),
+    mutant("density without pi", "pdf chi2", diffuse(density=lambda wi, wo: dr.pi)),
     mutant("uniform density of a cosine sampler", "chi2", lambert(UniformDensity)),
     mutant("uniform sampler of a cosine density", "chi2", lambert(UniformSampler)),
-    mutant("a variate ignored", "chi2", lambert(OneVariate)),
-    mutant("normalisation of a power off by one", "pdf", phong(UnnormalisedPower), exponent=30.0),
-    mutant("rotated sampler", "chi2", phong(SkewedPower), exponent=300.0),
-    mutant("density of the half vector", "pdf chi2", walter(HalfVectorDensity), alpha=0.3),
-    mutant("density of the half vector, sharp", "pdf chi2", walter(HalfVectorDensity), alpha=1e-3),
+    mutant("a variate ignored", "chi2", lambert(drawn(LambertLobe, lambda wi, wo, u, v: warped(mi.Point2f(v.x, 0.3))))),
+    mutant("normalisation of a power off by one", "pdf", phong(altered(PowerLobe, off_by_one)), exponent=30.0),
+    mutant("rotated sampler", "chi2", phong(drawn(PowerLobe, turned(0.1))), exponent=300.0),
+    mutant("density of the half vector", "pdf chi2", walter(changed(MicrofacetLobe, density=half_vector)), alpha=0.3),
+    mutant(
+        "density of the half vector, sharp",
+        "pdf chi2",
+        walter(changed(MicrofacetLobe, density=half_vector)),
+        alpha=1e-3,
+    ),
     mutant("alphas swapped in the density", "chi2", ward(SwappedDensity), alpha_u=0.1, alpha_v=0.3),
-    mutant("half of the samples lost", "pdf chi2", walter(LostHalf), alpha=0.3),
+    mutant(
+        "half of the samples lost",
+        "pdf chi2",
+        walter(drawn(MicrofacetLobe, lambda wi, wo, u, v: dr.select(v.x < 0.5, wo, -wo))),
+        alpha=0.3,
+    ),
     mutant("lobe probability omitted", "pdf components", phong(PowerLobe), SumOfDensities),
-    mutant("weight not divided", "weight", Phong, WeightNotDivided),
-    mutant("weight without eval's second cosine", "weight", Ward, CosineTwice),
+    mutant("weight not divided", "weight", Phong, sampled(weight=lambda bs, w, si, u: w * bs.pdf)),
+    mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
-    mutant("mask forgotten", "components", Ward, IgnoresMasks),
-    mutant("wrong component", "components", Ward, WrongComponent),
-    mutant("wrong type", "components", Ward, WrongType),
-    mutant("flags of the whole", "components", Ward, FlagsDisagree),
+    mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),
+    mutant("wrong component", "components", Ward, sampled(sampled_component=lambda bs, w, si, u: mi.UInt32(0))),
+    mutant(
+        "wrong type",
+        "components",
+        Ward,
+        sampled(sampled_type=lambda bs, w, si, u: mi.UInt32(int(mi.BSDFFlags.DiffuseReflection))),
+    ),
+    mutant("flags of the whole", "components", Ward, flagged(lambda components, flags: (components, components[0]))),
     mutant("glossy flagged diffuse", "flags", phong(PowerFlaggedDiffuse), exponent=300.0),
-    mutant("anisotropy not flagged", "flags", Ward, NoAnisotropicFlag, alpha_u=0.1, alpha_v=0.3),
+    mutant("anisotropy not flagged", "flags", Ward, flagged(anisotropy_not_flagged), alpha_u=0.1, alpha_v=0.3),
     mutant("one-way shadowing", "reciprocity", walter(shadowing=OneSidedShadowing()), alpha=0.6),
-    mutant("one-way diffuse", "reciprocity", lambert(OneWay)),
-    mutant("not a number at grazing", "finite", lambert(NotANumber)),
-    mutant("negative at grazing", "finite", lambert(Negative)),
-    mutant("black at exactly normal incidence", "continuity", lambert(BlackAtNormal)),
-    mutant("half of an azimuth", "continuity", lambert(HalfAzimuth)),
-    mutant("cut at grazing", "continuity", lambert(CutAtGrazing)),
-    mutant("mean of a texture", "textures", AverageColour),
-    mutant("texture at a fixed point", "textures", FixedPoint),
-    mutant("density zero where light is", "support", lambert(MissingDensity)),
-    mutant("shines through", "horizon", Lambert, ShinesThrough),
-    mutant("samples below the horizon", "horizon", Lambert, SamplesBelow),
-    mutant("gradient cut", "gradients", lambert(Detached)),
-    mutant("gradient not a number", "gradients", lambert(RootOfSquare)),
+    mutant("one-way diffuse", "reciprocity", diffuse(lambda wi, wo: 0.5 + 0.5 * wo.z)),
+    mutant("not a number at grazing", "finite", diffuse(lambda wi, wo: dr.sqrt(wo.z - 0.01) / dr.sqrt(wo.z - 0.01))),
+    mutant("negative at grazing", "finite", diffuse(lambda wi, wo: 1 - 1.1 * dr.square(dr.square(1 - wo.z)))),
+    mutant(
+        "black at exactly normal incidence", "continuity", diffuse(where(lambda wi, wo: dr.maximum(wi.z, wo.z) == 1, 0))
+    ),
+    mutant("half of an azimuth", "continuity", diffuse(half_azimuths)),
+    mutant("cut at grazing", "continuity", diffuse(where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 4e-4, 1e-4))),
+    mutant("mean of a texture", "textures", colour(lambda texture, si, active: texture.mean())),
+    mutant("texture at a fixed point", "textures", elsewhere(lambda uv: mi.Point2f(0))),
+    mutant("density zero where light is", "support", diffuse(density=towards(lambda w: w.z < 0.2, 0))),
+    mutant("shines through", "horizon", Lambert, adapted(eval_pdf=shines_through)),
+    mutant(
+        "samples below the horizon",
+        "horizon",
+        Lambert,
+        sampled(wo=lambda bs, w, si, u: dr.select(u < 0.1, bs.wo * [1, 1, -1], bs.wo)),
+    ),
+    mutant("gradient cut", "gradients", diffuse_value(lambda f, reflectance: dr.detach(f))),
+    mutant(
+        "gradient not a number", "gradients", diffuse_value(lambda f, r: f * (1 + 0.01 * dr.sqrt(dr.square(r - 0.5))))
+    ),
     mutant("parameter baked in", "recompiles", BakedIn),
-    mutant(
-        "density off for a quarter of the azimuths",
-        "pdf",
-        lambert(changed(LambertLobe, density=where(lambda wi, wo: third_quadrant(wi)))),
-    ),
-    mutant(
-        "density off towards a quarter of the azimuths",
-        "chi2",
-        lambert(
-            changed(
-                LambertLobe,
-                density=lambda wi, wo: (
-                    dr.select(third_quadrant(wo), 1.04, mi.Float(1)) - dr.select(first_quadrant(wo), 0.04, mi.Float(0))
-                ),
-            )
-        ),
-    ),
-    mutant(
-        "density off from 40 to 50 degrees",
-        "pdf",
-        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(40, 50)(wi), 1.01))),
-    ),
-    mutant(
-        "density off towards 40 to 50 degrees",
-        "chi2",
-        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(40, 50)(wo)))),
-    ),
-    mutant(
-        "density off above 81 degrees",
-        "pdf",
-        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(81, 90)(wi), 1.01))),
-    ),
-    mutant(
-        "density off towards more than 81 degrees",
-        "pdf",
-        lambert(changed(LambertLobe, density=where(lambda wi, wo: between(81, 90)(wo), 1.1))),
-    ),
-    mutant("samples lost from 40 to 50 degrees", "pdf", lambert(LostAtFortyFive)),
-    mutant(
-        "one way for a quarter of the azimuths",
-        "reciprocity",
-        lambert(changed(LambertLobe, value=where(lambda wi, wo: third_quadrant(wi), 1.02))),
-    ),
+    mutant("density off for a quarter of the azimuths", "pdf", diffuse(density=lit(third_quadrant))),
+    mutant("density off towards a quarter of the azimuths", "chi2", diffuse(density=shifted_between_quadrants)),
+    mutant("density off from 40 to 50 degrees", "pdf", diffuse(density=lit(between(40, 50), 1.01))),
+    mutant("density off towards 40 to 50 degrees", "chi2", diffuse(density=towards(between(40, 50)))),
+    mutant("density off above 81 degrees", "pdf", diffuse(density=lit(between(81, 90), 1.01))),
+    mutant("density off towards more than 81 degrees", "pdf", diffuse(density=towards(between(81, 90), 1.1))),
+    mutant("samples lost from 40 to 50 degrees", "pdf", lambert(drawn(LambertLobe, lost_at_forty_five))),
+    mutant("one way for a quarter of the azimuths", "reciprocity", diffuse(lit(third_quadrant, 1.02))),
     mutant(
         "density off for two directions of a thousand",
         "chi2",
-        lambert(changed(LambertLobe, density=where(lambda wi, wo: dr.square(wo.z) > 0.998, 1.5))),
+        diffuse(density=towards(lambda w: dr.square(w.z) > 0.998, 1.5)),
     ),
-    mutant("energy gained in blue", "albedo", lambert(changed(LambertLobe, value=blue)), reflectance=0.9),
-    mutant(
-        "energy gained at grazing",
-        "albedo",
-        lambert(changed(LambertLobe, value=lambda wi, wo: 1 + dr.power(1 - wi.z, 20))),
-        reflectance=0.7,
-    ),
-    mutant("not a number straight back", "finite", lambert(NotANumberStraightBack)),
+    mutant("energy gained in blue", "albedo", diffuse(lambda wi, wo: mi.Color3f(1, 1, 1.2)), reflectance=0.9),
+    mutant("energy gained at grazing", "albedo", diffuse(lambda wi, wo: 1 + dr.power(1 - wi.z, 20)), reflectance=0.7),
+    mutant("not a number straight back", "finite", diffuse(nothing_over_nothing)),
     mutant(
         "cut a quarter of a degree above the horizon",
         "continuity",
-        lambert(changed(LambertLobe, value=where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 5e-3, 1e-2))),
+        diffuse(where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 5e-3, 1e-2)),
     ),
     mutant("seen from behind", "horizon", Lambert, SeenFromBehind),
-    mutant("eta of zero", "components", Lambert, NoEta),
-    mutant("eta of glass", "components", Ward, EtaOfGlass),
-    mutant("other component from 65 to 75 degrees", "components", Ward, OtherComponentAtSome),
-    mutant("weight at most one", "weight", Ward, WeightAtMostOne, variant="ward", specular_reflectance=1.0),
-    mutant("channels exchanged in the weight", "weight", Lambert, WeightOfOtherChannels, reflectance=RED),
-    mutant("density of sample off at grazing", "weight", Ward, SampleDensityAtGrazing),
-    mutant("half floats", "weight eval_pdf", Ward, HalfFloats),
-    mutant("variate used twice", "chi2", Phong, VariateUsedTwice, diffuse_reflectance=0.4, specular_reflectance=0.5),
+    mutant("eta of zero", "components", Lambert, sampled(eta=lambda bs, w, si, u: mi.Float(0))),
+    mutant("eta of glass", "components", Ward, sampled(eta=lambda bs, w, si, u: mi.Float(1.5))),
+    mutant("other component from 65 to 75 degrees", "components", Ward, sampled(sampled_component=exchanged_in_part)),
+    mutant(
+        "weight at most one",
+        "weight",
+        Ward,
+        sampled(weight=lambda bs, w, si, u: dr.minimum(w, 1)),
+        variant="ward",
+        specular_reflectance=1.0,
+    ),
+    mutant(
+        "channels exchanged in the weight",
+        "weight",
+        Lambert,
+        sampled(weight=lambda bs, w, si, u: mi.Color3f(w.z, w.x, w.y)),
+        reflectance=RED,
+    ),
+    mutant(
+        "density of sample off at grazing",
+        "weight",
+        Ward,
+        sampled(pdf=lambda bs, w, si, u: bs.pdf * lit(between(82, 88), 1.02)(si.wi, 0)),
+    ),
+    mutant("half floats", "weight eval_pdf", Ward, adapted(eval=half_floats)),
+    mutant("variate used twice", "chi2", Phong, adapted(sample=one_variate_for_both), **TWO),
     mutant("lobes drawn by other shares", "chi2", Phong, OtherSharesDrawn),
     mutant("probability omitted of one lobe", "pdf chi2", Phong, ShareForgottenInOne),
-    mutant("turned by a degree", "chi2", phong(TurnedByADegree), exponent=300.0),
+    mutant("turned by a degree", "chi2", phong(drawn(PowerLobe, turned(math.radians(1)))), exponent=300.0),
     mutant("alphas swapped for a quarter of the azimuths", "chi2", ward(SwappedBeyond), alpha_u=0.2, alpha_v=0.3),
     mutant(
-        "density of the half vector if anisotropic", "pdf", walter(HalfVectorIfAnisotropic), alpha_u=0.3, alpha_v=0.31
+        "density of the half vector if anisotropic",
+        "pdf",
+        walter(altered(MicrofacetLobe, half_vector_if_anisotropic)),
+        alpha_u=0.3,
+        alpha_v=0.31,
     ),
-    mutant("eval_pdf_sample exchanges variates", "eval_pdf", Ward, AllVariatesTwice),
-    mutant("v ignored", "textures", IgnoresV),
-    mutant("u and v exchanged", "textures", ExchangesUV),
-    mutant("clamped to the unit square", "textures", ClampsUV),
-    mutant("given texture at a fixed point", "textures", FixedPoint, reflectance={"type": "checkerboard"}),
-    mutant("half a texel off", "textures", HalfATexel),
-    mutant("reflectance at a fixed point", "textures", Lambert, ReflectanceAtOnePoint),
-    mutant("derivative twice as large", "gradients", lambert(DoubleDerivative)),
-    mutant("root at normal incidence", "gradients", lambert(RootAtNormal)),
-    mutant("root at normal incidence in the density", "gradients", lambert(UndirectedDensity)),
-    mutant("weight detached", "gradients", Lambert, DetachedWeight),
-    mutant("weight over an attached density", "gradients", Phong, WeightOverAttachedDensity),
-    mutant("inactive lanes evaluated", "active", Ward, NeverInactive),
-    mutant("inactive lanes sampled", "active", Lambert, SamplesInactive),
-    mutant("inactive lanes evaluated and sampled at once", "active", Lambert, AllMethodsInOneInactive),
-    mutant("reflectance of inactive lanes", "active", Lambert, ReflectanceInactive),
-    mutant("active lanes dropped", "active", Lambert, AllOrNone),
-    mutant("derivatives of inactive lanes", "active", Lambert, LeaksDerivative),
-    mutant("stuck beyond a limit", "gradients", Stuck),
-    mutant("evaluated beyond a limit", "gradients", Unlimited),
-    mutant("led out of its range", "gradients", Outwards),
-    mutant("colours clipped in spectral variants", "spectral", ClippedSpectrum),
-    mutant("brighter in spectral variants", "spectral", BrighterSpectrum),
-    mutant("brighter below 420 nm", "spectral", BrighterInTheBlue),
-    mutant("weight off from 560 to 590 nm", "spectral", Lambert, WeightOffInTheYellow),
-    mutant("wavelengths exchanged", "spectral", WavelengthsExchanged),
-    mutant("red and blue exchanged", "colours", RedAndBlueExchanged),
-    mutant("keys exchanged", "updates", Phong, ExchangedKeys, diffuse_reflectance=0.4, specular_reflectance=0.5),
-    mutant("flagged for both sides", "flags", Lambert, FlaggedForBothSides),
-    mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), IgnoresMode),
-    mutant("cosines in light tracing", "mode", Lambert, CosinesInLightTracing),
-    mutant("twice the reflectance", "reflectance", Ward, DoubleReflectance),
-    mutant("reflectance over pi", "reflectance", Lambert, ReflectanceOverPi),
+    mutant("eval_pdf_sample exchanges variates", "eval_pdf", Ward, adapted(eval_pdf_sample=exchanged_variates)),
+    mutant("v ignored", "textures", elsewhere(lambda uv: mi.Point2f(uv.x, 0.5))),
+    mutant("u and v exchanged", "textures", elsewhere(lambda uv: mi.Point2f(uv.y, uv.x))),
+    mutant("clamped to the unit square", "textures", elsewhere(lambda uv: dr.clip(uv, 0, 1))),
+    mutant(
+        "given texture at a fixed point",
+        "textures",
+        elsewhere(lambda uv: mi.Point2f(0)),
+        reflectance={"type": "checkerboard"},
+    ),
+    mutant("half a texel off", "textures", elsewhere(lambda uv: mi.Point2f(uv.x + 0.5 / 3, uv.y))),
+    mutant(
+        "reflectance at a fixed point",
+        "textures",
+        Lambert,
+        reflectance(lambda value: value, lambda si: dr.zeros(mi.SurfaceInteraction3f)),
+    ),
+    mutant("derivative twice as large", "gradients", diffuse_value(lambda f, reflectance: 2 * f - dr.detach(f))),
+    mutant(
+        "root at normal incidence",
+        "gradients",
+        diffuse(lambda wi, wo: 1 + 0.01 * root_at_normal(wi) * root_at_normal(wo)),
+    ),
+    mutant(
+        "root at normal incidence in the density",
+        "gradients",
+        diffuse(density=lambda wi, wo: root_at_normal(wi) / root_at_normal(wi)),
+    ),
+    mutant("weight detached", "gradients", Lambert, sampled(weight=lambda bs, w, si, u: dr.detach(w))),
+    mutant("weight over an attached density", "gradients", Phong, sampled(weight=over_attached_density)),
+    mutant("inactive lanes evaluated", "active", Ward, masked("eval_pdf")),
+    mutant("inactive lanes sampled", "active", Lambert, masked("sample")),
+    mutant("inactive lanes evaluated and sampled at once", "active", Lambert, masked("eval_pdf_sample")),
+    mutant("reflectance of inactive lanes", "active", Lambert, masked("eval_diffuse_reflectance")),
+    mutant("active lanes dropped", "active", Lambert, masked("eval_pdf", lambda active: dr.all(mi.Bool(active)))),
+    mutant("derivatives of inactive lanes", "active", Lambert, adapted(eval_pdf=leaked_derivative)),
+    mutant(
+        "stuck beyond a limit", "gradients", colour(lambda texture, si, active: dr.clip(texture.eval(si, active), 0, 1))
+    ),
+    mutant("evaluated beyond a limit", "gradients", colour(lambda texture, si, active: texture.eval(si, active))),
+    mutant("led out of its range", "gradients", colour(outwards)),
+    mutant(
+        "colours clipped in spectral variants",
+        "spectral",
+        in_spectra(lambda value, nm: dr.minimum(value, 1), reflectance=UNLIMITED),
+    ),
+    mutant("brighter in spectral variants", "spectral", in_spectra(lambda value, nm: value * 1.02)),
+    mutant("brighter below 420 nm", "spectral", in_spectra(lambda value, nm: value * dr.select(nm < 420, 1.3, 1))),
+    mutant("weight off from 560 to 590 nm", "spectral", Lambert, sampled(weight=off_in_the_yellow)),
+    mutant(
+        "wavelengths exchanged",
+        "spectral",
+        in_spectra(lambda value, nm: type(value)(value[1], value[0], value[2], value[3])),
+    ),
+    mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
+    mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
+    mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
+    mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
+    mutant("cosines in light tracing", "mode", Lambert, adapted(eval_pdf=cosines_in_light_tracing)),
+    mutant("twice the reflectance", "reflectance", Ward, reflectance(lambda value: 2 * value)),
+    mutant("reflectance over pi", "reflectance", Lambert, reflectance(lambda value: value * dr.inv_pi)),
 ]

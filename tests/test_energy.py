@@ -15,6 +15,8 @@ from mi_brdfs.probe.parameter_space import choices, white
 from mi_brdfs.probe.stated_energy import fault
 
 PLUGINS = {model: model.plugins[0] for model in own_models()}
+FEW = "eon", "ward", "burley"
+"""Models that are always tried."""
 CONFIGURATIONS = [(model, given, albedo) for model in PLUGINS for given, albedo in model.energy.largest]
 
 
@@ -42,7 +44,11 @@ def test_references_are_configurations():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", PLUGINS, ids=configuration)
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(it, marks=[] if PLUGINS[it] in FEW else pytest.mark.slow) for it in PLUGINS],
+    ids=configuration,
+)
 def test_largest_albedo_of_the_defaults(model):
     assert not fault(model.energy.default, default_albedo(model))
 
@@ -123,6 +129,7 @@ TEXT = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("name, sentence, measured", TEXT, ids=[name for name, *_ in TEXT])
 def test_albedos_in_the_text(name, sentence, measured):

@@ -1,33 +1,26 @@
 """What fits cost grows linearly in directions and materials, and repeated fits hold no more memory."""
 
 import os
-import subprocess
 import sys
-from pathlib import Path
 
+import drjit as dr
+import fit_cost
 import pytest
 
-SCRIPT = Path(__file__).parent / "fit_cost.py"
-
-pytestmark = pytest.mark.slow
-
-
-def figures(*arguments, last):
-    """What the script prints: the number that ``last`` precedes, of each line that has one."""
-    done = subprocess.run([sys.executable, SCRIPT, *arguments], capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    return [float(line.split(last)[1].split()[0].rstrip("%")) for line in done.stdout.splitlines() if last in line]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("llvm_rgb")]
 
 
 @pytest.mark.skipif("MI_BRDFS_IDLE" not in os.environ, reason="measures time: set MI_BRDFS_IDLE=1 on an idle machine")
-@pytest.mark.parametrize("what", ["steps", "fits"])
-def test_cost_is_linear(what):
+@pytest.mark.parametrize("measure", [fit_cost.steps, fit_cost.fits])
+def test_cost_is_linear(measure):
     """A line through the times of more than a decade has no large deviations, in relative terms."""
-    by_directions, by_materials = figures(what, last="within ")
-    assert by_directions < 35 and by_materials < 35
+    threads = dr.thread_count()
+    dr.set_thread_count(1)
+    assert measure() < 0.35
+    dr.set_thread_count(threads)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the memory that a process holds is read from /proc")
 def test_memory_is_flat():
-    resident = figures("memory", last=": ")
+    resident = [held for held, _ in fit_cost.memory(["lambert", "low"])]
     assert len(resident) == 20 and max(resident[10:]) - min(resident[10:]) < 16

@@ -5,7 +5,7 @@ import pytest
 
 from mi_brdfs.probe.chi_square import chi_square
 from mi_brdfs.probe.directions import direction, from_plane, on_side, to_plane
-from mi_brdfs.probe.partition import partition
+from mi_brdfs.probe.partition import partitions
 from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 
@@ -41,7 +41,7 @@ def test_partitions_integrate_densities_of_any_width(width):
         versine = 0.5 * ((wo - axis) ** 2).sum(axis=1)
         return np.where(wo[:, 2] > 0, np.exp(-kappa * versine) * kappa / (2 * np.pi * -np.expm1(-2 * kappa)), 0)
 
-    cells = partition(pdf, pilot[pilot[:, 2] > 0], axis, count)
+    (cells,) = partitions(lambda _, wo: pdf(wo), [pilot[pilot[:, 2] > 0]], [axis], count)
     above = samples[samples[:, 2] > 0]
     share = (w[:, 2] > 0).mean()
     assert cells.integrals.sum() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / len(w)) + 1e-4)

@@ -49,6 +49,7 @@ def test_attributes_of_meshes_are_parameters(plugin, numbers, colours, tmp_path)
     assert abs(default - expected).max() > 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_mitsubas_own_chi2_test_passes():
     """With its own adapter and grid, for every plugin with its defaults."""
@@ -61,6 +62,7 @@ def test_mitsubas_own_chi2_test_passes():
             assert test.run(test_count=len(angles) * len(mi_brdfs.list_models()), quiet=True), f"{name} at {theta}°"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_an_instance_looks_like_the_shape():
     """Turned, so that an anisotropic highlight turns with it."""

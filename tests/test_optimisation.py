@@ -12,6 +12,8 @@ from support import hemisphere, interaction
 import mi_brdfs
 from mi_brdfs.mitsuba.registry import own_models
 
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
 SIDE = 10
 STARTS, PAIRS = SIDE * SIDE, 12
 LARGEST = 1e3
@@ -116,6 +118,14 @@ class Problem:
         return before, np.array(self.losses()), {n: np.array(self.params[k]).ravel() for n, k in self.keys.items()}
 
 
+FEW = "eon", "ward"
+"""Models that are always tried: one of numbers that are shares, and one whose number has a logarithmic range."""
+MODELS = [
+    pytest.param(model, id=model.plugins[0], marks=[] if model.plugins[0] in FEW else pytest.mark.slow)
+    for model in own_models()
+]
+
+
 def problems(model):
     """One for each way to give the parameters of a model."""
     for options in ways(model.declared()):
@@ -126,12 +136,11 @@ def problems(model):
             assert "is not known for distribution" in str(error)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", MODELS)
 def test_adam_ends_within_the_ranges(model):
     """From a hundred starts each; and it gets nearer to the values that it is to find."""
     for name, problem in problems(model):
-        before, after, ends = problem.optimise(40)
+        before, after, ends = problem.optimise(20)
         for quantity in problem.quantities:
             low, high = np.float32(quantity.limits)
             assert ((ends[quantity.name] >= low) & (ends[quantity.name] <= high)).all(), (name, quantity.name)
@@ -143,18 +152,19 @@ LIMITED_WITHIN = {"burley": ("roughness", "anisotropic"), "lafortune": ("cx", "c
 """Parameters of which a model limits what it makes of them, too, so that a value's derivative may lose a part."""
 
 
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
+@pytest.mark.parametrize("model", MODELS)
 def test_derivatives_beyond_the_ranges_lead_back(model):
     """Each value that a descent inwards lowers has the derivative that it has at the limit, and the others none; and
     forward derivatives are those at the limit."""
-    led = 0
+    led, seen = 0, set()
+    everywhere = {name for parameter in model.declared() if not parameter.words for name in parameter.names}
     for name, problem in problems(model):
         drawn = {n: problem.draw(limits) for n, limits in problem.limits().items()}
         for key, (low, high) in mi_brdfs.ranges(problem.bsdf).items():
-            if key not in problem.keys.values():
-                continue  # a default
             parameter = key.partition(".")[0]
+            if key not in problem.keys.values() or parameter in seen:
+                continue  # a default, or one that does not belong to a word, with which it was tried
+            seen |= {parameter} & everywhere
             for limit, inward in ((low, 1), (high, -1)):
                 if not np.isfinite(limit):
                     continue
@@ -173,7 +183,7 @@ def test_derivatives_beyond_the_ranges_lead_back(model):
     assert led > STARTS / 2
 
 
-@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given, name, start, target",
     [
@@ -233,7 +243,7 @@ COUNTERPARTS = {
 """Ours, the built-in that is the same, and where their parameters are searched."""
 
 
-@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COUNTERPARTS)
 def test_starts_end_no_worse_than_with_the_built_in(name):
     """The same values to find, from the same starts, by the same steps; the built-in's parameters are not projected.
@@ -250,7 +260,6 @@ def test_starts_end_no_worse_than_with_the_built_in(name):
     assert (ours <= theirs).all()
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("bsdf", [{"type": "orennayar", "model": "full"}, {"type": "roughdiffuse"}])
 def test_a_black_surface_can_become_brighter(bsdf):
     loaded = mi.load_dict(bsdf | {"reflectance": 0.0})

@@ -15,7 +15,6 @@ SPECTRUM = {"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}
 # ruff: noqa: E501
 REJECTED = [
     ("ward", {"alpha": 1.7}, "ward: alpha = 1.7 is not allowed; it must be a number in [0.0001, 1] or a texture."),
-    ("ward", {"alpha": 0}, "ward: alpha = 0 is not allowed; it must be a number in [0.0001, 1] or a texture."),
     ("ward", {"alpha": NAN}, "ward: alpha = nan is not allowed; it must be"),
     ("ward", {"alpha_v": -INF, "alpha_u": 0.1}, "ward: alpha_v = -inf is not allowed; it must be"),
     ("ward", {"alpha": True}, "ward: alpha = True is a boolean; it must be a number in"),
@@ -36,28 +35,21 @@ REJECTED = [
     ("lambert", {"reflectance": "red"}, 'lambert: reflectance = "red" is a string; it must be a number, rgb or spectrum'),
     ("lambert", {"reflectanse": 0.1}, "lambert: unknown parameter reflectanse; did you mean reflectance?"),
     ("phong", {"alpha": 0.1}, "phong: unknown parameter alpha; known are diffuse_reflectance, "),
-    ("phong", {"exponent": 2e6}, "phong: exponent = 2e+06 is not allowed; it must be a number in [0, 1e+06] or a texture."),
     ("walter", {"f0": 0.04, "int_ior": 1.5}, "walter: f0 excludes int_ior; give one of eta and k, material, f0, int_ior and"),
     ("walter", {"material": "Au", "eta": 1.5, "k": 1.0}, "walter: eta excludes material; give one of"),
     ("walter", {"eta": 1.5}, "walter: eta needs k beside it."),
-    ("walter", {"eta": 1.5, "k": -1.0}, "walter: k = -1 is not allowed; it must be"),
     ("walter", {"material": "gold"}, 'walter: material = "gold" is unknown; it must be "none", for F = 1, or one of Mitsuba\'s'),
     ("walter", {"material": "Au_palik"}, 'walter: material = "Au_palik" is unknown; did you mean "Cu_palik"? It must be "none"'),
     ("walter", {"material": 3}, "walter: material = 3 is a number; it must be a name."),
     ("walter", {"int_ior": "glas"}, 'walter: int_ior = "glas" is unknown; it must be a number or one of vacuum, helium'),
     ("walter", {"int_ior": 0}, "walter: int_ior = 0 is not allowed; it must be a number in [0.01, 100]"),
-    ("walter", {"int_ior": True}, "walter: int_ior = True is a boolean"),
-    ("walter", {"f0": 1.2}, "walter: f0 = 1.2 is not allowed"),
     ("walter", {"rotation": NAN}, "walter: rotation = nan is not allowed"),
     ("kurt", {"alpha_1": 0.1, "alpha_3": 0.1}, "kurt: alpha_3 leaves a gap; number the lobes from 1, so that this one is 2."),
     ("kurt", {"alpha": 0.1, "f0_1": 0.1}, "kurt: alpha excludes f0_1; number the names of all lobes, or of none."),
     ("kurt", {"alpha_u_1": 0.1}, "kurt: alpha_u_1 needs alpha_v_1 beside it; give both, or alpha_1 alone."),
-    ("lafortune", {"cx_1": 2.0}, "lafortune: cx_1 = 2 is not allowed; it must be a number in [-1.5, 1.5] or a texture."),
     ("lafortune", {"cx_9": 1.0}, "lafortune: unknown parameter cx_9; did you mean cx_"),
-    ("walter", {"shadowing": "smith"}, 'walter: shadowing = "smith" is unknown; it must be one of "separable" or "correlated".'),
     ("orennayar", {"sigma": 0.3, "alpha": 0.3}, "orennayar: sigma excludes alpha; give either sigma or alpha."),
     ("orennayar", {"alpha": 3}, "orennayar: alpha = 3 is not allowed; it must be a number in [0, 2.2] or a texture."),
-    ("roughdiffuse", {"use_fast_approx": "yes"}, 'roughdiffuse: use_fast_approx = "yes" is a string; it must be true or false.'),
     ("roughdiffuse", {"use_fast_approx": 1}, "roughdiffuse: use_fast_approx = 1 is a number; it must be true or false."),
     ("microfacet", {"gamma": 2}, 'microfacet: gamma does not belong to distribution = "beckmann", which has alpha, alpha_u and alpha_v of its own.'),
     ("microfacet", {"distribution": "gtr", "alpha_u": 0.1}, 'alpha_u does not belong to distribution = "gtr", which has alpha and gamma'),
@@ -65,22 +57,20 @@ REJECTED = [
     ("microfacet", {"distribution": "phong"}, 'microfacet: distribution = "phong" is unknown; it must be one of "beckmann", "ggx"'),
     ("microfacet", {"distribution": "abc"}, 'shadowing = "smith" is not known for distribution = "abc"; take it with beckmann, ggx or blinn,'),
     ("microfacet", {"distribution": "hepd", "shadowing": "schlick"}, 'shadowing = "schlick" is not known for distribution = "hepd"; take it with'),
-    ("microfacet", {"distribution": "hepd", "shadowing": "vcavity", "kappa": 90}, "microfacet: kappa = 90 is not allowed; it must be a number in [-80, 80]"),
-    ("microfacet", {"alfa": 0.1}, "microfacet: unknown parameter alfa; did you mean alpha?"),
     ("nishino", {"variant": "dsbrdf", "f0": 0.1}, 'nishino: f0 does not belong to variant = "dsbrdf", which has no parameter of its own.'),
-    ("low", {"variant": "smooth", "normalization": "fit"}, 'low: normalization does not belong to variant = "smooth", which has no parameter'),
     ("brady", {"specular_reflectance": -1.0}, "brady: specular_reflectance = -1 is not allowed; it must be a number, rgb or spectrum within [0, ∞)"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_spectral"])
-@pytest.mark.parametrize("plugin, given, message", REJECTED, ids=[f"{p} {g}" for p, g, _ in REJECTED])
-def test_rejected(plugin, given, message, variant):
-    with mi.variant_context(variant), pytest.raises(RuntimeError) as caught:
-        mi.load_dict({"type": plugin, **given})
-    sentence = one_line(caught.value)
-    assert message in sentence and sentence in str(caught.value)
-    assert sentence.startswith(f"{plugin}: ") and sentence.endswith(".")
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", pytest.param("scalar_spectral", marks=pytest.mark.slow)])
+def test_rejected(variant):
+    with mi.variant_context(variant):
+        for plugin, given, message in REJECTED:
+            with pytest.raises(RuntimeError) as caught:
+                mi.load_dict({"type": plugin, **given})
+            sentence = one_line(caught.value)
+            assert message in sentence and sentence in str(caught.value)
+            assert sentence.startswith(f"{plugin}: ") and sentence.endswith(".")
 
 
 @pytest.mark.usefixtures("llvm_rgb")

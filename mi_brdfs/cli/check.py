@@ -113,7 +113,7 @@ def check(
     if html_file is not None:
         write_text(html_file, page(reports))
     if junit_file is not None:
-        from ..validation.junit import junit
+        from ..validation.formats import junit
 
         write_text(junit_file, junit(reports))
     _print_reports(sources, reports, settings)
@@ -198,7 +198,7 @@ def _start_job(variant: str, sources: list[str]) -> None:
 
 def _print_reports(sources: list[BSDFSource], reports: list[Report], settings: Settings) -> None:
     """Print a block for each report, with the command that makes its failing checks again."""
-    from ..validation.text import block
+    from ..validation.formats import block
 
     for source, report in zip(sources, reports, strict=True):
         for line, style in block(report, out.width):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def print_ranking(fits: list[Fit]) -> None:
     """Print the models by their error, and the best one to paste."""
     from ..fit import METRICS
-    from ..fit.summary import notes, values
+    from ..fit.result import notes, values
 
     best = fits[0]
     out.print(best.file, style="bold")
@@ -48,7 +48,7 @@ def print_ranking(fits: list[Fit]) -> None:
 
 def print_medians(ranked: list[list[Fit]]) -> None:
     """Print the medians over the files."""
-    from ..fit.summary import medians
+    from ..fit.result import medians
 
     out.print("Medians", style="bold")
     rows = medians(ranked)

@@ -10,12 +10,10 @@ from ..measured import FileError
 from ..mitsuba.registry import find_model
 from ..writing import write_text
 from .engine import fit_configuration
-from .image_fit import ImageFit
-from .isotropy import isotropic
-from .lanes import rgb_variant
+from .lanes import isotropic, rgb_variant
 from .metrics import METRICS, Metric, find_metric
 from .observations import CUT, PAIRS, FitError, Observations, Source, observe
-from .pictures import images
+from .pictures import ImageFit, images
 from .result import Fit, Starts
 from .starts import warm
 from .unknowns import check_names, configurations
@@ -155,15 +153,13 @@ def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[F
         FitError: if the data of a fit are no file.
         OSError: if the page cannot be written.
     """
-    from .appearance import MOST, by_flip, check_file, render
+    from .appearance import MOST, by_flip, render
     from .html import Page
 
     page, found = Page(), []
     by_file: dict[str, list[Fit]] = {}
     for it in fits:
         by_file.setdefault(it.file, []).append(it)
-    for own in by_file.values():
-        check_file(own)
     for own in by_file.values():
         ranked = sorted(own, key=lambda it: it.held_out)
         shown = render(ranked if image else ranked[:MOST])

@@ -44,7 +44,9 @@ def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> A
     Raises:
         FitError: if the data are arrays.
     """
-    file = check_file(fits)
+    file = fits[0].file
+    if not os.path.exists(file):
+        raise FitError(f"Pictures need the file that was fitted; there is none of {file}.")
     with rgb_variant(), warnings.catch_warnings():
         warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
         pictures = []
@@ -55,17 +57,6 @@ def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> A
         stops = _stops(pictures[0])
         measured, *others = (encoded(2.0**stops * picture).astype(np.float32) for picture in pictures)
     return Appearance(measured, others, stops)
-
-
-def check_file(fits: Sequence[Fit]) -> str:
-    """Return the file that fits are of.
-
-    Raises:
-        FitError: if there is none.
-    """
-    if not os.path.exists(fits[0].file):
-        raise FitError(f"Pictures need the file that was fitted; there is none of {fits[0].file}.")
-    return fits[0].file
 
 
 def by_flip(fits: Sequence[Fit], shown: Appearance) -> tuple[list[Fit], Appearance]:

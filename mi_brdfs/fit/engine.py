@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -56,9 +56,7 @@ def fit_configuration(
             metric=metric,
             bsdf=configuration.bsdf(x),
             errors=errors[m],
-            sigma=_by_parameter(configuration, spread[m].sigma),
-            correlations=spread[m].correlations,
-            undetermined=spread[m].undetermined,
+            **spread[m],
             bounds=[u.label for u, value in zip(configuration.unknowns, x, strict=True) if u.at_end(float(value))],
             starts=Starts(len(own), warm, int((own <= AGREEMENT**2 * own.min() + 1e-16).sum())),
             bic=float(residuals * np.log(max(own.min(), 1e-300)) + len(x) * np.log(residuals)),
@@ -75,19 +73,10 @@ def fit_configuration(
     return fits
 
 
-class Uncertainty(NamedTuple):
-    """Of the unknowns at the best setting, but for those at the end of their range."""
-
-    sigma: list[float | None]
-    """The standard deviations; None where the data do not tell."""
-    correlations: dict[str, dict[str, float]]
-    undetermined: list[str]
-    """Unknowns that can change together without a change of the values."""
-
-
-def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Array) -> Uncertainty:
-    """Return the uncertainty from the Jacobian and from how far the data are from the model at each pair of directions,
-    so that noise may differ from pair to pair and be common to the channels.
+def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Array) -> dict[str, Any]:
+    """Return what a fit says of its uncertainty (``sigma``, ``correlations`` and ``undetermined``), from the Jacobian
+    and from how far the data are from the model at each pair of directions, so that noise may differ from pair to pair
+    and be common to the channels.
 
     Unknowns at the end of their range are anywhere in it as far as the data allow: where the others stand depends on
     that. They are given the variance of a uniform distribution beforehand.
@@ -117,17 +106,12 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
     known = [k for k in range(len(unknowns)) if not ended[k] and not lost[k]]
     rows = {labels[k]: {labels[j]: float(np.clip(ratio[k, j], -1, 1)) for j in known} for k in known}
-    sigma = [float(deviations[k]) if k in known else None for k in range(len(unknowns))]
-    return Uncertainty(sigma, rows, [label for label, gone in zip(labels, lost, strict=True) if gone])
-
-
-def _by_parameter(configuration: Configuration, sigma: list[float | None]) -> dict[str, Any]:
-    """Return the standard deviations by parameter, a list for a colour with several channels."""
-    found: dict[str, Any] = {}
-    for name in configuration.names:
-        numbers = [sigma[k] for k in configuration.indices(name)]
-        found[name] = numbers[0] if len(numbers) == 1 else numbers
-    return found
+    sigma: dict[str, Any] = {}
+    for name in problem.configuration.names:
+        own = [float(deviations[k]) if k in known else None for k in problem.configuration.indices(name)]
+        sigma[name] = own[0] if len(own) == 1 else own
+    undetermined = [label for label, gone in zip(labels, lost, strict=True) if gone]
+    return {"sigma": sigma, "correlations": rows, "undetermined": undetermined}
 
 
 def _in_highlight(problem: Problem, material: Observations, x: Array) -> int:

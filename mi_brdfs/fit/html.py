@@ -11,13 +11,12 @@ import numpy as np
 from ..measured import Measurement, read
 from ..pages import environment
 from ..pages.figures import DIFFERENCE, data_uri, svg
-from .appearance import MOST, Appearance, check_file, lightness
+from .appearance import MOST, Appearance, lightness
 from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import Fit
-from .summary import Median, medians, notes, values
+from .result import Fit, Median, medians, notes, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
@@ -90,12 +89,10 @@ class Page:
         """Add the fits to a material, the best first. With pictures of them, in the same order, it also gets drawings.
 
         Raises:
-            FitError: if the data are arrays.
-            FileError: if they cannot be read any more.
+            FileError: if the data cannot be read any more.
         """
-        file = check_file(fits)
         cards = [Card(it, rank) for rank, it in enumerate(fits, 1)]
-        section = Section(f"material-{len(self.sections) + 1}", file, cards)
+        section = Section(f"material-{len(self.sections) + 1}", fits[0].file, cards)
         if shown:
             _draw(section, shown)
         self.sections.append(section)

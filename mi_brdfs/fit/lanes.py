@@ -1,10 +1,12 @@
 """A model's values and derivatives for many settings at once: one kernel, with a lane for each pair of directions of
-each setting."""
+each setting; and which unknowns an isotropic material says nothing about."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cached_property
+from itertools import combinations
 
 import drjit as dr
 import mitsuba as mi
@@ -13,11 +15,19 @@ import numpy as np
 from ..mitsuba import llvm
 from ..probe.arrays import Array, context, floats, interaction, numbers, per_lane, vectors
 from ..probe.directions import hemisphere
+from ..variants import activated
 from .observations import FitError
 from .unknowns import Configuration
 
 LANES = 1 << 18
 """The most lanes of a kernel: memory does not grow with the number of materials."""
+
+PAIRS, TURN = 64, 0.65
+"""The pairs of directions that are compared with themselves, turned by this angle in radians."""
+PLACES = 0.3, 0.7
+"""Where each parameter is tried, as parts of its range on its scale."""
+TOLERANCE = 1e-3
+"""The largest relative difference that is rounding."""
 
 
 @contextmanager
@@ -27,20 +37,15 @@ def rgb_variant() -> Iterator[None]:
     if active is not None and active.endswith("_ad_rgb"):
         yield
         return
-    for name in ("cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb"):
-        if name not in mi.variants() or (name.startswith("llvm") and llvm.problem()):
-            continue
-        try:
-            mi.set_variant(name)
-        except ImportError:
-            continue
-        try:
-            yield
-        finally:
-            if active is not None:
-                mi.set_variant(active)
-        return
-    raise FitError(f"A fit needs a variant with derivatives: {llvm.problem() or 'none works on this machine'}.")
+    with ExitStack() as stack:
+        for name in ("cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb"):
+            if name in mi.variants() and not (name.startswith("llvm") and llvm.problem()):
+                with suppress(ImportError):
+                    stack.enter_context(activated(name))
+                    break
+        else:
+            raise FitError(f"A fit needs a variant with derivatives: {llvm.problem() or 'none works on this machine'}.")
+        yield
 
 
 class Lanes:
@@ -60,7 +65,6 @@ class Lanes:
             if not refused:
                 raise
             raise FitError(sentence.strip()) from None
-        self._sweeps = self._find_sweeps()
 
     def batches(self, pairs: Sequence[tuple[Array, Array]]) -> Iterator[range]:
         """Yield ranges of settings that fit into a kernel together."""
@@ -78,11 +82,7 @@ class Lanes:
     ) -> tuple[Array, Array]:
         """Return the values of all lanes, shape (lanes, channels), and the derivatives by the unknowns, shape (lanes,
         channels, unknowns), or none of them; float32."""
-        return self._evaluated(settings, pairs, self._sweeps if derivatives else [])
-
-    def _evaluated(
-        self, settings: Array, pairs: Sequence[tuple[Array, Array]], sweeps: list[list[int]]
-    ) -> tuple[Array, Array]:
+        sweeps = self._sweeps if derivatives else []
         counts = [len(wi) for wi, _ in pairs]
         si, wo = interaction(np.concatenate([wi for wi, _ in pairs])), vectors(np.concatenate([wo for _, wo in pairs]))
         dr.make_opaque(si)
@@ -134,25 +134,82 @@ class Lanes:
             dr.clear_grad(each)
         return tangent
 
-    def _find_sweeps(self) -> list[list[int]]:
-        """Return the unknowns of each sweep of differentiation: the channels of a colour together, unless some channel
-        of the value depends on another one of the colour."""
+    @cached_property
+    def _sweeps(self) -> list[list[int]]:
+        """The unknowns of each sweep of differentiation: the channels of a colour together, unless some channel of the
+        value changes with another one of the colour."""
         unknowns = self.configuration.unknowns
-        alone = [[k] for k in range(len(unknowns))]
-        names = list(dict.fromkeys(unknown.name for unknown in unknowns))
+        names = dict.fromkeys(unknown.name for unknown in unknowns)
         together = [self.configuration.indices(name) for name in names]
-        if len(together) == len(alone):
-            return alone
-        rng = np.random.default_rng(1)
+        if len(together) == len(unknowns):
+            return together
         ends = np.array([np.clip(unknown.ends, -3, 8) for unknown in unknowns])
-        points = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * rng.uniform(0.2, 0.8, (8, len(unknowns)))
-        settings = np.stack([u.from_scale(points[:, k]) for k, u in enumerate(unknowns)], axis=-1)
-        pairs = [(hemisphere(64, 1, 0.2), hemisphere(64, 2, 0.2))] * 8
-        _, found = self._evaluated(settings, pairs, alone)
-        jacobian = np.nan_to_num(np.asarray(found))
-        for sweep in together:
-            if len(sweep) > 1 and any(
-                jacobian[:, channel, k].any() for channel in range(3) for j, k in enumerate(sweep) if j != channel
-            ):
-                return alone
+        points = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * np.random.default_rng(1).uniform(0.2, 0.8, (8, len(unknowns)))
+        colours = [(k, channel) for sweep in together if len(sweep) > 1 for channel, k in enumerate(sweep)]
+        moved = np.stack([points, *(points + 0.5 * (np.arange(len(unknowns)) == k) for k, _ in colours)])
+        settings = np.stack([u.from_scale(moved[..., k]) for k, u in enumerate(unknowns)], axis=-1)
+        pairs = [(hemisphere(64, 1, 0.2), hemisphere(64, 2, 0.2))] * (8 * len(moved))
+        values, _ = self.evaluate(settings.reshape(len(pairs), -1), pairs, derivatives=False)
+        first, *others = values.reshape(len(moved), 8 * 64, -1)
+        for (_, channel), other in zip(colours, others, strict=True):
+            if not np.array_equal(np.delete(first, channel, axis=1), np.delete(other, channel, axis=1), equal_nan=True):
+                return [[k] for k in range(len(unknowns))]
         return together
+
+
+def isotropic(configuration: Configuration) -> Configuration:
+    """Return a configuration whose values do not change as both directions turn about the normal.
+
+    Numbers that would change that are left at their defaults, but pairs of them that would not if equal are tied: so
+    it is with Lafortune's Cx and Cy.
+    """
+    names = [u.name for u in configuration.unknowns if not u.colour]
+    if not names:
+        return configuration
+    lanes, indices = Lanes(configuration, 3), {name: configuration.indices(name)[0] for name in names}
+    base = np.array([
+        u.default if u.default is not None else float(u.from_scale(np.mean(np.clip(u.ends, -3, 3))))
+        for u in configuration.unknowns
+    ])  # fmt: skip
+    base = np.array([np.clip(x, u.low, u.high) for x, u in zip(base, configuration.unknowns, strict=True)])
+
+    def turns(settings: list[np.ndarray]) -> np.ndarray:
+        """Return whether each of some settings is anisotropic."""
+        wi, wo = hemisphere(PAIRS, 1, 0.2), hemisphere(PAIRS, 2, 0.2)
+        wo[::2] = wi[::2] * [-1, -1, 1] + 0.05 * wo[::2]  # near the mirror direction, where glossy lobes are
+        wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+        cos, sin = np.cos(TURN), np.sin(TURN)
+        turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        pairs = [(np.concatenate([wi, wi @ turn]), np.concatenate([wo, wo @ turn]))] * len(settings)
+        values, _ = lanes.evaluate(np.array(settings), pairs, derivatives=False)
+        straight, turned = np.moveaxis(values.reshape(len(settings), 2, PAIRS, -1), 1, 0)
+        scale = np.maximum(np.abs(straight), 1e-3 * np.abs(straight).max(axis=1, keepdims=True))
+        return np.asarray((np.abs(straight - turned) > TOLERANCE * scale).any(axis=(1, 2)))
+
+    def moved(*together: str) -> list[np.ndarray]:
+        """Return the base with some parameters at the same other places."""
+        settings = []
+        for part in PLACES:
+            setting, unknown = base.copy(), configuration.unknowns[indices[together[0]]]
+            low, high = unknown.ends
+            setting[[indices[name] for name in together]] = unknown.from_scale(np.array(low + part * (high - low)))
+            settings.append(setting)
+        return settings
+
+    found = turns([base, *(setting for name in names for setting in moved(name))])
+    if found[0]:  # no matter what they are
+        return configuration
+    tried = np.any(found[1:].reshape(len(names), len(PLACES)), axis=1)
+    breaking = [name for name, breaks in zip(names, tried, strict=True) if breaks]
+    limits = {name: (configuration.unknowns[indices[name]].low, configuration.unknowns[indices[name]].high)
+              for name in breaking}  # fmt: skip
+    alike = [(a, b) for a, b in combinations(breaking, 2) if limits[a] == limits[b]]
+    tied: dict[str, str] = {}
+    if alike:
+        found = turns([setting for pair in alike for setting in moved(*pair)])
+        broken = np.any(found.reshape(len(alike), len(PLACES)), axis=1)
+        for (a, b), apart in zip(alike, broken, strict=True):
+            if not apart and a not in tied and b not in tied:
+                tied[b] = a
+    dropped = [name for name in breaking if name not in tied and name not in tied.values()]
+    return configuration.without(dropped, tied)

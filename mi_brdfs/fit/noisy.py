@@ -1,12 +1,14 @@
-"""Levenberg–Marquardt steps where residuals and derivatives are noisy, as those of renderings are.
+"""Steps where residuals and derivatives are noisy, as those of renderings are: Levenberg–Marquardt's for numbers and
+colours, and Adam's for textures, texel by texel.
 
-Expectations are without bias: the residuals and their derivatives come of different random numbers, and of each there
-are two, so that no product has the square of a noise in it.
+Expectations of the former are without bias: the residuals and their derivatives come of different random numbers, and
+of each there are two, so that no product has the square of a noise in it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +28,12 @@ PATIENCE, GAIN = 3, 0.9
 """Nor is there after so many steps that did not lower the cost by this factor."""
 MORE = 4
 """How many times the samples the last step takes."""
+
+TEXEL_STEPS = 10
+"""Steps of Adam for each that is told of."""
+FIRST, LAST = 0.2, 0.01
+"""The longest of these along an unknown, on its scale, in the beginning and at the end."""
+MOMENTUM, MEMORY = 0.9, 0.99
 
 
 class Look(NamedTuple):
@@ -120,3 +128,29 @@ def _matrix(one: Array, other: Array) -> Array:
     parts, directions = np.linalg.eigh((axes / roots).T @ (cross / np.outer(scale, scale)) @ (axes / roots))
     kept = (axes * roots) @ directions
     return np.asarray((kept * np.clip(parts, LEAST, 1)) @ kept.T * np.outer(scale, scale))
+
+
+def refine_textures(rendered: Rendered, point: Array, steps: int, on_step: Callable[[], None]) -> Array:
+    """Give the textures of slots the texels that suit the pictures best, from where they are at a point, and return the
+    point there: numbers and colours move along, and textures have no shift any more.
+
+    D. P. Kingma, J. Ba, Adam: A method for stochastic optimization, ICLR 2015, arXiv:1412.6980.
+    """
+    slots = rendered.slots
+    bases = [slot.on_scale(point[place]) for slot, place in zip(slots, rendered.places, strict=True)]
+    means, squares = ([np.zeros_like(base) for base in bases] for _ in range(2))
+    rest = np.zeros_like(point)
+    for step in range(1, TEXEL_STEPS * steps + 1):
+        rendered.slots = [replace(slot, base=base) for slot, base in zip(slots, bases, strict=True)]
+        rate = FIRST * (LAST / FIRST) ** (step / (TEXEL_STEPS * steps))
+        for k, gradient in enumerate(rendered.gradients(rest)):
+            means[k] = MOMENTUM * means[k] + (1 - MOMENTUM) * gradient
+            squares[k] = MEMORY * squares[k] + (1 - MEMORY) * gradient**2
+            mean, square = means[k] / (1 - MOMENTUM**step), squares[k] / (1 - MEMORY**step)
+            bases[k] = np.clip(bases[k] - rate * mean / np.sqrt(square + 1e-30), *slots[k].unknown.ends)
+        if step % TEXEL_STEPS == 0:
+            on_step()
+    rendered.slots = [replace(s, base=b) if s.is_texture else s for s, b in zip(slots, bases, strict=True)]
+    return np.concatenate([
+        np.zeros(slot.channels) if slot.is_texture else base for slot, base in zip(slots, bases, strict=True)
+    ])  # fmt: skip

@@ -21,12 +21,12 @@ class Problem:
     def __init__(self, configuration: Configuration, materials: Sequence[Observations], metric: Metric):
         self.configuration, self.materials, self.metric = configuration, materials, metric
         self.lanes = Lanes(configuration, materials[0].channels)
-        self.targets = [_Target(material, metric) for material in materials]
+        self.targets = [_Target(material, slice(0, material.fitted), metric) for material in materials]
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """The ends of the unknowns on their scales; turns have none."""
-        ends = np.array([u.ends if u.scale != "turns" else (-np.inf, np.inf) for u in self.configuration.unknowns])
+        """The ends of the unknowns on their scales."""
+        ends = np.array([u.ends for u in self.configuration.unknowns])
         return ends[:, 0], ends[:, 1]
 
     def values_of(self, points: Array) -> Array:
@@ -46,34 +46,28 @@ class Problem:
             found.matrix[p] = jacobian.T @ jacobian * np.outer(slopes[p], slopes[p])
         return found
 
+    def costs(self, which: Sequence[int] | Array, points: Array, pairs: int) -> Array:
+        """Return the same sums of squares without derivatives, infinite where they are no numbers."""
+        found = np.empty(len(points))
+        for p, residuals, _ in self.residuals(which, self.values_of(points), pairs, derivatives=False):
+            found[p] = residuals @ residuals
+        return np.where(np.isfinite(found), found, np.inf)
+
     def residuals(
-        self, which: Sequence[int] | Array, values: Array, pairs: int | None = None
+        self, which: Sequence[int] | Array, values: Array, pairs: int | None = None, derivatives: bool = True
     ) -> Iterator[tuple[int, Array, Array]]:
         """Yield ``(setting, residuals, derivatives by the unknowns)`` of the fitted pairs, of shapes (N channels,) and
         (N channels, K): their squares add to the square of the error."""
         targets = [self.targets[m] for m in which]
-        given = [(t.fitted[0][:pairs], t.fitted[1][:pairs]) for t in targets]
+        given = [(t.wi[:pairs], t.wo[:pairs]) for t in targets]
         for batch in self.lanes.batches(given):
-            own = targets[batch.start : batch.stop]
-            model, jacobian = self.lanes.evaluate(values[batch.start : batch.stop], given[batch.start : batch.stop])
+            own = slice(batch.start, batch.stop)
+            model, jacobian = self.lanes.evaluate(values[own], given[own], derivatives)
             first = 0
-            for p, target in zip(batch, own, strict=True):
+            for p in batch:
                 last = first + len(given[p][0])
-                yield p, *target.compared(model[first:last], jacobian[first:last], self.metric)
+                yield p, *targets[p].compared(model[first:last], jacobian[first:last])
                 first = last
-
-    def costs(self, which: Sequence[int] | Array, values: Array, pairs: int) -> Array:
-        """Return the squares of the errors on the first of the fitted pairs alone."""
-        targets, found = [self.targets[m] for m in which], np.empty(len(values))
-        given = [(t.fitted[0][:pairs], t.fitted[1][:pairs]) for t in targets]
-        for batch in self.lanes.batches(given):
-            own = given[batch.start : batch.stop]
-            model, _ = self.lanes.evaluate(values[batch.start : batch.stop], own, derivatives=False)
-            first = 0
-            for p, (wi, _) in zip(batch, own, strict=True):
-                found[p] = targets[p].cost(model[first : first + len(wi)], self.metric)
-                first += len(wi)
-        return np.where(np.isfinite(found), found, np.inf)
 
     def errors(self, which: Sequence[int] | Array, values: Array) -> list[dict[str, dict[str, float]]]:
         """Return the errors of settings in every metric, on the fitted pairs and on those held out."""
@@ -86,52 +80,32 @@ class Problem:
             ])  # fmt: skip
             parts = {"fitted": slice(0, material.fitted), "held_out": slice(material.fitted, None)}
             found.append({
-                name: {part: _error(material, model, rows, metric) for part, rows in parts.items()}
+                name: {part: _Target(material, rows, metric).error(model[rows]) for part, rows in parts.items()}
                 for name, metric in METRICS.items()
             })  # fmt: skip
         return found
 
 
 class _Target:
-    """The fitted pairs of a material, transformed as a metric does."""
+    """Some pairs of a material, transformed as a metric does, with the roots of weights that add to 1."""
 
-    def __init__(self, material: Observations, metric: Metric):
-        rows = slice(0, material.fitted)
-        self.fitted = material.wi[rows], material.wo[rows]
-        self.factor = _cosines(material)[rows]
-        self.transformed = metric.transform(material.f[rows] * material.wi[rows, 2:])
-        self.root = np.sqrt(_weights(material, metric, rows))
+    def __init__(self, material: Observations, rows: slice, metric: Metric):
+        self.metric, self.wi, self.wo = metric, material.wi[rows], material.wo[rows]
+        self.factor = self.wi[:, 2:].astype(np.float64) / self.wo[:, 2:]  # of what a plugin returns, f cosθo
+        self.transformed = metric.transform(material.f[rows] * self.wi[:, 2:])
+        weights = metric.weights(self.wo.astype(np.float64), material.solid_angle[rows])
+        weights = weights[:, None] * material.usable[rows]
+        self.root = np.sqrt(weights / max(weights.sum(), 1e-300))
 
-    def compared(self, model: Array, jacobian: Array, metric: Metric) -> tuple[Array, Array]:
+    def compared(self, model: Array, jacobian: Array) -> tuple[Array, Array]:
         """Return the residuals and their derivatives by the unknowns, flat, of the first of the pairs, as many as there
         are values."""
         root, factor = self.root[: len(model)], self.factor[: len(model)]
         seen = model.astype(np.float64) * factor
-        residuals = root * (metric.transform(seen) - self.transformed[: len(model)])
-        scale = root * metric.derivative(seen) * factor
-        return residuals.ravel(), (scale[..., None] * jacobian).reshape(residuals.size, -1)
+        residuals = root * (self.metric.transform(seen) - self.transformed[: len(model)])
+        scale = root * self.metric.derivative(seen) * factor
+        return residuals.ravel(), (scale[..., None] * jacobian).reshape(residuals.size, jacobian.shape[-1])
 
-    def cost(self, model: Array, metric: Metric) -> float:
-        """Return the square of the error on the first of the pairs, as many as there are values."""
-        n = len(model)
-        root, seen = self.root[:n], model.astype(np.float64) * self.factor[:n]
-        difference = root * (metric.transform(seen) - self.transformed[:n])
-        return float((difference**2).sum() / max((root**2).sum(), 1e-300))
-
-
-def _cosines(material: Observations) -> Array:
-    """Return cosθi / cosθo, which turns what a plugin returns into what metrics compare."""
-    return material.wi[:, 2:].astype(np.float64) / material.wo[:, 2:]
-
-
-def _weights(material: Observations, metric: Metric, rows: slice) -> Array:
-    """Return weights that add to 1, shape (N, channels)."""
-    weights = metric.weights(material.wo[rows].astype(np.float64), material.solid_angle[rows])
-    weights = weights[:, None] * material.usable[rows]
-    return weights / max(weights.sum(), 1e-300)
-
-
-def _error(material: Observations, model: Array, rows: slice, metric: Metric) -> float:
-    seen = (model.astype(np.float64) * _cosines(material))[rows]
-    difference = metric.transform(seen) - metric.transform((material.f * material.wi[:, 2:])[rows])
-    return float(np.sqrt((_weights(material, metric, rows) * difference**2).sum()))
+    def error(self, model: Array) -> float:
+        residuals, _ = self.compared(model, np.empty((*model.shape, 0)))
+        return float(np.sqrt(residuals @ residuals))

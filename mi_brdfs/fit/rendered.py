@@ -44,12 +44,8 @@ class Slot:
     def is_texture(self) -> bool:
         return self.base.ndim > 1
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        return self.unknown.ends if self.unknown.scale != "turns" else (-np.inf, np.inf)
-
     def on_scale(self, shift: Array) -> Array:
-        return np.clip(self.base + shift, *self.ends)
+        return np.clip(self.base + shift, *self.unknown.ends)
 
     def values(self, shift: Array) -> Array:
         return self.unknown.from_scale(self.on_scale(shift))
@@ -120,7 +116,7 @@ class Rendered:
     @property
     def box(self) -> tuple[Array, Array]:
         """The ends of the shifts; texels are limited by themselves."""
-        ends = np.array([(-LARGEST, LARGEST) if slot.is_texture else slot.ends for slot in self.slots
+        ends = np.array([(-LARGEST, LARGEST) if slot.is_texture else slot.unknown.ends for slot in self.slots
                          for _ in range(slot.channels)])  # fmt: skip
         return ends[:, 0], ends[:, 1]
 

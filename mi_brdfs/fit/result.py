@@ -1,10 +1,12 @@
-"""A fitted material, and what the fit says of it."""
+"""A fitted material, what the fit says of it, and the rows of tables that the command prints and its report shows."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from statistics import median
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -26,6 +28,11 @@ FEW = 5
 """Pairs of directions in a highlight below which its width is a guess."""
 CORRELATED = 0.95
 """The correlation from which two parameters are told to be hard to tell apart."""
+ROW = (
+    "file", "model", "metric", "bsdf", "errors", "flip", "sigma", "starts", "bic", "correlations", "undetermined",
+    "bounds", "albedo", "resolved", "scatter", "cut", "pairs", "negative", "missing",
+)  # fmt: skip
+"""What JSON has of a fit, besides the remarks."""
 
 
 class Starts(NamedTuple):
@@ -138,36 +145,67 @@ class Fit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as what JSON can hold; ``bsdf`` is the dict for ``mi.load_dict``."""
-        finite = {
+        row = {name: getattr(self, name) for name in ROW}
+        row["errors"] = {
             name: {part: value if np.isfinite(value) else None for part, value in parts.items()}
             for name, parts in self.errors.items()
         }
-        return {
-            "file": self.file,
-            "model": self.model,
-            "metric": self.metric,
-            "bsdf": self.bsdf,
-            "errors": finite,
-            "flip": self.flip,
-            "sigma": self.sigma,
-            "starts": self.starts._asdict(),
-            "bic": self.bic,
-            "correlations": self.correlations,
-            "undetermined": self.undetermined,
-            "bounds": self.bounds,
-            "albedo": self.albedo,
-            "resolved": self.resolved,
-            "scatter": [
-                {"theta_i": theta, "stated": stated, "values": values, "fit": float(np.mean(self.albedos(theta)))}
-                for theta, stated, values in self.scatter
-            ],
-            "cut": self.cut,
-            "pairs": self.pairs,
-            "negative": self.negative,
-            "missing": self.missing,
-            "remarks": self.remarks(),
-        }
+        row["starts"] = self.starts._asdict()
+        row["scatter"] = [
+            {"theta_i": theta, "stated": stated, "values": values, "fit": float(np.mean(self.albedos(theta)))}
+            for theta, stated, values in self.scatter
+        ]
+        return row | {"remarks": self.remarks()}
 
     def to_xml(self) -> str:
         """Return the BSDF as XML, to paste into a scene."""
         return to_xml(self.bsdf)
+
+
+class Median(NamedTuple):
+    """A model over several materials."""
+
+    error: float
+    """By which models are ranked: the FLIP error where pictures were compared, and else the held-out one."""
+    held_out: float
+    fitted: float
+    model: str
+    files: int
+    best_in: int
+    flip: float | None
+
+
+def notes(fit: Fit) -> str:
+    """Return what of a fit calls for caution, in words."""
+    words = ["albedo above 1"] * (fit.albedo > 1) + ["unresolved"] * (not fit.resolved)
+    return ", ".join(words + ([f"at an end: {', '.join(fit.bounds)}"] if fit.bounds else []))
+
+
+def values(fit: Fit) -> list[tuple[str, float, float | None]]:
+    """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's numbers, the first has the
+    name."""
+    found = []
+    for name, sigma in fit.sigma.items():
+        value = fit.bsdf[name]
+        for k, number in enumerate(value["value"] if isinstance(value, dict) else [value]):
+            found.append(("" if k else name, number, sigma[k] if isinstance(sigma, list) else sigma))
+    return found
+
+
+def medians(ranked: Sequence[Sequence[Fit]]) -> list[Median]:
+    """Return the medians of each model's errors over materials, whose fits are each in the order of their rank; the
+    best first."""
+    by_model: dict[str, list[Fit]] = {}
+    for own in ranked:
+        for it in own:
+            by_model.setdefault(it.model, []).append(it)
+    winners = [own[0].model for own in ranked]
+    found = []
+    for model, own in by_model.items():
+        held_out = median(it.held_out for it in own)
+        fitted = median(it.errors[it.metric]["fitted"] for it in own)
+        seen = [it.flip for it in own if it.flip is not None]
+        flip = median(seen) if seen else None
+        error = held_out if flip is None else flip
+        found.append(Median(error, held_out, fitted, model, len(own), winners.count(model), flip))
+    return sorted(found, key=lambda it: it.error)

@@ -111,11 +111,11 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
     for m, material in enumerate(problem.materials):
         rng = np.random.default_rng(seed)  # the same with other materials beside
         tried = _advanced(problem, m, candidates(problem, material, rng), max(ADVANCED, 2 * count), rng)
-        order = np.argsort(_scores(problem, m, tried), kind="stable")
+        order = _best_first(problem, m, tried)
         chosen = [_completed(problem, tried[order[0]], values) for values in own]
         if known:
             warm_points = np.array([_completed(problem, tried[order[0]], values) for values in known])
-            chosen.append(warm_points[np.argmin(_scores(problem, m, warm_points))])
+            chosen.append(warm_points[_best_first(problem, m, warm_points)[0]])
         best = -(-count // 2)
         rest = order[best:]  # none, where more starts are asked for than there are candidates
         others = rng.choice(rest, min(count - best, len(rest)), replace=False)
@@ -127,7 +127,7 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
 
 def _advanced(problem: Problem, m: int, tried: Array, count: int, rng: np.random.Generator) -> Array:
     """Return some of the candidates, half of them the best ones, some steps on."""
-    order = np.argsort(_scores(problem, m, tried), kind="stable")
+    order = _best_first(problem, m, tried)
     best = order[: count // 2]
     others = rng.choice(order[len(best) :], min(count - len(best), len(order) - len(best)), replace=False)
     points = tried[[*best, *others]]
@@ -135,13 +135,13 @@ def _advanced(problem: Problem, m: int, tried: Array, count: int, rng: np.random
     return solve(lambda which, at: problem.sums([m] * len(which), at, COMPARED), points, low, high, steps=STEPS)[0]
 
 
-def _scores(problem: Problem, m: int, points: Array) -> Array:
-    return problem.costs([m] * len(points), problem.values_of(points), COMPARED)
+def _best_first(problem: Problem, m: int, points: Array) -> Array:
+    return np.argsort(problem.costs([m] * len(points), points, COMPARED), kind="stable")
 
 
 def _completed(problem: Problem, point: Array, values: dict[int, float]) -> Array:
     """Return a point with some unknowns at given values."""
     point = point.copy()
     for k, value in values.items():
-        point[k] = problem.configuration.unknowns[k].to_scale(np.array(value))
+        point[k] = problem.configuration.unknowns[k].to_scale(value)
     return point

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..model import Model
 from ..parameters import Parameter, PerLobe, Quantity, nested
 from ..parameters.messages import listed, meant
+from ..probe.arrays import Array
 from ..probe.parameter_space import choices
 from .observations import FitError
 
@@ -19,6 +21,27 @@ SMALLEST, LARGEST = 1e-3, 1e6
 """Where a search on a logarithmic scale begins if a range begins at 0, and ends if it has no end."""
 EDGE = 1e-5
 """How near to its ends a share is sought, as a part of its range; so near, it counts as at the end."""
+
+
+class Scale(NamedTuple):
+    """u of x, x of u, and dx/du of x, for numbers with the sum of the ends of their range."""
+
+    u: Callable[[Array, float], Array]
+    x: Callable[[Array, float], Array]
+    slope: Callable[[Array, float], Array]
+
+
+SCALES = {
+    "log": Scale(lambda x, _: np.log(x), lambda u, _: np.exp(u), lambda x, _: x),
+    "logit": Scale(  # a share of the range
+        lambda x, whole: np.log(x / whole / (1 - x / whole)),
+        lambda u, whole: whole / (1 + np.exp(-u)),
+        lambda x, whole: x * (1 - x / whole),
+    ),
+    "asinh": Scale(lambda x, _: np.arcsinh(x), lambda u, _: np.sinh(u), lambda x, _: np.sqrt(1 + x * x)),
+    "turns": Scale(lambda x, _: x, lambda u, _: u, lambda x, _: np.ones_like(x)),
+}
+"""By name: for positive numbers, shares, numbers of both signs, and rotations, whose range has no ends."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +56,7 @@ class Unknown:
     low: float
     high: float
     scale: str
-    """"log", "logit" (a share of the range), "asinh" (numbers of both signs) or "turns"."""
+    """One of ``SCALES``."""
     default: float | None = None
 
     @property
@@ -46,38 +69,15 @@ class Unknown:
         low, high = self.to_scale(np.array([self.low, self.high]))
         return float(low), float(high)
 
-    def to_scale(self, x: np.ndarray) -> np.ndarray:
-        x = np.asarray(x, np.float64)
-        if self.scale == "turns":
-            return x
-        x = np.clip(x, self.low, self.high)
-        if self.scale == "log":
-            return np.log(x)
-        if self.scale == "asinh":
-            return np.arcsinh(x)
-        share = x / (self.high + self.low)
-        return np.log(share / (1 - share))
+    def to_scale(self, x: ArrayLike) -> Array:
+        return SCALES[self.scale].u(np.clip(np.asarray(x, np.float64), self.low, self.high), self.high + self.low)
 
-    def from_scale(self, u: np.ndarray) -> np.ndarray:
-        if self.scale == "turns":
-            return u
-        if self.scale == "log":
-            x = np.exp(u)
-        elif self.scale == "asinh":
-            x = np.sinh(u)
-        else:
-            x = (self.high + self.low) / (1 + np.exp(-u))
-        return np.clip(x, self.low, self.high)
+    def from_scale(self, u: Array) -> Array:
+        return np.clip(SCALES[self.scale].x(u, self.high + self.low), self.low, self.high)
 
-    def slope(self, x: np.ndarray) -> np.ndarray:
+    def slope(self, x: Array) -> Array:
         """Return dx/du."""
-        if self.scale == "turns":
-            return np.ones_like(x)
-        if self.scale == "log":
-            return x
-        if self.scale == "asinh":
-            return np.sqrt(1 + x * x)
-        return x * (1 - x / (self.high + self.low))
+        return SCALES[self.scale].slope(x, self.high + self.low)
 
     def shown(self, x: float) -> float:
         """Return a value as a plugin dict has it: half turns change nothing."""
@@ -85,9 +85,7 @@ class Unknown:
 
     def at_end(self, x: float) -> bool:
         """Return whether a value is at an end of the range."""
-        if self.scale == "turns":
-            return False
-        u, (low, high) = float(self.to_scale(np.array(x))), self.ends
+        u, (low, high) = float(self.to_scale(x)), self.ends
         return min(u - low, high - u) < 1e-3 * (high - low)
 
 
@@ -96,7 +94,7 @@ def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
     a logarithmic one."""
     low, high = quantity.limits
     if quantity.turns:
-        low, high, scale = -0.5, 0.5, "turns"
+        low, high, scale = -math.inf, math.inf, "turns"
     elif low < 0:
         low, high, scale = max(low, -LARGEST), min(high, LARGEST), "asinh"
     elif low == 0 and high <= 1:
@@ -146,7 +144,7 @@ class Configuration:
     def is_colour(self, name: str) -> bool:
         return self.unknowns[self.indices(name)[0]].colour
 
-    def bsdf(self, x: np.ndarray) -> dict[str, Any]:
+    def bsdf(self, x: Array) -> dict[str, Any]:
         """Return the plugin dict for values of the unknowns."""
         values: dict[str, Any] = {}
         for name in self.names:
@@ -191,14 +189,13 @@ def configurations(
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
     tied = {key: value for key, value in tied.items() if {key, value} <= known}
-    words = {choice: allowed[:1] for choice, allowed in _choices(model.declared())}
+    words = dict[str, tuple[Any, ...]]()
     for choice, allowed in _choices(model.declared()):
-        if choice in given:
-            wanted = given[choice] if isinstance(given[choice], tuple) else (given[choice],)
-            for word in wanted:
-                if word not in allowed:
-                    raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
-            words[choice] = wanted
+        wanted = given.get(choice, allowed[0])
+        words[choice] = wanted if isinstance(wanted, tuple) else (wanted,)
+        for word in words[choice]:
+            if word not in allowed:
+                raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
     fixed = {key: value for key, value in given.items() if key not in words}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
     found = []

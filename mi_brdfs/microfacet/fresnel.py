@@ -132,4 +132,4 @@ class NamedConductor(Conductor):
 
 
 for _term in (Conductor, NamedConductor, Schlick, Dielectric, Unit):
-    FresnelSet.add_term(_term)
+    FresnelSet().add_term(_term)

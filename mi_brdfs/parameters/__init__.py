@@ -16,13 +16,12 @@ textured and optimised ones are limited to it where they are evaluated.
 """
 
 from .colours import Colour, Reflectance
-from .file import File
 from .fresnel import ConductorName, FresnelSet
 from .groups import OneOf, OneTerm, PerLobe
 from .parameter import Parameter, ParameterRow, Quantity, nested
-from .preset import Preset
+from .published import Preset
 from .reader import ParameterError, PropertyReader, Range
-from .scalars import Choice, Flag, Index, Number, Rotation, Spelling
+from .scalars import Choice, File, Flag, Index, Number, Rotation, Spelling
 
 __all__ = [
     "Choice",

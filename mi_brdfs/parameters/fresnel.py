@@ -5,44 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import mitsuba as mi
 
 from ..math import clamp
 from .colours import rgb_texture
+from .groups import OneTerm
 from .messages import listed, meant, shown
-from .parameter import BoundParameters, Parameter, ParameterRow
+from .parameter import Parameter, ParameterRow
 from .reader import PropertyReader, Range
 
 
-class FresnelSet(Parameter):
+class FresnelSet(OneTerm):
     """The Fresnel term: of a conductor (eta and k, or a material's name), Schlick's (f0), of a dielectric (int_ior
     over ext_ior), or none (F = 1), as the given parameters imply; or another one by its word. Evaluated, a function of
     the cosine."""
 
     words: dict[str, Mapping[str, Parameter]] = {}
-    terms: ClassVar[dict[str, Any]] = {}
-    """The term of each word, made by ``of_values``: those of :mod:`mi_brdfs.microfacet.fresnel`, and of others."""
+    terms: dict[str, Any] = {}
+    """The term of each word: those of :mod:`mi_brdfs.microfacet.fresnel`, and of others. All models have the same."""
     implied_words = ("conductor", "material", "schlick", "dielectric", "none")
 
-    own: BoundParameters
-    """Once bound, the parameters of the chosen word."""
-    word: str
-
     def __init__(self) -> None:
-        super().__init__("another Fresnel term")
-
-    @classmethod
-    def add_term(cls, term: Any) -> None:
-        for name, parameter in term.parameters.items():
-            parameter.__set_name__(None, name)
-        cls.words[term.word], cls.terms[term.word] = term.parameters, term
+        Parameter.__init__(self, "another Fresnel term")
 
     @property
-    def brought(self) -> list[str]:
+    def brought(self) -> tuple[str, ...]:
         """The words that others have brought."""
-        return [word for word in self.words if word not in self.implied_words]
+        return tuple(word for word in self.words if word not in self.implied_words)
 
     @property
     def fit_words(self) -> tuple[str, ...]:
@@ -51,22 +42,16 @@ class FresnelSet(Parameter):
 
     @property
     def names(self) -> list[str]:
-        own = [name for parameter in self.children() for name in parameter.names]
+        own = [name for word in self.words for name in self.names_of(word)]
         return [*own, *([self.name] if self.brought else [])]
 
     def rivals(self, name: str) -> list[str]:
         declared = next((it for it in self.words.values() if name in it), {})
         return [other for other in self.names if other not in declared]
 
-    def bind(self, reader: PropertyReader) -> FresnelSet:
-        word = self._word(reader)
-        own = BoundParameters(self.words[word].values(), reader)
-        chosen = own.chosen | ({} if word in self.implied_words else {self.name: word})
-        return self.replace(word=word, own=own, textures=own.textures, ranges=own.ranges, chosen=chosen)
-
     def _word(self, reader: PropertyReader) -> str:
-        """Return the word that the given parameters imply."""
-        given = {word: [name for name in declared if name in reader] for word, declared in self.words.items()}
+        """Return the word that the given parameters imply, or that is given."""
+        given = {word: [name for name in self.names_of(word) if name in reader] for word in self.words}
         chosen = [word for word in self.implied_words if given[word]]
         other = next((name for word in self.brought for name in (self.name, *given[word]) if name in reader), None)
         if other:
@@ -75,12 +60,7 @@ class FresnelSet(Parameter):
             if self.name not in reader:
                 words = listed(self.brought, quote=True)
                 raise reader.error(other, f"needs {self.name} beside it, which is {words}")
-            word = reader.choice(self.name, tuple(self.brought))
-            wrong = next((name for it in self.brought if it != word for name in given[it]), None)
-            if wrong and wrong not in self.words[word]:
-                has = f"has {listed(self.words[word], 'and')}" if self.words[word] else "has no parameter"
-                raise reader.error(wrong, f'does not belong to {self.name} = "{word}", which {has} of its own')
-            return word
+            return self._given(reader, self.brought)
         if len(chosen) > 1:
             first, second = (given[word][0] for word in chosen[:2])
             raise reader.error(
@@ -92,24 +72,12 @@ class FresnelSet(Parameter):
                     raise reader.error(name, f"needs {other} beside it")
         return chosen[0] if chosen else "none"
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
-        return self.terms[self.word].of_values(self.own.evaluate(si, active))
-
-    def placeholder(self) -> Any:
-        return self.terms[self.word].of_values(self.own.placeholders())
+    def _made_of(self, values: dict[str, Any]) -> Any:
+        return self.terms[self.word].of_values(values)
 
     def rows(self) -> list[ParameterRow]:
         own = [row for word in self.implied_words for it in self.words[word].values() for row in it.rows()]
-        if not self.brought:
-            return own
-        words = " | ".join(self.brought)
-        others = [
-            row._replace(text=f"with {word}: {row.text}")
-            for word in self.brought
-            for parameter in self.words[word].values()
-            for row in parameter.rows()
-        ]
-        return [*own, ParameterRow(self.name, "string", "none", words, self.text), *others]
+        return [*own, *(self._rows(self.brought, "none") if self.brought else [])]
 
 
 class ConductorName(Parameter):

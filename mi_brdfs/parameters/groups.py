@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -21,8 +21,10 @@ class OneOf(Chosen[str]):
     attributes.
     """
 
+    word: str
+    """Once bound, the chosen word."""
     own: BoundParameters
-    """Once bound, the parameters of the chosen word."""
+    """Once bound, its parameters."""
 
     def __init__(self, words: Mapping[str, Mapping[str, Parameter]], text: str):
         super().__init__(text)
@@ -36,25 +38,36 @@ class OneOf(Chosen[str]):
             parameter.__set_name__(None, name)
         self.words[word] = declared
 
+    def names_of(self, word: str) -> list[str]:
+        """Return the names of the properties that belong to a word."""
+        return [name for parameter in self.words[word].values() for name in parameter.names]
+
     @property
     def names(self) -> list[str]:
-        own = [name for parameter in self.children() for name in parameter.names]
-        return list(dict.fromkeys([self.name, *own]))
+        return list(dict.fromkeys([self.name, *(name for word in self.words for name in self.names_of(word))]))
 
     def rivals(self, name: str) -> list[str]:
         return [] if name == self.name else [self.name]
 
     def bind(self, reader: PropertyReader) -> OneOf:
-        word = reader.choice(self.name, tuple(self.words))
-        declared = self.words[word].values()
-        allowed = [name for parameter in declared for name in parameter.names]
-        for name in self.names[1:]:
+        word = self._word(reader)
+        own = BoundParameters(self.words[word].values(), reader)
+        chosen = own.chosen if word in self.implied_words else {self.name: word, **own.chosen}
+        bound = {"textures": own.textures, "ranges": own.ranges, "roles": own.roles, "chosen": chosen}
+        return self.replace(word=word, own=own, **bound)
+
+    def _word(self, reader: PropertyReader) -> str:
+        return self._given(reader, tuple(self.words))
+
+    def _given(self, reader: PropertyReader, words: tuple[str, ...]) -> str:
+        """Return the given one of some words, and raise if a parameter is given that belongs to another one of them."""
+        word = reader.choice(self.name, words)
+        allowed = self.names_of(word)
+        for name in (name for other in words for name in self.names_of(other)):
             if name in reader and name not in allowed:
                 has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
                 raise reader.error(name, f'does not belong to {self.name} = "{word}", which {has} of its own')
-        own = BoundParameters(declared, reader)
-        chosen = {self.name: word, **own.chosen}
-        return self.replace(own=own, textures=own.textures, ranges=own.ranges, chosen=chosen)
+        return word
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
         return SimpleNamespace(**self.own.evaluate(si, active))
@@ -63,10 +76,13 @@ class OneOf(Chosen[str]):
         return SimpleNamespace(**self.own.placeholders())
 
     def rows(self) -> list[ParameterRow]:
-        rows = [ParameterRow(self.name, "string", next(iter(self.words)), " | ".join(self.words), self.text)]
+        return self._rows(tuple(self.words), next(iter(self.words)))
+
+    def _rows(self, given: tuple[str, ...], default: str) -> list[ParameterRow]:
+        rows = [ParameterRow(self.name, "string", default, " | ".join(given), self.text)]
         users: dict[Parameter, list[str]] = {}
-        for word, declared in self.words.items():
-            for parameter in declared.values():
+        for word in given:
+            for parameter in self.words[word].values():
                 users.setdefault(parameter, []).append(word)
         for parameter, words in users.items():
             rows += [row._replace(text=f"with {listed(words, 'and')}: {row.text}") for row in parameter.rows()]
@@ -87,13 +103,13 @@ class OneTerm(OneOf):
         self.add(term.word, term.parameters)
         self.terms[term.word] = term
 
-    def _made_of(self, values: dict[str, Any]) -> Callable[..., Any]:
-        return functools.partial(self.terms[str(self.chosen[self.name])].of_values, values)
+    def _made_of(self, values: dict[str, Any]) -> Any:
+        return functools.partial(self.terms[self.word].of_values, values)
 
-    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Callable[..., Any]:
+    def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
         return self._made_of(self.own.evaluate(si, active))
 
-    def placeholder(self) -> Callable[..., Any]:
+    def placeholder(self) -> Any:
         return self._made_of(self.own.placeholders())
 
 
@@ -133,11 +149,11 @@ class PerLobe(Parameter):
 
     def bind(self, reader: PropertyReader) -> PerLobe:
         lobes = [BoundParameters(self.lobe(number), reader) for number in self._given(reader)]
-        return self.replace(
-            lobes=lobes,
-            textures={name: texture for lobe in lobes for name, texture in lobe.textures.items()},
-            ranges={name: limits for lobe in lobes for name, limits in lobe.ranges.items()},
-        )
+        bound = {
+            of: {name: value for lobe in lobes for name, value in getattr(lobe, of).items()}
+            for of in ("textures", "ranges", "roles")
+        }
+        return self.replace(lobes=lobes, **bound)
 
     def _given(self, reader: PropertyReader) -> list[str]:
         """Return the numbers of the lobes that exist, and raise if they are not in order."""

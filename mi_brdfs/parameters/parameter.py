@@ -64,6 +64,8 @@ class Parameter:
         """Once bound, its textures by property name. A parameter without a default that was not given has none."""
         self.ranges: dict[str, Range] = {}
         """What the values of these are limited to."""
+        self.roles: dict[str, str] = {}
+        """The roles of those that belong to its words or lobes."""
         self.chosen: dict[str, Any] = {}
         """Once bound, the choices made with it, by declared name."""
 
@@ -164,7 +166,7 @@ def nested(declared: Iterable[Parameter]) -> Iterator[Parameter]:
 
 
 class BoundParameters(dict[str, Parameter]):
-    """Several parameters bound together, by declared name, with all their ``textures`` and ``ranges``.
+    """Several parameters bound together, by declared name, with all their ``textures``, ``ranges`` and ``roles``.
 
     Choices are not among the parameters: ``chosen`` has their words and flags.
     """
@@ -173,6 +175,7 @@ class BoundParameters(dict[str, Parameter]):
         super().__init__()
         self.textures: dict[str, mi.Texture] = {}
         self.ranges: dict[str, Range] = {}
+        self.roles: dict[str, str] = {}
         self.chosen: dict[str, Any] = {}
         for parameter in declared:
             bound = parameter.bind(reader)
@@ -182,6 +185,7 @@ class BoundParameters(dict[str, Parameter]):
             self[parameter.name] = bound
             self.textures |= bound.textures
             self.ranges |= bound.ranges
+            self.roles |= dict.fromkeys(bound.ranges, bound.role) if bound.role else bound.roles
             self.chosen |= bound.chosen
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -149,6 +150,14 @@ def floats(x: ArrayLike) -> mi.Float:
     aligned = memory[first : first + x.nbytes].view(np.float32)
     aligned[:] = x
     return mi.Float(aligned)
+
+
+def launched_kernels(work: Callable[[], object]) -> set[int]:
+    """Return the kernels that some work launches, by hash: whether one is compiled depends on the cache that earlier
+    runs left. ``dr.JitFlag.KernelHistory`` must be set."""
+    dr.kernel_history_clear()
+    work()
+    return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
 
 
 def _columns(rows: ArrayLike) -> Any:

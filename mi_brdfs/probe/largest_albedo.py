@@ -97,18 +97,22 @@ class _Search:
         self.rng = np.random.default_rng(1)
 
     def run(self) -> Maximum:
-        """Return the brightest setting."""
-        best = self._starts()
-        for k in range(ROUNDS):
-            best = self._brightest(self._tried(best, k), k)
-        return self._measured(best[self._albedos(best, LOG2_CHOICE).argmax()])
-
-    def _starts(self) -> Array:
-        """Return where the climbs start: the brightest of a Latin hypercube of points."""
+        """Return the brightest setting. Climb from the brightest of a Latin hypercube of points."""
         strata = self.rng.permuted(np.tile(np.arange(STARTS), (len(self.axes), 1)), axis=1).T
         # It stretches over the ends of the ranges, where most maxima lie, as the steps do.
         points = (1.2 * (strata + 0.5) / STARTS - 0.1).clip(0, 1)
-        return points[np.argsort(self._albedos(points, LOG2_COUNTS[0]))[-CLIMBS:]]
+        best = points[np.argsort(self._albedos(points, LOG2_COUNTS[0]))[-CLIMBS:]]
+        first, last = LOG2_COUNTS
+        for k in range(ROUNDS):
+            tried = self._tried(best, k)
+            # By other variates in each round: nothing stays at the top by their noise.
+            found = self._albedos(np.concatenate(tried), first + (last - first) * k // ROUNDS, seed=2 + k)
+            best = tried[np.arange(CLIMBS), found.reshape(CLIMBS, -1).argmax(axis=1)]
+        brightest = best[self._albedos(best, LOG2_CHOICE).argmax()]
+        measured = np.concatenate([self._albedos(brightest[None], LOG2_FINAL, seed) for seed in SEEDS])
+        numbers = {name: float(value) for name, value in self._numbers(brightest).items()}
+        noise = float(measured.std(ddof=1)) / len(measured) ** 0.5
+        return Maximum(float(measured.mean()), noise, numbers, self.given)
 
     def _tried(self, best: Array, k: int) -> Array:
         """Return what each climb tries in a round, shape (climbs, 1 + steps, axes): where it is, and steps along some
@@ -119,19 +123,6 @@ class _Search:
         start = np.where(own % 2, self.rng.integers(CLIMBS, size=(CLIMBS, STEPS)), own)
         moved = np.where(along, (best[start] + step).clip(0, 1), best[:, None])
         return np.concatenate([best[:, None], moved], axis=1)
-
-    def _brightest(self, tried: Array, k: int) -> Array:
-        """Return the brightest of what each climb has tried in a round."""
-        first, last = LOG2_COUNTS
-        # By other variates in each round: nothing stays at the top by their noise.
-        found = self._albedos(np.concatenate(tried), first + (last - first) * k // ROUNDS, seed=2 + k)
-        return tried[np.arange(CLIMBS), found.reshape(CLIMBS, -1).argmax(axis=1)]
-
-    def _measured(self, point: Array) -> Maximum:
-        """Return the setting of a point with its albedo."""
-        found = np.concatenate([self._albedos(point[None], LOG2_FINAL, seed) for seed in SEEDS])
-        numbers = {name: float(value) for name, value in self._numbers(point).items()}
-        return Maximum(float(found.mean()), float(found.std(ddof=1)) / len(found) ** 0.5, numbers, self.given)
 
     def _numbers(self, points: Array) -> dict[str, Array]:
         return {axis.name: axis.at(t) for axis, t in zip(self.axes, np.transpose(points), strict=True)}

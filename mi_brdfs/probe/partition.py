@@ -82,27 +82,18 @@ class Partition:
         return np.cumsum(np.diff(ancestors, prepend=-1) > 0) - 1
 
 
-def partition(pdf: Callable[[Array], Array], pilot: Array, wi: Array, count: int, cells: int = 1024) -> Partition:
-    """Return the partition for a density.
-
-    Args:
-        pdf: the density of an array of directions.
-        pilot: samples that say where the density is; they must not be those that are tested.
-        wi: the direction of incidence, of which only the azimuth counts.
-        count: how many samples will be tested: the integrals are precise to a part of their deviation.
-        cells: no cell holds more than this part of the samples.
-    """
-    (made,) = partitions(lambda _, wo: pdf(wo), [pilot], [wi], count, cells)
-    return made
-
-
 def partitions(
-    pdf: Callable[[Array, Array], Array], pilots: Sequence[Array], wis: Sequence[Array], count: int, cells: int
+    pdf: Callable[[Array, Array], Array], pilots: Sequence[Array], wis: Sequence[Array], count: int, cells: int = 1024
 ) -> list[Partition]:
     """Return the partition for each of several directions of incidence.
 
-    The density is evaluated for one array of all directions at once, as ``pdf(of, wo)``, where ``of`` has the index of
-    the direction of incidence of each. Everything else is as in :func:`partition`.
+    Args:
+        pdf: the density, evaluated for one array of all directions at once, as ``pdf(of, wo)``, where ``of`` has the
+            index of the direction of incidence of each.
+        pilots: samples that say where the densities are; they must not be those that are tested.
+        wis: the directions of incidence, of which only the azimuths count.
+        count: how many samples will be tested: the integrals are precise to a part of their deviation.
+        cells: no cell holds more than this part of the samples.
     """
     growing = [_grow(pilot, wi, count, cells) for pilot, wi in zip(pilots, wis, strict=True)]
     made: dict[int, Partition] = {}

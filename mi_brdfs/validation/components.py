@@ -5,12 +5,12 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from ..probe.arrays import Array, context
+from ..probe.arrays import context
 from ..probe.bsdf import Part, Samples
-from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
-from .outcome import Findings, Outcome
+from .outcome import Findings, Outcome, relative
 from .run import SEED, Run
 
 COUNT = 4000
@@ -38,68 +38,53 @@ def components(run: Run) -> Findings:
 def _check_sampled(run: Run, outcome: Outcome, part: Part, incident: Incident) -> None:
     """Check that sampled components and types are those that were asked for, and those that were drawn."""
     samples = run.samples(part, incident)
-    chosen = samples.lit
-    if not chosen.any():
-        return
-    index, kind = samples.component[chosen].astype(np.int64), samples.kind[chosen].astype(np.int64)
-    allowed = {each.component: each.flags for each in run.probe.components}
-    if part.component is not None:
-        allowed = {part.component: part.flags}
-
-    def first(which: Array) -> Array:
-        return incident.vector(np.flatnonzero(chosen)[int(np.argmax(which))])
-
-    for k in np.unique(index):
-        if k not in allowed:
-            outcome.fault(
-                f"for light from {incident.name} sampled_component is {k} in {(index == k).mean():.1%} of the samples, "
-                f"where only {', '.join(map(str, allowed))} may be drawn",
-                wi=first(index == k),
-                seed=SEED,
-            )
-            continue
-        wrong = (kind[index == k] & ~allowed[k] != 0) | (kind[index == k] == 0)
+    index, kind = (np.where(samples.lit, each, -1).astype(np.int64) for each in (samples.component, samples.kind))
+    allowed = {each.component: each for each in ([part] if part.component is not None else run.probe.components)}
+    for k in np.unique(index[samples.lit]):
+        own = index == k
+        if k in allowed:
+            wrong = own & ((kind & ~allowed[k].flags != 0) | (kind == 0))
+            told = f"type is {kind[wrong.argmax()]:#x} for {allowed[k].name}, whose flags are {allowed[k].flags:#x}"
+        else:
+            wrong, share = own, own.sum() / samples.lit.sum()
+            told = f"component is {k} in {share:.1%} of the samples, where only {', '.join(map(str, allowed))} may be"
         if wrong.any():
-            outcome.fault(
-                f"for light from {incident.name} sampled_type is {kind[index == k][wrong][0]:#x} for "
-                f"{run.probe.name_of(int(k))}, whose flags are {allowed[k]:#x}",
-                wi=first(index == k),
-                seed=SEED,
-            )
+            told = f"for light from {incident.name} sampled_{told}"
+            outcome.fault(told, wi=incident.vector(int(wrong.argmax())), seed=SEED)
     _check_eta(outcome, incident, samples)
-    if part.component is None and len(allowed) > 1:
-        # A sample of a component must lie where that component can send one.
-        for each in run.probe.components:
-            drawn = np.flatnonzero(chosen)[index == each.component]
-            if len(drawn):
-                wo = np.ascontiguousarray(samples.wo[drawn])
-                stray = (run.probe.pdf(each, incident.at(drawn), wo) <= 0).mean()
-                if stray > 1e-3:
-                    outcome.fault(
-                        f"for light from {incident.name} {stray:.1%} of the samples said to be those of {each.name} "
-                        "lie where it draws none",
-                        stray,
-                        wi=incident.vector(int(drawn[0])),
-                        seed=SEED,
-                    )
-                _check_share(run, outcome, incident, each, samples, drawn)
+    if len(allowed) > 1:
+        _check_drawn(run, outcome, incident, samples)
 
 
 def _check_eta(outcome: Outcome, incident: Incident, samples: Samples) -> None:
     """Check that light that stays on its side stays in its medium."""
     stays = samples.lit & (samples.wo[:, 2] * incident.wi[..., 2] > 0)
-    wrong = (stays & (samples.eta != 1)) | samples.lit & ~(np.isfinite(samples.eta) & (samples.eta > 0))
-    if wrong.any():
-        k = int(np.argmax(wrong))
-        needed = "it must be 1 as the light stays on its side" if stays[k] else "it must be above 0"
-        outcome.fault(
-            f"for light from {incident.of(k)} a sample towards {angles_of(samples.wo[k])} has the eta "
-            f"{samples.eta[k]:.4g}, but {needed}; {wrong.sum() / samples.lit.sum():.1%} of them are wrong",
-            np.inf,
-            wi=incident.vector(k),
-            wo=samples.wo[k],
-            seed=SEED,
-        )
+    for wrong, needed in (
+        (stays & (samples.eta != 1), "1 as the light stays on its side"),
+        (samples.lit & ~(np.isfinite(samples.eta) & (samples.eta > 0)), "above 0"),
+    ):
+        why = f"but must be {needed}; {wrong.sum() / max(samples.lit.sum(), 1):.1%} of the samples are wrong"
+        outcome.wrong(wrong, "a sample's eta", samples.eta, why, incident.wi, samples.wo, seed=SEED)
+
+
+def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Samples) -> None:
+    """Check that the samples said to be those of a component lie where it can send one, and that where only one can,
+    its share of the samples is that of its density in the mixture's."""
+    lit = np.flatnonzero(samples.lit)
+    wi, wo = incident.at(lit), np.ascontiguousarray(samples.wo[lit])
+    densities = [run.probe.pdf(part, wi, wo) for part in run.probe.components]
+    for part, own in zip(run.probe.components, densities, strict=True):
+        said = samples.component[lit] == part.component
+        stray, alone = said & (own <= 0), (own > 1e3 * (sum(densities) - own)) & (own > 0)
+        start = f"for light from {incident.name}"
+        if stray.sum() > 1e-3 * said.sum():
+            share = stray.sum() / said.sum()
+            told = f"{start} {share:.1%} of the samples said to be those of {part.name} lie where it draws none"
+            outcome.fault(told, share, wi=incident.vector(int(lit[stray][0])), seed=SEED)
+        if alone.sum() >= 200 and said[alone].mean() < 0.9:
+            share = said[alone].mean()
+            told = f"{start} only {share:.1%} of the samples where nothing but {part.name} draws any are said to be its"
+            outcome.fault(f"{told} own", 1 - share, wi=incident.vector(int(lit[alone][0])), seed=SEED)
 
 
 def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
@@ -121,27 +106,6 @@ def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
         )
 
 
-def _check_share(run: Run, outcome: Outcome, incident: Incident, each: Part, samples: Samples, drawn: Array) -> None:
-    """Check that where only one component can be, its share of the samples is that of its density in the mixture's."""
-    others = [other for other in run.probe.components if other is not each]
-    kept = samples.lit
-    wi, wo = incident.at(kept), np.ascontiguousarray(samples.wo[kept])
-    own = run.probe.pdf(each, wi, wo)
-    rest = sum(run.probe.pdf(other, wi, wo) for other in others)
-    alone = (own > 1e3 * rest) & (own > 0)
-    if alone.sum() < 200:
-        return
-    said = np.isin(np.flatnonzero(kept)[alone], drawn).mean()
-    if said < 0.9:
-        outcome.fault(
-            f"for light from {incident.name} only {said:.1%} of the samples where nothing but {each.name} draws any "
-            "are said to be its own",
-            1 - said,
-            wi=incident.vector(int(np.flatnonzero(kept)[alone][0])),
-            seed=SEED,
-        )
-
-
 def _check_sum(run: Run, outcome: Outcome) -> None:
     """Check that the components add up to the whole, and that its density is a mixture of theirs."""
     probe, tolerance = run.probe, 10 * run.rounding(run.probe.whole)
@@ -158,32 +122,14 @@ def _check_sum(run: Run, outcome: Outcome) -> None:
         wi = incident.at(lanes)
         whole, density = probe.eval_pdf(probe.whole, wi, wo)
         values, pdfs = zip(*(probe.eval_pdf(part, wi, wo) for part in probe.components), strict=True)
-        total = sum(values)
-        scale = np.maximum(np.maximum(whole, total), 1e-6 * np.max(total) + 1e-12)
-        error = np.nan_to_num(abs(whole - total) / scale).max(axis=1)
-        if error.max() > tolerance:
-            k = int(np.argmax(error))
-            outcome.fault(
-                f"for light from {incident.of(lanes[k])} eval is {whole[k].max():.4g} towards {angles_of(wo[k])}, but "
-                f"the components add up to {total[k].max():.4g}",
-                error[k],
-                wi=incident.vector(lanes[k]),
-                wo=wo[k],
-            )
-        low, high = np.min(pdfs, axis=0), np.max(pdfs, axis=0)
-        if probe.deltas:
-            low = np.zeros_like(low)  # they take a share of the samples
-        beyond = np.maximum(density - high, low - density) / np.maximum(np.maximum(density, high), 1e-9)
-        beyond = np.nan_to_num(beyond)
-        if beyond.max() > tolerance:
-            k = int(np.argmax(beyond))
-            outcome.fault(
-                f"for light from {incident.of(lanes[k])} pdf is {density[k]:.4g} towards {angles_of(wo[k])}, but a "
-                f"mixture of the components' lies between {low[k]:.4g} and {high[k]:.4g}",
-                beyond[k],
-                wi=incident.vector(lanes[k]),
-                wo=wo[k],
-            )
+        error = relative(whole, total := sum(values), 1e-6, unknown=0)
+        why = "is what the components add up to"
+        outcome.wrong(error * (error > tolerance), "eval", whole, why, wi, wo, expected=total)
+        # Delta functions take a share of the samples.
+        mixed = np.clip(density, 0 if probe.deltas else np.min(pdfs, axis=0), np.max(pdfs, axis=0))
+        error = relative(density, mixed, unknown=0)
+        why = "is the nearest that a mixture of the components' can be"
+        outcome.wrong(error * (error > tolerance), "pdf", density, why, wi, wo, expected=mixed)
 
 
 def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
@@ -199,27 +145,16 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         nothing = part._replace(context=excluding)
         value, density = probe.eval_pdf(nothing, wi, wo)
         samples = probe.sample(nothing, wi, random(COUNT, 3))
-        for name, number in (("eval", value), ("pdf", density), ("sample's weight", samples.weight)):
-            if number.any():
-                outcome.fault(
-                    f"{name} reaches {number.max():.4g} for {words}, where all must be black",
-                    number.max(),
-                    wi=wi,
-                    seed=3,
-                )
+        why = f"for {words}, where all must be black"
+        outcome.wrong(value != 0, "eval", value, why, wi, wo)
+        outcome.wrong(density != 0, "pdf", density, why, wi, wo)
+        outcome.wrong(samples.weight != 0, "a sample's weight", samples.weight, why, wi, samples.wo, seed=3)
     alone = [each for each in probe.components if each.flags & kind]
     selected = part._replace(context=context(mask=kind))
     value, expected = probe.eval(selected, wi, wo), np.sum([probe.eval(each, wi, wo) for each in alone], axis=0)
-    error = abs(value - expected).max() / max(expected.max(), 1e-12)
-    if error > 10 * run.rounding(probe.whole):
-        k = int(np.argmax(abs(value - expected).max(axis=1)))
-        outcome.fault(
-            f"with the type mask {kind:#x} eval is {value[k].max():.4g} towards {angles_of(wo[k])}, but the components "
-            f"of this type make {expected[k].max():.4g}",
-            error,
-            wi=wi,
-            wo=wo[k],
-        )
+    error = abs(value - expected) / max(expected.max(), 1e-12)
+    name, why = f"with the type mask {kind:#x} eval", "is what the components of this type make"
+    outcome.wrong(error * (error > 10 * run.rounding(probe.whole)), name, value, why, wi, wo, expected=expected)
 
 
 def flags(run: Run) -> Findings:

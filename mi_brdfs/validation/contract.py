@@ -8,12 +8,12 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
-from ..probe.directions import angles_of, hemisphere, on_side, scattered
+from ..probe.directions import hemisphere, on_side, scattered
 from ..probe.variates import random
-from .outcome import Findings, Outcome, told
+from .outcome import Findings, Outcome, relative, told
 from .report import Finding
 from .run import Run
-from .traversal import attach, traced_floats, value_of
+from .updates import attach, traced_floats, value_of
 
 COUNT = 2000
 
@@ -66,28 +66,12 @@ def active(run: Run) -> Findings:
         (False, np.zeros(COUNT, bool), "where active is False"),
     ):
         for name, value in called(mask).items():
+            stray = (value != 0) & ~lit[:, None]
             if probe.is_ours or not (name == "pdf" or "density" in name or "reflectance" in name):
-                stray = (value[~lit] != 0).any(axis=1)
-                if stray.any():
-                    k = np.flatnonzero(~lit)[int(np.argmax(stray))]
-                    outcome.fault(
-                        f"{name} is {value[k].max():.4g} for light from {angles_of(wi[k])} {words}, but must be 0",
-                        np.inf,
-                        wi=wi[k],
-                        wo=wo[k],
-                        seed=62,
-                    )
-            changed = abs(value - every[name])[lit]
-            if (changed > 1e-5 * abs(every[name][lit]) + 1e-12).any():
-                k = np.flatnonzero(lit)[int(np.argmax(changed.max(axis=1)))]
-                outcome.fault(
-                    f"{name} is {value[k].max():.4g} for light from {angles_of(wi[k])}, {words}, but "
-                    f"{every[name][k].max():.4g} when all are",
-                    changed.max(),
-                    wi=wi[k],
-                    wo=wo[k],
-                    seed=62,
-                )
+                outcome.wrong(stray, name, value, f"{words}, but must be 0", wi, wo, seed=62)
+            changed = abs(value - every[name])
+            changed = np.where(lit[:, None] & (changed > 1e-5 * abs(every[name]) + 1e-12), changed, 0)
+            outcome.wrong(changed, f"{words}, {name}", value, "when all are", wi, wo, expected=every[name], seed=62)
     _check_derivatives(run, outcome, wi, wo, half)
     yield outcome.finding("Inactive lanes get no light, no weight and no derivative.")
 
@@ -152,34 +136,18 @@ def mode(run: Run) -> Findings:
                 expected = run.probe.eval(part, wi, wo)
             else:
                 expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
-            larger = np.nan_to_num(np.maximum(abs(got), abs(expected)))
-            error = np.nan_to_num(abs(got - expected) / np.maximum(larger, 1e-6 * larger.max() + 1e-12)).max(axis=1)
-            off = error > tolerance
-            if off.mean() > 1e-3:
-                k = int(np.argmax(np.where(off, larger.max(axis=1), 0)))
+            error = relative(got, expected, 1e-6, unknown=0)
+            off = (error.max(axis=1) > tolerance).mean()
+            if off > 1e-3:
                 why = "it is not flagged NonSymmetric" if symmetric else "that is f with its directions exchanged"
-                outcome.fault(
-                    f"in the mode Importance eval is {got[k].max():.4g} for light from {angles_of(wi[k])} towards "
-                    f"{angles_of(wo[k])}, but must be {expected[k].max():.4g}, as {why}; {off.mean():.1%} of the pairs "
-                    "are wrong",
-                    off.mean(),
-                    wi=wi[k],
-                    wo=wo[k],
-                )
-            lit = samples.lit
-            if lit.any():
-                reflected, value = samples.weight[lit] * samples.pdf[lit, None], samples.value[lit]
-                error = abs(reflected - value).max(axis=1) / np.maximum(value.max(axis=1), 1e-9)
-                if np.quantile(error, 0.99) > tolerance:
-                    k = int(np.argmax(error))
-                    outcome.fault(
-                        f"in the mode Importance a weight times pdf is {reflected[k].max():.4g} towards "
-                        f"{angles_of(samples.wo[lit][k])}, but eval {value[k].max():.4g}",
-                        error[k],
-                        wi=wi[np.flatnonzero(lit)[k]],
-                        wo=samples.wo[lit][k],
-                        seed=67,
-                    )
+                why = f"is needed, as {why}; {off:.1%} of the pairs are wrong"
+                outcome.wrong(error, "in the mode Importance eval", got, why, wi, wo, expected=expected)
+            if samples.lit.any():
+                reflected, value = samples.weight * samples.pdf[:, None], samples.value
+                error = abs(reflected - value).max(axis=1) / np.maximum(value.max(axis=1), 1e-9) * samples.lit
+                if np.quantile(error[samples.lit], 0.99) > tolerance:
+                    name = "in the mode Importance a weight times pdf"
+                    outcome.wrong(error, name, reflected, "is eval", wi, samples.wo, expected=value, seed=67)
         yield outcome.finding("Light may be traced from either end.")
 
 

@@ -1,23 +1,24 @@
-"""The check of the derivatives that an optimiser needs."""
+"""The check of the derivatives that an optimiser needs, by finite differences."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..parameters import nested
 from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import Part
-from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from ..ranges import ranges
-from .differences import differences
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run
-from .traversal import attach, restored, set_value, traced_floats, value_of
+from .updates import attach, restored, set_value, traced_floats, value_of
 
 TOLERANCE = 0.02
 COUNT = 2000
@@ -53,7 +54,10 @@ def gradients(run: Run) -> Findings:
         wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (12, 14))
         scale = np.full(COUNT, 2 * np.pi)
     wi, scale = np.ascontiguousarray(wi), scale[:, None]
-    edges, limits = _edges(part), ranges(probe.bsdf) if probe.is_ours else {}
+    edges, limits, turning = _edges(part), {}, set[str]()
+    if probe.is_ours:
+        limits, declared = ranges(probe.bsdf), nested(probe.bsdf.model.declared())
+        turning = {it.name for parameter in declared for way in parameter.spellings for it in way if it.turns}
 
     def values() -> Array:
         return probe.eval(part, wi, wo)
@@ -75,17 +79,19 @@ def gradients(run: Run) -> Findings:
                 if not np.isfinite(found).all():
                     outcome.fault(f"{1 - np.isfinite(found).mean():.1%} {name} are not finite", np.inf)
             size = float(np.mean(abs(np.array(original, np.float64))))
-            # Mitsuba itself refuses negative values of a measured spectrum.
-            for limit, beyond, inside in _beyond(None if key.endswith(".values") else limits.get(key)):
-                _check_way_back(run, outcome, params, key, (limit, beyond, inside), wi, wo)
+            lowest, highest = limits.get(key, (-np.inf, np.inf))
+            for limit, outwards in ((lowest, -1), (highest, 1)):
+                # Mitsuba itself refuses negative values of a measured spectrum.
+                if np.isfinite(limit) and not key.endswith(".values"):
+                    beyond = outwards * max(0.1 * min(highest - lowest, 1), 1e-3 * abs(limit))
+                    _check_way_back(run, outcome, params, key, limit, beyond, wi, wo)
             set_value(params, key, original)
-            if probe.is_ours and key.startswith("rotation."):
+            if key.partition(".")[0] in turning:
                 size = min(size, 1)  # many turns are as few
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
             candidates = [(0, 1), (0, 0.1), (0, 0.01), (10 * step, 1), (-10 * step, 1)]
             # At the end of a range, the derivative that leads an optimiser inwards need not be that of the values.
-            lowest, highest = limits.get(key, (-np.inf, np.inf))
             least, most = (float(extreme(np.array(original))) for extreme in (np.min, np.max))
             inner = [each for each in candidates if lowest < least + each[0] and most + each[0] < highest]
             for shift, part_of in inner or candidates:
@@ -93,7 +99,7 @@ def gradients(run: Run) -> Findings:
                 if shift:
                     # At an index of refraction of 1, no reflection turns into total reflection: look beside it.
                     derivative, _ = _derivatives(run, params, key, wi, wo)
-                tried = differences(params, key, values, part_of * step)
+                tried = _differences(params, key, values, part_of * step)
                 if tried.trusted.mean() > trusted.mean():
                     low, high, trusted, noise = tried
                     compared = derivative
@@ -138,16 +144,10 @@ def _directional(run: Run) -> Finding:
             continue
         dr.backward(dr.sum(result, axis=None))
         for word, gradient in (("wi", dr.grad(si.wi)), ("wo", dr.grad(towards))):
-            bad = ~np.isfinite(numbers(gradient, len(wi))).all(axis=1)
-            if bad.any():
-                k = int(np.argmax(bad))
-                outcome.fault(
-                    f"the derivative of {name} for {word} is not finite for light from {angles_of(wi[k])} towards "
-                    f"{angles_of(wo[k])}, and of {bad.mean():.1%} of the pairs tried",
-                    bad.sum(),
-                    wi=wi[k],
-                    wo=wo[k],
-                )
+            found = numbers(gradient, len(wi))
+            bad = np.logical_not(np.isfinite(found).all(axis=1))
+            why = f"as of {bad.mean():.1%} of the pairs tried"
+            outcome.wrong(bad, f"the derivative of {name} for {word}", found, why, wi, wo)
     return outcome.finding("The derivatives of eval and pdf for the directions are finite.")
 
 
@@ -184,29 +184,10 @@ def _check_weight(
         )
 
 
-def _beyond(limits: tuple[float, float] | None) -> Iterator[tuple[float, float, float]]:
-    """Yield ``(limit, beyond, inside)`` for each finite end of a range: values of a parameter."""
-    if limits is None:
-        return
-    low, high = limits
-    width = min(high - low, 1)
-    for limit, outwards in ((low, -1), (high, 1)):
-        if np.isfinite(limit):
-            step = outwards * max(0.1 * width, 1e-3 * abs(limit))
-            yield limit, limit + step, limit - 0.1 * step
-
-
 def _check_way_back(
-    run: Run,
-    outcome: Outcome,
-    params: mi.SceneParameters,
-    key: str,
-    values: tuple[float, float, float],
-    wi: Array,
-    wo: Array,
+    run: Run, outcome: Outcome, params: mi.SceneParameters, key: str, limit: float, step: float, wi: Array, wo: Array
 ) -> None:
-    """Check that an optimiser returns from a value beyond a limit; ``values`` are those of :func:`_beyond`."""
-    limit, beyond, inside = values
+    """Check that an optimiser returns from a value that is a step beyond a limit."""
     probe, part = run.probe, run.probe.whole
     original, few = value_of(params, key), slice(0, 500)  # a number, a colour, or the texels of a bitmap
     wi, wo = np.ascontiguousarray(wi[few]), np.ascontiguousarray(wo[few])
@@ -227,6 +208,7 @@ def _check_way_back(
         dr.disable_grad(params[key])
         return numbers(dr.detach(result), len(wi)), found
 
+    beyond = limit + step
     value, ways = backward(beyond, (1, -1))
     set_value(params, key, original * 0 + limit)
     error = relative(value, probe.eval(part, wi, wo)).max(initial=0)
@@ -240,7 +222,7 @@ def _check_way_back(
     if any(found.any() for found in ways):
         return
     # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump.
-    near, nearer = (abs(backward(limit + share * (inside - limit), (1,))[1][0]).sum() for share in (0.1, 0.001))
+    near, nearer = (abs(backward(limit - 0.1 * share * step, (1,))[1][0]).sum() for share in (0.1, 0.001))
     if max(0.3 * near, 1e-6 * len(wi)) < nearer < 3 * near:
         outcome.fault(
             f"at {beyond:g}, beyond its limit of {limit:g}, no derivative leads back: those of the sum of eval and of "
@@ -260,8 +242,6 @@ def _edges(part: Part) -> tuple[Array, Array]:
 def _derivatives(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: Array) -> tuple[Array, Array]:
     """Return ``(derivatives, total)`` for a parameter: of each value as all entries of the parameter grow alike, by
     forward differentiation, and of the sum of the values by reverse differentiation, in which other things go wrong."""
-    if not len(wo):
-        return np.zeros((0, 1)), np.zeros(1)
     found = []
     for reverse in (False, True):
         attach(params, key)
@@ -278,3 +258,65 @@ def _derivatives(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: 
         dr.disable_grad(params[key])
     derivatives, total = found
     return derivatives, total
+
+
+# --- Finite differences ---------------------------------------------------------------------------------------------
+
+
+class Differences(NamedTuple):
+    """Derivatives, with what is known of them."""
+
+    low: Array
+    high: Array
+    """The bounds of each."""
+    trusted: Array
+    """Which of them the two steps agree on."""
+    noise: Array
+    """The error of each."""
+
+
+def _differences(params: mi.SceneParameters, key: str, values: Callable[[], Array], step: float) -> Differences:
+    """Return the derivatives of some values for a parameter, by differences of two steps, extrapolated.
+
+    The bounds are the same, except where the differences to the two sides do not approach each other: at a kink any
+    derivative between them will do. Where one side changes nothing, the other counts, if that is so of most, as at the
+    end of a range: where it is so of some, they may be reflected totally.
+    """
+    original, centre = value_of(params, key), values()
+
+    def at(shift: float) -> Array:
+        set_value(params, key, original + shift)
+        return values()
+
+    def quotients(h: float) -> tuple[Array, Array]:
+        return (at(h) - centre) / h, (centre - at(-h)) / h
+
+    (above, below), (nearer_above, nearer_below) = quotients(step), quotients(step / 2)
+    noise = 4e-7 * abs(centre) / step
+    up, down = 2 * nearer_above - above, 2 * nearer_below - below
+    lone = (above == 0) != (below == 0)
+    if lone.sum() > 0.5 * ((above != 0) | (below != 0)).sum():
+        up, down = np.where(above == 0, down, up), np.where(below == 0, up, down)
+    else:
+        lone[:] = False
+    gap, nearer_gap = abs(above - below), abs(nearer_above - nearer_below)
+    slopes = (above, nearer_above), (below, nearer_below)
+    settled = [abs(near - far) <= 0.3 * np.maximum(abs(near), abs(far)) + 4 * noise for far, near in slopes]
+    kink = (
+        ~lone
+        & settled[0]
+        & settled[1]
+        & (nearer_gap > 0.75 * gap)
+        & (nearer_gap > 0.05 * abs(nearer_above) + 4 * noise)
+    )
+    first, second = (above + below) / 2, (nearer_above + nearer_below) / 2
+    smooth = np.where(lone, up, (4 * second - first) / 3)
+    change = np.where(lone, up - np.where(above == 0, below, above), first - second)
+    # Across a peak far narrower than the steps the two sides cancel, but each grows as the step shrinks.
+    grows = nearer_gap > 1.5 * gap + 4 * noise
+    trusted = (kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)) & (lone | ~grows)
+    noise = noise + np.where(kink, 0, 0.5 * abs(change))
+    low, high = (np.where(kink, choose(up, down), smooth) for choose in (np.minimum, np.maximum))
+    # Float32 must know the values to far less than a step.
+    fine = np.spacing(np.abs(np.array(original, np.float32)).max()) < 0.01 * step
+    return Differences(low, high, fine & trusted & np.isfinite(low) & np.isfinite(high), noise)

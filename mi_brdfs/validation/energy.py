@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,7 +13,7 @@ from ..probe.bsdf import Part
 from ..probe.directions import direction, on_side
 from ..probe.variates import SHIFTS, lattice, sampling_efficiency
 from . import sampling
-from .incidents import Incident, named
+from .incidents import named
 from .outcome import Findings, Outcome
 from .report import Finding
 from .run import Run
@@ -33,8 +32,11 @@ def albedo(run: Run) -> Findings:
     points = lattice(12, 5)
     limits = _limits(run)
     for part in run.probe.parts:
-        outcome, largest = Outcome("albedo", part.name), Largest()
-        for name, wi, _ in _white_furnace(run, part):
+        outcome, found = Outcome("albedo", part.name), []
+        added = limits.diffuse if part.component is None else 0
+        angles = sorted({*run.angles, 0, 45, 70, 85, 89, 89.9})
+        for side, theta in ((side, theta) for side in part.sides for theta in angles):
+            name, wi = named(theta, side), on_side(direction(theta, 17), side)
             samples = run.probe.sample(part, wi, points)
             weights = samples.weight * np.where(samples.weight.any(axis=1), samples.eta, 1)[:, None] ** 2
             copies = weights.reshape(SHIFTS, -1, weights.shape[1]).mean(axis=1)
@@ -45,11 +47,7 @@ def albedo(run: Run) -> Findings:
             k = int(np.argmax(least))
             alike = np.ptp(means) <= 1e-4 * abs(means[k])
             words = f"light from {name} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
-            if not mean <= largest.mean:
-                largest = largest._replace(mean=mean, name=name)
-            if least[k] > largest.least:
-                largest = largest._replace(least=float(least[k]), words=words)
-            added = limits.diffuse if part.component is None else 0
+            found.append(Reflected(name, mean, float(least[k]), words))
             if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
@@ -57,7 +55,7 @@ def albedo(run: Run) -> Findings:
             words = "Not judged, as the mean of the weights is the albedo only where pdf, chi2 and weight pass."
             yield Finding("albedo", part.name, "skip", words, outcome.data)
             continue
-        yield _judged(part, outcome, largest, limits)
+        yield _judged(part, outcome, found, limits)
 
 
 def _is_sampled_wrongly(run: Run, part: Part) -> bool:
@@ -74,13 +72,13 @@ TOLERANCE = 1e-3
 """Of float32, relatively."""
 
 
-class Largest(NamedTuple):
-    """The largest albedo of a part: the luminance and its angle, and what a channel reflects at least, in words."""
+class Reflected(NamedTuple):
+    """What a part reflects of light from an angle: the luminance, and what a channel reflects at least, in words."""
 
-    mean: float = 0
-    name: str = ""
-    least: float = 0
-    words: str = ""
+    name: str
+    mean: float
+    least: float
+    words: str
 
 
 def _mean(copies: Array) -> tuple[Array, Array]:
@@ -88,27 +86,22 @@ def _mean(copies: Array) -> tuple[Array, Array]:
     return copies.mean(axis=0), copies.std(axis=0, ddof=1) / sqrt(len(copies))
 
 
-def _judged(part: Part, outcome: Outcome, largest: Largest, limits: Limits) -> Finding:
+def _judged(part: Part, outcome: Outcome, found: list[Reflected], limits: Limits) -> Finding:
     """Return the finding on a part whose faults are known."""
     is_whole = part.component is None
+    largest, most = max(found, key=lambda it: np.nan_to_num(it.mean, nan=np.inf)), max(found, key=lambda it: it.least)
     if is_whole and limits.default is not None and not abs(largest.mean - limits.default) <= 0.02 * limits.default:
         outcome.fault(f"the largest albedo is {largest.mean:.4g}, but its page says {limits.default:.4g}", 0)
-    message = f"At most {largest.mean:.4g}, for light from {largest.name}." if largest.name else "Black."
+    message = f"At most {largest.mean:.4g}, for light from {largest.name}." if largest.mean != 0 else "Black."
     if limits.largest is None and limits.default is None:
         return Finding("albedo", part.name, "info", message, outcome.data)
-    gains = largest.least > 1 + TOLERANCE
+    gains = most.least > 1 + TOLERANCE
     if gains and limits.largest is not None:
         why = f"{limits.page} ({_shown(limits.largest)})" if limits.largest > 1 else "its lobes add up"
-        message = f"It gains energy, as {why}: {largest.words}."
-    found = outcome.finding(message, limits.sums if is_whole else "")
+        message = f"It gains energy, as {why}: {most.words}."
+    finding = outcome.finding(message, limits.sums if is_whole else "")
     noted = is_whole and (gains or limits.sums) and not outcome.faults
-    return replace(found, verdict="note") if noted else found
-
-
-def _white_furnace(run: Run, part: Part) -> Iterator[Incident]:
-    for side in part.sides:
-        for theta in sorted({*run.angles, 0, 45, 70, 85, 89, 89.9}):
-            yield Incident(named(theta, side), on_side(direction(theta, 17), side))
+    return replace(finding, verdict="note") if noted else finding
 
 
 def efficiency(run: Run) -> Findings:

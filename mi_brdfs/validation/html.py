@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from ..pages import environment
 from ..pages.figures import svg
 from .pictures import SURE, chart, pictures
-from .report import Finding, Report, Verdict
+from .report import Finding, Report
 from .trial import Trial
 
 
@@ -23,16 +23,9 @@ class Part(NamedTuple):
 
 def page(reports: Sequence[Report]) -> str:
     """Return the page, as text."""
-    functions = {"by_verdict": _by_verdict, "parts": _parts, "others": _others}
+    functions = {"parts": _parts, "others": _others}
     drawings = {"pictures": pictures, "chart": chart, "svg": svg, "sure": SURE}
     return environment.get_template("check.html").render(reports=reports, **functions, **drawings)
-
-
-def _by_verdict(report: Report) -> list[tuple[str, list[str]]]:
-    """Return the names of the checks by their verdicts, the gravest first."""
-    checks = dict.fromkeys(finding.check for finding in report.findings)
-    verdicts = {verdict: [it for it in checks if report.verdict(it) == verdict] for verdict in get_args(Verdict)}
-    return [(verdict, named) for verdict, named in verdicts.items() if named]
 
 
 def _parts(report: Report) -> Iterator[Part]:

@@ -34,10 +34,6 @@ class Incident(NamedTuple):
         """Return the direction of a lane."""
         return self.wi if self.wi.ndim == 1 else self.wi[lane]
 
-    def of(self, lane: int) -> str:
-        """Return the direction of a lane in words."""
-        return self.name if self.wi.ndim == 1 else angles_of(self.wi[lane])
-
 
 def incidents(part: Part, angles: Sequence[float]) -> list[Incident]:
     """Return a direction for each angle of incidence, in degrees, on each side that a part is seen from."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..parameters.messages import brief
 from ..probe.arrays import Array
+from ..probe.directions import angles_of
 from .report import Finding
 
 
@@ -35,6 +36,47 @@ class Outcome:
         at: dict[str, Any] = {name: w.tolist() for name, w in directions.items()}
         self.faults.append(Fault(message, size, at if seed is None else at | {"seed": seed}))
 
+    def wrong(
+        self,
+        lanes: Array,
+        name: str,
+        got: Array,
+        why: str,
+        wi: Array,
+        wo: Array,
+        *,
+        expected: Array | None = None,
+        uv: Array | None = None,
+        seed: int | None = None,
+        digits: int = 4,
+    ) -> None:
+        """Add a fault for the lane that is most wrong, if any is.
+
+        Args:
+            lanes: how wrong each is, or which are, shape (N,) or (N, channels).
+            name: of what is wrong.
+            got: what it is, shape (N,) or (N, channels).
+            why: what is wrong with that, or what is ``expected`` if that is given.
+            wi: the directions of incidence, shape (3,) or (N, 3).
+            wo: the others.
+            uv: the texture coordinates, shape (N, 2), if they matter.
+        """
+        if not np.any(lanes):
+            return
+        k = int(np.argmax(np.reshape(lanes, (len(lanes), -1)).max(axis=1)))
+        wi, wo = (w if w.ndim == 1 else w[k] for w in (wi, wo))
+        values = np.atleast_1d(got[k])
+        if expected is None:
+            # A value that is negative or no number is wrong before any other.
+            channel = np.argmax(np.where(np.isfinite(values) & (values >= 0), values, np.inf))
+        else:
+            wanted = np.atleast_1d(expected[k])
+            channel = np.argmax(abs(values - wanted))
+            why = f"but {wanted[channel]:.{digits}g} {why}"
+        name = name if uv is None else f"at uv = ({uv[k, 0]:.3g}, {uv[k, 1]:.3g}) {name}"
+        told = f"{name} is {values[channel]:.{digits}g} for light from {angles_of(wi)} towards {angles_of(wo)}, {why}"
+        self.fault(told, float(np.sum(lanes)), wi=wi, wo=wo, seed=seed)
+
     def finding(self, message: str, remark: str = "") -> Finding:
         """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case."""
         remark = f" {remark}" if remark else ""
@@ -60,8 +102,11 @@ def told(error: Exception) -> str:
     return type(cause).__name__ + (f": {brief(line.rstrip('.'))}" if line else "")
 
 
-def relative(got: Array, expected: Array) -> Array:
-    """Return the relative errors of numbers; those far below the largest count as a ten-millionth of it would."""
-    scale = np.maximum(np.maximum(abs(got), abs(expected)), 1e-7 * np.max(abs(expected), initial=0) + 1e-12)
-    error = abs(got - expected) / scale
-    return np.where(np.isfinite(error), error, np.where(np.isfinite(expected), np.inf, 0))
+def relative(got: Array, expected: Array, floor: float = 1e-7, unknown: float = np.inf) -> Array:
+    """Return the relative errors of numbers; those below ``floor`` of the largest count as that part of it. Where what
+    is expected is not finite it is 0, and where only the other is NaN, ``unknown``."""
+    largest = np.max(abs(expected), initial=0, where=np.isfinite(expected))
+    scale = np.maximum(np.maximum(abs(got), abs(expected)), floor * largest + 1e-12)
+    with np.errstate(invalid="ignore"):
+        error = abs(got - expected) / scale
+    return np.where(np.isfinite(error), error, np.where(np.isfinite(expected), unknown, 0))

@@ -11,8 +11,6 @@ from .trial import Trial
 
 Verdict = Literal["fail", "note", "pass", "skip", "info"]
 """The gravest first."""
-
-
 INSTEAD = "Check a rough BSDF in its place, as roughconductor is for conductor."
 """What to do where a BSDF has delta functions only."""
 
@@ -82,11 +80,6 @@ class Report:
         return " ".join(["Nothing was judged.", *told])
 
     @property
-    def notable(self) -> list[Finding]:
-        """The findings that a user should read: failures first, then notes."""
-        return [*self.failures, *(finding for finding in self.findings if finding.verdict == "note")]
-
-    @property
     def outcome(self) -> str:
         """The verdict on the BSDF in a word or two."""
         return "passed" if self.passed else "FAILED" if self.judged else "not judged"
@@ -96,6 +89,13 @@ class Report:
         found = [finding.verdict for finding in self.of(check)]
         return next((verdict for verdict in get_args(Verdict) if verdict in found), None)
 
+    @property
+    def by_verdict(self) -> list[tuple[Verdict, list[str]]]:
+        """The names of the checks by their verdicts, the gravest first."""
+        checks = dict.fromkeys(finding.check for finding in self.findings)
+        every = ((verdict, [it for it in checks if self.verdict(it) == verdict]) for verdict in get_args(Verdict))
+        return [(verdict, named) for verdict, named in every if named]
+
     def of(self, check: str) -> list[Finding]:
         """Return the findings of one check."""
         return [finding for finding in self.findings if finding.check == check]
@@ -103,7 +103,8 @@ class Report:
     @property
     def sentences(self) -> list[str]:
         """What a user should read: failures with what reproduces them, notes, and why nothing was judged."""
-        told = [f"{finding.check}, {finding.subject}: {finding.sentence}" for finding in self.notable]
+        notable = [*self.failures, *(finding for finding in self.findings if finding.verdict == "note")]
+        told = [f"{finding.check}, {finding.subject}: {finding.sentence}" for finding in notable]
         return [*told, *([self.why_not_judged] if self.why_not_judged else [])]
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..probe.bsdf import BSDFProbe, Part, Samples
 from ..probe.directions import direction, on_side, scattered
 from ..probe.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
-from .trial import Trial, Trials, trials_of
+from .trial import Trial, trials_of
 
 SEED = 11
 """Of the samples that several checks look at."""
@@ -34,7 +34,7 @@ class Run:
     at_random: int = RANDOM
     """Directions at random on each side, for statistical tests, beside those that were asked for."""
     _samples: dict[tuple[str, str], Samples] = field(default_factory=dict, init=False)
-    _trials: dict[str, Trials] = field(default_factory=dict, init=False)
+    _trials: dict[str, list[Trial]] = field(default_factory=dict, init=False)
     _spreads: dict[str, float] = field(default_factory=dict, init=False)
 
     def incidents(self, part: Part) -> list[Incident]:
@@ -63,18 +63,18 @@ class Run:
     def trials(self, part: Part) -> list[Trial]:
         """Return the trials of a part, the same for every check."""
         if part.name not in self._trials:
-            scattered = random_incidents(part, self.at_random)
-            self._trials[part.name] = trials_of(self.probe, part, self.incidents(part), scattered)
-        asked, at_random = self._trials[part.name]
-        return asked + at_random
+            at_random = random_incidents(part, self.at_random)
+            self._trials[part.name] = trials_of(self.probe, part, self.incidents(part), at_random)
+        return self._trials[part.name]
 
     def shown_trials(self) -> Iterator[Trial]:
         """Yield the trials for a report, if they were made: those for the directions that were asked for, and the worst
         of the others if it fails."""
-        for asked, at_random in self._trials.values():
-            yield from asked
-            worst = min(at_random, key=lambda trial: trial.test.p_value)
-            if worst.test.p_value < self.level:
+        for part in self.probe.parts:
+            trials, asked = self._trials.get(part.name, []), len(self.incidents(part))
+            yield from trials[:asked]
+            worst = min(trials[asked:], key=lambda trial: trial.test.p_value, default=None)
+            if worst and worst.test.p_value < self.level:
                 yield worst
 
     @property

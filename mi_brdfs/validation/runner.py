@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from numbers import Real
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.bsdf import BSDFProbe, load
+from ..probe.directions import angles_of, scattered
 from ..probe.sources import find_sources, name_of
+from ..probe.variates import random
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, sampling, spectral, textures, updates, values
-from .against import against
-from .outcome import Findings, told
+from .incidents import SCATTERED, all_over, incidents
+from .outcome import Findings, Outcome, told
 from .report import Finding, Report
 from .run import Run
 
@@ -54,6 +58,9 @@ ANGLES: tuple[float, ...] = (0, 30, 60, 80)
 """Of incidence, in degrees, by default."""
 SIGNIFICANCE = 0.01
 """By default."""
+AGAINST_SEED = 91
+FAINT = 1e-6
+"""Values below this part of the largest one for an angle of incidence differ as much as this part does."""
 DELTA = "A delta function, which cannot be evaluated or tested."
 
 
@@ -129,7 +136,39 @@ def compare(
     with _measurable(bsdf, other):
         bsdf, other = _described(bsdf), _described(other)
         run = Run(_probe(bsdf), angles, SIGNIFICANCE, None, None)
-        return Report(name or _name(bsdf), [against(run, _probe(other), other_name or _name(other))])
+        return Report(name or _name(bsdf), [_against(run, _probe(other), other_name or _name(other))])
+
+
+def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
+    """Check that another BSDF, called ``name``, has the same values: see :func:`compare`."""
+    outcome, probes = Outcome("against", name), (run.probe, other)
+    if not all(probe.components for probe in probes):
+        return Finding("against", name, "skip", "A delta function has no values to compare.")
+    tolerance = max(run.rounding(run.probe.whole), replace(run, probe=other).rounding(other.whole))
+    sides = tuple(sorted({side for probe in probes for side in probe.whole.sides}, reverse=True))
+    part = run.probe.whole._replace(sides=sides)
+    largest, words, at = 0.0, "both are black", {}
+    for incident in [*incidents(part, run.angles), all_over(part)]:
+        lanes = np.tile(np.arange(SCATTERED), 3)
+        drawn = [probe.sample(probe.whole, incident.wi, random(SCATTERED, AGAINST_SEED)).wo for probe in probes]
+        wo = np.concatenate([scattered(SCATTERED, AGAINST_SEED, (1, -1)), *drawn])
+        ours, theirs = (probe.eval(probe.whole, incident.at(lanes), wo) for probe in probes)
+        scale = np.maximum(ours, theirs)
+        error = np.nan_to_num(abs(ours - theirs) / np.maximum(scale, FAINT * np.nanmax(scale) + 1e-12), nan=np.inf)
+        k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
+        if error[k, channel] > largest or (scale.any() and not largest):
+            largest = float(error[k, channel])
+            light = incident.name if incident.wi.ndim == 1 else angles_of(incident.vector(lanes[k]))
+            words = (
+                f"the largest relative difference is {largest:.2g}, for light from {light} towards "
+                f"{angles_of(wo[k])}: {ours[k, channel]:.6g}, but {theirs[k, channel]:.6g} of {name}"
+            )
+            at = {"wi": incident.vector(lanes[k]), "wo": wo[k]}
+    outcome.data = {"difference": largest, "tolerance": tolerance}
+    words += f"; float32 rounds by up to {tolerance:.2g}"
+    if largest > tolerance:
+        outcome.fault(words, largest, **at)
+    return outcome.finding(f"{words[0].upper()}{words[1:]}.")
 
 
 def checked_angles(angles: float | Iterable[float]) -> tuple[float, ...]:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import erfc, sqrt
 
 import numpy as np
 
-from ..probe.arrays import Array
-from ..probe.bsdf import Samples
-from ..probe.directions import angles_of
 from .outcome import Findings, Outcome
 from .report import Finding
 from .run import SEED, Run
@@ -72,46 +68,23 @@ def weight(run: Run) -> Findings:
         outcome, tolerance, worst = Outcome("weight", part.name), 3 * run.rounding(part), 0.0
         for incident in run.views(part):
             samples = run.samples(part, incident)
-            if not samples.lit.any():
+            lit = samples.lit
+            if not lit.any():
                 continue  # black, or found by the check of the density's integral
-            for name, error in _mismatches(samples):
-                typical, largest = np.quantile(error, 0.999), error.max()
+            weight, value, pdf, density = samples.weight, samples.value, samples.pdf, samples.density
+            with np.errstate(invalid="ignore", divide="ignore"):
+                quotient = value / pdf[:, None]
+                reflected = weight * pdf[:, None]
+                scale = np.maximum(np.maximum(value, reflected).max(axis=1), 1e-6 * np.maximum(pdf, 1e-6))
+                off = abs(reflected - value).max(axis=1) / scale
+                wide = abs(density - pdf) / np.maximum(np.maximum(density, pdf), 1e-9)
+            for name, got, expected, why, error in (
+                ("a sample's weight", weight, quotient, "is eval/pdf", off),
+                ("the density that sample says", density, pdf, "is pdf", wide),
+            ):
+                error = np.where(lit, np.where(np.isnan(error), np.inf, error), 0)
+                typical, largest = np.quantile(error[lit], 0.999), error.max()
                 worst = max(worst, typical)
                 if not (typical <= tolerance and largest <= max(0.1, 30 * tolerance)):
-                    k = int(np.argmax(error))
-                    k = np.flatnonzero(samples.lit)[k]
-                    outcome.fault(
-                        f"for light from {incident.of(k)} {_told(name, samples, k)}",
-                        largest,
-                        wi=incident.vector(k),
-                        wo=samples.wo[k],
-                        seed=SEED,
-                    )
+                    outcome.wrong(error, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
         yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.")
-
-
-def _mismatches(samples: Samples) -> Iterator[tuple[str, Array]]:
-    """Yield the relative errors of weights and of densities, of the samples that carry light."""
-    weight, value, pdf, density = (
-        x[samples.lit] for x in (samples.weight, samples.value, samples.pdf, samples.density)
-    )
-    reflected = (weight * pdf[:, None]).max(axis=1)
-    scale = np.maximum(np.maximum(value.max(axis=1), reflected), 1e-6 * np.maximum(pdf, 1e-6))
-    with np.errstate(invalid="ignore"):
-        yield "weight", _never_nan(abs(weight * pdf[:, None] - value).max(axis=1) / scale)
-        yield "density", _never_nan(abs(density - pdf) / np.maximum(np.maximum(density, pdf), 1e-9))
-
-
-def _never_nan(error: Array) -> Array:
-    return np.where(np.isnan(error), np.inf, error)
-
-
-def _told(name: str, samples: Samples, k: int) -> str:
-    """Return what is wrong with a sample in words."""
-    where = f"towards {angles_of(samples.wo[k])}"
-    if name == "density":
-        return f"sample says the density {samples.density[k]:.4g} {where}, but pdf {samples.pdf[k]:.4g}"
-    channel = int(np.argmax(_never_nan(abs(samples.weight[k] * samples.pdf[k] - samples.value[k]))))
-    pdf = samples.pdf[k]
-    expected = f"{samples.value[k, channel] / pdf:.4g}" if pdf > 0 else f"{samples.value[k, channel]:.4g}/0"
-    return f"the weight is {samples.weight[k, channel]:.4g} {where}, but eval/pdf is {expected}"

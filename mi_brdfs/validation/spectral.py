@@ -12,10 +12,10 @@ from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
 from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
 from ..probe.bsdf import BSDFProbe, load
-from ..probe.directions import angles_of, hemisphere, on_side
+from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from . import sampling, values
-from .outcome import Findings, Outcome, told
+from .outcome import Findings, Outcome, relative, told
 from .report import Finding
 from .run import Run
 
@@ -95,18 +95,14 @@ def spectral(run: Run) -> Findings:
         if findings and all(finding.verdict != "fail" for finding in check(run)):
             outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
     for words in tried:
-        wanted = expected[words].mean(axis=1)
-        error, typical = _error(got[words], wanted[:, None])
+        wanted = np.broadcast_to(expected[words].mean(axis=1, keepdims=True), got[words].shape)
+        error, typical = _error(got[words], wanted)
         worst = max(worst, typical)
         if typical > TOLERANCE:
-            k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
-            outcome.fault(
-                f"in grey{words}, eval for light from {angles_of(wi[k])} towards {angles_of(wo[k])} is "
-                f"{got[words][k, channel]:.4g} at {hero_wavelengths(COUNT)[k, channel]:.0f} nm in {other}, but "
-                f"{wanted[k]:.4g} in {rgb}",
-                typical,
-                wi=wi[k],
-                wo=wo[k],
+            lane, channel = np.unravel_index(int(np.argmax(error)), error.shape)
+            name = f"in grey{words}, at {hero_wavelengths(COUNT)[lane, channel]:.0f} nm in {other} eval"
+            outcome.wrong(
+                error, name, got[words], f"in {rgb}", wi, wo, expected=np.broadcast_to(wanted, error.T.shape).T
             )
     grey = f"Grey is the same in {rgb} and {other}, to {worst:.1g}. " if tried else ""
     yield outcome.finding(f"{grey}Wavelengths follow their own.")
@@ -134,31 +130,22 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     errors = np.array([[_error(got[:, k], grey[other][:, k])[1] for other in range(count)] for k in range(count)])
     for k in range(count):
         channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
-        nearest = int(np.argmin(errors[k]))
-        lane = int(np.argmax(abs(got[:, k] - grey[k][:, k])))
-        where = f"eval in {channel} is {got[lane, k]:.4g} for light from {angles_of(wi[lane])}"
-        must = f"where grey of the colours' value there makes {grey[k][lane, k]:.4g}"
-        if errors[k, k] > TOLERANCE and errors[k, nearest] < 0.5 * errors[k, k]:
-            outcome.fault(f"{where}, {must}: it follows another channel", errors[k, k], wi=wi[lane], wo=wo[lane])
+        difference, why = abs(got[:, k] - grey[k][:, k]), "where all colours are grey of their value there"
+        if errors[k, k] > TOLERANCE and errors[k].min() < 0.5 * errors[k, k]:
+            name, of_other = f"eval in {channel}", f"{why}: it follows another channel"
+            outcome.wrong(difference, name, got[:, k], of_other, wi, wo, expected=grey[k][:, k])
         if mi.is_spectral:
             # Of four equal wavelengths no tint can depend on the others.
             alone = evaluated(coloured, alike[k])[:, k]
             error, typical = _error(alone, grey[k][:, k])
             if typical > TOLERANCE:
-                lane = int(np.argmax(error))
-                outcome.fault(
-                    f"eval at {wavelengths[lane, k]:.0f} nm is {alone[lane]:.4g} for light from {angles_of(wi[lane])}, "
-                    f"where grey of the colours' value there makes {grey[k][lane, k]:.4g}",
-                    typical,
-                    wi=wi[lane],
-                    wo=wo[lane],
-                )
+                name = f"eval at {wavelengths[np.argmax(error), k]:.0f} nm"
+                outcome.wrong(error, name, alone, why, wi, wo, expected=grey[k][:, k])
 
 
 def _error(got: Array, expected: Array) -> tuple[Array, float]:
     """Return the relative errors, and what 99 of 100 do not exceed."""
-    scale = np.maximum(abs(expected), 1e-6 * abs(expected).max() + 1e-12)
-    error = np.nan_to_num(abs(got - expected) / scale, nan=np.inf)
+    error = relative(got, expected, 1e-6)
     return error, float(np.quantile(error, 0.99))
 
 

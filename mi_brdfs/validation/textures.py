@@ -59,20 +59,15 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     wo[::2] = samples.wo[::2]
     # The one has its values wherever it is asked: let it be asked elsewhere.
     other = BSDFProbe(load(given | constant))
-    reflected = samples.weight * samples.pdf[:, None]
-    lit = samples.lit[:, None]
-    words = "but {:.4g} where its textures have the values of this point everywhere"
+    lit, why = samples.lit[:, None], "where its textures have the values of this point everywhere"
     for name, got, expected, but in (
-        ("eval", real.eval(part, wi, wo, uv), other.eval(part, wi, wo), words),
-        ("eval_diffuse_reflectance", real.diffuse_reflectance(wi, uv), other.diffuse_reflectance(wi), words),
-        ("the weight times pdf", reflected * lit, samples.value * lit, "but eval {:.4g}"),
+        ("eval", real.eval(part, wi, wo, uv), other.eval(part, wi, wo), why),
+        ("eval_diffuse_reflectance", real.diffuse_reflectance(wi, uv), other.diffuse_reflectance(wi), why),
+        ("the weight times pdf", samples.weight * samples.pdf[:, None] * lit, samples.value * lit, "is eval"),
     ):
         error = relative(got, expected)
-        if error.max() > 3 * run.rounding(part):
-            lane, channel = np.unravel_index(int(np.argmax(error)), error.shape)
-            u, v = uv[lane]
-            where = f"at uv = ({u:.3g}, {v:.3g}) {name} is {got[lane, channel]:.4g}"
-            outcome.fault(f"{where}, {but.format(expected[lane, channel])}", error.max(), wi=wi[lane], wo=wo[lane])
+        over = error * (error > 3 * run.rounding(part))
+        outcome.wrong(over, name, got, but, wi, wo, expected=expected, uv=uv)
 
 
 def _textured(run: Run) -> tuple[dict[str, mi.Texture], list[str]]:

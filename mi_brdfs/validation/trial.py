@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -96,15 +95,9 @@ class Trial:
         worst = np.argsort(excess)[-DOUBTFUL:]
         return worst[excess[worst] > 6]
 
-    @property
-    def is_suspect(self) -> bool:
-        """Whether it may fail, though perhaps by chance or for want of precision."""
-        return not (self.test.p_value > 1e-3 and abs(self.integral - self.share) < 5e-4)
-
-    @property
-    def is_wrong(self) -> bool:
-        """Whether it fails, whatever the significance."""
-        return not (self.test.p_value > 1e-6 and abs(self.integral - self.share) < 2e-3)
+    def fails(self, p_value: float, error: float) -> bool:
+        """Return whether it fails for a significance and a tolerance of the integral."""
+        return not (self.test.p_value > p_value and abs(self.integral - self.share) < error)
 
     @property
     def deviation(self) -> str:
@@ -116,28 +109,19 @@ class Trial:
         )
 
 
-class Trials(NamedTuple):
-    """The trials of a part."""
-
-    asked: list[Trial]
-    """Those for the directions of incidence that were asked for."""
-    at_random: list[Trial]
-    """Those for some at random."""
-
-
-def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> Trials:
-    """Make a trial of a part for each direction of incidence, those that were asked for and some at random."""
+def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> list[Trial]:
+    """Make a trial of a part for each direction of incidence, those that were asked for and then some at random."""
     found = _trials(probe, part, asked, COUNT, CELLS)
     if at_random:
         found += _trials(probe, part, at_random, RANDOM_COUNT, RANDOM_CELLS)
     # What is narrow, or jumps close to a line of the cells, may escape the quadrature: suspects get cells across that
     # line, made by as many samples as are counted, until some fail.
     confirmed = 0
-    for k in [k for k, trial in enumerate(found) if trial.is_suspect]:
+    for k in [k for k, trial in enumerate(found) if trial.fails(1e-3, 5e-4)]:
         if confirmed < CONFIRMED:
             (found[k],) = _trials(probe, part, [found[k].incident], COUNT, CELLS, pilot=1, turn=0.6)
-            confirmed += found[k].is_wrong
-    return Trials(found[: len(asked)], found[len(asked) :])
+            confirmed += found[k].fails(1e-6, 2e-3)
+    return found
 
 
 def _trials(

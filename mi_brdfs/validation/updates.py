@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.arrays import numbers
+from ..probe.arrays import launched_kernels, numbers
 from ..probe.bsdf import BSDFProbe, load
-from ..probe.directions import angles_of, hemisphere, on_side
-from ..probe.kernels import launched_kernels
+from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run
-from .traversal import restored, set_value, traced_floats
 
 COUNT = 1000
 
@@ -54,16 +55,9 @@ def updates(run: Run) -> Findings:
                 ("pdf", probe.pdf(part, wi, wo)[:, None], fresh.pdf(part, wi, wo)[:, None]),
             ):
                 error = relative(got, expected)
-                if error.max() > 10 * run.rounding(part):
-                    k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
-                    shown = ", ".join(f"{each:.4g}" for each in number)
-                    outcome.fault(
-                        f"once it is set to {shown}, {word} is {got[k, channel]:.4g} for light from "
-                        f"{angles_of(wi[k])}, but {expected[k, channel]:.4g} if it is loaded with that",
-                        error.max(),
-                        wi=wi[k],
-                        wo=wo[k],
-                    )
+                name = f"once it is set to {', '.join(f'{each:.4g}' for each in number)}, {word}"
+                why, over = "if it is loaded with that", error * (error > 10 * run.rounding(part))
+                outcome.wrong(over, name, got, why, wi, wo, expected=expected)
         yield outcome.finding("Set and updated, it acts as loaded.")
     if not tried:
         yield Finding("updates", "whole", "skip", "It has no parameters that could be given as a number or a colour.")
@@ -97,3 +91,58 @@ def recompiles(run: Run) -> Findings:
             yield outcome.finding("No kernel is compiled for a new value.")
     if not keys and not findings:
         yield Finding("recompiles", "whole", "skip", "It has no parameters.")
+
+
+# --- The parameters, as mi.traverse lists them ----------------------------------------------------------------------
+
+
+def traced_floats(run: Run, check: str) -> tuple[mi.SceneParameters, list[str], list[Finding]]:
+    """Return ``(params, keys, findings)``: the parameters that are floats, and what a check says of the others."""
+    params = mi.traverse(run.probe.bsdf)
+    keys, findings = [], []
+    for key in params.keys():
+        if not _is_traced(params, key):
+            findings.append(Finding(check, key, "skip", "Not a number of floating point that Dr.Jit traces."))
+        elif check in ("gradients", "active") and int(params.flags(key)) & int(mi.ParamFlags.NonDifferentiable):
+            findings.append(Finding(check, key, "skip", "Declared not differentiable."))
+        else:
+            keys.append(key)
+    return params, keys, findings
+
+
+def _is_traced(params: mi.SceneParameters, key: str) -> bool:
+    try:
+        value = params[key]
+    except TypeError:  # it may be None, which Mitsuba does not expect itself
+        return False
+    is_float = dr.is_arithmetic_v(value) and dr.is_float_v(value) and dr.is_jit_v(value)
+    return is_float and not dr.is_matrix_v(value) and dr.width(value) > 0
+
+
+def value_of(params: mi.SceneParameters, key: str) -> Any:
+    """Return a copy of the value of a parameter."""
+    return type(params[key])(params[key])
+
+
+def set_value(params: mi.SceneParameters, key: str, value: Any) -> None:
+    """Set a parameter to a copy of a value."""
+    params[key] = type(params[key])(value)
+    params.update()
+
+
+def attach(params: mi.SceneParameters, key: str) -> None:
+    """Make a parameter what derivatives are taken for."""
+    value = type(params[key])(dr.detach(params[key]))
+    dr.enable_grad(value)
+    params[key] = value
+    params.update()
+
+
+@contextmanager
+def restored(params: mi.SceneParameters, key: str) -> Iterator[Any]:
+    """Yield the value of a parameter, and set the parameter to it in the end."""
+    original = value_of(params, key)
+    try:
+        yield original
+    finally:
+        set_value(params, key, original)

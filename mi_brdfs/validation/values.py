@@ -9,7 +9,7 @@ import numpy as np
 
 from ..probe.arrays import Array
 from ..probe.bsdf import Part
-from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED
 from .outcome import Findings, Outcome, relative
@@ -46,15 +46,8 @@ def finite(run: Run) -> Findings:
         wi, wo = _pairs(part)
         for name, values in (("eval", run.probe.eval(part, wi, wo)), ("pdf", run.probe.pdf(part, wi, wo))):
             bad = _bad(values, signed and name == "eval")
-            if bad.any():
-                k = int(np.argmax(bad))
-                outcome.fault(
-                    f"{name} is {_shown(values[k])} for light from {angles_of(wi[k])} towards {angles_of(wo[k])}, and "
-                    f"{bad.mean():.1%} of the pairs tried are negative or not finite",
-                    bad.sum(),
-                    wi=wi[k],
-                    wo=wo[k],
-                )
+            why = f"and {bad.mean():.1%} of the pairs tried are negative or not finite"
+            outcome.wrong(bad, name, values, why, wi, wo)
         corners = np.array([0, 2**-24, 0.5, 1 - 2**-24], np.float32)
         u = np.stack(np.meshgrid(corners, corners, corners), axis=-1).reshape(-1, 3)
         u = np.concatenate([u, random(2000, 4)])
@@ -90,62 +83,34 @@ def horizon(run: Run) -> Findings:
     for part in run.probe.parts:
         outcome = Outcome("horizon", part.name)
         wi, wo = _pairs(part)
-        same = wi[:, 2] * wo[:, 2] > 0
-        for flag, where, words in ((flags.Reflection, same, "above"), (flags.Transmission, ~same, "below")):
+        above = wi[:, 2] * wo[:, 2] > 0
+        for flag, where, words in ((flags.Reflection, above, "above"), (flags.Transmission, ~above, "below")):
             if part.has(flag):
                 continue
-            for name, values in (
-                ("eval", run.probe.eval(part, wi[where], wo[where]).max(axis=1)),
-                ("pdf", run.probe.pdf(part, wi[where], wo[where])),
-            ):
-                if (values != 0).any():
-                    k = int(np.argmax(values != 0))
-                    outcome.fault(
-                        f"{name} is {values[k]:.4g} for light from {angles_of(wi[where][k])} towards "
-                        f"{angles_of(wo[where][k])}, {words} the horizon, where the flags allow nothing",
-                        np.inf,
-                        wi=wi[where][k],
-                        wo=wo[where][k],
-                    )
+            why = f"{words} the horizon, where the flags allow nothing"
+            _check_dark(run, outcome, part, wi[where], wo[where], why)
             for incident in run.views(part):
                 samples = run.samples(part, incident)
-                there = (samples.wo[:, 2] * incident.wi[..., 2] > 0) == (words == "above")
-                lost = there & samples.lit
-                if lost.any():
-                    outcome.fault(
-                        f"for light from {incident.name} {lost.mean():.2%} of the samples go {words} the horizon with "
-                        f"a weight, where the flags allow nothing",
-                        lost.sum(),
-                        wi=incident.vector(int(np.argmax(lost))),
-                        wo=samples.wo[int(np.argmax(lost))],
-                        seed=SEED,
-                    )
-        for side in (1, -1):
+                lost = samples.lit & ((samples.wo[:, 2] * incident.wi[..., 2] > 0) == (words == "above"))
+                told = f"{why}, as of {lost.mean():.2%} of the samples"
+                outcome.wrong(lost, "a sample's weight", samples.weight, told, incident.wi, samples.wo, seed=SEED)
+        for side, words in (1, "the front"), (-1, "behind"):
             if side not in run.probe.whole.sides:
-                _check_blind(run, outcome, part, side)
+                wi, wo = (on_side(hemisphere(4000, seed), side) for seed in (2, 3))
+                wo[::2, 2] *= -1
+                why = f"but its flags say that it cannot be seen from {words}"
+                _check_dark(run, outcome, part, wi, wo, why)
+                samples = run.probe.sample(part, wi, random(4000, 4))
+                weights = samples.weight * samples.smooth[:, None]
+                outcome.wrong(weights != 0, "a sample's weight", weights, why, wi, samples.wo, seed=4)
         yield outcome.finding("Nothing on the sides that the flags exclude.")
 
 
-def _check_blind(run: Run, outcome: Outcome, part: Part, side: int) -> None:
-    """Check that nothing comes of light from a side that the flags of all components exclude."""
-    wi, wo = (on_side(hemisphere(4000, seed), side) for seed in (2, 3))
-    wo[::2, 2] *= -1
-    samples = run.probe.sample(part, wi, random(4000, 4))
-    for name, values in (
-        ("eval", run.probe.eval(part, wi, wo).max(axis=1)),
-        ("pdf", run.probe.pdf(part, wi, wo)),
-        ("the weight of a sample", (samples.weight * samples.smooth[:, None]).max(axis=1)),
-    ):
-        if (values != 0).any():
-            k = int(np.argmax(values != 0))
-            towards = samples.wo[k] if "sample" in name else wo[k]
-            outcome.fault(
-                f"{name} is {values[k]:.4g} for light from {angles_of(wi[k])} towards {angles_of(towards)}, but its "
-                f"flags say that it cannot be seen from {'the front' if side > 0 else 'behind'}",
-                np.inf,
-                wi=wi[k],
-                wo=towards,
-            )
+def _check_dark(run: Run, outcome: Outcome, part: Part, wi: Array, wo: Array, why: str) -> None:
+    """Check that values and densities of some pairs are zero; ``why`` follows what is not."""
+    value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
+    outcome.wrong(value != 0, "eval", value, why, wi, wo)
+    outcome.wrong(density != 0, "pdf", density, why, wi, wo)
 
 
 def support(run: Run) -> Findings:
@@ -163,17 +128,9 @@ def support(run: Run) -> Findings:
             wi = incident.at(np.arange(len(wo)) % SCATTERED)
             value = np.nan_to_num(run.probe.eval(part, wi, wo).max(axis=1))
             pdf = run.probe.pdf(part, wi, wo)
-            missed = (value > 1e-9 * value.max()) & ~(pdf > 0)
+            missed = np.where((value > 1e-9 * value.max()) & ~(pdf > 0), value, 0)
             tried += len(wo)
-            if missed.any():
-                k = int(np.argmax(np.where(missed, value, 0)))
-                outcome.fault(
-                    f"for light from {incident.of(k % SCATTERED)} eval is {value[k]:.4g} towards {angles_of(wo[k])}, "
-                    "but pdf is 0: this light is never sampled",
-                    missed.sum(),
-                    wi=incident.vector(k % SCATTERED),
-                    wo=wo[k],
-                )
+            outcome.wrong(missed, "eval", value, "but pdf is 0: this light is never sampled", wi, wo)
         yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
 
 
@@ -190,31 +147,21 @@ def eval_pdf(run: Run) -> Findings:
             wo[::4, 2] *= -1  # where nothing is, the sample must still be drawn
             value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
             pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
-            drawn, every = np.flatnonzero(samples.drawn), np.arange(len(u))
-            comparisons = [
-                ("eval_pdf", "eval", pair[0], value, every),
-                ("eval_pdf", "pdf", pair[1], density, every),
-                ("eval_pdf_sample", "eval", triple[0], value, every),
-                ("eval_pdf_sample", "pdf", triple[1], density, every),
-                ("eval_pdf_sample", "sample's density", triple[3][drawn], samples.density[drawn], drawn),
-                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, every),
-                ("eval_pdf_sample", "sample's direction", triple[2][drawn] + 2.0, samples.wo[drawn] + 2.0, drawn),
-            ]
-            for name, of, got, expected, which in comparisons:
-                error = relative(got, expected)
-                if not error.size:
-                    continue
+            drawn = samples.drawn
+            for name, of, got, expected, which in (
+                ("eval_pdf", "eval", pair[0], value, ...),
+                ("eval_pdf", "pdf", pair[1], density, ...),
+                ("eval_pdf_sample", "eval", triple[0], value, ...),
+                ("eval_pdf_sample", "pdf", triple[1], density, ...),
+                ("eval_pdf_sample", "sample's density", triple[3], samples.density, drawn),
+                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, ...),
+                ("eval_pdf_sample", "sample's direction", triple[2] + 2.0, samples.wo + 2.0, drawn),
+            ):
+                error = np.zeros(got.shape)
+                error[which] = relative(got[which], expected[which])
                 worst = max(worst, error.max())
-                if error.max() > tolerance:
-                    k = np.unravel_index(int(np.argmax(error)), error.shape)
-                    outcome.fault(
-                        f"for light from {incident.of(lanes[which[k[0]]])} {name} gives {got[k]:.6g} where {of} is "
-                        f"{expected[k]:.6g}",
-                        error.max(),
-                        wi=incident.vector(lanes[which[k[0]]]),
-                        wo=wo[which[k[0]]],
-                        seed=6,
-                    )
+                over, why = error * (error > tolerance), f"by {of}"
+                outcome.wrong(over, f"{of} of {name}", got, why, wi, wo, expected=expected, seed=6, digits=6)
         yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
 
 
@@ -232,23 +179,15 @@ def reciprocity(run: Run) -> Findings:
             drawn = run.probe.sample(part, wi, random(8000, 10)).wo
             near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * side > 0.01)
             wo[near] = drawn[near]
+            # Of both, times the two cosines.
             forth = run.probe.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
             back = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
-            larger = np.nan_to_num(np.maximum(forth, back))
-            scale = np.maximum(larger, 1e-6 * larger.max() + 1e-12)
-            error = np.nan_to_num(abs(forth - back) / scale, nan=0).max(axis=1)
-            off = error > tolerance
+            error = relative(forth, back, 1e-6, unknown=0).max(axis=1)
+            off = (error > tolerance).mean()
             worst = max(worst, float(np.quantile(error, 0.999)))
-            if off.mean() > 1e-3:
-                k = int(np.argmax(error))
-                f, g = (x[k].max() / (abs(wi[k, 2]) * abs(wo[k, 2])) for x in (forth, back))
-                outcome.fault(
-                    f"f from {angles_of(wi[k])} to {angles_of(wo[k])} is {f:.4g}, but {g:.4g} from there back, and "
-                    f"{off.mean():.1%} of the pairs differ",
-                    off.mean(),
-                    wi=wi[k],
-                    wo=wo[k],
-                )
+            if off > 1e-3:
+                f, g = (x / abs(wi[:, 2:] * wo[:, 2:]) for x in (forth, back))
+                outcome.wrong(error, "f", f, f"from there back, and {off:.1%} of the pairs differ", wi, wo, expected=g)
         yield outcome.finding(f"f(wi, wo) = f(wo, wi) to {worst:.1g}, within {tolerance:.1g}.")
 
 
@@ -276,19 +215,14 @@ def continuity(run: Run) -> Findings:
                 others = _companions(run, part, crossing[0])
                 for word, (at, *around) in _both_ways(run, part, crossing, others):
                     mean, farther = (around[0] + around[1]) / 2, (around[2] + around[3]) / 2
-                    scale = np.maximum(np.maximum(at, mean), 1e-6 * np.max(at) + 1e-12)
-                    jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), np.nan_to_num(abs(at - mean) / scale), 0)
+                    error = relative(mean, at, 1e-6, unknown=0)
+                    jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), error, 0)
                     typical = float(np.quantile(jump, 0.99))
                     worst = max(worst, typical)
                     if typical > tolerance:
-                        k = int(np.argmax(jump))
-                        wi, wo = (crossing[0], others[k])[:: 1 if word == "from" else -1]
-                        outcome.fault(
-                            f"eval jumps at light {word} {where}: it is {at[k]:.4g}, but {mean[k]:.4g} around it",
-                            typical,
-                            wi=wi,
-                            wo=wo,
-                        )
+                        wi, wo = (crossing[0], others)[:: 1 if word == "from" else -1]
+                        name = f"eval jumps at light {word} {where}: it"
+                        outcome.wrong(jump, name, at, "around that", wi, wo, expected=mean)
             for phi in (0, 77):
                 # Far above the horizon only hard edges jump, the more often the farther apart two heights are.
                 angles = [70, 70 + np.degrees(STEP), *(90 - np.degrees(STEP) * times for times in OCTAVES)]
@@ -355,7 +289,8 @@ def _both_ways(run: Run, part: Part, directions: list[Array], others: Array) -> 
     """Yield the values for light from each of some directions towards others, and from the others towards each."""
 
     def values(wi: Array, wo: Array) -> Array:
-        return run.probe.eval(part, *map(np.ascontiguousarray, np.broadcast_arrays(wi, wo))).max(axis=1)
+        pairs = (np.ascontiguousarray(w.reshape(-1, 3)) for w in np.broadcast_arrays(wi, wo))
+        return run.probe.eval(part, *pairs).max(axis=1).reshape(len(directions), len(others))
 
-    yield "from", np.array([values(w, others) for w in directions])
-    yield "towards", np.array([values(others, w) for w in directions])
+    yield "from", values(np.stack(directions)[:, None], others)
+    yield "towards", values(others, np.stack(directions)[:, None])

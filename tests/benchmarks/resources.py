@@ -14,7 +14,7 @@ import numpy as np
 
 from mi_brdfs.bench.first import SIZE, in_new_process
 from mi_brdfs.bench.pictures import sphere
-from mi_brdfs.probe.kernels import launched_kernels
+from mi_brdfs.probe.arrays import launched_kernels
 
 from .cases import CASES, Case, Plugin, defaults
 from .figure import Figure, Target

@@ -1,12 +1,30 @@
-"""Reports as JUnit's XML, which servers of continuous integration read."""
+"""Reports for others: in a terminal, folded to the width, and as JUnit's XML for servers of continuous integration."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
 from xml.etree import ElementTree
 
 from ..parameters.messages import printable
 from .report import Finding, Report
+
+STYLES = {"FAILED": "bold red", "passed": "bold green", "not judged": "bold yellow", "fail": "red", "note": "yellow"}
+
+
+def block(report: Report, width: int) -> Iterator[tuple[str, str]]:
+    """Yield the lines of a block with their styles: the outcome, the checks by their verdicts, and the sentences."""
+    yield from _folded(f"{report.name}: {report.outcome}", width, "", STYLES[report.outcome])
+    for verdict, checks in report.by_verdict:
+        word = "FAIL" if verdict == "fail" else verdict
+        yield from _folded(f"  {word}  {', '.join(checks)}", width, " " * 8, STYLES.get(verdict, "dim"))
+    for sentence in report.sentences:
+        yield from _folded(f"  {sentence}", width, " " * 4, "")
+
+
+def _folded(text: str, width: int, indent: str, style: str) -> Iterator[tuple[str, str]]:
+    for line in textwrap.wrap(printable(text), width, subsequent_indent=indent, break_on_hyphens=False):
+        yield line, style
 
 
 def junit(reports: Sequence[Report]) -> str:
