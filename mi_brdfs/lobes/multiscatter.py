@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, clamp
+from ..math import EPSILON, Spectrum, clamp, select
 from ..microfacet.escape import Escape, Tables, textures
 from ..parameters import Choice, ParameterError
 from .lobe import Lobe, WeightedLobe
@@ -22,13 +22,16 @@ if TYPE_CHECKING:
 class MultipleScattering(Lobe):
     """f = ρ C (1 - E(wi)) (1 - E(wo)) / (π (1 - Ē)), where E is the albedo of a lobe with F = 1, Ē its mean, and C a
     colour: with C = 1 all that the lobe loses is reflected (C. Kulla and A. Conty, Revisiting physically based shading
-    at Imageworks, in: Physically based shading in theory and practice, SIGGRAPH 2017 courses). Reciprocal and
-    cosine-sampled."""
+    at Imageworks, in: Physically based shading in theory and practice, SIGGRAPH 2017 courses). Reciprocal.
+
+    Draw from the cosine on rough surfaces, and uniformly on smooth ones, which lose most of the light at grazing angles.
+    """
 
     def __init__(self, lobe: MicrofacetLobe, tables: Tables) -> None:
         self.reflectance, self.fresnel, self.anisotropic = lobe.reflectance, lobe.fresnel, lobe.anisotropic
         alphas = lobe.shadowing.alpha_u, lobe.shadowing.alpha_v
         self.of, self.mean = functools.partial(tables.of, *alphas), tables.mean_of(*alphas)
+        self.uniform = 1 - dr.minimum(dr.sqrt(alphas[0] * alphas[1]), 1)
 
     def colour(self, i: Escape, o: Escape) -> Spectrum:
         """Return C for what becomes of light from both directions; it is 1 if F is."""
@@ -39,12 +42,13 @@ class MultipleScattering(Lobe):
         return self.reflectance * self.colour(i, typical) * i.lost
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
-        i, o, pdf = self.of(wi), self.of(wo), wo.z * dr.inv_pi
+        i, o, cosine = self.of(wi), self.of(wo), wo.z * dr.inv_pi
         scale = i.lost * o.lost / dr.maximum(self.mean.lost, EPSILON)
-        return self.reflectance * self.colour(i, o) * (scale * pdf), pdf
+        return self.reflectance * self.colour(i, o) * (scale * cosine), dr.lerp(cosine, dr.inv_two_pi, self.uniform)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        return mi.warp.square_to_cosine_hemisphere(v)
+        uniform, cosine = (warp(v) for warp in (mi.warp.square_to_uniform_hemisphere, mi.warp.square_to_cosine_hemisphere))
+        return select(u < self.uniform, uniform, cosine)
 
 
 class WalkLobe(MultipleScattering):

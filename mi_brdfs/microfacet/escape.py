@@ -21,11 +21,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, clamp, normalize_or
+from ..math import EPSILON, clamp
 
 FILE = Path(__file__).with_name("escape.npz")
 ROUGHEST = 3.2
 """The largest tabulated α: that of Burley's most anisotropic facets."""
+
+
+UPRIGHT = 0.01
+"""The sin²θ below which the azimuth counts less and less: what is tabulated changes little with it there."""
 
 
 class Escape(NamedTuple):
@@ -62,10 +66,12 @@ class Tables:
 
     def of(self, alpha_u: mi.Float, alpha_v: mi.Float, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
-        x, y = normalize_or(v.x, v.y, (1, 0))
-        u2, v2, x2, y2 = dr.square(alpha_u), dr.square(alpha_v), x * x, y * y
+        u2, v2, x2, y2 = (dr.square(each) for each in (alpha_u, alpha_v, v.x, v.y))
+        cos = v.z * dr.rsqrt(dr.maximum(v.z * v.z + u2 * x2 + v2 * y2, EPSILON))
+        # At the normal all azimuths are one.
+        inverse = dr.rcp(x2 + y2 + 2 * UPRIGHT)
+        x2, y2 = (x2 + UPRIGHT) * inverse, (y2 + UPRIGHT) * inverse
         along2, across2 = u2 * x2 + v2 * y2, u2 * y2 + v2 * x2
-        cos = v.z * dr.rsqrt(dr.maximum(v.z * v.z + along2 * (v.x * v.x + v.y * v.y), EPSILON))
         at = [cos, _compressed(dr.sqrt(along2)), _compressed(dr.sqrt(across2))]
         k = self.towards.eval(mi.Point3f(*reversed([_texel(x, n) for x, n in zip(at, self.towards.shape)])))
         rho2 = 1 - u2 * v2 / (along2 * across2)

@@ -15,20 +15,20 @@ from harness import parser
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import erfc, erfinv
 
-from mi_brdfs.microfacet.escape import FILE, ROUGHEST
+from mi_brdfs.microfacet.escape import FILE, ROUGHEST, UPRIGHT
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip
 import numpy as np  # isort: skip
 
-COSINES, ALPHAS = 32, 24
+COSINES, ALPHAS = 28, 28
 WALK_COSINES, WALK_ALPHAS = 13, 9
 """Nodes of the walks: what they say changes less, and splines are drawn through it."""
 WALKS = 1 << 15
 REFLECTIONS = 10
 TYPICAL = 0.85
 """What facets reflect where paths are averaged: as metals do, of which most light is lost at the first reflections."""
-CORRELATIONS = 0, 0.5, 0.99
+CORRELATIONS = 0, 0.5, 0.9
 """The ρ² of polynomials for E; those for walks are lines through the first and the second."""
 
 
@@ -292,14 +292,15 @@ def mean_table(shape: str, first: np.ndarray, walked: dict[str, RegularGridInter
     result = np.zeros((ALPHAS, 1 if shape == "blinn" else ALPHAS, 8))
     for i, j in np.ndindex(result.shape[:2]):
         u2, v2 = alpha[i] ** 2, alpha[i if shape == "blinn" else j] ** 2
-        along2, across2 = u2 * np.cos(phi) ** 2 + v2 * np.sin(phi) ** 2, u2 * np.sin(phi) ** 2 + v2 * np.cos(phi) ** 2
-        c = NODES[:, None]
-        stretched = c / np.sqrt(c * c + along2 * (1 - c * c))
-        place = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) + 0 * c for a2 in (along2, across2)]
-        rho2 = np.maximum(1 - u2 * v2 / (along2 * across2), 0) + 0 * c
+        c, x2 = NODES[:, None], np.cos(phi) ** 2
+        stretched = c / np.sqrt(c * c + (u2 * x2 + v2 * (1 - x2)) * (1 - c * c))
+        x2 = ((1 - c * c) * x2 + UPRIGHT) / (1 - c * c + 2 * UPRIGHT)
+        along2, across2 = u2 * x2 + v2 * (1 - x2), u2 * (1 - x2) + v2 * x2
+        place = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
+        rho2 = np.maximum(1 - u2 * v2 / (along2 * across2), 0)
         k = look_up(np.stack([stretched, *place][: 2 if shape == "blinn" else 3], axis=-1))
         weight = WEIGHTS[:, None] * 2 * c / len(phi)
-        lost = weight * (k[..., 0] + rho2 * (k[..., 1] + rho2 * k[..., 2]))
+        lost = weight * np.maximum(k[..., 0] + rho2 * (k[..., 1] + rho2 * k[..., 2]), 0)
         at = np.stack([stretched, *place], axis=-1)
 
         def along_line(name, channel=0, at=at, rho2=rho2):
