@@ -91,9 +91,10 @@ def test_a_component_alone_is_lit_from_its_side(side):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", ["wrap sphere", "blinnphong original"])
 def test_a_particle_tracer_sees_what_a_path_tracer_sees(name):
-    """A patch under a small lamp: the mean brightness, to four standard errors of both over sixteen seeds."""
+    """A patch under a small lamp, also from behind: the mean brightness, to four standard errors of both over sixteen
+    seeds. Of the other models test_ptracer has it."""
     lamp = mi.ScalarTransform4f().look_at([1.5, 0, -1 if "sphere" in name else 1], [0, 0, 0], [0, 0, 1]).scale(0.3)
     scene = {
         "type": "scene",

@@ -7,6 +7,8 @@ import pytest
 from catalogue import ROWS
 from scipy.stats import ttest_ind
 
+pytestmark = pytest.mark.slow
+
 PIXELS = 16
 """Of a cell, from side to side."""
 SEEDS, SAMPLES = 8, 24
