@@ -5,6 +5,8 @@ import functools
 import importlib
 import itertools
 import multiprocessing
+import os
+import signal
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import drjit as dr
@@ -15,6 +17,7 @@ from catalogue import ROWS
 from support import call, hemisphere, is_scalar, sphere
 
 import mi_brdfs
+from mi_brdfs.mitsuba import registry
 from mi_brdfs.mitsuba.registry import own_models
 
 NAMES = [model.plugins[0] for model in own_models()]
@@ -192,6 +195,22 @@ def there_and_back(variants):
         mi.set_variant(variant)
         again += [result for bsdf in loaded for result in value_and_density(bsdf)]
     return first, again
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_waits_until_all_plugins_are_registered(monkeypatch):
+    register, registered = registry._register_for, []
+
+    def struck(variant):
+        os.kill(os.getpid(), signal.SIGINT)
+        register(variant)
+        registered.append(variant)
+
+    monkeypatch.setattr(registry, "_register_for", struck)
+    mi.set_variant("scalar_rgb")
+    with pytest.raises(KeyboardInterrupt):
+        mi.set_variant("llvm_ad_rgb")
+    assert registered[-1:] == ["llvm_ad_rgb"]
 
 
 # --- Threads --------------------------------------------------------------------------------------------------------

@@ -7,8 +7,11 @@ import importlib
 import json
 import pkgutil
 import re
+import signal
+import threading
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -272,7 +275,26 @@ def _on_variant(old: str | None, new: str | None) -> None:
         if old is not None:  # as where Mitsuba itself refuses a variant, which it does before it changes
             mi.set_variant(old)
         raise
-    _register_for(new)
+    with _ctrl_c_held():
+        _register_for(new)
+
+
+@contextmanager
+def _ctrl_c_held() -> Iterator[None]:
+    """Let Ctrl-C wait until the end: imports that it interrupts print tracebacks, and half of the plugins would be
+    registered."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield  # it does not interrupt
+        return
+    pressed = []
+    signal.signal(signal.SIGINT, lambda *_: pressed.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if pressed:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _register_for(active: str) -> None:
