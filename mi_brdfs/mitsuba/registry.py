@@ -30,8 +30,8 @@ from ..parameters import published
 from ..parameters.messages import meant
 from ..tabulated.tabulated import Tabulated
 from . import llvm
-from .bsdf import bsdf_class
-from .integrator import integrator_class
+from .bsdf import ModelBSDF, variant_class
+from .integrator import PixelCentreIntegrator
 
 Registered = TypeVar("Registered", bound=type[Model] | type[Term])
 
@@ -313,9 +313,10 @@ def _register_in(variant: str) -> None:
         if issubclass(plugin, Model):
             if name not in known and variant == mi.variant() and _is_foreign(name):
                 warnings.warn(f'mi_brdfs replaces the BSDF "{name}", registered by another package.', stacklevel=2)
-            module.register_bsdf(name, bsdf_class(plugin, module.BSDF))
+            module.register_bsdf(name, variant_class(plugin, ModelBSDF, module.BSDF))
         else:
-            module.register_integrator(name, integrator_class(plugin, module.SamplingIntegrator))
+            integrator = variant_class(plugin, PixelCentreIntegrator, module.SamplingIntegrator)
+            module.register_integrator(name, integrator)
         known[name] = plugin
 
 
