@@ -3,6 +3,7 @@
 import mitsuba as mi
 import numpy as np
 import pytest
+from catalogue import mostly_slow
 from support import call, chi_square, context, direction, hemisphere, is_scalar, sphere
 
 NOT_RECIPROCAL = {
@@ -45,7 +46,7 @@ def test_the_roles_of_the_directions_are_exchanged(name, variant):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", NOT_RECIPROCAL)
+@pytest.mark.parametrize("name", mostly_slow(NOT_RECIPROCAL))
 def test_the_sampler_draws_what_its_density_says(name):
     """By the stock χ² test, also from behind where light shines through; and weights are value over density."""
     bsdf, rng = mi.load_dict(NOT_RECIPROCAL[name]), np.random.default_rng(1)

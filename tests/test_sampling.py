@@ -50,8 +50,9 @@ def test_chi2(row):
         assert test.histogram_sum[0] > 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("row", mostly_slow(REPRESENTATIVES))
+@pytest.mark.parametrize("row", REPRESENTATIVES, ids=str)
 def test_passes_the_checker(row):
     """Of the public checker, what needs no statistics. One angle of incidence does: it looks at directions all over,
     too."""
