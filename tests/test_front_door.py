@@ -12,7 +12,7 @@ import pytest
 from support import call, direction
 
 import mi_brdfs
-from mi_brdfs.bench.first import first_picture, in_new_process
+from mi_brdfs.bench.pictures import first_picture, in_new_process
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.models.eon import EON
