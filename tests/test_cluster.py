@@ -76,11 +76,12 @@ def address(tmp_path_factory):
     """A scheduler and two workers, started by their commands as on other machines."""
     folder = tmp_path_factory.mktemp("machine")
     scheduler, address = scheduler_in(folder)
-    processes = [start("worker", address, "--nthreads", "1", "--no-nanny", folder=folder) for _ in range(2)]
+    workers = start("worker", address, "--nthreads", "1", "--nworkers", "2", folder=folder)
     yield address
-    for process in [*processes, scheduler]:
-        process.kill()
-        process.wait()
+    workers.terminate()
+    workers.wait()
+    scheduler.kill()
+    scheduler.wait()
 
 
 @pytest.fixture
@@ -278,7 +279,6 @@ NO_SCHEDULER = (
     [
         ("tcp://127.0.0.1:1", NO_SCHEDULER.format("tcp://127.0.0.1:1")),
         ("nonsense", "nonsense is not the address of a scheduler; write tcp://HOST:PORT."),
-        ("http://127.0.0.1:80", "http://127.0.0.1:80 is not the address of a scheduler; write tcp://HOST:PORT."),
     ],
 )
 def test_a_wrong_address_is_one_sentence(scheduler, sentence, scene, tmp_path, monkeypatch):

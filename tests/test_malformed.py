@@ -24,7 +24,13 @@ from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
 
-MODELS = pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
+FEW = "lambert", "ward", "cooktorrance", "lafortune"
+"""The models that are tried by default: pairs, words, conductors and lobes are among their parameters."""
+MODELS = pytest.mark.parametrize(
+    "model",
+    [pytest.param(model, marks=() if model.plugins[0] in FEW else pytest.mark.slow) for model in own_models()],
+    ids=[model.plugins[0] for model in own_models()],
+)
 
 
 def refusal(load, *arguments):
@@ -315,6 +321,7 @@ def edited(draw, text):
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_edited_documents():
     """They load, or they do not."""

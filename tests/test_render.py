@@ -11,7 +11,7 @@ import pytest
 
 import mi_brdfs  # noqa: F401
 from mi_brdfs.rendering import passes as module
-from mi_brdfs.rendering.output import display_image, tonemap, write
+from mi_brdfs.rendering.output import display_image, tonemap
 from mi_brdfs.rendering.passes import render
 
 WIDTH, HEIGHT = 32, 24
@@ -235,10 +235,3 @@ def test_the_display_image_of_a_well_exposed_picture_is_plain_srgb(variant):
     bitmap = mi.Bitmap(pixels)
     plain = np.array(mi.util.convert_to_bitmap(bitmap)).astype(int)
     assert np.abs(np.array(display_image(bitmap)).astype(int) - plain).max() <= 1
-
-
-def test_files_are_written_whole(variant, tmp_path):
-    bitmap = mi.Bitmap(np.full((4, 4, 3), 0.25, dtype=np.float32))
-    write(bitmap, tmp_path / "a.exr")
-    np.testing.assert_allclose(np.array(mi.Bitmap(str(tmp_path / "a.exr"))), 0.25)
-    assert [file.name for file in tmp_path.iterdir()] == ["a.exr"]

@@ -191,13 +191,6 @@ def test_results_of_what_a_file_became_are_not_kept_as_those_of_what_it_was(seri
     assert [outcome.error for outcome in pictures.render()] == [sentence] and pictures.finished() == 0
 
 
-def test_nothing_is_left_of_a_file_that_cannot_be_written(tmp_path):
-    store = Store(tmp_path)
-    with pytest.raises(ValueError):
-        store.add("it", [{"seed": "no number"}])
-    assert not list(tmp_path.iterdir())
-
-
 # --- Tables and pictures --------------------------------------------------------------------------------------------
 
 
