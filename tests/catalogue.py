@@ -50,6 +50,15 @@ def first_of_each(names):
 ROWS = [row for file in _files for row in file.ROWS]
 FIRST_ROWS = first_of_each(ROWS)
 """One of each plugin."""
+
+
+def options(row):
+    """The plugin and its choices of a row."""
+    return tuple(value for value in row.bsdf.values() if isinstance(value, (str, bool)))
+
+
+REPRESENTATIVES = {options(row): row for row in sorted(ROWS, key=lambda row: len(row.bsdf)) if not row.sharp}.values()
+"""Of each model and its choices the row with the most parameters, among those that are not sharp."""
 EXTREME = [row for file in _files for row in getattr(file, "EXTREME", [])]
 SMOOTH = {name: bsdf for file in _files for name, bsdf in file.SMOOTH.items()}
 

@@ -529,7 +529,7 @@ class Mutant:
             module = importlib.import_module(f"mitsuba.{variant}")
             members = {k: v for base in reversed(self.methods.__mro__[:-1]) for k, v in vars(base).items()}
             members = {k: v for k, v in members.items() if k not in ("__dict__", "__weakref__")}
-            made = type(self.model.__name__, (module.BSDF,), members | {"model_class": self.model})
+            made = type(self.model.__name__, (module.BSDF,), members | {"plugin_class": self.model})
             module.register_bsdf(plugin, made)
         return {"type": plugin, **dict(self.given)}
 

@@ -157,16 +157,12 @@ def wrap(wi, wo, reflectance, wrap, exponent, domain, normalization):
         case "sphere":
             cos, darkest = wo[:, 2] * np.sign(wi[:, 2]), -wrap
             seen = wi[:, 2] != 0
-        case _:
-            raise ValueError(domain)
     match normalization:
         case "energy":  # 2 pi times the integral of the lobe over the cosines from the darkest to 1
             first = (darkest + wrap) / (1 + wrap)
             z = 2 * np.pi * (1 + wrap) / (exponent + 1) * (1 - first ** (exponent + 1))
         case "none":
             z = np.pi
-        case _:
-            raise ValueError(normalization)
     lit = np.maximum(cos + wrap, 0.0) / (1 + wrap)
     return np.where(seen & (cos > darkest), reflectance * lit**exponent / z, 0.0)
 
@@ -185,8 +181,6 @@ def minnaert(i, o, reflectance, exponent, normalization):
             return published
         case "none":  # the shading formula: f times the cosine is rho (NL NV)^k / pi
             return reflectance * (cos_i * cos_o) ** exponent / (np.pi * cos_i)
-        case _:
-            raise ValueError(normalization)
 
 
 @_brdf
@@ -205,8 +199,6 @@ def orennayar(i, o, reflectance, sigma, model):
             direct = c1 + cos_phi * c2 * np.tan(beta) + (1 - np.abs(cos_phi)) * c3 * np.tan((alpha + beta) / 2)
             twice = 0.17 * sigma**2 / (sigma**2 + 0.13) * (1 - cos_phi * (2 * beta / np.pi) ** 2)
             return reflectance / np.pi * direct + reflectance**2 / np.pi * twice
-        case _:
-            raise ValueError(model)
 
 
 @_brdf
@@ -245,8 +237,6 @@ def toon(
     normalization,
 ):
     """Two-band shading after Lake et al. 2000: f cos = rho r(c) / Z, c the cosine of i with n or with the mirror R."""
-    if normalization not in ("energy", "none"):
-        raise ValueError(normalization)
     lobes = 0.0
     for cos, reflectance, threshold, smooth, shadow in (
         (i[:, 2], diffuse_reflectance, diffuse_threshold, diffuse_smooth, diffuse_shadow),
@@ -285,8 +275,6 @@ def phong(i, o, diffuse_reflectance, specular_reflectance, exponent, normalizati
             scale = 1.0
         case "original":  # the shading formula has no cosine: it is f times the cosine that is rho cos^n / pi
             scale = 1 / (np.pi * i[:, 2])
-        case _:
-            raise ValueError(normalization)
     return diffuse_reflectance / np.pi + specular_reflectance * scale * lobe
 
 
@@ -305,8 +293,6 @@ def blinnphong(i, o, diffuse_reflectance, specular_reflectance, exponent, normal
             scale = 1.0
         case "original":  # f times the cosine is rho cos^n / pi, as in `phong`
             scale = 1 / (np.pi * i[:, 2])
-        case _:
-            raise ValueError(normalization)
     return diffuse_reflectance / np.pi + specular_reflectance * scale * cos_h**n
 
 
@@ -338,15 +324,11 @@ def cooktorrance(
             d = ggx(*_half(i, o), alpha, alpha)
         case "blinn":
             d = blinn(*_half(i, o), 2 / alpha**2 - 2)
-        case _:
-            raise ValueError(distribution)
     match normalization:
         case "modern":
             scale = 1 / 4
         case "tog82":
             scale = 1.0
-        case _:
-            raise ValueError(normalization)
     lobe = scale * fresnel(_cos_d(i, o)) * d * vcavity(i, o) / (i[:, 2] * o[:, 2])
     return diffuse_reflectance / np.pi + specular_reflectance * lobe
 
@@ -367,8 +349,6 @@ def ward(i, o, diffuse_reflectance, specular_reflectance, alpha_u, alpha_v, vari
             scale = 1 / (4 * i[:, 2] * o[:, 2])
         case "balanced":  # H = i + o, not normalised: (H.H) / (H.n)^4
             scale = _dot(i + o, i + o) / (i + o)[:, 2] ** 4
-        case _:
-            raise ValueError(variant)
     lobe = np.exp(-exponent) / (np.pi * alpha_u * alpha_v)
     return diffuse_reflectance / np.pi + specular_reflectance * lobe * scale
 
@@ -388,8 +368,6 @@ def schlick(i, o, specular_reflectance, diffuse_reflectance, roughness, isotropy
             d = g * zenith * azimuth + 1 - g
         case "plain":
             d = zenith * azimuth
-        case _:
-            raise ValueError(variant)
     s = fresnel_schlick(cos_d, specular_reflectance)
     below = 0 if diffuse_reflectance is None else fresnel_schlick(cos_d, diffuse_reflectance) / np.pi
     return s * d / (4 * np.pi * i[:, 2] * o[:, 2]) + (1 - s) * below
@@ -398,8 +376,6 @@ def schlick(i, o, specular_reflectance, diffuse_reflectance, roughness, isotropy
 @_brdf
 def lafortune(i, o, diffuse_reflectance, lobes, normalization):
     """Lafortune et al. 1997: a sum of lobes (Cx ix ox + Cy iy oy + Cz iz oz)^n; `energy` bounds the albedo of each."""
-    if normalization not in ("energy", "none"):
-        raise ValueError(normalization)
     f = diffuse_reflectance / np.pi
     for lobe in lobes:
         c = [lobe["cx"], lobe["cy"], lobe["cz"]]
@@ -445,8 +421,6 @@ def walter(i, o, diffuse_reflectance, specular_reflectance, alpha_u, alpha_v, sh
             g = 1 / ((1 + lambda_i) * (1 + lambda_o))
         case "correlated":
             g = 1 / (1 + lambda_i + lambda_o)
-        case _:
-            raise ValueError(shadowing)
     f = fresnel(_cos_d(i, o))
     d = ggx(*_half(i, o), alpha_u, alpha_v)
     return diffuse_reflectance / np.pi + specular_reflectance * f * d * g / (4 * i[:, 2] * o[:, 2])
@@ -483,8 +457,6 @@ def nishino(i, o, diffuse_reflectance, specular_reflectance, kappa, gamma, varia
             lobe = fresnel(_cos_d(i, o)) * d * vcavity(i, o) / (4 * i[:, 2] * o[:, 2])
         case "dsbrdf":
             lobe = d / 4
-        case _:
-            raise ValueError(variant)
     return diffuse_reflectance / np.pi + specular_reflectance * lobe
 
 
@@ -520,8 +492,6 @@ def low(i, o, diffuse_reflectance, a, b, c, int_ior, variant, normalization="fit
             off, across = (i + o)[:, :2], (i - o)[:, :2]
             cos_d = np.sqrt(np.maximum(0.0, 1 - _dot(across, across) / 4))
             lobe = a * fresnel_dielectric(cos_d, int_ior) * (1 + b * _dot(off, off)) ** -c
-        case _:
-            raise ValueError(variant)
     return diffuse_reflectance / np.pi + lobe
 
 
@@ -575,8 +545,6 @@ def brady(i, o, diffuse_reflectance, specular_reflectance, f0, exponent, beta, n
             scale = exponent / 2 / (np.pi * beta**4 * special.gamma(2 / exponent))
         case "none":
             scale = 1.0
-        case _:
-            raise ValueError(normalization)
     _, tan_h, _ = _half(i, o)
     lobe = fresnel_schlick(_cos_d(i, o), f0) / (4 * _cos_d(i, o)) * np.exp(-((tan_h / beta**2) ** exponent))
     return diffuse_reflectance / np.pi + specular_reflectance * scale * lobe
@@ -593,8 +561,6 @@ def metallicroughness(i, o, base_color, metallic, roughness, shadowing):
             g = _schlick(i, o, roughness**2 / 2)
         case "smith":
             g = _smith(i, o, smith_ggx, alpha_u=alpha, alpha_v=alpha)
-        case _:
-            raise ValueError(shadowing)
     f = fresnel_schlick(_cos_d(i, o), _mix(0.04, base_color, metallic))
     d = ggx(*_half(i, o), alpha, alpha)
     return f * d * g / (4 * i[:, 2] * o[:, 2]) + (1 - f) * (1 - metallic) * base_color / np.pi
@@ -664,8 +630,6 @@ def shadowing_term(i, o, shadowing, distribution, parameters, kurt_exponent):
             return cos_i * cos_o / (cos_i + cos_o - cos_i * cos_o)
         case "kurt":  # Kurt et al. 2010
             return cos_i * cos_o / (cos_d * (cos_i * cos_o) ** kurt_exponent)
-        case _:
-            raise ValueError(shadowing)
 
 
 def _alpha(distribution, parameters):
@@ -677,8 +641,6 @@ def _alpha(distribution, parameters):
             return np.sqrt(2 / (parameters["exponent"] + 2))
         case "gtr" | "epd":
             return parameters["alpha"]
-        case _:
-            raise ValueError(distribution)
 
 
 DISTRIBUTIONS = {"beckmann": beckmann, "ggx": ggx, "blinn": blinn, "gtr": gtr, "abc": abc, "hepd": hepd, "epd": epd}

@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
 from mi_brdfs.probe import directions
 from mi_brdfs.probe.arrays import context as context
@@ -64,6 +65,23 @@ def call(method, ctx, wi, *arrays):
     types[1] = lambda value: float(value[0])
     rows = [once(w, [array[k] for array in arrays]) for k, w in enumerate(wi)]
     return [np.concatenate(column) for column in zip(*rows, strict=True)]
+
+
+def chi_square(bsdf, ctx, wi, *, seed, **resolution) -> ChiSquareTest:
+    """Mitsuba's χ² test of a sampler. The sphere's poles are laid into the horizon, as cells at a pole are too long for
+    a narrow lobe, and the horizon onto cell borders, as densities may jump there. Samples count by pdf > 0: where f = 0
+    the weight is 0 though the sample was drawn."""
+    si = interaction(wi)
+    si.wi = dr.normalize(si.wi)
+
+    def sample(u):
+        bs, _ = bsdf.sample(ctx, si, u[0], mi.Point2f(u[1], u[2]), True)
+        return mi.Vector3f(bs.wo.x, bs.wo.z, bs.wo.y), dr.select(bs.pdf > 0, 1.0, 0.0)
+
+    def pdf(w):
+        return bsdf.pdf(ctx, si, mi.Vector3f(w.x, w.z, w.y), True)
+
+    return ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, seed=seed, **{"ires": 16} | resolution)
 
 
 def efficiencies(bsdf: dict, angles) -> np.ndarray:

@@ -45,18 +45,18 @@ def test_plugins_are_there_without_an_import():
     assert run.stderr == ""
 
 
+@pytest.mark.slow
 @needs_extra
-@pytest.mark.parametrize("first", ["llvm_ad_rgb", "scalar_rgb"])
-def test_llvm_works_where_dr_jit_has_found_a_safe_one(first):
+def test_llvm_works_where_dr_jit_has_found_a_safe_one():
     run = python(
-        f"{AUTOLOAD}\nmi.set_variant('{first}'); mi.set_variant('llvm_ad_rgb')\n{RENDER}\n{SHOW}\n"
-        f"mi.set_variant('scalar_rgb')\n{SHOW}",
+        f"{AUTOLOAD}\nmi.set_variant('llvm_ad_rgb')\n{RENDER}\n{SHOW}\nmi.set_variant('scalar_rgb')\n{SHOW}",
         library=llvm.extra_library(),
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout.splitlines()[1:] == ["Ward llvm_ad_rgb", "Ward scalar_rgb"] and run.stderr == ""
 
 
+@pytest.mark.slow
 @needs_extra
 @too_late
 def test_a_choice_of_llvm_that_comes_too_late(before):
@@ -68,6 +68,7 @@ def test_a_choice_of_llvm_that_comes_too_late(before):
     assert run.stderr == ""
 
 
+@pytest.mark.slow
 @needs_extra
 @needs_bad
 def test_an_llvm_variant_that_aborts_comes_first():
@@ -80,6 +81,7 @@ def test_an_llvm_variant_that_aborts_comes_first():
     assert run.stderr.count(RESTART) == 1
 
 
+@pytest.mark.slow
 @needs_extra
 def test_an_import_before_mitsuba_still_chooses_the_llvm():
     run = python(

@@ -1,4 +1,4 @@
-"""The command line, each command in a process of its own as a user would type it."""
+"""The command line: what it prints and writes, what it says of errors, how it ends; in processes where these matter."""
 
 import contextlib
 import glob
@@ -21,7 +21,6 @@ from mi_brdfs.mitsuba import llvm
 from mi_brdfs.mitsuba.errors import one_line
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
-needs_bad_llvm = pytest.mark.skipif(BAD_LLVM is None or not llvm._has_avx512(), reason="no LLVM here that aborts")
 
 SCENE = """<scene version="3.0.0">
   <default name="res" value="24"/>
@@ -59,52 +58,52 @@ def run(*arguments, cwd=None, library=None):
     return subprocess.run(command(*arguments), cwd=cwd, env=env, capture_output=True, text=True, timeout=180)
 
 
-def test_list_names_every_type_once():
-    done = run("list")
-    assert done.returncode == 0 and done.stderr == ""
-    words = done.stdout.split()
-    assert all(name in words for name in mi_brdfs.list_models())
-    assert "Ward" in next(line for line in done.stdout.splitlines() if line.startswith("ward "))
+def invoke(*words, cwd="."):
+    """The result of a command that runs in this process."""
+    before = os.getcwd()
+    os.chdir(cwd)
+    try:
+        return CliRunner().invoke(app, [*map(str, words)])
+    finally:
+        os.chdir(before)
 
 
-def test_info_shows_the_manual_page():
-    done = run("info", "ward")
-    assert done.returncode == 0
-    assert done.stdout.startswith(mi_brdfs.info("ward").splitlines()[0])
-    assert "alpha_u" in done.stdout and "``" not in done.stdout
+def test_types_are_listed_and_have_pages():
+    words = invoke("list").stdout
+    assert all(name in words.split() for name in mi_brdfs.list_models())
+    assert "Ward" in next(line for line in words.splitlines() if line.startswith("ward "))
+    page = invoke("info", "ward").stdout
+    assert page.startswith(mi_brdfs.info("ward").splitlines()[0])
+    assert "alpha_u" in page and "``" not in page
 
 
-def test_info_of_a_misspelt_type():
-    done = run("info", "phnog")
-    assert done.returncode == 1 and done.stdout == ""
-    assert "'phong'" in done.stderr and done.stderr.count("\n") == 1
+def states(text):
+    return dict(re.findall(r"^(scalar|llvm|cuda|metal) +(works|missing|aborts|fails)", text, re.MULTILINE))
 
 
 def test_doctor_tries_every_backend():
-    done = run("doctor")
-    states = dict(re.findall(r"^(scalar|llvm|cuda|metal) +(works|missing|aborts|fails)", done.stdout, re.MULTILINE))
-    assert states["scalar"] == "works"
-    assert set(states) == {variant.split("_")[0] for variant in mi.variants()}
-    works = any(states[name] == "works" for name in states if name != "scalar")
-    assert done.returncode == (0 if works else 1)
+    done = invoke("doctor")
+    found = states(done.stdout)
+    assert found["scalar"] == "works"
+    assert set(found) == {variant.split("_")[0] for variant in mi.variants()}
+    works = any(found[name] == "works" for name in found if name != "scalar")
+    assert done.exit_code == (0 if works else 1)
     assert f"mitsuba {mi.__version__}" in done.stdout and "llvm_ad_spectral_polarized" in done.stdout
-    if states["llvm"] == "works" and states.get("cuda") != "works":
+    if found["llvm"] == "works" and found.get("cuda") != "works":
         assert re.search(r"LLVM \d+\.\d+\.\d+ \S*libLLVM", done.stdout)
         assert "Everything works" in done.stdout
 
 
-@needs_bad_llvm
-def test_doctor_survives_an_llvm_that_aborts():
-    done = run("doctor", library=BAD_LLVM)
-    assert re.search(r"^llvm +aborts +the test render died of SIGABRT", done.stdout, re.MULTILINE)
-    assert f"Next: unset {llvm.VARIABLE}" in done.stdout
-    assert done.stderr == ""
-
-
-def test_doctor_with_no_llvm_at_all():
-    done = run("doctor", library="/nowhere/libLLVM.so")
-    assert re.search(r"^llvm +missing", done.stdout, re.MULTILINE)
-    if "cuda     works" not in done.stdout and "metal    works" not in done.stdout:
+@pytest.mark.slow
+@pytest.mark.parametrize("library", ["/nowhere/libLLVM.so", BAD_LLVM])
+def test_doctor_of_an_llvm_that_is_not_there_or_aborts(library):
+    if library == BAD_LLVM and not (BAD_LLVM and llvm._has_avx512()):
+        pytest.skip("no LLVM here that aborts")
+    done = run("doctor", library=library)
+    detail = "aborts +the test render died of SIGABRT" if library == BAD_LLVM else "missing"
+    assert re.search(rf"^llvm +{detail}", done.stdout, re.MULTILINE), done.stdout
+    assert done.stderr == "" or library != BAD_LLVM
+    if not {"cuda", "metal"} & {name for name, state in states(done.stdout).items() if state == "works"}:
         assert done.returncode == 1 and f"unset {llvm.VARIABLE}" in done.stdout
 
 
@@ -120,22 +119,20 @@ def test_render_writes_an_exr_and_a_display_image_here(folder):
     assert list(png.size()) == [20, 20] and np.array(png).mean() > 20
 
 
-def test_the_output_option_names_either_file(folder):
-    done = run("render", "scenes/box.xml", "--variant", "scalar_rgb", "-o", "work/picture.jpg", cwd=folder)
-    assert done.stdout.split() == ["work/picture.exr", "work/picture.jpg"]
-    assert "3 samples per pixel" in done.stderr
-    assert list(mi.Bitmap(str(folder / "work" / "picture.jpg")).size()) == [24, 24]
-
-
-def test_seeds(folder):
+def test_the_output_option_names_either_file_and_the_seed_the_noise(folder):
     pixels = []
     for name, seed in ("a", 1), ("b", 1), ("c", 2):
-        run("render", "scenes/box.xml", "--variant", "scalar_rgb", "--seed", seed, "-o", f"{name}.exr", cwd=folder)
-        pixels.append(np.array(mi.Bitmap(str(folder / f"{name}.exr"))))
+        words = "--variant", "scalar_rgb", "--seed", seed, "-o", f"work/{name}.jpg"
+        done = invoke("render", "scenes/box.xml", *words, cwd=folder)
+        assert done.stdout.split() == [f"work/{name}.exr", f"work/{name}.jpg"]
+        assert "3 samples per pixel" in done.stderr
+        pixels.append(np.array(mi.Bitmap(str(folder / "work" / f"{name}.exr"))))
+        assert list(mi.Bitmap(str(folder / "work" / f"{name}.jpg")).size()) == [24, 24]
     np.testing.assert_allclose(pixels[0], pixels[1], rtol=1e-4)
     assert not np.allclose(pixels[0], pixels[2], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_mitsubas_warnings_go_to_stderr(folder):
     done = run("render", "scenes/box.xml", "--variant", "llvm_ad_mono", cwd=folder)
     assert done.stdout.split() == ["box.exr", "box.png"]
@@ -163,6 +160,7 @@ ERRORS = {
 }
 
 
+@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("arguments, status, text", ERRORS.values(), ids=ERRORS)
 def test_an_error_is_one_readable_line(folder, arguments, status, text):
     write = (folder / "scenes").joinpath
@@ -179,31 +177,47 @@ def test_an_error_is_one_readable_line(folder, arguments, status, text):
     write("no_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
     (folder / "taken.exr").mkdir()
     before = sorted(folder.rglob("*"))
-    done = run("render", *arguments, cwd=folder)
-    assert done.returncode == status
+    done = invoke("render", *arguments, cwd=folder)
+    assert done.exit_code == status
     assert done.stdout == ""
     assert re.search(text, done.stderr), done.stderr
     assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
     assert sorted(folder.rglob("*")) == before
 
 
-def test_a_variant_that_does_not_work_here(folder):
-    backends = {"cuda_ad_rgb", "metal_ad_rgb"} & set(mi.variants())
-    if not backends or f"{(name := backends.pop()).split('_')[0]} works" in " ".join(run("doctor").stdout.split()):
-        pytest.skip("every variant works here")
-    done = run("render", "scenes/box.xml", "--variant", name, cwd=folder)
-    assert done.returncode == 1
-    assert done.stderr == f"mi-brdfs: {name} does not work on this machine; `mi-brdfs doctor` says why\n"
+def test_info_of_a_misspelt_type():
+    done = invoke("info", "phnog")
+    assert done.exit_code == 1 and done.stdout == ""
+    assert "'phong'" in done.stderr and done.stderr.count("\n") == 1
 
 
-@needs_bad_llvm
-def test_a_bad_llvm_is_refused(folder):
-    done = run("render", "scenes/box.xml", "--variant", "llvm_ad_rgb", cwd=folder, library=BAD_LLVM)
-    assert done.returncode == 1
-    assert f"unset {llvm.VARIABLE}" in done.stderr and done.stderr.count("\n") == 1
+@pytest.mark.parametrize(
+    "words, status, told",
+    [
+        (["--variant", "cuda_ad_rgb"], 1, "cuda_ad_rgb does not work on this machine; `mi-brdfs doctor` says why\n"),
+        (["--variant", "llvm_ad_rgb"], 1, "unset it\n"),
+        ([], 0, "using scalar_rgb, which is slow: unset it\n"),
+    ],
+)
+def test_variants_that_do_not_work_here(words, status, told, folder, monkeypatch):
+    """They are refused, and without a choice the next best is used."""
+    works = mi.set_variant
+
+    def set_variant(name):
+        if name == "cuda_ad_rgb":
+            raise ImportError
+        works(name)
+
+    monkeypatch.setattr(mi, "variants", lambda: ["scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"])
+    monkeypatch.setattr(mi, "set_variant", set_variant)
+    monkeypatch.setattr(llvm, "problem", lambda: "unset it")
+    done = invoke("render", "scenes/box.xml", *words, cwd=folder)
+    assert done.exit_code == status and done.stderr.startswith(f"mi-brdfs: {told}")
+    assert ("scalar_rgb." in done.stderr and "box.exr" in done.stdout) == (status == 0)
 
 
-@needs_bad_llvm
+@pytest.mark.slow
+@pytest.mark.skipif(BAD_LLVM is None or not llvm._has_avx512(), reason="no LLVM here that aborts")
 def test_without_a_choice_a_bad_llvm_is_avoided(folder):
     done = run("render", "scenes/box.xml", cwd=folder, library=BAD_LLVM)
     assert done.returncode == 0 and "box.exr" in done.stdout
@@ -240,7 +254,7 @@ def interrupted(folder, *arguments, running, times=1):
 
 
 @pytest.mark.usefixtures("ctrl_c")
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_rgb"])
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", pytest.param("scalar_rgb", marks=pytest.mark.slow)])
 def test_ctrl_c_keeps_what_is_finished(folder, variant):
     if variant.startswith("llvm") and llvm.version() is None:
         pytest.skip("no LLVM here")
@@ -253,6 +267,7 @@ def test_ctrl_c_keeps_what_is_finished(folder, variant):
     assert exr[0, 0] == pytest.approx(1, rel=0.01)  # the constant emitter, so sums and weights belong together
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_a_second_ctrl_c_aborts_at_once(folder):
     if llvm.version() is None:
@@ -265,13 +280,15 @@ def test_a_second_ctrl_c_aborts_at_once(folder):
     assert not list(folder.glob("*.exr"))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_a_measurement(folder):
     if llvm.version() is None:
         pytest.skip("no LLVM here")
-    status, out, err = interrupted(folder, "energy", "--variant", "llvm_ad_rgb", running="Measuring blinnphong")
+    words = "energy", "burley", "walter", "--variant", "llvm_ad_rgb"
+    status, out, err = interrupted(folder, *words, running="Measuring burley")
     assert status == 130 and out == ""
-    assert "Interrupted; nothing was written." in err and "Traceback" not in err
+    assert NOTHING in err and "Traceback" not in err
 
 
 @pytest.mark.usefixtures("ctrl_c")

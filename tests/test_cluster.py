@@ -111,39 +111,36 @@ def worker_processes():
 def test_workers_return_what_a_serial_run_does(address):
     tasks = {str(number): (number,) for number in range(6)}
     serial = dict(run(powers, tasks, shared=(2.5,)))
-    for where in ({"workers": 2}, {"scheduler": address}):
-        keys, results = zip(*run(powers, iter(tasks.items()), shared=(2.5,), **where), strict=True)
-        assert sorted(keys) == sorted(tasks)
-        assert all(np.array_equal(serial[key], result) for key, result in zip(keys, results, strict=True))
+    keys, results = zip(*run(powers, iter(tasks.items()), shared=(2.5,), scheduler=address), strict=True)
+    assert sorted(keys) == sorted(tasks)
+    assert all(np.array_equal(serial[key], result) for key, result in zip(keys, results, strict=True))
 
 
 def test_killed_workers_cost_no_task_and_a_failure_is_one_tasks(ctrl_c):
-    results = []
-    for key, result in run(work, {str(number): (number,) for number in range(10)}, workers=2):
-        results.append((key, result))
+    """Of tasks without end; when no more results are wanted, no process is left."""
+    results = {}
+    iterator = run(work, ((str(number), (number,)) for number in range(10**9)), workers=2)
+    for key, result in iterator:
+        assert key not in results
+        results[key] = result
         if len(results) in (1, 4):
             worker_processes()[0].kill()
-    assert sorted(key for key, _ in results) == sorted(map(str, range(10)))
-    results = dict(results)
+        if results.keys() >= set(map(str, range(10))):
+            break
+    assert len(worker_processes()) == 2
+    before = time.perf_counter()
+    iterator.close()
+    assert not worker_processes()
+    assert time.perf_counter() - before < 3
     assert results.pop("3") == Failed("3 is not a number that I like")
     assert all(result[:2] == (int(key), "llvm_ad_rgb") for key, result in results.items())
     assert len({result[2] for result in results.values()} - {os.getpid()}) >= 2
-    assert not worker_processes()
 
 
+@pytest.mark.slow
 def test_a_task_of_which_workers_die_is_given_out_again(tmp_path):
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        assert list(run(last_breath, {"a": (str(tmp_path), 2)}, workers=1)) == [("a", "alive")]
-
-
-def test_a_closed_iterator_leaves_no_process():
-    results = run(work, ((str(number), (number,)) for number in range(10**9)), workers=2)
-    next(results)
-    assert len(worker_processes()) == 2
-    before = time.perf_counter()
-    results.close()
-    assert not worker_processes()
-    assert time.perf_counter() - before < 3
+        assert list(run(last_breath, {"a": (str(tmp_path), 1)}, workers=1)) == [("a", "alive")]
 
 
 @pytest.fixture
@@ -154,7 +151,13 @@ def small_passes(monkeypatch):
 @pytest.mark.usefixtures("small_passes")
 @pytest.mark.parametrize(
     "integrator, variant",
-    [("path", "llvm_ad_rgb"), ("shading", "llvm_ad_rgb"), ("ptracer", "llvm_ad_rgb"), ("path", "scalar_rgb")],
+    [
+        ("path", "llvm_ad_rgb"),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in [("shading", "llvm_ad_rgb"), ("ptracer", "llvm_ad_rgb"), ("path", "scalar_rgb")]
+        ),
+    ],
 )
 def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, address, integrator, variant):
     file = SceneFile(str(scene_in(tmp_path, integrator)), {"radius": "1.2"})
@@ -201,6 +204,7 @@ def test_a_scene_and_its_copy_are_found_from_any_folder(scene, tmp_path, monkeyp
     assert np.array_equal(*pictures) and pictures[0].mean() == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_passes", "ctrl_c")
 def test_also_with_a_worker_killed_in_a_crop_with_aovs(scene):
     scene.write_text(
@@ -275,7 +279,6 @@ NO_SCHEDULER = (
     [
         ("tcp://127.0.0.1:1", NO_SCHEDULER.format("tcp://127.0.0.1:1")),
         ("nonsense", "nonsense is not the address of a scheduler; write tcp://HOST:PORT."),
-        ("http://127.0.0.1:80", "http://127.0.0.1:80 is not the address of a scheduler; write tcp://HOST:PORT."),
     ],
 )
 def test_a_wrong_address_is_one_sentence(scheduler, sentence, scene, tmp_path, monkeypatch):
@@ -296,24 +299,19 @@ class HTTP(BaseHTTPRequestHandler):
         """Nothing."""
 
 
-@pytest.fixture(params=[Silent, HTTP])
-def other_server(request):
-    """The address of a server that is no scheduler, and ends a connection after some seconds."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), request.param) as server:
-        threading.Thread(target=server.serve_forever).start()
-        yield f"tcp://127.0.0.1:{server.server_port}"
-        server.shutdown()
-
-
-@pytest.mark.parametrize("command", ["render", "sweep"])
-def test_what_is_no_scheduler_is_not_waited_for(command, other_server, scene, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("command", "handler"), [("render", Silent), ("sweep", HTTP)])
+def test_what_is_no_scheduler_is_not_waited_for(command, handler, scene, tmp_path, monkeypatch):
+    """A server that ends a connection after some seconds."""
     assert client.CONNECTING <= 3
     monkeypatch.setattr(client, "CONNECTING", 0.5)
     given = {"render": [scene, "-o", tmp_path / "x.exr"], "sweep": [LOFT, "--model", "lambert", "-o", tmp_path]}
-    begun = time.perf_counter()
-    done = CliRunner().invoke(app, [command, *map(str, given[command]), "--scheduler", other_server])
-    assert done.exit_code == 1 and done.stderr.splitlines()[0] == f"mi-brdfs: {NO_SCHEDULER.format(other_server)}"
-    assert time.perf_counter() - begun < 5
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address, begun = f"tcp://127.0.0.1:{server.server_port}", time.perf_counter()
+        done = CliRunner().invoke(app, [command, *map(str, given[command]), "--scheduler", address])
+        assert time.perf_counter() - begun < 5
+        server.shutdown()
+    assert done.exit_code == 1 and done.stderr.splitlines()[0] == f"mi-brdfs: {NO_SCHEDULER.format(address)}"
 
 
 def test_other_versions_are_refused(address, monkeypatch):
@@ -322,6 +320,7 @@ def test_other_versions_are_refused(address, monkeypatch):
         list(run(powers, {"a": (2, 1)}, scheduler=address))
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes(tmp_path):
     scheduler, address = scheduler_in(tmp_path)
     worker = start("worker", address, "--nthreads", "1", "--no-nanny", folder=tmp_path)
@@ -361,16 +360,3 @@ def test_without_the_extra(monkeypatch):
     assert dict(run(powers, {"a": (2, 1)})).keys() == {"a"}
     with pytest.raises(ImportError, match=r'^workers need the extra "cluster": pip install "mi_brdfs\[cluster\]"$'):
         run(powers, {"a": (2, 1)}, workers=2)
-
-
-@pytest.mark.skipif("MI_BRDFS_IDLE" not in os.environ, reason="measures time: set MI_BRDFS_IDLE=1 on an idle machine")
-def test_two_workers_render_at_least_1_7_times_as_fast_as_one():
-    """On a machine with two idle cores; ``-s`` shows the times, which include the start of the processes."""
-    file = SceneFile(str(ROOT / "scenes/cornell_box.xml"), {"width": "256", "height": "256"})
-    loaded, seconds = file.load(), {1: [], 2: []}
-    for workers in (1, 2) * 3:
-        start = time.perf_counter()
-        render(loaded, spp=640, passes=passes_on(file, workers=workers))
-        seconds[workers].append(time.perf_counter() - start)
-    print({workers: [round(each, 2) for each in all_of] for workers, all_of in seconds.items()})
-    assert min(seconds[1]) >= 1.7 * min(seconds[2])

@@ -13,7 +13,7 @@ from support import call, direction
 from typer.testing import CliRunner
 
 import mi_brdfs
-from mi_brdfs.bench.first import first_picture, in_new_process
+from mi_brdfs.bench.pictures import first_picture, in_new_process
 from mi_brdfs.cli import app
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba import guests

@@ -131,6 +131,7 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("theta, phi, part, given", HEAVY)
 def test_heaviest_weights(theta, phi, part, given):

@@ -2,13 +2,12 @@
 sampler by an entry point: nothing in the project knows of it."""
 
 import importlib.metadata
-import subprocess
-import sys
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from support import call, hemisphere, is_scalar
+from test_cli import invoke
 
 import mi_brdfs
 from mi_brdfs.explorer.controls import controls_of
@@ -39,7 +38,6 @@ def student_t(wi, wo):
     return ndf * shadowing / (4 * wi[:, 2])
 
 
-@pytest.mark.parametrize("variant", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
 @pytest.mark.parametrize(
     "bsdf, reference", [({"type": "regolith", "w": 0.6}, lommel_seeliger), (KIT, student_t)], ids=["model", "D"]
 )
@@ -52,14 +50,12 @@ def test_formulas(variant, bsdf, reference):
 
 
 def command(folder, *words):
-    done = subprocess.run(
-        [sys.executable, "-m", "mi_brdfs", *words], cwd=folder, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = invoke(*words, cwd=folder)
+    assert done.exit_code == 0, done.output
     return done.stdout
 
 
-def test_it_is_listed_and_has_a_page(tmp_path):
+def test_it_is_listed_and_has_a_page(tmp_path, llvm_rgb):
     assert {"regolith", "dust"} <= set(mi_brdfs.list_models())
     assert "The law of Lommel and Seeliger" in command(tmp_path, "list")
     assert "single-scattering albedo w" in command(tmp_path, "info", "dust")
@@ -67,8 +63,9 @@ def test_it_is_listed_and_has_a_page(tmp_path):
     assert "student-t" in page and "with beckmann, ggx and student-t" not in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["dust", "vcavity", "bare"])
-def test_it_passes_all_checks(tmp_path, word):
+def test_it_passes_all_checks(tmp_path, word, llvm_rgb):
     (tmp_path / "kit.xml").write_text(
         '<bsdf type="microfacet" version="3.0.0"><string name="distribution" value="student-t"/>'
         f'<string name="shadowing" value="{word}"/><float name="alpha" value="0.5"/></bsdf>'
@@ -95,7 +92,8 @@ def test_its_kind_of_parameter_is_known_everywhere(llvm_rgb):
     assert Sweep("craters", (0.0, 25.0, 50.0, 75.0), {}) in sweeps_of(model)
 
 
-def test_its_energy_is_measured(tmp_path):
+@pytest.mark.slow
+def test_its_energy_is_measured(tmp_path, llvm_rgb):
     """As the integral has it: w/2 (1 - μ ln(1 + 1/μ)) at 89.9°, for w = 0.3 and 1."""
     cosine = np.cos(np.radians(89.9))
     largest = 0.5 * (1 - cosine * np.log(1 + 1 / cosine))
@@ -103,11 +101,13 @@ def test_its_energy_is_measured(tmp_path):
     assert "energy = Energy(0.149, [({}, 0.495)])" in command(tmp_path, "energy", "dust")
 
 
-def test_it_is_plotted_and_pictured(tmp_path):
+@pytest.mark.slow
+def test_it_is_plotted_and_pictured(tmp_path, llvm_rgb):
     command(tmp_path, "plot", "dust", "-o", "dust.png")
     command(tmp_path, "gallery", "dust", "-o", "pictures", "--size", "32", "--spp", "4")
     assert (tmp_path / "dust.png").exists() and (tmp_path / "pictures" / "regolith.png").exists()
 
 
-def test_it_is_benched(tmp_path):
+@pytest.mark.slow
+def test_it_is_benched(tmp_path, llvm_rgb):
     assert "first picture" in command(tmp_path, "bench", "dust", "lambert")

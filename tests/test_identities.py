@@ -6,22 +6,19 @@ import mitsuba as mi
 import numpy as np
 import pytest
 import reference as ref
-from support import call, efficiencies, hemisphere, is_scalar
+from support import call, efficiencies, hemisphere
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
 
-def assert_same(ours, theirs):
-    """To float32 round-off, at directions all over the hemisphere."""
-    count = 40 if is_scalar() else 20_000
-    wi, wo, ctx = hemisphere(count, 1), hemisphere(count, 2), mi.BSDFContext()
-    values = [call(mi.load_dict(bsdf).eval, ctx, wi, wo)[0] for bsdf in (ours, theirs)]
-    compared = values[1] > 1e-6 * values[1].max()
-    assert compared.mean() > 0.1
-    np.testing.assert_allclose(values[0][compared], values[1][compared], rtol=1e-5)
-
-
-def both_densities(ours, theirs):
+def assert_same(ours, theirs, **density):
+    """Values and densities, to float32 round-off, at directions all over the hemisphere."""
     wi, wo, ctx = hemisphere(20_000, 1), hemisphere(20_000, 2), mi.BSDFContext()
-    return [call(mi.load_dict(bsdf).pdf, ctx, wi, wo)[0] for bsdf in (ours, theirs)]
+    (value, pdf), (expected, other) = (call(mi.load_dict(bsdf).eval_pdf, ctx, wi, wo) for bsdf in (ours, theirs))
+    compared = expected > 1e-6 * expected.max()
+    assert compared.mean() > 0.1
+    np.testing.assert_allclose(value[compared], expected[compared], rtol=1e-5)
+    np.testing.assert_allclose(pdf, other, **{"rtol": 1e-5} | density)
 
 
 LAMBERT = {
@@ -37,30 +34,21 @@ LAMBERT = {
 
 
 @pytest.mark.parametrize("name", LAMBERT)
-def test_lambert(name, variant):
+def test_lambert(name):
     colour = {"reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
     assert_same(LAMBERT[name] | colour, {"type": "lambert"} | colour)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", LAMBERT)
-def test_lambert_is_sampled_by_the_cosine(name):
-    np.testing.assert_allclose(*both_densities(LAMBERT[name], {"type": "lambert"}), rtol=1e-5)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model", ["qualitative", "full"])
 def test_two_spellings_of_the_roughness_of_orennayar(model):
     for alpha in (0.1, 0.4, 0.9):
         sigma, spelt = ({"type": "orennayar", "model": model} | given
                         for given in ({"sigma": alpha / sqrt(2)}, {"alpha": alpha}))  # fmt: skip
         assert_same(spelt, sigma)
-        np.testing.assert_allclose(*both_densities(spelt, sigma), rtol=1e-5)
         assert [key.split(".")[0] for key in mi.traverse(mi.load_dict(spelt)).keys()] == ["reflectance", "alpha"]
         assert [key.split(".")[0] for key in mi.traverse(mi.load_dict(sigma)).keys()] == ["reflectance", "sigma"]
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("fast, model", [(None, "full"), (False, "full"), (True, "qualitative")])
 def test_roughdiffuse(fast, model):
     given = {} if fast is None else {"use_fast_approx": fast}
@@ -69,13 +57,11 @@ def test_roughdiffuse(fast, model):
         assert_same(roughdiffuse, {"type": "orennayar", "model": model, "sigma": (alpha or 0.2) / sqrt(2)})
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_roughdiffuse_of_a_mitsuba_06_scene():
     xml = '<bsdf type="roughdiffuse" version="0.6.0"><boolean name="useFastApprox" value="true"/></bsdf>'
     assert "use_fast_approx = True" in str(mi.load_string(xml))
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_full_orennayar_is_black_where_its_formula_is_negative():
     bsdf = mi.load_dict({"type": "orennayar", "model": "full", "sigma": 1.5, "reflectance": 0.2})
     wi, wo = hemisphere(20_000, 1), hemisphere(20_000, 2)
@@ -152,21 +138,13 @@ KIT = {
 
 
 @pytest.mark.parametrize("name", SAME | KIT)
-def test_same_model(name, variant):
-    assert_same(*(SAME | KIT)[name])
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", SAME | KIT)
-def test_same_efficiency(name):
-    """However a model is spelt, its sampler is as good."""
-    np.testing.assert_allclose(*(efficiencies(bsdf, (5, 30, 60, 80, 87)) for bsdf in (SAME | KIT)[name]), atol=0.005)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", [name for name in SAME | KIT if not name.startswith("epd")])  # sampled by steps
-def test_same_density(name):
-    np.testing.assert_allclose(*both_densities(*(SAME | KIT)[name]), rtol=2e-4, atol=1e-6)
+def test_same_model(name):
+    """However a model is spelt, its sampler is as good. The EPD's, which goes by steps, is another one."""
+    stepwise = name.startswith("epd")
+    assert_same(*(SAME | KIT)[name], rtol=2e-4, atol=1e9 if stepwise else 1e-6)
+    if stepwise:
+        both = (efficiencies(bsdf, (5, 30, 60, 80, 87)) for bsdf in (SAME | KIT)[name])
+        np.testing.assert_allclose(*both, atol=0.005)
 
 
 ISOTROPIC = {
@@ -178,11 +156,9 @@ ISOTROPIC = {
 }
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("plugin", ISOTROPIC)
 def test_isotropic_is_anisotropic_with_equal_pairs(plugin):
     parameter, value = ISOTROPIC[plugin]
     one, two = {"type": plugin, parameter: value}, {"type": plugin, f"{parameter}_u": value, f"{parameter}_v": value}
     assert_same(one, two)
-    assert_same(one, one | {"rotation": 0.17})
-    np.testing.assert_allclose(*both_densities(one, two), rtol=1e-5)
+    assert_same(one, one | {"rotation": 0.17}, rtol=1e-4, atol=1e-6)

@@ -6,7 +6,6 @@ import difflib
 import gc
 import itertools
 import re
-import subprocess
 import sys
 from functools import singledispatch
 
@@ -17,14 +16,21 @@ from fuzzing import examples, typical, ways
 from hypothesis import assume
 from hypothesis import strategies as st
 from support import call, direction
-from test_resources import scene_of
+from test_cli import invoke
 
+from mi_brdfs.bench.pictures import sphere
 from mi_brdfs.mitsuba.errors import one_line
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
 from mi_brdfs.parameters import FresnelSet, Number, OneOf, PerLobe
 
-MODELS = pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
+FEW = "lambert", "ward", "cooktorrance", "lafortune"
+"""The models that are tried by default: pairs, words, conductors and lobes are among their parameters."""
+MODELS = pytest.mark.parametrize(
+    "model",
+    [pytest.param(model, marks=() if model.plugins[0] in FEW else pytest.mark.slow) for model in own_models()],
+    ids=[model.plugins[0] for model in own_models()],
+)
 
 
 def refusal(load, *arguments):
@@ -268,43 +274,27 @@ def ward(body):
     return f'<bsdf type="ward" version="3.0.0">{body}</bsdf>'
 
 
-def bitmap(file):
-    return f'<texture name="alpha" type="bitmap"><string name="filename" value="{file}"/></texture>'
-
-
 PARAMETERS = {
     "no number": '<float name="alpha" value="rough"/>',
-    "two points": '<float name="alpha" value="0.1.2"/>',
-    "no value": '<float name="alpha"/>',
     "no name": '<float value="0.1"/>',
-    "an empty name": '<float name="" value="0.1"/>',
     "twice": '<float name="alpha" value="0.1"/><float name="alpha" value="0.1"/>',
     "infinite": '<float name="alpha" value="1e999"/>',
-    "5000 digits": f'<float name="alpha" value="{"9" * 5000}"/>',
-    "too tiny": '<float name="alpha" value="1e-320"/>',
     "a huge integer": f'<integer name="alpha" value="{"9" * 30}"/>',
     "two channels": '<rgb name="diffuse_reflectance" value="0.1, 0.2"/>',
     "too bright": '<rgb name="diffuse_reflectance" value="0.1, 0.2, 3"/>',
-    "no colour": '<rgb name="diffuse_reflectance" value="#ff00zz"/>',
     "half a spectrum": '<spectrum name="diffuse_reflectance" value="400:0.1, 500"/>',
     "a spectrum without a file": '<spectrum name="diffuse_reflectance" filename="gone.spd"/>',
     "a file name of escapes": '<spectrum name="diffuse_reflectance" filename="&#27;[31m&#7;&#10;gone"/>',
-    "a texture without a file": bitmap("gone.png"),
-    "a folder as a texture": bitmap("."),
+    "a folder as a texture": '<texture name="alpha" type="bitmap"><string name="filename" value="."/></texture>',
     "a number as a string": '<string name="alpha" value="0.1"/>',
     "a megabyte": f'<string name="variant" value="{"x" * 10**6}"/>',
-    "a long name": f'<float name="{"x" * 10**5}" value="1"/>',
     "escapes": '<string name="variant" value="&#27;[31mred&#7;&#10;&#9;"/>',
     "escapes in a name": '<float name="&#27;[31mred&#7;" value="1"/>',
-    "Greek": '<float name="α" value="0.1"/>',
     "right to left": '<string name="variant" value="\u202edraw"/>',
     "a boolean": '<boolean name="alpha" value="true"/>',
-    "a vector": '<vector name="alpha" value="1, 2, 3"/>',
     "a transform": '<transform name="alpha"><translate x="1"/></transform>',
     "a BSDF": '<bsdf name="alpha" type="diffuse"/>',
     "a BSDF without a name": '<bsdf type="ward"/>',
-    "an emitter": '<emitter name="alpha" type="area"/>',
-    "a shape without a name": '<shape type="sphere"/>',
     "a reference to nowhere": '<ref name="alpha" id="nowhere"/>',
     "an undefined variable": '<float name="alpha" value="$alpha"/>',
     "an unknown tag": '<roughness name="alpha" value="0.1"/>',
@@ -331,6 +321,7 @@ def edited(draw, text):
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_edited_documents():
     """They load, or they do not."""
@@ -356,26 +347,23 @@ FILES = {
 }
 
 
-def command_line(folder, *arguments):
-    command = [sys.executable, "-m", "mi_brdfs", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
-
-
+@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("command, name", [("check", "binary"), *(("render", name) for name in FILES)])
 def test_hostile_files(command, name, tmp_path):
     """On the command line: an error in one line that names the file and the line."""
     (tmp_path / f"{name}.xml").write_bytes(FILES[name])
-    done = command_line(tmp_path, command, f"{name}.xml")
-    assert done.returncode in (1, 2) and done.stdout == ""
+    done = invoke(command, f"{name}.xml", cwd=tmp_path)
+    assert done.exit_code in (1, 2) and done.stdout == ""
     assert done.stderr.startswith(f"mi-brdfs: {name}.xml: line 1") and done.stderr[:-1].isprintable(), done.stderr
 
 
+@pytest.mark.usefixtures("llvm_rgb")
 def test_ids_are_no_markup(tmp_path):
     """A report names materials by their ids, whatever stands in them."""
     body = '<shape type="sphere"><bsdf type="lambert" id="[/red]"/></shape>'
     (tmp_path / "[b].xml").write_text(f'<scene version="3.0.0">{body}</scene>')
-    done = command_line(tmp_path, "check", "--only", "finite", "[b].xml")
-    assert done.returncode == 0 and "[b].xml:[/red]: passed" in done.stdout, done.stderr
+    done = invoke("check", "--only", "finite", "[b].xml", cwd=tmp_path)
+    assert done.exit_code == 0 and "[b].xml:[/red]: passed" in done.stdout, done.stderr
 
 
 # --- What is left behind --------------------------------------------------------------------------------------------
@@ -412,10 +400,11 @@ def test_failures_leave_no_model_behind():
     assert alive() == before + 1
     (value,) = call(bsdf.eval, mi.BSDFContext(), direction(0)[None], direction(0)[None])
     np.testing.assert_allclose(value, 0.5 / np.pi, rtol=1e-6)
-    picture = np.array(mi.render(mi.load_dict(scene_of({"type": "ward"})), spp=1))
+    picture = np.array(mi.render(mi.load_dict(sphere({"type": "ward"}, 16)), spp=1))
     assert np.isfinite(picture).all() and picture.any()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
 @pytest.mark.usefixtures("llvm_rgb")
 def test_failures_keep_no_memory():

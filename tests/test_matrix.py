@@ -154,25 +154,23 @@ def turns(turn):
 
 
 @pytest.mark.parametrize(
-    "variant", [pytest.param(name, marks=[pytest.mark.slow] if name != "llvm_ad_rgb" else []) for name in COMPILED]
+    "integrator, variant",
+    [
+        pytest.param(*case, marks=[] if case in (("path", "llvm_ad_rgb"), ("aov", "scalar_rgb")) else pytest.mark.slow)
+        for case in itertools.product(INTEGRATORS, [*COMPILED, "scalar_rgb"])
+    ],
 )
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_compiled(integrator, variant):
+def test_pictures(integrator, variant):
     """Pictures are finite, nonnegative and not black, and albedos in [0, 1].
 
-    Compilation takes its time for each model, so each of them is in one variant under each integrator: in turn in every
-    variant, and in every wrapper."""
-    turn, stride = list(INTEGRATORS).index(integrator), len(COMPILED)
+    Every model is in each wrapper under one integrator, and in another one under each. Compilation takes its time for
+    each model, so each of them is in one compiled variant under each integrator, in turn."""
+    turn = list(INTEGRATORS).index(integrator)
+    cells = turns(turn)
+    if variant in COMPILED:
+        cells = cells[(COMPILED.index(variant) - turn) % len(COMPILED) :: len(COMPILED)]
     with mi.variant_context(variant):
-        check(turns(turn)[(COMPILED.index(variant) - turn) % stride :: stride], integrator)
-
-
-@pytest.mark.parametrize("wrapper", WRAPPERS)
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_scalar(integrator, wrapper):
-    """The same for every model in every wrapper under every integrator."""
-    with mi.variant_context("scalar_rgb"):
-        check([(name, wrapper) for name in NAMES], integrator)
+        check(cells, integrator)
 
 
 @pytest.mark.slow

@@ -27,13 +27,11 @@ def test_version():
 @pytest.mark.parametrize(
     "version, outcome",
     [
-        ("3.6.4", "ImportError: mi_brdfs needs Mitsuba 3.7.1 or newer, this is 3.6.4: pip install -U mitsuba"),
-        ("3.7.0", "ImportError"),
-        ("2.99.0", "ImportError"),
+        ("3.7.0", "ImportError: mi_brdfs needs Mitsuba 3.7.1 or newer, this is 3.7.0: pip install -U mitsuba"),
         ("3.7.1", ""),
-        ("3.9.1", ""),
         ("3.10.0", "UserWarning: mi_brdfs was tested with Mitsuba 3.7.1 to 3.9, this is 3.10.0."),
-        ("4.0.0.dev1", "UserWarning"),
+        pytest.param("2.99.0", "ImportError", marks=pytest.mark.slow),
+        pytest.param("4.0.0.dev1", "UserWarning", marks=pytest.mark.slow),
     ],
 )
 def test_mitsuba_versions(version, outcome):
@@ -43,6 +41,7 @@ def test_mitsuba_versions(version, outcome):
     assert (done.returncode != 0) == ("ImportError" in outcome)
 
 
+@pytest.mark.slow
 def test_import_is_fast(tmp_path):
     """At most 0.2 s over Mitsuba's own, of the processor's time, with modules that are compiled, as those of an
     installed package are. Other processes only add to it, so the least of several counts."""
@@ -53,21 +52,18 @@ def test_import_is_fast(tmp_path):
         return float(python(code, **compiled).stdout)
 
     seconds("mi_brdfs")  # compiles
-    mitsuba, ours = zip(*((seconds("mitsuba"), seconds("mi_brdfs")) for _ in range(7)), strict=True)
+    ours, mitsuba = [], []
+    while len(ours) < 2 or (min(ours) - min(mitsuba) >= 0.2 and len(ours) < 7):
+        ours, mitsuba = [*ours, seconds("mi_brdfs")], [*mitsuba, seconds("mitsuba")]
     assert min(ours) - min(mitsuba) < 0.2, (mitsuba, ours)
 
 
-def test_style():
-    done = subprocess.run([sys.executable, "-m", "ruff", "check", str(ROOT)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
-
-
-def test_types():
-    done = subprocess.run([sys.executable, "-m", "mypy", "--no-incremental"], capture_output=True, text=True, cwd=ROOT)
+@pytest.mark.parametrize(
+    "tool", [["ruff", "check"], pytest.param(["mypy", "--no-incremental"], marks=pytest.mark.slow)], ids=" ".join
+)
+def test_style_and_types(tool):
+    done = subprocess.run([sys.executable, "-m", *tool], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_types_are_shipped():
     assert (Path(mi_brdfs.__file__).parent / "py.typed").exists()
 
 

@@ -4,14 +4,15 @@ They share the base lobe (Burley's term of 2012 and the retro-reflection of 2015
 ``subsurface``), the sheen, the tints, and the specular lobe with its roughness and anisotropy, but for its Fresnel
 term: ``principled`` mixes the exact reflectance of a dielectric into it, with the weight (1 - metallic)
 (1 - spec_tint). So they are equal where this is 0. The clear coats differ by a factor: that of ``principled`` lacks the
-denominator 4 cosθ_i cosθ_o of a microfacet lobe. In spectral variants ``principled`` has
-another luminance for the tints.
+denominator 4 cosθ_i cosθ_o of a microfacet lobe.
 """
 
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, hemisphere, is_scalar
+from support import call, hemisphere
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
 ORANGE = {"base_color": {"type": "rgb", "value": [0.8, 0.4, 0.15]}}
 GREY = {"base_color": 0.6}
@@ -48,18 +49,15 @@ def pairs(count):
 
 
 @pytest.mark.parametrize("name", SHARED)
-def test_same_values(name, variant):
+def test_same_values(name):
     """To float32 round-off, which D multiplies by 4/α at most (α = .04 here)."""
-    if mi.is_spectral and "spec_tint" in SHARED[name]:
-        pytest.skip("the luminance is another")
     ours, theirs = load(SHARED[name])
-    wi, wo = pairs(60 if is_scalar() else 20_000)
+    wi, wo = pairs(20_000)
     expected = call(theirs.eval, mi.BSDFContext(), wi, wo)[0]
     assert (expected > 0).all()
     np.testing.assert_allclose(call(ours.eval, mi.BSDFContext(), wi, wo)[0], expected, rtol=2e-5)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("gloss", [0.0, 0.3, 0.8])
 def test_the_clear_coats_differ_by_the_denominator(gloss):
     """The difference to the surface without a coat; what it adds is compared where it is not lost to round-off."""
@@ -74,7 +72,6 @@ def test_the_clear_coats_differ_by_the_denominator(gloss):
     np.testing.assert_allclose(ours[seen] * denominator[seen], theirs[seen], rtol=1e-3)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_the_dielectrics_differ_by_schlicks_approximation():
     """Without a tint ``principled`` is exact, and Schlick's F for an index of 1.5 errs by up to 0.04: the values
     of the specular lobe alone must differ, by no more than that does."""

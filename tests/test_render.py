@@ -11,13 +11,13 @@ import pytest
 
 import mi_brdfs  # noqa: F401
 from mi_brdfs.rendering import passes as module
-from mi_brdfs.rendering.output import display_image, tonemap, write
+from mi_brdfs.rendering.output import display_image, tonemap
 from mi_brdfs.rendering.passes import render
 
 WIDTH, HEIGHT = 32, 24
 
 
-@pytest.fixture(params=["scalar_rgb", "llvm_ad_rgb"])
+@pytest.fixture(params=[pytest.param("scalar_rgb", marks=pytest.mark.slow), "llvm_ad_rgb"])
 def variant(request):
     mi.set_variant(request.param)
     return request.param
@@ -55,14 +55,21 @@ class Deposits:
         self.counts.append(spp)
 
 
-def test_the_result_is_exactly_the_sum_of_the_raw_passes(variant):
+def test_the_result_is_exactly_the_sum_of_the_raw_passes(variant, monkeypatch):
     deposits = np.random.default_rng(0).uniform(0.1, 2, (3, HEIGHT, WIDTH, 4)).astype(np.float32)
     integrator, sensors = Deposits(deposits), scene().sensors()
-    picture = render(SimpleNamespace(sensors=lambda: sensors, integrator=lambda: integrator), spp=10, seed=3)
+    given = SimpleNamespace(sensors=lambda: sensors, integrator=lambda: integrator)
+    picture = render(given, spp=10, seed=3)
     total = (deposits[0] + deposits[1]) + deposits[2]
     assert np.array_equal(np.array(sensors[0].film().develop(raw=True)), total)
     np.testing.assert_allclose(np.array(picture.image), total[..., :3] / total[..., 3:], rtol=1e-6)
     assert integrator.counts == [4, 4, 2] and len(set(integrator.seeds)) == 3
+    # One sample at least, in however many pixels; powers of two are not exceeded.
+    for limit, counts in (0, [1, 1]), (7 * WIDTH * HEIGHT, [4, 1]):
+        monkeypatch.setattr(module, "_samples_per_pass", lambda threads, limit=limit: limit)
+        integrator.seeds, integrator.counts = [], []
+        render(given, spp=sum(counts))
+        assert integrator.counts == counts
 
 
 def test_passes_agree_with_one_render_of_the_same_total(variant):
@@ -78,13 +85,10 @@ def test_passes_agree_with_one_render_of_the_same_total(variant):
     assert 0.8 < noise < 1.25
 
 
-def test_a_single_pass_is_what_mitsuba_renders(variant):
+def test_the_seed_decides_the_noise(variant):
+    """A single pass has that of Mitsuba's."""
     loaded = scene()
     np.testing.assert_allclose(np.array(render(loaded, spp=4).image), np.array(mi.render(loaded, spp=4)), rtol=1e-4)
-
-
-def test_the_seed_decides_the_noise(variant):
-    loaded = scene()
     a, b, c = (np.array(render(loaded, spp=10, seed=seed).image) for seed in (5, 5, 6))
     np.testing.assert_allclose(a, b, rtol=1e-4)
     assert not np.allclose(a, c, rtol=1e-2)
@@ -106,8 +110,9 @@ def test_particle_tracing_is_averaged_not_summed(variant):
 )
 def test_films_and_aovs_are_developed_as_by_mitsuba(variant, film):
     loaded = scene({"type": "aov", "aovs": "depth:depth", "inner": {"type": "path", "max_depth": 3}}, **film)
-    picture = render(loaded, spp=300)
-    mi.render(loaded, spp=300, seed=9)
+    spp = 300 if "crop_width" in film else 68  # of the mean, a standard deviation of 1.5 to 2.5 %
+    picture = render(loaded, spp=spp)
+    mi.render(loaded, spp=spp, seed=9)
     own = loaded.sensors()[0].film()
     expected = np.array(own.develop())
     assert [field.name for field in picture.bitmap.struct_()] == [field.name for field in own.bitmap().struct_()]
@@ -116,6 +121,7 @@ def test_films_and_aovs_are_developed_as_by_mitsuba(variant, film):
     assert np.array(display_image(picture.bitmap)).shape == (*expected.shape[:2], 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["llvm_ad_mono_polarized", "llvm_ad_spectral", "scalar_spectral_polarized"])
 def test_other_variants(name):
     mi.set_variant(name)
@@ -147,7 +153,7 @@ def test_a_spectral_film_has_no_display_image():
     ],
 )
 def test_samples_are_counted_as_the_sampler_rounds_them(variant, sampler, spp, counted):
-    loaded, progress = scene(sampler=sampler), []
+    loaded, progress = scene({"type": "path", "max_depth": 1}, sampler=sampler), []
     picture = render(loaded, spp=spp, on_pass=lambda done, total: progress.append((done, total)))
     assert (picture.spp, picture.total) == (counted, counted)
     assert progress[-1] == (counted, counted) and len(progress) > 1
@@ -196,19 +202,6 @@ def test_passes_share_their_kernels():
     assert sum(not kernel["cache_hit"] for kernel in kernels) <= 2
 
 
-def test_pass_sizes():
-    mi.set_variant("scalar_rgb")
-    sampler = mi.load_dict({"type": "independent"})
-    assert module._pass_sizes(sampler, 100, 37) == [32, 32, 32, 4]
-    assert module._pass_sizes(sampler, 3, 0) == [1, 1, 1]
-    assert module._pass_sizes(sampler, 5, 1 << 20) == [5]
-
-
-def test_tonemapping_leaves_a_well_exposed_picture_alone():
-    image = np.random.default_rng(1).uniform(0, 1, (50, 40, 3)).astype(np.float32)
-    np.testing.assert_allclose(tonemap(image), image, rtol=1e-6)
-
-
 def test_tonemapping_keeps_darks_hue_and_order_of_highlights():
     image = np.random.default_rng(2).uniform(0, 1, (100, 100, 3)) * np.linspace(0, 30, 100)[:, None, None]
     mapped, m = tonemap(image), image.max(-1)
@@ -242,10 +235,3 @@ def test_the_display_image_of_a_well_exposed_picture_is_plain_srgb(variant):
     bitmap = mi.Bitmap(pixels)
     plain = np.array(mi.util.convert_to_bitmap(bitmap)).astype(int)
     assert np.abs(np.array(display_image(bitmap)).astype(int) - plain).max() <= 1
-
-
-def test_files_are_written_whole(variant, tmp_path):
-    bitmap = mi.Bitmap(np.full((4, 4, 3), 0.25, dtype=np.float32))
-    write(bitmap, tmp_path / "a.exr")
-    np.testing.assert_allclose(np.array(mi.Bitmap(str(tmp_path / "a.exr"))), 0.25)
-    assert [file.name for file in tmp_path.iterdir()] == ["a.exr"]

@@ -114,21 +114,16 @@ def test_lights_cast_shadows_unless_they_are_asked_not_to():
         ({"type": "wrap", "normalization": "none", "domain": "sphere"}, 0.5, 0),
         ({"type": "toon", "normalization": "none", "diffuse_threshold": 0.2}, 0.5, 0),
         ({"type": "walter"}, 0, 0),
+        ({"type": "diffuse", "reflectance": 0.3}, 0.3, 0.3),
+        ({"type": "conductor"}, 0, 0),
     ],
     ids=named,
 )
 def test_ambient_light_meets_the_diffuse_reflectance(bsdf, front, back):
-    """Which is a formula's colour, even where its albedo is another; seen from both sides."""
+    """Which is a formula's colour, even where its albedo is another, seen from both sides; and of built-ins what they
+    say that it is."""
     assert shade(bsdf, ambient=0.5) == pytest.approx(0.5 * front, abs=1e-6)
     assert shade(bsdf, ambient=0.5, tilt=180) == pytest.approx(0.5 * back, abs=1e-6)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize(
-    ("bsdf", "reflectance"), [({"type": "diffuse", "reflectance": 0.3}, 0.3), ({"type": "conductor"}, 0)], ids=named
-)
-def test_ambient_light_meets_what_built_ins_say_that_their_reflectance_is(bsdf, reflectance):
-    assert shade(bsdf, ambient=0.5) == pytest.approx(0.5 * reflectance, abs=1e-6)
 
 
 def test_ambient_light_is_white_in_spectral_variants():

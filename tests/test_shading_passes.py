@@ -55,6 +55,7 @@ def test_passes_draw_different_samples(monkeypatch):
     assert in_passes(noisy(32, clamp=False), monkeypatch, spp=64)[0].std() == pytest.approx(at_once, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("sampler", ["stratified", "multijitter", "orthogonal", "ldsampler"])
 def test_samplers_stratify_over_all_that_is_drawn(sampler, monkeypatch):
@@ -92,6 +93,7 @@ def test_memory_does_not_grow_with_samples(monkeypatch):
     check_memory(monkeypatch)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_memory_of_derivatives_does_not_grow_with_samples(monkeypatch):
     """Forward and backward, which find the same for the same seeds."""

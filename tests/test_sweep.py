@@ -4,7 +4,6 @@ import csv
 import json
 import os
 import re
-import subprocess
 import sys
 
 import drjit as dr
@@ -15,7 +14,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 from support import ROOT
-from test_cli import interrupted, run
+from test_cli import interrupted, invoke
 
 from mi_brdfs.fit import METRICS, fit, observe
 from mi_brdfs.mitsuba import guests
@@ -27,7 +26,7 @@ LOFT = [ROOT / "scenes" / "measured" / f"AnoBlack{name}.bsdf" for name in ("EC1o
 MODELS, METRIC = ["lambert", "phong"], ["log", "cube-root"]
 
 
-def swept(folder, files=LOFT, models=MODELS, metrics=METRIC, **settings):
+def swept(folder, files=LOFT[:2], models=MODELS, metrics=METRIC, **settings):
     return Sweep(files, models, folder, metrics=metrics, **{"starts": 1} | settings)
 
 
@@ -50,13 +49,14 @@ def serial(tmp_path_factory):
     """A folder with all fits, made in this process."""
     folder = tmp_path_factory.mktemp("serial")
     with mi.variant_context("llvm_ad_rgb"):
-        assert fitted(swept(folder)) == 12
+        assert fitted(swept(folder)) == 8
     return folder
 
 
 # --- The same results, each once ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_a_killed_worker_costs_nothing_but_time(serial, tmp_path):
     """The results of two workers, of which one is killed, are those of this process, bit for bit."""
@@ -67,38 +67,24 @@ def test_a_killed_worker_costs_nothing_but_time(serial, tmp_path):
     assert len(workers) == 2
     workers[0].kill()
     sizes += [outcome.size for outcome in outcomes if not outcome.error]
-    assert sum(sizes) == sweep.finished() == sweep.total == 12
+    assert sum(sizes) == sweep.finished() == sweep.total == 8
     assert results(tmp_path) == results(serial)
 
 
-def test_one_process_fits_where_there_is_no_dask(tmp_path):
-    code = "import sys; sys.modules['distributed'] = None; from mi_brdfs.cli import main; main()"
-    command = [
-        sys.executable,
-        "-c",
-        code,
-        "sweep",
-        str(LOFT[0]),
-        "--model",
-        "lambert",
-        "--starts",
-        "1",
-        "-o",
-        str(tmp_path),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=180)
-    assert done.returncode == 0 and "lambert" in done.stdout, done.stderr
-    assert 'one process fits; pip install "mi_brdfs[cluster]"' in " ".join(done.stderr.split())
-
-
-@pytest.mark.parametrize(
-    ("library", "option", "extra"), [("distributed", "--workers=2", "cluster"), ("PIL", "--render", "gallery")]
-)
-def test_a_missing_extra_is_named(tmp_path, library, option, extra):
-    code = f"import sys; sys.modules['{library}'] = None; from mi_brdfs.cli import main; main()"
-    command = [sys.executable, "-c", code, "sweep", str(LOFT[0]), option, "-o", str(tmp_path / "sweep")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1 and f"mi_brdfs[{extra}]" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+@pytest.mark.usefixtures("llvm_rgb")
+def test_extras_that_are_not_installed(tmp_path, monkeypatch):
+    """Without Dask one process fits; what is asked for and cannot be had is named."""
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    words = "sweep", LOFT[0], "--model", "lambert", "--starts", 1, "-o", tmp_path / "sweep"
+    done = invoke(*words)
+    assert done.exit_code == 0 and "lambert" in done.stdout, done.stderr
+    assert 'one process fits; pip install "mi_brdfs[cluster]"' in done.stderr
+    monkeypatch.delitem(sys.modules, "mi_brdfs.gallery")
+    monkeypatch.delattr("mi_brdfs.gallery")
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    for option, extra in ("--workers=2", "cluster"), ("--render", "gallery"):
+        done = invoke(*words, option)
+        assert done.exit_code == 1 and f"mi_brdfs[{extra}]" in done.stderr and done.stderr.count("\n") == 1
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -112,7 +98,7 @@ def test_what_is_finished_is_not_made_again(serial, tmp_path, monkeypatch):
     made = plan.fit_material
     monkeypatch.setattr(plan, "fit_material", counted)
     assert fitted(swept(serial)) == 0 and not calls
-    assert fitted(swept(serial, LOFT[::-1], MODELS[::-1], METRIC[::-1])) == 0 and not calls
+    assert fitted(swept(serial, LOFT[1::-1], MODELS[::-1], METRIC[::-1])) == 0 and not calls
 
     files = [tmp_path / "a.bsdf", tmp_path / "b.bsdf"]
     for file, own in zip(files, LOFT, strict=False):
@@ -205,13 +191,6 @@ def test_results_of_what_a_file_became_are_not_kept_as_those_of_what_it_was(seri
     assert [outcome.error for outcome in pictures.render()] == [sentence] and pictures.finished() == 0
 
 
-def test_nothing_is_left_of_a_file_that_cannot_be_written(tmp_path):
-    store = Store(tmp_path)
-    with pytest.raises(ValueError):
-        store.add("it", [{"seed": "no number"}])
-    assert not list(tmp_path.iterdir())
-
-
 # --- Tables and pictures --------------------------------------------------------------------------------------------
 
 
@@ -240,15 +219,15 @@ def test_medians():
 def test_a_wall_is_rendered_once(serial, monkeypatch):
     monkeypatch.setattr(wall, "SIZE", 32)
     monkeypatch.setattr(wall, "SPP", 4)
-    sweep = swept(serial)
+    sweep = swept(serial, LOFT[:1])
     first = wall.Wall(sweep)
     outcomes = list(first.render())
-    assert len(outcomes) == 3 + 12 and not any(outcome.error for outcome in outcomes)
+    assert len(outcomes) == 1 + 4 and not any(outcome.error for outcome in outcomes)
     again = wall.Wall(sweep)
-    assert again.finished() == again.total == 15 and not list(again.render())
+    assert again.finished() == again.total == 5 and not list(again.render())
     assert [path.name for path in again.write()] == ["wall_log.jpg", "wall_cube-root.jpg"]
     picture = np.array(mi.Bitmap(str(serial / "wall_log.jpg"))).astype(float)
-    assert picture.shape[0] > 3 * 32 and picture.shape[1] > 3 * 32
+    assert picture.shape[0] > 32 and picture.shape[1] > 3 * 32
     assert 0.1 < (picture.mean(axis=-1) < 200).mean() < 0.9  # pictures on paper
     (row, *_) = again.cells["log"].values()
     assert [cell.caption.split("\n")[0] for cell in row] == ["measured", "phong", "lambert"]
@@ -258,22 +237,25 @@ def test_a_wall_is_rendered_once(serial, monkeypatch):
 # --- The command ----------------------------------------------------------------------------------------------------
 
 
-def test_the_command_prints_a_table_of_what_workers_found(serial, tmp_path):
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_command_prints_a_table(serial, tmp_path):
     cut = tmp_path / "cut.bsdf"
     cut.write_bytes(LOFT[0].read_bytes()[:3000])
     options = "--model", "lambert,phong", "--metric", "log,cube-root", "--starts", 1, "--table", "csv"
-    done = run("sweep", *LOFT[:2], cut, *options, "--workers", 2, "-o", "made", cwd=tmp_path)
-    assert done.returncode == 1 and "Traceback" not in done.stderr
+    done = invoke("sweep", *LOFT[:2], cut, *options, "--workers", 0, "-o", "made", cwd=tmp_path)
+    assert done.exit_code == 1 and "Traceback" not in done.stderr
     assert done.stderr.count("cut.bsdf") == 1  # for all models
     assert "8 of 12 fits are finished; the same command tries the others again." in done.stderr
     rows = list(csv.DictReader(done.stdout.splitlines()))
     assert list(rows[0]) == SCHEMA.names and len(rows) == 8
+    made = results(serial)
     for row in rows:
-        known = results(serial)[row["key"]]
+        known = made[row["key"]]
         assert json.loads(row["bsdf"]) == json.loads(known["bsdf"])
         assert float(row["log_held_out"]) == known["log_held_out"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
     options = "--model", "lambert,burley", "--metric", ",".join(METRICS), "--starts", 300, "--workers", 2, "-o", "made"
@@ -285,6 +267,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     assert not [it for it in psutil.process_iter(["cmdline"]) if str(tmp_path) in " ".join(it.info["cmdline"] or [])]
 
 
+@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("arguments", "status", "sentence"),
     [
@@ -298,7 +281,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     ],
 )
 def test_wrong_usage_gets_a_sentence(arguments, status, sentence, tmp_path):
-    done = run("sweep", LOFT[0], *arguments, cwd=tmp_path)
-    assert done.returncode == status and done.stdout == ""
+    done = invoke("sweep", LOFT[0], *arguments, cwd=tmp_path)
+    assert done.exit_code == status and done.stdout == ""
     assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
     assert not list(tmp_path.iterdir())

@@ -1,5 +1,6 @@
 """Each command in a terminal of 80 columns: no line is longer, and nothing is cut off."""
 
+import contextlib
 import os
 import re
 import struct
@@ -11,68 +12,66 @@ import pytest
 fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
 
 COLUMNS = 80
-COMMANDS = {
-    "help": ["-h"],
-    **{
-        f"help of {name}": [name, "-h"]
-        for name in ("show", "render", "gallery", "plot", "convert", "check", "energy", "bench")
-    },
-    "list": ["list"],
-    "info": ["info", "ward"],
-    "info of the kit": ["info", "microfacet"],
-    "presets": ["presets"],
-    "a preset": ["presets", "ngan/cook-torrance/chrome"],
-    "doctor": ["doctor"],
-    "show": ["show", "lambert", "--size", "16", "--spp", "2"],
-    "render": ["render", "scene.xml"],
-    "gallery": ["gallery", "lambert", "--size", "16", "--spp", "4"],
-    "plot": ["plot", "lambert", "--kind", "albedo"],
-    "convert": ["convert", "phong", "phong.binary"],
-    "check": ["check", "lambert", "phong", "scene.xml", "--only", "finite", "--only", "albedo"],
-    "energy": ["energy", "lambert"],
-    "bench": ["bench", "lambert", "scene.xml"],
-}
+PAGES = [
+    *(f"{name} -h" for name in ("", "show", "render", "gallery", "plot", "convert", "check", "energy", "bench")),
+    "list", "info ward", "info microfacet", "presets", "presets ngan/cook-torrance/chrome",
+]  # fmt: skip
+DONE = [
+    "show lambert --size 16 --spp 2", "render scene.xml", "plot lambert --kind albedo",
+    "check lambert phong scene.xml --only finite --only albedo",
+]  # fmt: skip
+LONG = ["doctor", "gallery lambert --size 16 --spp 4", "convert phong phong.binary", "energy lambert",
+        "bench lambert scene.xml"]  # fmt: skip
+PROCESS = """
+import sys
+from mi_brdfs.cli import app
+for line in sys.argv[1:]:
+    try:
+        app(line.split(), prog_name="mi-brdfs")
+    except SystemExit as end:
+        print(f"\\nended {end.code}: {line}", flush=True)
+"""
+"""Carries out one command after the other."""
 SCENE = """<scene version="3.0.0"><integrator type="direct"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="8"/></film></sensor>
 <shape type="sphere"><bsdf type="twosided" id="a_material_whose_name_is_long_and_goes_on_for_more_than_a_line_of_text_">
 <bsdf type="lambert"/></bsdf></shape><emitter type="constant"/></scene>"""
 
 
-def captured(words, folder):
-    """What a terminal gets, without control sequences, and the exit status."""
+def captured(commands, folder):
+    """What a terminal gets of each command, without control sequences, after which it has ended well."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, COLUMNS, 0, 0))
     env = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
     process = subprocess.Popen(
-        [sys.executable, "-m", "mi_brdfs", *words],
+        [sys.executable, "-c", PROCESS, *commands],
         cwd=folder, env=env | {"TERM": "xterm"}, stdin=theirs, stdout=theirs, stderr=theirs,
     )  # fmt: skip
     os.close(theirs)
     data = b""
-    while True:
-        try:
-            read = os.read(ours, 1 << 16)
-        except OSError:  # the other end was closed
-            break
-        if not read:
-            break
-        data += read
+    with contextlib.suppress(OSError):  # the other end was closed
+        while read := os.read(ours, 1 << 16):
+            data += read
     os.close(ours)
-    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", data.decode()), process.wait()
+    assert process.wait() == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", data.decode())
+    for line in commands:
+        shown, ended, text = text.partition(f"ended 0: {line}")
+        assert ended, f"{line}: {shown[-1000:]}"
+        yield line, shown
 
 
-@pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
-def test_it_fits_the_terminal(words, tmp_path):
-    if words[0] in ("plot", "gallery"):
+@pytest.mark.parametrize("commands", [PAGES, DONE, pytest.param(LONG, marks=pytest.mark.slow)])
+def test_it_fits_the_terminal(commands, tmp_path):
+    if commands != PAGES:
         pytest.importorskip("matplotlib")
         pytest.importorskip("mitsuba_oidn")
     (tmp_path / "scene.xml").write_text(SCENE)
-    text, status = captured(words, tmp_path)
-    assert status == 0, text
-    lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
-    assert len(lines) > 0 and "Traceback" not in text
-    # What must not be folded: a formula, a name.
-    wide = [line for line in lines if len(line) > COLUMNS and not line.startswith("    ")]
-    assert not [line for line in wide if "a_material_whose_name" not in line], wide
-    progress = ("Checking", "Rendering", "Measuring")
-    assert not [line for line in lines if re.search(r"…\s*│?$", line) and not line.startswith(progress)]
+    for command, text in captured(commands, tmp_path):
+        lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
+        assert len(lines) > 0 and "Traceback" not in text
+        # What must not be folded: a formula, a name.
+        wide = [line for line in lines if len(line) > COLUMNS and not line.startswith("    ")]
+        assert not [line for line in wide if "a_material_whose_name" not in line], (command, wide)
+        progress = ("Checking", "Rendering", "Measuring")
+        assert not [line for line in lines if re.search(r"…\s*│?$", line) and not line.startswith(progress)], command

@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import EXTREME, ROWS
+from catalogue import EXTREME, ROWS, mostly_slow
 from support import call, direction, hemisphere, sphere
 
 ROUNDING = 2e-7
@@ -12,7 +12,7 @@ COSINES = [1, 0.999, 0.9, 0.7, 0.4, 0.1, 0.05, 0.02]
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("row", [*ROWS, *EXTREME], ids=str)
+@pytest.mark.parametrize("row", mostly_slow([*ROWS, *EXTREME]))
 def test_matches_the_reference(row):
     """Within 1e-4 where f is above 1e-6 of its peak: a few float32 ulp, times the at most 14 e-foldings of a lobe. What
     is seen there can be sampled. Where total reflection begins, the slope of F has no end: there it may differ by what
@@ -39,7 +39,7 @@ def test_matches_the_reference(row):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("row", EXTREME, ids=str)
+@pytest.mark.parametrize("row", mostly_slow(EXTREME))
 def test_finite_at_grazing_and_normal_incidence(row):
     bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
     special = [[0, 0, 1], [1, 0, 1e-7], [0, -1, 1e-4], [0.6, 0.8, 1e-20], [1e-20, 0, 1], [0.6, 0, 0.8]]

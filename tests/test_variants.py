@@ -5,7 +5,8 @@ import functools
 import importlib
 import itertools
 import multiprocessing
-import pickle
+import os
+import signal
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import drjit as dr
@@ -16,6 +17,7 @@ from catalogue import ROWS
 from support import call, hemisphere, is_scalar, sphere
 
 import mi_brdfs
+from mi_brdfs.mitsuba import registry
 from mi_brdfs.mitsuba.registry import own_models
 
 NAMES = [model.plugins[0] for model in own_models()]
@@ -36,7 +38,12 @@ VARIANTS = list(dict.fromkeys([*mi.variants(), *PLATFORMS]))
 COMPILED_RGB = ["llvm_ad_rgb", "cuda_ad_rgb", "metal_ad_rgb"]
 
 
-@pytest.fixture(scope="module", params=VARIANTS)
+def mostly_slow(variants):
+    """The variants as parameters: but for the first of LLVM's they are slow."""
+    return [pytest.param(name, marks=[] if name == "llvm_ad_rgb" else pytest.mark.slow) for name in variants]
+
+
+@pytest.fixture(scope="module", params=mostly_slow(VARIANTS))
 def variant(request):
     """Each variant in turn, unless this Mitsuba or this machine is without it. Whether it is does not depend on our
     plugins: they are registered only afterwards."""
@@ -166,6 +173,7 @@ def test_parameters_have_the_same_keys(variant):
     assert keys_in(variant) == keys_in("scalar_rgb")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", COMPILED_RGB, indirect=True)
 def test_bsdfs_outlive_changes_of_variant(variant):
     """In a process that begins with a compiled variant, lest a value of that is kept and met by another."""
@@ -189,9 +197,25 @@ def there_and_back(variants):
     return first, again
 
 
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_waits_until_all_plugins_are_registered(monkeypatch):
+    register, registered = registry._register_for, []
+
+    def struck(variant):
+        os.kill(os.getpid(), signal.SIGINT)
+        register(variant)
+        registered.append(variant)
+
+    monkeypatch.setattr(registry, "_register_for", struck)
+    mi.set_variant("scalar_rgb")
+    with pytest.raises(KeyboardInterrupt):
+        mi.set_variant("llvm_ad_rgb")
+    assert registered[-1:] == ["llvm_ad_rgb"]
+
+
 # --- Threads --------------------------------------------------------------------------------------------------------
 
-IN_THREADS = pytest.mark.parametrize("variant", ["scalar_rgb", *COMPILED_RGB], indirect=True)
+IN_THREADS = pytest.mark.parametrize("variant", mostly_slow(["scalar_rgb", *COMPILED_RGB]), indirect=True)
 
 
 def check_loaded(bsdfs):
@@ -213,23 +237,20 @@ def test_loading_in_threads(variant):
 
 
 @IN_THREADS
-@pytest.mark.parametrize("loader", ["load_dict", "load_string", "load_file"])
-def test_loading_a_scene_of_many(variant, loader, tmp_path):
+@pytest.mark.parametrize("loader", ["load_dict", "load_string"])
+def test_loading_a_scene_of_many(variant, loader):
     """Mitsuba's loaders instantiate the plugins of a scene in parallel, and name the one that is wrong."""
     given = [row.bsdf for row in ROWS]
-    check_loaded(load(loader, given, tmp_path))
+    check_loaded(load(loader, given))
     with pytest.raises(RuntimeError, match="ward: unknown parameter alfa"):
-        load(loader, [*given, {"type": "ward", "alfa": 1}, *given], tmp_path)
+        load(loader, [*given, {"type": "ward", "alfa": 1}, *given])
 
 
-def load(loader, bsdfs, folder):
+def load(loader, bsdfs):
     """The BSDFs of a scene of spheres."""
     scene = {"type": "scene"} | {f"sphere_{k}": {"type": "sphere", "bsdf": bsdf} for k, bsdf in enumerate(bsdfs)}
-    if loader != "load_dict":
+    if loader == "load_string":
         scene = mi.parser.write_string(mi.parser.parse_dict(mi.parser.ParserConfig(mi.variant()), scene))
-    if loader == "load_file":
-        (folder / "scene.xml").write_text(scene, encoding="utf-8")
-        scene = str(folder / "scene.xml")
     return [shape.bsdf() for shape in getattr(mi, loader)(scene, parallel=True, optimize=False).shapes()]
 
 
@@ -323,8 +344,6 @@ def test_frozen_optimisation(variant, bsdf):
 
 # --- Copies ---------------------------------------------------------------------------------------------------------
 
-COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}
-
 
 def described(declared):
     """All that declarations say of themselves."""
@@ -345,29 +364,26 @@ def rows_of(model):
     return [row.bsdf for row in ROWS if row.bsdf["type"] == model.plugins[0]]
 
 
-@pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
-def test_copies_of_declarations(model, how):
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy])
+def test_copies_of_declarations(duplicate):
     """They say the same and accept the same, and belong to a model as well as the original does."""
-    declared = model.declared()
-    copies = [COPIES[how](parameter) for parameter in declared]
-    assert not set(map(id, copies)) & set(map(id, declared))
-    assert described(copies) == described(declared)
-    with mi.variant_context("scalar_rgb"):
+    for model in own_models():
+        declared = model.declared()
+        copies = list(map(duplicate, declared))
+        assert not set(map(id, copies)) & set(map(id, declared))
+        assert described(copies) == described(declared)
         for bsdf in rows_of(model):
             assert bound(model, copies, bsdf) == bound(model, declared, bsdf)
-    assert COPIES[how](model) is model
-    assert COPIES[how](model.energy) == model.energy
-    assert COPIES[how](model.parameter_rows()) == model.parameter_rows()
+        assert duplicate(model) is model
 
 
+@pytest.mark.slow
 def test_declarations_in_another_process():
     """One that starts from nothing understands what it is sent."""
     models = own_models()
     with fresh_process() as process:
         said = list(process.map(meaning, models, [model.declared() for model in models]))
-    with mi.variant_context("scalar_rgb"):
-        assert said == [meaning(model, model.declared()) for model in models]
+    assert said == [meaning(model, model.declared()) for model in models]
 
 
 def meaning(model, declared):
@@ -383,17 +399,16 @@ def test_a_changed_deepcopy_leaves_the_model_alone():
     distribution = next(parameter for parameter in declared if parameter.name == "distribution")
     distribution.words["beckmann"]["alpha"].limits = (0.2, 0.5)
     assert described(model.declared()) == before != described(declared)
-    with mi.variant_context("scalar_rgb"):
-        assert bound(model, model.declared(), {"alpha": 0.1})
-        with pytest.raises(ValueError, match=r"alpha = 0.1 is not allowed; it must be a number in \[0.2, 0.5\]"):
-            bound(model, declared, {"alpha": 0.1})
+    assert bound(model, model.declared(), {"alpha": 0.1})
+    with pytest.raises(ValueError, match=r"alpha = 0.1 is not allowed; it must be a number in \[0.2, 0.5\]"):
+        bound(model, declared, {"alpha": 0.1})
 
 
 @pytest.mark.parametrize("variant", ["scalar_rgb"], indirect=True)
 def test_preview_scenes_are_the_users_own(variant):
     """Changing one changes neither the next nor the material that it was made of."""
     material = {"type": "ward", "specular_reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.3]}}
-    given = COPIES["pickle"](material)
+    given = copy.deepcopy(material)
     scene = mi_brdfs.preview_scene(given, stage="lamp")
     scene["sensor"]["film"].update(width=4, height=3)
     scene["key"]["radius"] *= 2

@@ -7,22 +7,23 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from rich.table import Column, Table
 
 from ..mitsuba import guests
-from ..probe.arrays import Array
+from ..probe.arrays import Array, interaction, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe
+from ..probe.directions import hemisphere
 from ..probe.sources import BSDFSource, find_sources
+from ..probe.variates import random
 from ..variants import is_measurable
-from .calls import call_times
-from .first import bsdf_of, first_pictures
-from .pictures import SIZE, render_in_turn, sphere
+from .pictures import SIZE, bsdf_of, first_pictures, render_in_turn, sphere
 from .sampling import ANGLES, sampling
-from .statistics import Interval, deviations, median_interval, time_variance
+from .statistics import Interval, deviations, in_turn, median_interval, time_variance
 
-FIRST_ROUNDS = 3
+LANES, CALL_ROUNDS, FIRST_ROUNDS = 1 << 20, 31, 3
 STAGES = "efficiency", "calls", "pictures", "first pictures"
 
 
@@ -104,6 +105,24 @@ def compare(*bsdfs: str | dict | BSDFSource, on_progress: Callable[[str], None] 
         on_progress(first)
         rows.append(_timed("first picture", first_pictures([[it] for it in found], FIRST_ROUNDS), "{:.2f} s"))
     return Comparison(names, rows)
+
+
+def call_times(probes: list[BSDFProbe]) -> Array:
+    """Return the nanoseconds that ``eval_pdf_sample`` takes for a lane, in kernels of each BSDF in turn, compiled
+    before; shape (BSDFs, rounds). Tracing does not count."""
+    si, wo, variates = interaction(hemisphere(LANES, 1)), vectors(hemisphere(LANES, 2)), random(LANES, 3)
+    u, v = sample_arguments(variates)
+    times = np.zeros((len(probes), CALL_ROUNDS))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for k, each in in_turn(len(probes), 1 + CALL_ROUNDS):
+            dr.kernel_history_clear()
+            probe = probes[k]
+            value, pdf, bs, weight = probe.bsdf.eval_pdf_sample(probe.whole.context, si, wo, u, v, True)
+            dr.eval(dr.sum(value) + pdf + dr.sum(weight) + bs.pdf + dr.sum(bs.wo))
+            if each:  # the first round compiles
+                kernels = dr.kernel_history([dr.KernelType.JIT])
+                times[k, each - 1] = 1e6 / LANES * sum(kernel["execution_time"] for kernel in kernels)
+    return times
 
 
 def _probe(given: Any) -> BSDFProbe:

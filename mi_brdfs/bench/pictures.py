@@ -1,9 +1,15 @@
-"""Pictures of BSDFs in turn, with their render times."""
+"""Pictures of BSDFs in turn, with their render times, and the first of a process: tracing and compiling."""
 
 from __future__ import annotations
 
+import importlib
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from math import asin, atan, degrees, radians, sin, sqrt, tan
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -11,11 +17,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..mitsuba import guests
 from ..probe.arrays import Array, luminance
+from ..probe.sources import BSDFSource
 from .statistics import in_turn
 
 SIZE = 128
 """The width and height of pictures."""
+FIRST_SIZE = 16
+"""That of the first of a process."""
 SPP = 64
 ROUNDS = 15
 """Pictures of each BSDF."""
@@ -77,3 +87,64 @@ def render(scene: Scene, seed: int, spp: int = SPP) -> tuple[float, Array]:
     dr.eval(picture)
     dr.sync_thread()
     return perf_counter() - start, np.array(picture, np.float64)
+
+
+# --- First pictures --------------------------------------------------------------------------------------------------
+
+
+def bsdf_of(given: Any) -> Any:
+    """Return the dict or the BSDF of a source, which another process gets as a list, and a dict as it is."""
+    return given if isinstance(given, dict) else BSDFSource(*given).load()
+
+
+def first_pictures(subjects: Sequence[list[Any]], rounds: int) -> Array:
+    """Return the seconds to the first picture of each subject, some BSDFs each, in new processes without cached
+    kernels; shape (subjects, rounds)."""
+    seconds = np.zeros((len(subjects), rounds))
+    for k, each in in_turn(len(subjects), rounds):
+        seconds[k, each] = in_new_process(first_picture, subjects[k])
+    return seconds
+
+
+def first_picture(bsdfs: list[Any]) -> float:
+    """Return the seconds from loading a scene with a sphere for each of some BSDFs to its small picture, traced and
+    compiled, in a process that has rendered nothing."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        start = perf_counter()
+        seen, *others = map(bsdf_of, bsdfs)
+        beside = {
+            f"sphere_{k}": {"type": "sphere", "center": [3 * k, 0, 0], "bsdf": bsdf} for k, bsdf in enumerate(others, 1)
+        }
+        dr.eval(mi.render(mi.load_dict(sphere(seen, FIRST_SIZE) | beside), spp=1))
+        dr.sync_thread()
+        seconds = perf_counter() - start
+        kernels = dr.kernel_history([dr.KernelType.JIT])
+    if any(kernel["cache_disk"] for kernel in kernels):
+        raise RuntimeError("kernels compiled by earlier runs were found")
+    return seconds
+
+
+def in_new_process(function: Callable, *arguments: Any) -> Any:
+    """Return a function's result from a process that knows the same models (:func:`mi_brdfs.mitsuba.guests.source`),
+    but no kernels of earlier runs: these are cached in the user's home folder, so the process gets an empty one.
+    Arguments and result must be of JSON's types."""
+    call = json.dumps([guests.sources(), mi.variant(), function.__module__, function.__name__, arguments])
+    with TemporaryDirectory() as folder:
+        # The path names packages in the home folder, which would not be found.
+        env = os.environ | {"HOME": folder, "TMP": folder, "PYTHONPATH": os.pathsep.join(sys.path)}
+        done = subprocess.run(
+            [sys.executable, "-c", f"from {__name__} import answer; answer()", call],
+            capture_output=True, text=True, env=env,
+        )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(f"{function.__name__} failed in its process:\n{done.stderr.strip()}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def answer() -> None:
+    """Carry out the call given as the argument of the new process."""
+    sources, variant, module, name, arguments = json.loads(sys.argv[1])
+    for source in sources:
+        guests.import_models(source)
+    mi.set_variant(variant)
+    print(json.dumps(getattr(importlib.import_module(module), name)(*arguments)))

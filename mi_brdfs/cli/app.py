@@ -17,8 +17,8 @@ import typer
 
 from .. import __version__
 from ..mitsuba import guests
+from ..mitsuba.errors import unwrapped_ctrl_c
 from ..starting import raise_on_ctrl_c
-from .interrupts import interruptible
 from .terminal import Exit, err, fail, out
 
 app = typer.Typer(
@@ -26,7 +26,7 @@ app = typer.Typer(
 )
 
 imported: list[str] = []
-"""The arguments of --import."""
+"""The arguments of the command's --import."""
 
 
 def main() -> None:
@@ -61,10 +61,10 @@ def _describe(
 
 
 def _import(names: list[str] | None) -> None:
-    for name in names or []:
+    imported[:] = names or []
+    for name in imported:
         try:
             guests.import_models(name)
-            imported.append(name)
         except (ImportError, ValueError) as error:
             fail(f"--import {name}: {error}", Exit.USAGE)
 
@@ -80,15 +80,23 @@ Imports = Annotated[
 
 
 def command(name: str | None = None) -> Callable:
-    """Register a function as a command, with the option --import."""
+    """Register a function as a command, with the option --import, which Ctrl-C and missing extras end in a sentence."""
 
     def add(function: Callable) -> Callable:
         @functools.wraps(function)
         def importing(*args: Any, imports: Imports = None, **kwargs: Any) -> Any:
-            with interruptible():
-                raise_on_ctrl_c()
-                _import(imports)
-                return function(*args, **kwargs)
+            try:
+                with unwrapped_ctrl_c():
+                    raise_on_ctrl_c()
+                    _import(imports)
+                    return function(*args, **kwargs)
+            except KeyboardInterrupt:
+                err.print("Interrupted; nothing was written.")
+                raise typer.Exit(Exit.INTERRUPTED) from None
+            except ImportError as error:
+                if error.name:  # a module is broken; what an extra brings is told without one
+                    raise
+                fail(str(error))
 
         signature = inspect.signature(function, eval_str=True)
         option = inspect.Parameter("imports", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Imports)

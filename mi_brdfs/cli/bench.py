@@ -8,11 +8,9 @@ from typing import Annotated
 
 import typer
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .options import Parameters, check_output, parameters_of, sources_of, write_json
-from .terminal import Exit, err, fail, print_table, progress, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
+from .options import Parameters, TracingVariant, file_option, parameters_of, set_tracing_variant, sources_of, write_json
+from .terminal import Exit, err, failing, print_table, progress, stdout_to_stderr
 
 
 @command()
@@ -25,15 +23,12 @@ def bench(
         ),
     ],
     parameters: Parameters = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures to this file.")
-    ] = None,
+    json_file: Annotated[Path | None, file_option("--json", "Also write all figures to this file.")] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Compare two BSDFs: the efficiency of their samplers, the time of calls and pictures, noise. One alone shows its
     own numbers. Intervals are those of 95 % confidence."""
     given = parameters_of(parameters)
-    check_output("--json", json_file)
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
     with stdout_to_stderr(), progress("Measuring") as bar:
@@ -41,12 +36,9 @@ def bench(
 
         task = bar.add_task("", total=len(STAGES))
         sources = [source for word in targets for source in sources_of(word, given)]
-        try:
-            with unwrapped_ctrl_c():
-                result = compare(*sources, on_progress=lambda stage: bar.update(
-                    task, description=stage, completed=STAGES.index(stage)))  # fmt: skip
-        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
-            fail(one_line(error), Exit.USAGE)
+        with failing(Exit.USAGE):
+            result = compare(*sources, on_progress=lambda stage: bar.update(
+                task, description=stage, completed=STAGES.index(stage)))  # fmt: skip
     write_json(json_file, result.to_dict())
     print_table(result.table())
     err.print(f"Measured in {time.perf_counter() - start:.0f} s, {chosen}.")

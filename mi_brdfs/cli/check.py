@@ -8,7 +8,7 @@ import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -21,10 +21,18 @@ from ..model import EnergyWarning
 from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
-from .interrupts import ending_processes
-from .options import Parameters, check_names, check_output, parameters_of, sources_of, write_json, write_text
+from .options import (
+    Parameters,
+    TracingVariant,
+    file_option,
+    parameters_of,
+    set_tracing_variant,
+    source_of,
+    sources_of,
+    write_json,
+    write_text,
+)
 from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
 
 if TYPE_CHECKING:
     from ..probe.sources import BSDFSource
@@ -69,17 +77,9 @@ def check(
         float | None,
         typer.Option(metavar="P", help="How probable it is that a right BSDF fails a statistical test. Default: 0.01."),
     ] = None,
-    html_file: Annotated[
-        Path | None,
-        typer.Option("--html", metavar="FILE", help="Also write a page with pictures (extra report)."),
-    ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
-    ] = None,
-    junit_file: Annotated[
-        Path | None,
-        typer.Option("--junit", metavar="FILE", help="Also write all findings as JUnit's XML."),
-    ] = None,
+    html_file: Annotated[Path | None, file_option("--html", "Also write a page with pictures (extra report).")] = None,
+    json_file: Annotated[Path | None, file_option("--json", "Also write all findings to this file.")] = None,
+    junit_file: Annotated[Path | None, file_option("--junit", "Also write all findings as JUnit's XML.")] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check this many BSDFs in parallel.")] = 1,
     variant: TracingVariant = None,
 ) -> None:
@@ -90,24 +90,21 @@ def check(
     given = parameters_of(parameters)
     options = _options(angles, significance)
     if against is None:
-        check_names(only, CHECKS, "check")
+        for name in only or []:
+            if name not in CHECKS:
+                fail(f"--only {name}: there is no such check; there are {', '.join(CHECKS)}", Exit.USAGE)
         options |= {"only": only or None, "conserves": conserves or None}
     elif only or conserves or significance is not None:
         fail("--against compares values; --only, --conserves and --significance belong to the checks", Exit.USAGE)
-    for option, file in ("--html", html_file), ("--json", json_file), ("--junit", junit_file):
-        check_output(option, file)
     if html_file is not None:
-        try:
-            from ..validation.html import page
-        except ImportError as error:
-            fail(str(error))
+        from ..validation.html import page
     chosen = set_tracing_variant(variant)
     start = time.perf_counter()
     warnings.simplefilter("ignore", EnergyWarning)  # the report says it
     with stdout_to_stderr():
         words = targets or [model.plugins[0] for model in all_models()]
         sources = [source for word in words for source in sources_of(word, given)]
-        settings = Settings(options, None if against is None else _other(against))
+        settings = Settings(options, None if against is None else source_of(against, {}))
         reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
@@ -132,26 +129,14 @@ def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     options: dict[str, Any] = {}
     if angles is not None:
         try:
-            degrees = degrees_of(angles)
+            options["angles"] = checked_angles(degrees_of(angles))
         except ValueError as error:
-            fail(f"--angles {error}", Exit.USAGE)
-        try:
-            options["angles"] = checked_angles(degrees)
-        except ValueError as error:
-            fail(f"--angles {angles}: {error}", Exit.USAGE)
+            fail(f"--angles {angles}: {str(error).removeprefix(f'{angles}: ')}", Exit.USAGE)
     if significance is not None:
         if not 0 < significance < 1:
             fail(f"--significance {significance:g}: it must be in (0, 1)", Exit.USAGE)
         options["significance"] = significance
     return options
-
-
-def _other(word: str) -> BSDFSource:
-    """Return the one BSDF to compare with."""
-    sources = sources_of(word, {})
-    if len(sources) > 1:
-        fail(f"--against {word}: name one of {', '.join(source.word for source in sources)}", Exit.USAGE)
-    return sources[0]
 
 
 def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs: int) -> list[Report]:
@@ -167,11 +152,15 @@ def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
         known = variant, guests.sources()
-        pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known)
-        with pool, ending_processes():
-            for future in [pool.submit(_check_one, source, settings) for source in sources]:
-                reports.append(future.result())
-                bar.update(task, description=reports[-1].name, advance=each)
+        with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
+            try:
+                for future in [pool.submit(_check_one, source, settings) for source in sources]:
+                    reports.append(future.result())
+                    bar.update(task, description=reports[-1].name, advance=each)
+            except BaseException:  # also Ctrl-C
+                for process in active_children():
+                    process.terminate()
+                raise
     return reports
 
 

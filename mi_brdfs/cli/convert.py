@@ -5,14 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import mitsuba as mi
 import typer
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .options import Parameters, check_output, parameters_of, quantity_of
-from .terminal import Exit, err, fail, print_paragraph, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
+from .options import (
+    Parameters,
+    TracingVariant,
+    check_output,
+    parameters_of,
+    quantity_of,
+    set_tracing_variant,
+    source_of,
+    writing_to,
+)
+from .terminal import Exit, err, failing, print_paragraph, stdout_to_stderr
 
 
 @command()
@@ -39,29 +45,13 @@ def convert(
     from ..measured import read
     from ..probe.sources import is_measured  # imports numpy
 
-    is_bsdf = not is_measured(given)
-    parts = parameters_of(parameters) if is_bsdf else {}
-    quantity: Any = None if is_bsdf else quantity_of(parameters)
-    if is_bsdf:
+    is_file = is_measured(given)
+    values = {} if is_file else parameters_of(parameters)
+    quantity: Any = quantity_of(parameters) if is_file else None
+    if not is_file:
         set_tracing_variant(variant)
-    with stdout_to_stderr(), err.status(f"Writing {output.name}"):
-        try:
-            with unwrapped_ctrl_c():
-                result = converted(_bsdf(given, parts) if is_bsdf else read(given, quantity), output, format)
-        except OSError as error:
-            fail(f"cannot write {output}: {error.strerror or error}")
-        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
-            fail(one_line(error), Exit.USAGE)
+    with stdout_to_stderr(), err.status(f"Writing {output.name}"), writing_to(output), failing(Exit.USAGE):
+        taken = read(given, quantity) if is_file else source_of(given, values, "convert").load()
+        result = converted(taken, output, format)
     for line in str(result).splitlines():
         print_paragraph(line)
-
-
-def _bsdf(word: str, parameters: dict[str, str]) -> dict[str, Any] | mi.BSDF:
-    """Return the only BSDF that a word stands for."""
-    from ..probe.sources import find_sources
-
-    found = list(find_sources(word, parameters))
-    if len(found) > 1:
-        words = ", ".join(it.word for it in found)
-        raise ValueError(f"{word} has several materials; convert one of {words}")
-    return found[0].load()

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable
 from math import isinf
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import ENERGY, find_models, is_own, own_models
 from ..model import Energy, Model
 from ..writing import write_text
 from .app import command
-from .terminal import Exit, err, fail, out, print_table, progress, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
+from .options import TracingVariant, set_tracing_variant
+from .terminal import Exit, err, failing, out, print_table, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..probe.largest_albedo import Maximum
-
-T = TypeVar("T")
 
 LINE = 80
 """The length beyond which the statement is broken into several lines."""
@@ -52,10 +47,8 @@ def energy(
 ) -> None:
     """Measure the largest albedo of models, by default and in white for each choice, and print the line of code that
     states it in the class."""
-    try:
+    with failing(Exit.USAGE):
         models = find_models(names)
-    except ValueError as error:
-        fail(one_line(error), Exit.USAGE)
     if check:
         for model in models:
             if model.energy is None:
@@ -80,27 +73,20 @@ def _measure_all(models: list[type[Model]]) -> list[Measured]:
     from ..probe.stated_energy import configurations
 
     measured = []
+    todo = {}
+    for model in models:
+        with failing(Exit.ERROR, Exception, about=model.plugins[0]):
+            todo[model] = configurations(model)
     with progress("Measuring") as bar:
-        todo = {model: _of(model, configurations) for model in models}
         task = bar.add_task("", total=sum(map(len, todo.values())))
         for model, configured in todo.items():
             bar.update(task, description=model.plugins[0])
-            result = Measured(model, _of(model, default_albedo), [])
-            for given in configured:
-                result.found.append((given, _of(model, largest_albedo, given)))
-                bar.advance(task)
-            measured.append(result)
+            with failing(Exit.ERROR, Exception, about=model.plugins[0]):
+                measured.append(Measured(model, default_albedo(model), []))
+                for given in configured:
+                    measured[-1].found.append((given, largest_albedo(model, given)))
+                    bar.advance(task)
     return measured
-
-
-def _of(model: type[Model], measure: Callable[..., T], *given: Any) -> T:
-    """Return what a function measures of a model, or fail with a sentence about the model."""
-    try:
-        with unwrapped_ctrl_c():
-            return measure(model, *given)
-    except Exception as error:
-        name, text = model.plugins[0], one_line(error)
-        fail(text if text.startswith(f"{name}: ") else f"{name}: {text}")
 
 
 def _print_statements(measured: list[Measured]) -> None:
@@ -158,25 +144,11 @@ def _print_comparison(measured: list[Measured]) -> bool:
 
 def _statement(stated: Energy) -> str:
     """Return the line of code, in several lines if it is long."""
-    default, *rows = [
-        f"{stated.default:g}",
-        *(f"({_literal(given)}, {_number(albedo)})" for given, albedo in stated.largest),
-    ]
-    line = f"energy = Energy({default}, [{', '.join(rows)}])"
+    numbers = [f"{albedo:g}".replace("inf", 'float("inf")') for _, albedo in stated.largest]
+    given = [repr(words).replace("'", '"') for words, _ in stated.largest]
+    rows = [f"({words}, {number})" for words, number in zip(given, numbers, strict=True)]
+    line = f"energy = Energy({stated.default:g}, [{', '.join(rows)}])"
     if len(line) <= LINE:
         return line
-    return "\n".join(
-        ["energy = Energy(", f"    {default},", "    [", *(f"        {row}," for row in rows), "    ],", ")"]
-    )
-
-
-def _number(albedo: float) -> str:
-    return 'float("inf")' if isinf(albedo) else f"{albedo:g}"
-
-
-def _literal(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_literal(name)}: {_literal(it)}" for name, it in value.items()) + "}"
-    if isinstance(value, tuple):
-        return f"({', '.join(map(_literal, value))})"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    indented = "".join(f"        {row},\n" for row in rows)
+    return f"energy = Energy(\n    {stated.default:g},\n    [\n{indented}    ],\n)"

@@ -13,11 +13,10 @@ from typing import Annotated, Any
 
 import typer
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
+from ..mitsuba.errors import unwrapped_ctrl_c
 from .app import command
-from .options import Parameters, check_output, parameters_of, write_text
-from .terminal import Exit, err, fail, out, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
+from .options import Parameters, TracingVariant, file_option, parameters_of, set_tracing_variant, source_of, write_text
+from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 
 @command()
@@ -37,7 +36,7 @@ def explore(
         Path | None, typer.Option(metavar="FILE.exr", help="An environment map to light the pictures with.")
     ] = None,
     export: Annotated[
-        Path | None, typer.Option(metavar="FILE.html", help="Write a page that needs no server, and end.")
+        Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
     ] = None,
     host: Annotated[str, typer.Option(help="Who may connect: by default only this machine.")] = "127.0.0.1",
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Default: 8490, or any free one.")] = None,
@@ -51,14 +50,11 @@ def explore(
     except ImportError:
         fail('this needs the extra of this name: pip install "mi_brdfs[explore]"')
     given = parameters_of(parameters)
-    check_output("--export", export)
     if environment and not environment.is_file():
         fail(f"--environment {environment}: no such file", Exit.USAGE)
-    chosen = set_tracing_variant(variant)
-    if not chosen.endswith("_rgb"):
-        fail(f"this needs an rgb variant, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
+    chosen = set_tracing_variant(variant, "_rgb")
 
-    from ..explorer.server import PortError, listening, serve
+    from ..explorer.server import listening, serve
     from ..explorer.stages import UserScene
 
     file, _, material = (scene or "").partition(".xml:")
@@ -71,10 +67,8 @@ def explore(
     if export:
         _export(export, user, sources, state)
         return
-    try:
+    with failing(Exit.USAGE, about="--port"):
         on = listening(host, port)
-    except PortError as error:
-        fail(f"--port: {error}", Exit.USAGE)
 
     def ready(address: str) -> None:
         out.print(address)
@@ -105,7 +99,7 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     from ..explorer.materials import Materials, plain
     from ..explorer.state import GIVEN, MEASURED, PRESET, SUBJECTS, checked
     from ..mitsuba.registry import presets
-    from ..probe.sources import find_sources, is_measured, value_of
+    from ..probe.sources import is_measured, value_of
 
     if len(targets) > SUBJECTS:
         fail(f"a page shows {SUBJECTS} BSDFs at most, these are {len(targets)}", Exit.USAGE)
@@ -113,26 +107,21 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     sources, subjects = [], []
     known = set(presets())
     for target in targets:
-        try:
-            with unwrapped_ctrl_c():
-                if target in known:
-                    subject = {**Materials().expanded({"type": PRESET, "name": target}), **values}
-                elif ".xml" in target or target.startswith("<") or (is_measured(target) and os.path.exists(target)):
-                    found = list(find_sources(target, given if not is_measured(target) else {}))
-                    if len(found) > 1:
-                        words = ", ".join(it.word for it in found)
-                        raise ValueError(f"{target} has several materials; name one of {words}")
-                    sources += found
-                    kind = MEASURED if is_measured(target) else GIVEN
-                    subject = {"type": kind, "file": found[0].word, **(values if kind == MEASURED else {})}
-                else:
-                    subject = {"type": target, **values}
-                materials = Materials({it.word: it for it in sources})
-                with materials.loaded(materials.expanded(checked(subject))):
-                    pass
-                subjects.append({"bsdf": subject, "name": Path(target).name if os.path.exists(target) else target})
-        except (ValueError, RuntimeError) as error:
-            fail(one_line(error), Exit.USAGE)
+        with failing(Exit.USAGE):
+            if target in known:
+                subject = {**Materials().expanded({"type": PRESET, "name": target}), **values}
+            elif is_measured(target) and os.path.exists(target):
+                sources.append(source_of(target, {}))
+                subject = {"type": MEASURED, "file": sources[-1].word, **values}
+            elif ".xml" in target or target.startswith("<"):
+                sources.append(source_of(target, given))
+                subject = {"type": GIVEN, "file": sources[-1].word}
+            else:
+                subject = {"type": target, **values}
+            materials = Materials({it.word: it for it in sources})
+            with materials.loaded(materials.expanded(checked(subject))):
+                pass
+            subjects.append({"bsdf": subject, "name": Path(target).name if os.path.exists(target) else target})
     return sources, subjects
 
 
@@ -142,12 +131,9 @@ def _export(file: Path, user: Any, sources: list[Any], data: dict[str, Any]) -> 
     from ..explorer.stages import Stages
     from ..explorer.state import parse
 
-    try:
-        with stdout_to_stderr(), unwrapped_ctrl_c():
-            scenes = Stages(user)
-            state = parse(data, scenes.names)
-            text = page(state, Materials({it.word: it for it in sources}), scenes, data)
-    except (ValueError, RuntimeError) as error:
-        fail(one_line(error))
+    with stdout_to_stderr(), failing(Exit.ERROR):
+        scenes = Stages(user)
+        state = parse(data, scenes.names)
+        text = page(state, Materials({it.word: it for it in sources}), scenes, data)
     write_text(file, text)
     out.print(str(file))

@@ -8,16 +8,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.progress import TaskProgressColumn
+from rich.table import Table
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models, find_models
 from ..model import Model
 from ..probe.sources import value_of
 from .app import command
-from .fit_tables import print_medians, print_ranking
-from .options import check_output, parameters_of, write_json, write_text
-from .terminal import Exit, err, fail, progress, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
+from .options import (
+    TracingVariant,
+    file_option,
+    parameters_of,
+    parameters_option,
+    set_tracing_variant,
+    write_json,
+    write_text,
+)
+from .terminal import Exit, err, fail, failing, out, print_table, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..fit import Fit, Observations
@@ -26,63 +33,61 @@ if TYPE_CHECKING:
 TOGETHER = 10
 """The most files that are fitted together: Ctrl-C keeps what was finished before."""
 
+Files = Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")]
+Models = Annotated[str, typer.Option("--model", metavar="TYPE,…|all", help="The models, as `list` shows them.")]
+Starts = Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")]
+Cut = Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")]
+
 
 @command("fit")
 def fit_(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
-    model: Annotated[str, typer.Option(metavar="TYPE,…|all", help="The models, as `list` shows them.")] = "all",
+    files: Files,
+    model: Models = "all",
     metric: Annotated[
         str,
         typer.Option(
             metavar="NAME", help="The error to make small: log, l2, ngan, cube-root, bieron-l2 or bieron-log."
         ),
     ] = "log",
-    starts: Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")] = 10,
+    starts: Starts = 10,
     parameters: Annotated[
         list[str] | None,
-        typer.Option(
-            "-D",
-            "--param",
-            metavar="name=value",
-            help="Fix a parameter of the models that have it to a number, a word, true, false, #rrggbb or 'r;g;b'; of "
-            "a choice, name=a,b fits each; or set the quantity of files that do not state it; may be repeated.",
+        parameters_option(
+            "Fix a parameter of the models that have it to a number, a word, true, false, #rrggbb or 'r;g;b'; of "
+            "a choice, name=a,b fits each; or set the quantity of files that do not state it; may be repeated."
         ),
     ] = None,
-    cut: Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")] = 80,
+    cut: Cut = 80,
     seed: Annotated[int, typer.Option(min=0, help="Of the random starts, and of what is held out.")] = 0,
     image: Annotated[
         bool, typer.Option("--image", help="Rank by FLIP, the error of a rendered picture as an eye sees it.")
     ] = False,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="Also write a page with pictures.")
-    ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Also write all fits to this file.")
-    ] = None,
+    output: Annotated[Path | None, file_option("-o", "Also write a page with pictures.", "FILE.html")] = None,
+    json_file: Annotated[Path | None, file_option("--json", "Also write all fits to this file.")] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Fit models to measured BRDFs, and rank them by their error on directions that were not fitted. Ctrl-C keeps what
     is finished."""
     from ..fit import find_metric
 
-    check_output("--json", json_file)
-    check_output("-o", output)
     if output and output.suffix.lower() not in (".html", ".htm"):
         fail(f"-o {output}: the report is a page; give it a name that ends in .html", Exit.USAGE)
-    try:
+    with failing(Exit.USAGE):
         find_metric(metric)
         models = all_models() if model == "all" else find_models(model.split(","))
         words = parameters_of(parameters)
         quantity = words.pop("quantity", "stated")
         given = _given(words, models)
-        page = _page(image, output)
-    except ValueError as error:
-        fail(one_line(error), Exit.USAGE)
-    except ImportError as error:
-        fail(str(error))
-    chosen = set_tracing_variant(variant)
-    if not chosen.endswith("_ad_rgb"):
-        fail(f"this needs an rgb variant with derivatives, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
+    page: Page | None = None
+    if image:
+        from ..fit.appearance import evaluator
+
+        evaluator()  # is there, or the error says what brings it
+    if output:
+        from ..fit.html import Page
+
+        page = Page()
+    set_tracing_variant(variant, "_ad_rgb")
     names = [it.plugins[0] for it in models]
     fits: list[Fit] = []
     complete, seen, failed = True, True, 0
@@ -112,23 +117,6 @@ def fit_(
         raise typer.Exit(Exit.INTERRUPTED)
     if failed:
         raise typer.Exit(Exit.ERROR)
-
-
-def _page(image: bool, output: Path | None) -> Page | None:
-    """Return an empty report if one is wanted.
-
-    Raises:
-        ImportError: if what it or FLIP needs is not installed.
-    """
-    if image:
-        from ..fit.appearance import evaluator
-
-        evaluator()
-    if not output:
-        return None
-    from ..fit.html import Page
-
-    return Page()
 
 
 def _given(parameters: dict[str, str], models: list[type[Model]]) -> dict[str, Any]:
@@ -231,3 +219,62 @@ def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: boo
                 page.add(own)
             found.append(own)
     return found, complete
+
+
+# --- What is printed --------------------------------------------------------------------------------------------------
+
+
+def print_ranking(fits: list[Fit]) -> None:
+    """Print the models by their error, and the best one to paste."""
+    from ..fit import METRICS
+    from ..fit.result import notes, values
+
+    best = fits[0]
+    out.print(best.file, style="bold")
+    seen = best.flip is not None
+    table = Table("model", *["FLIP"] * seen, "held out", "fitted", "ΔBIC", "albedo", "agree", "notes", box=None,
+                  pad_edge=False)  # fmt: skip
+    for column in table.columns[1:-1]:
+        column.justify = "right"
+    lowest = min(it.bic for it in fits)
+    for it in fits:
+        table.add_row(
+            it.model, *[_shown(it.flip)] * seen, f"{it.held_out:.4g}",
+            f"{it.errors[it.metric]['fitted']:.4g}",
+            f"{it.bic - lowest:.0f}", f"{it.albedo:.2f}", f"{it.starts.agree}/{it.starts.tried}", notes(it),
+        )  # fmt: skip
+    print_table(table)
+    out.print(f"Error of {METRICS[best.metric].text}, up to {best.cut:g}°; {best.pairs} pairs of directions fitted.")
+    if seen:
+        out.print("FLIP (Andersson et al. 2020) is that of a picture of the fit, beside one of the data.")
+    out.print()
+    parameters = Table(best.model, "", "", box=None, pad_edge=False)
+    for name, value, sigma in values(best):
+        parameters.add_row(name, f"{value:.4g}", "" if sigma is None else f"± {sigma:.2g}")
+    print_table(parameters)
+    out.print(f"\n{best.to_xml()}\n")
+    for sentence in best.remarks():
+        out.print(sentence)
+    out.print()
+
+
+def print_medians(ranked: list[list[Fit]]) -> None:
+    """Print the medians over the files."""
+    from ..fit.result import medians
+
+    out.print("Medians", style="bold")
+    rows = medians(ranked)
+    seen = any(row.flip is not None for row in rows)
+    table = Table("model", *["FLIP"] * seen, "held out", "fitted", "files", "best in", box=None, pad_edge=False)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for row in rows:
+        table.add_row(
+            row.model, *[_shown(row.flip)] * seen, f"{row.held_out:.4g}", f"{row.fitted:.4g}",
+            str(row.files), str(row.best_in),
+        )  # fmt: skip
+    print_table(table)
+
+
+def _shown(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
-from .variants import AnyVariant, set_variant
+from .options import AnyVariant, set_variant
+from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
 @command()
@@ -33,10 +32,8 @@ def gallery(
 ) -> None:
     """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps the
     finished pictures."""
-    try:
-        from ..gallery import gallery as render_gallery
-    except ImportError as error:
-        fail(str(error))
+    from ..gallery import gallery as render_gallery
+
     chosen = set_variant(variant)
     start, finished, total = time.perf_counter(), 0, 0
     with stdout_to_stderr(), progress("Rendering") as bar:
@@ -48,14 +45,10 @@ def gallery(
             bar.update(task, description=type, completed=done, total=of)
 
         try:
-            with unwrapped_ctrl_c():
+            with failing(Exit.USAGE, ValueError), failing(Exit.ERROR, RuntimeError):
                 render_gallery(types or (), output, spp, size, advance, presets)
-        except ValueError as error:
-            fail(one_line(error), Exit.USAGE)
         except OSError as error:
             fail(f"cannot write to the folder {output}: {error.strerror}")
-        except RuntimeError as error:
-            fail(one_line(error))
         except KeyboardInterrupt:
             pass
     if finished:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ..mitsuba.errors import one_line
 from .app import command
-from .options import check_output, quantity_of, write_json
+from .options import check_output, file_option, parameters_option, quantity_of, write_json, writing_to
 from .terminal import Exit, err, fail, out, print_table
 
 if TYPE_CHECKING:
@@ -29,13 +29,9 @@ def measured(
     ] = None,
     parameters: Annotated[
         list[str] | None,
-        typer.Option(
-            "-D", "--param", metavar="quantity=NAME", help="What files hold that do not state it: f or f cos."
-        ),
+        parameters_option("What files hold that do not state it: f or f cos.", "quantity=NAME"),
     ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Also write all findings to this file.")
-    ] = None,
+    json_file: Annotated[Path | None, file_option("--json", "Also write all findings to this file.")] = None,
 ) -> None:
     """Tell what files with measured BRDFs hold: grid, range and symmetry, how much is negative or missing, errors of
     reciprocity, albedos."""
@@ -43,7 +39,6 @@ def measured(
 
     if plot_file is not None:
         _check_picture(plot_file)
-    check_output("--json", json_file)
     held = quantity_of(parameters)
     drawn, findings, failed = [], [], 0
     for file in files:
@@ -73,10 +68,8 @@ def measured(
 
 def _check_picture(file: Path) -> None:
     """Fail if no picture can be drawn, or not into this file: before the work."""
-    try:
-        from ..plot.command import PICTURES
-    except ImportError as error:
-        fail(str(error))
+    from ..plot.command import PICTURES
+
     if file.suffix.lower() not in PICTURES:
         fail(f"--plot {file}: write a {', '.join(PICTURES[:-1])} or {PICTURES[-1]}", Exit.USAGE)
     check_output("--plot", file)
@@ -86,8 +79,6 @@ def _draw(measurements: list[Measurement], file: Path) -> None:
     from .. import plot
     from ..plot.command import write
 
-    try:
+    with writing_to(file):
         write(plot.measured(*measurements), file)
-    except OSError as error:
-        fail(f"cannot write {file}: {error.strerror}")
     out.print(str(file))

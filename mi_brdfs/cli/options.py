@@ -5,29 +5,62 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Collection
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import mitsuba as mi
 import typer
 
 from .. import writing
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
-from .terminal import Exit, fail
+from ..mitsuba import llvm
+from ..variants import is_measurable
+from .terminal import Exit, err, fail, failing
 
 if TYPE_CHECKING:
     from ..probe.sources import BSDFSource
 
+
+def parameters_option(help: str, metavar: str = "name=value") -> Any:
+    return typer.Option("-D", "--param", metavar=metavar, help=help)
+
+
+def file_option(name: str, help: str, metavar: str = "FILE") -> Any:
+    """Return an option for a file to be written, which is checked before the work whose result it is to hold."""
+
+    def checked(file: Path | None) -> Path | None:
+        check_output(name, file)
+        return file
+
+    names = ["-o", "--output"] if name == "-o" else [name]
+    return typer.Option(*names, metavar=metavar, help=help, callback=checked)
+
+
 Parameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "-D",
-        "--param",
-        metavar="name=value",
-        help="Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b', or a <default> of the "
-        "XML; may be repeated.",
+    parameters_option(
+        "Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b', or a <default> of the XML; "
+        "may be repeated."
     ),
 ]
+
+AnyVariant = Annotated[
+    str | None,
+    typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),
+]
+"""The option --variant of commands that render."""
+
+TracingVariant = Annotated[
+    str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
+]
+"""The option --variant of commands that measure."""
+KINDS = {
+    "": "a vectorized and unpolarized variant",
+    "_rgb": "an rgb variant",
+    "_ad_rgb": "an rgb variant with derivatives",
+}
+"""What variants whose names have an ending are called in messages."""
 
 
 def parameters_of(definitions: list[str] | None) -> dict[str, str]:
@@ -51,24 +84,23 @@ def quantity_of(definitions: list[str] | None) -> Any:
 
 def sources_of(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
     """Return the BSDFs that a word stands for, or fail with a sentence."""
-    from ..probe.sources import find_sources
+    from ..probe.sources import find_sources  # imports numpy
 
-    try:
-        with unwrapped_ctrl_c():
-            return list(find_sources(word, parameters))
-    except Exception as error:
-        text = one_line(error)
-        fail(text if text.startswith((word, "-D")) else f"{word}: {text}", Exit.USAGE)
+    with failing(Exit.USAGE, Exception, about=word):
+        return list(find_sources(word, parameters))
 
 
-def check_names(names: list[str] | None, known: Collection[str], kind: str) -> None:
-    for name in names or []:
-        if name not in known:
-            fail(f"--only {name}: there is no such {kind}; there are {', '.join(known)}", Exit.USAGE)
+def source_of(word: str, parameters: dict[str, str], verb: str = "name") -> BSDFSource:
+    """Return the one BSDF that a word stands for."""
+    source, *others = sources_of(word, parameters)
+    if others:
+        words = ", ".join(it.word for it in (source, *others))
+        fail(f"{word} has several materials; {verb} one of {words}", Exit.USAGE)
+    return source
 
 
 def check_output(option: str, file: Path | None) -> None:
-    """Fail if a file cannot be written: before the work whose result it is to hold."""
+    """Fail if a file cannot be written."""
     if file is None:
         return
     if not file.absolute().parent.is_dir():
@@ -84,13 +116,49 @@ def check_output(option: str, file: Path | None) -> None:
         fail(f"{option} {file}: it cannot be written: {error.strerror}", Exit.USAGE)
 
 
+@contextmanager
+def writing_to(file: Path) -> Iterator[None]:
+    """Fail with a sentence about a file that cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        fail(f"cannot write {file}: {error.strerror or error}")
+
+
 def write_text(file: Path | None, text: str) -> None:
     if file is not None:
-        try:
+        with writing_to(file):
             writing.write_text(file, text)
-        except OSError as error:
-            fail(f"cannot write {file}: {error.strerror}")
 
 
 def write_json(file: Path | None, data: list | dict) -> None:
     write_text(file, json.dumps(data, indent=1) + "\n")
+
+
+def set_variant(wanted: str | None) -> str:
+    """Activate the requested variant, or the fastest that works, and return its name."""
+    if wanted and wanted not in mi.variants():
+        fail(f"there is no variant {wanted}; this Mitsuba has {', '.join(mi.variants())}")
+    for name in [wanted] if wanted else ["cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb", "scalar_rgb"]:
+        if name not in mi.variants():
+            continue
+        if name.startswith("llvm") and (text := llvm.problem()):
+            if wanted:
+                fail(text)
+            err.print(f"mi-brdfs: using scalar_rgb, which is slow: {text}")
+            continue
+        try:
+            mi.set_variant(name)
+            return name
+        except ImportError:
+            continue
+    fail(f"{wanted} does not work on this machine; `mi-brdfs doctor` says why")
+
+
+def set_tracing_variant(wanted: str | None, ending: str = "") -> str:
+    """Do the same among the variants that commands which measure can use, with names that have a given ending."""
+    chosen = set_variant(wanted)
+    if is_measurable(chosen) and chosen.endswith(ending):
+        return chosen
+    kind = KINDS[ending if is_measurable(chosen) else ""]
+    fail(f"this needs {kind}, not {chosen}", Exit.USAGE if wanted else Exit.ERROR)

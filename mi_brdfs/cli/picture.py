@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import socket
 import tempfile
+import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,13 +17,10 @@ import mitsuba as mi
 import typer
 from rich.progress import TextColumn
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
-from .interrupts import answer_ctrl_c
-from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
+from .options import writing_to
+from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from ..rendering.passes import Picture
 
 DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -92,12 +95,38 @@ def _render(scene: mi.Scene, sensor: int, options: dict[str, Any]) -> Picture:
             parts += [] if seconds is None else [(time.perf_counter() - start) / max(seconds, 1e-3)]
             bar.update(task, completed=max(parts), total=1, spp=spp)
 
-        with answer_ctrl_c(lambda: err.print("Stopping; Ctrl-C again aborts at once.")):
-            try:
-                with unwrapped_ctrl_c():
-                    return render(scene, sensor=sensor, on_pass=advance, **options)
-            except Exception as error:
-                fail(one_line(error))
+        with _answering_ctrl_c(), failing(Exit.ERROR, Exception):
+            return render(scene, sensor=sensor, on_pass=advance, **options)
+
+
+@contextmanager
+def _answering_ctrl_c() -> Iterator[None]:
+    """Answer as soon as Ctrl-C is pressed, where Python's own handlers wait for the pass to end; a second Ctrl-C ends
+    the process."""
+    ours, written_by_python = socket.socketpair()
+    written_by_python.setblocking(False)
+
+    def watch() -> None:
+        pressed = 0
+        while received := ours.recv(64):
+            pressed += received.count(signal.SIGINT)
+            if pressed > 1:
+                err.show_cursor(True)
+                err.print("Aborted; nothing was written.")
+                os._exit(Exit.INTERRUPTED)
+            if pressed == 1:
+                err.print("Stopping; Ctrl-C again aborts at once.")
+
+    previous = signal.set_wakeup_fd(written_by_python.fileno(), warn_on_full_buffer=False)
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(previous)
+        written_by_python.close()
+        watcher.join()
+        ours.close()
 
 
 def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
@@ -108,11 +137,7 @@ def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
     if image is None:
         err.print(f"The film has no RGB, XYZ or luminance channels, so there is no {display.name}.")
         files.pop()
-    try:
-        for bitmap, path in files:
+    for bitmap, path in files:
+        with failing(Exit.ERROR, Exception, about=f"cannot write {path}"), writing_to(path):
             write(bitmap, path)
-    except OSError as error:
-        fail(f"cannot write {path}: {error.strerror}")
-    except Exception as error:
-        fail(f"cannot write {path}: {one_line(error)}")
     return [path for _, path in files]

@@ -8,11 +8,10 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..mitsuba.errors import one_line
 from ..mitsuba.registry import presets
 from ..parameters.published import preset, provenance
 from .app import command
-from .terminal import Exit, err, fail, out, print_paragraph, print_table
+from .terminal import Exit, err, fail, failing, out, print_paragraph, print_table
 
 LETTERS = {"alpha": "α", "exponent": "n", "b": "B"}
 """The parameters that are shown in the table, the width of the lobe."""
@@ -25,13 +24,11 @@ def presets_(
     like: Annotated[str | None, typer.Option(metavar="TEXT", help="Only names with this text in them.")] = None,
 ) -> None:
     """List the published materials, or show one. The plugin takes its name as its parameter `preset`."""
-    try:
+    with failing(Exit.USAGE):
         if name is not None:
             _show(name)
             return
         found = [it for it in presets(model) if (like or "").lower() in it]
-    except ValueError as error:
-        fail(one_line(error), Exit.USAGE)
     if not found:
         words = [f" of {model}" if model else "", f" with {like!r} in its name" if like else ""]
         fail(f"there is no preset{''.join(words)}", Exit.USAGE)

@@ -8,13 +8,11 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
-from .options import parameters_of
+from .options import AnyVariant, parameters_of, parameters_option, set_variant
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
-from .terminal import Exit, fail
-from .variants import AnyVariant, set_variant
+from .terminal import Exit, fail, failing
 
 
 @command()
@@ -24,10 +22,7 @@ def render(
     variant: AnyVariant = None,
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: the scene's.")] = None,
     seconds: Seconds = None,
-    define: Annotated[
-        list[str] | None,
-        typer.Option("-D", "--param", metavar="name=value", help="Set a <default> parameter of the scene."),
-    ] = None,
+    define: Annotated[list[str] | None, parameters_option("Set a <default> parameter of the scene.")] = None,
     sensor: Annotated[
         str, typer.Option(metavar="NUMBER|ID", help="Which of the scene's sensors, counted from 0, or its id.")
     ] = "0",
@@ -63,7 +58,10 @@ def render(
         loaded = _load(file)
         index = _index(loaded, sensor)
         if window:
-            _crop(loaded.sensors()[index], window)
+            from ..rendering.passes import crop  # imports numpy
+
+            with failing(Exit.USAGE, about=f"--crop {','.join(map(str, window))}"):
+                crop(loaded.sensors()[index], *window)
         return loaded, index
 
     passes = None
@@ -84,15 +82,6 @@ def _window(text: str | None) -> list[int] | None:
     return [x, y, width, height]
 
 
-def _crop(sensor: mi.Sensor, window: list[int]) -> None:
-    from ..rendering.passes import crop
-
-    try:
-        crop(sensor, *window)
-    except ValueError as error:
-        fail(f"--crop {','.join(map(str, window))}: {error}", Exit.USAGE)
-
-
 def _index(scene: mi.Scene, sensor: str) -> int:
     ids = [it.id() for it in scene.sensors()]
     if sensor in ids:
@@ -107,11 +96,8 @@ def _load(file: SceneFile) -> mi.Scene:
     path = Path(file.path)
     if not path.is_file():
         fail(f"{path}: {'not a file' if path.exists() else 'no such file'}")
-    try:
-        with unwrapped_ctrl_c():
-            scene = file.load()
-    except Exception as error:
-        fail(one_line(error))
+    with failing(Exit.ERROR, Exception):
+        scene = file.load()
     if not isinstance(scene, mi.Scene):
         fail(f"{path} does not hold a <scene>")
     if not scene.sensors():

@@ -9,13 +9,11 @@ from typing import Annotated
 import mitsuba as mi
 import typer
 
-from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..preview import STAGES, preview_scene
 from .app import command
-from .options import Parameters, parameters_of
+from .options import AnyVariant, Parameters, parameters_of, set_variant, source_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
-from .terminal import Exit, fail
-from .variants import AnyVariant, set_variant
+from .terminal import Exit, fail, failing
 
 
 @command()
@@ -46,17 +44,8 @@ def show(
     set_variant(variant)
 
     def load() -> tuple[mi.Scene, int]:
-        from ..probe.sources import find_sources  # imports numpy
-
-        try:
-            with unwrapped_ctrl_c():
-                found = list(find_sources(material, given))
-                scene = preview_scene(found[0].load(), stage)
-        except (ValueError, RuntimeError) as error:  # Mitsuba raises both
-            fail(one_line(error), Exit.USAGE)
-        if len(found) > 1:
-            words = ", ".join(it.word for it in found)
-            fail(f"{material} has several materials; show one of {words}", Exit.USAGE)
+        with failing(Exit.USAGE):
+            scene = preview_scene(source_of(material, given, "show").load(), stage)
         film = scene["sensor"]["film"]
         film |= {"width": size, "height": size}
         if denoise:

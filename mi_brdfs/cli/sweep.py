@@ -13,8 +13,9 @@ import typer
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
-from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
-from .variants import TracingVariant, set_tracing_variant
+from .fit import Cut, Files, Models, Starts
+from .options import TracingVariant, set_tracing_variant
+from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..sweep import Outcome
@@ -24,13 +25,13 @@ TABLES = "md", "csv"
 
 @command()
 def sweep(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Measured BRDFs, of any format that is known.")],
-    model: Annotated[str, typer.Option(metavar="TYPE,…|all", help="The models, as `list` shows them.")] = "all",
+    files: Files,
+    model: Models = "all",
     metric: Annotated[
         str, typer.Option(metavar="METRIC,…", help="The errors to make small, as `fit` has them.")
     ] = "log",
-    starts: Annotated[int, typer.Option(min=1, help="From how many settings each fit starts.")] = 10,
-    cut: Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")] = 80,
+    starts: Starts = 10,
+    cut: Cut = 80,
     seed: Annotated[
         str, typer.Option(metavar="NUMBER,…", help="Of the random starts, and of what is held out: a fit for each.")
     ] = "0",
@@ -53,14 +54,11 @@ def sweep(
 ) -> None:
     """Fit many models to many measured BRDFs, in parallel, and compare them. The same command goes on where it was
     interrupted, and fits only what is new or has changed."""
-    try:
-        from ..sweep import MEDIANS, ClusterError, FileError, Sweep, csv, medians
+    from ..sweep import MEDIANS, ClusterError, FileError, Sweep, csv, medians
 
-        if render:
-            from .. import gallery  # noqa: F401 -- it says what pictures need
-            from ..sweep.wall import Wall
-    except ImportError as error:
-        fail(str(error))
+    if render:
+        from .. import gallery  # noqa: F401 -- it says what pictures need
+        from ..sweep.wall import Wall
     if table not in TABLES:
         fail(f"--table {table}: there is no such table; there are {', '.join(TABLES)}", Exit.USAGE)
     if workers and scheduler:
@@ -68,22 +66,17 @@ def sweep(
     if (workers or scheduler) and find_spec("distributed") is None:
         fail('workers need the extra "cluster": pip install "mi_brdfs[cluster]"')
     seeds = _numbers(seed)
-    chosen = set_tracing_variant(variant)
-    if not chosen.endswith("_ad_rgb"):
-        fail(f"this needs an rgb variant with derivatives, not {chosen}", Exit.USAGE if variant else Exit.ERROR)
+    set_tracing_variant(variant, "_ad_rgb")
     if workers is None and not scheduler:
         workers = min(os.cpu_count() or 1, 8)
         if find_spec("distributed") is None:
             workers = 0
             err.print('mi-brdfs: one process fits; pip install "mi_brdfs[cluster]" for all cores')
+    names = [] if model == "all" else model.split(",")
     try:
-        names = [] if model == "all" else model.split(",")
-        plan = Sweep(files, names, output, metrics=metric.split(","), seeds=seeds, starts=starts, cut=cut)
+        with failing(Exit.USAGE, ValueError), failing(Exit.ERROR, FileError):
+            plan = Sweep(files, names, output, metrics=metric.split(","), seeds=seeds, starts=starts, cut=cut)
         output.mkdir(parents=True, exist_ok=True)
-    except FileError as error:
-        fail(one_line(error))
-    except ValueError as error:
-        fail(one_line(error), Exit.USAGE)
     except OSError as error:
         fail(f"{output}: {error.strerror}")
     complete, errors, wall = True, list[str](), None

@@ -15,6 +15,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from ..mitsuba.errors import one_line, unwrapped_ctrl_c
+
 out = Console(markup=False, highlight=False, soft_wrap=True)
 err = Console(markup=False, highlight=False, soft_wrap=True, stderr=True)
 
@@ -52,6 +54,20 @@ def progress(doing: str, count: ProgressColumn | None = None) -> Progress:
 def fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:
     err.print(f"mi-brdfs: {text}")
     raise typer.Exit(status)
+
+
+@contextmanager
+def failing(status: Exit, *wanted: type[Exception], about: str = "") -> Iterator[None]:
+    """Fail with the sentence of an error, by default of those that Mitsuba raises; it begins with what it is about."""
+    errors = wanted or (ValueError, RuntimeError)
+    try:
+        with unwrapped_ctrl_c():
+            yield
+    except typer.Exit:  # a RuntimeError, of what has failed in a sentence
+        raise
+    except errors as error:
+        text = one_line(error)
+        fail(text if text.startswith((about, "-D")) else f"{about}: {text}", status)
 
 
 @contextmanager

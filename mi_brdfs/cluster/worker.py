@@ -36,10 +36,6 @@ class Setup(NamedTuple):
     versions: dict[str, str]
 
 
-class Unsuitable(RuntimeError):
-    """Why a worker cannot take tasks."""
-
-
 _current: Setup | None = None
 
 
@@ -88,7 +84,7 @@ def _prepare(wanted: Setup) -> None:
     from distributed import get_worker
 
     if text := problem(versions(), wanted.versions, get_worker().state.nthreads):
-        raise Unsuitable(f"The worker at {get_worker().address} {text}.")
+        raise RuntimeError(f"The worker at {get_worker().address} {text}.")
     for source, text in wanted.guests.items():
         guests.import_models(source if text is None else _file(source, text))
     if wanted.variant and wanted.variant != mi.variant():

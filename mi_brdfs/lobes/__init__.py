@@ -1,9 +1,8 @@
 """The lobes of BRDFs, which can be evaluated, sampled and mixed."""
 
 from .diffuse import LambertLobe, over_diffuse
-from .lobe import Lobe, WeightedLobe
+from .lobe import Lobe, Mixture, WeightedLobe
 from .microfacet import MicrofacetLobe
-from .mixture import Mixture
 from .multiscatter import MULTISCATTER, multiscattering
 from .power import PowerLobe, PowerResponseLobe
 

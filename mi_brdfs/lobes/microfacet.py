@@ -74,7 +74,9 @@ class MicrofacetLobe(Lobe):
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         facet = Facet.between(wi, wo)
-        return self._eval(facet), self._sampler(wi).pdf(facet)
+        # The last factor is the same for all facets of wi, so Dr.Jit computes it once.
+        facets = self.distribution.eval(facet) * self.shadowing(facet) * (0.25 / facet.cos_i)
+        return self.reflectance * (self.fresnel(facet.cos_d) * facets), self._sampler(wi).pdf(facet)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self._sampler(wi).draw(u, v)
@@ -83,12 +85,6 @@ class MicrofacetLobe(Lobe):
         sampler = self.shadowing.sampler(self.distribution, self.fresnel, wi, self._reflect)
         forward = self.fresnel.forward(self.distribution, wi)
         return sampler if forward is None else Mixture(sampler, forward, forward.share)
-
-    def _eval(self, facet: Facet) -> Spectrum:
-        """Return f cosθ_o."""
-        # The last factor is the same for all facets of wi, so Dr.Jit computes it once.
-        facets = self.distribution.eval(facet) * self.shadowing(facet) * (0.25 / facet.cos_i)
-        return self.reflectance * (self.fresnel(facet.cos_d) * facets)
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.colour * self.fresnel(wi.z)

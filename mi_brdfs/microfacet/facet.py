@@ -8,7 +8,7 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..math import SMALL, normalize_or, select
+from ..math import SMALL, normalize_or
 
 
 class Cosines(NamedTuple):
@@ -62,11 +62,6 @@ class Facet:
     def image(self) -> Facet:
         """Return the facet mirrored about the normal, which reflects the same ``wi``."""
         return self.reflecting(self.wi, mi.Vector3f(-self.h.x, -self.h.y, self.h.z))
-
-    def where(self, mask: mi.Bool, other: Facet) -> Facet:
-        """Return this facet where the mask is set, and elsewhere another one for the same ``wi``."""
-        pairs = (self.wo, other.wo), (self.h, other.h), (self.cos_d, other.cos_d)
-        return Facet(self.wi, *(select(mask, *pair) for pair in pairs))
 
     @property
     def cos_i(self) -> mi.Float:

@@ -49,11 +49,6 @@ def power_32(x: mi.Float) -> tuple[mi.Float, mi.Float]:
     return power, quotient
 
 
-def versine(cos: mi.Float, sin2: mi.Float) -> mi.Float:
-    """1 - cosθ."""
-    return sin2 / (1 + cos)
-
-
 def versine_of_tan2(tan2: mi.Float) -> mi.Float:
     """1 - cosθ of tan²θ, for tan²θ up to infinity."""
     cos = dr.rsqrt(1 + tan2)

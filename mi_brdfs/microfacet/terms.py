@@ -10,10 +10,12 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import Spectrum, luminance
-from ..parameters import Parameter
+from ..parameters import Number, Parameter
 from .facet import Facet
 
 T = TypeVar("T", bound="Term")
+
+ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets")
 
 
 class Term:

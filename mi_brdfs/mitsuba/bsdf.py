@@ -9,29 +9,29 @@ import mitsuba as mi
 
 from ..lobes import Lobe, Mixture
 from ..math import clamp, select
-from ..model import Model, Values, warn_once
+from ..model import Model, Plugin, Values, warn_once
 from ..parameters.colours import evaluate_colour
 from ..variants import is_scalar
 
 
-def bsdf_class(model: type[Model], base: type) -> type:
-    """Return the BSDF class of a model for one variant, whose ``mi.BSDF`` is ``base``.
+def variant_class(plugin: type[Plugin], adapter: type, base: type) -> type:
+    """Return the class of a plugin for one variant, whose ``mi.BSDF`` or ``mi.SamplingIntegrator`` is ``base``.
 
-    Each variant has its own BSDF class, and the bindings allow only one base class: so the methods, which work in every
-    variant, are written once below and copied to each class.
+    Each variant has its own base class, and the bindings allow only one: so the methods, which work in every variant,
+    are written once, in an ``adapter``, and copied to each class.
     """
-    methods = {name: value for name, value in vars(ModelBSDF).items() if name not in ("__dict__", "__weakref__")}
-    return type(model.__name__, (base,), {**methods, "model_class": model})
+    methods = {name: value for name, value in vars(adapter).items() if name not in ("__dict__", "__weakref__")}
+    return type(plugin.__name__, (base,), {**methods, "plugin_class": plugin})
 
 
 class ModelBSDF:
     """A model as a BSDF. Each of its lobes is a component."""
 
-    model_class: type[Model]
+    plugin_class: type[Model]
 
     def __init__(self, props: mi.Properties) -> None:
         mi.BSDF.__init__(self, props)
-        self.model = self.model_class(props)
+        self.model = self.plugin_class(props)
         if excess := self.model.excess(self.model.constants):
             warn_once(f"{self.model.plugins[0]}: {excess}.")
         # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,

@@ -43,7 +43,13 @@ def import_models(target: str) -> None:
         ImportError: if it cannot be imported, or fails.
         ValueError: if it defines no model or term, or one that cannot be registered.
     """
-    module = _file(Path(target)) if target.endswith(".py") else _module(target)
+    path = Path(target) if target.endswith(".py") else None
+    if path and not path.is_file():
+        raise ImportError("no such file")
+    try:
+        module = _of_file(path) if path else importlib.import_module(target)
+    except Exception as error:
+        raise ImportError(_sentence(error, path)) from None
     found = _brought_by(module)
     if not found:
         raise ValueError("it defines no subclass of mi_brdfs.Model, nor a term of the kit with a word")
@@ -71,25 +77,13 @@ def sources() -> list[str]:
     return [each for each in found if each]
 
 
-def _file(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise ImportError("no such file")
+def _of_file(path: Path) -> ModuleType:
     spec: Any = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[path.stem] = module  # where dataclasses and pickle look it up
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise ImportError(_sentence(error, path)) from None
+    spec.loader.exec_module(module)
     _files[path.stem] = str(path.resolve())
     return module
-
-
-def _module(name: str) -> ModuleType:
-    try:
-        return importlib.import_module(name)
-    except Exception as error:
-        raise ImportError(_sentence(error)) from None
 
 
 def _sentence(error: Exception, path: Path | None = None) -> str:

@@ -9,20 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..model import Plugin
 from ..variants import is_scalar
-
-
-def integrator_class(physics: type[Plugin], base: type) -> type:
-    """Return the integrator class of some physics for one variant, whose ``mi.SamplingIntegrator`` is ``base``.
-
-    As with :func:`mi_brdfs.mitsuba.bsdf.bsdf_class`, the methods are written once below and copied to the class of each
-    variant.
-    """
-    methods = {
-        name: value for name, value in vars(PixelCentreIntegrator).items() if name not in ("__dict__", "__weakref__")
-    }
-    return type(physics.__name__, (base,), {**methods, "physics_class": physics})
 
 
 class PixelCentreIntegrator:
@@ -34,11 +21,11 @@ class PixelCentreIntegrator:
     A picture takes two steps, :meth:`sums` and :meth:`put`, so that any number of passes may add up before the finish.
     """
 
-    physics_class: type[Any]
+    plugin_class: type[Any]
 
     def __init__(self, props: mi.Properties) -> None:
         mi.SamplingIntegrator.__init__(self, props)
-        self.physics = self.physics_class(props)
+        self.physics = self.plugin_class(props)
         self.textures = self.physics.textures  # a member, as in ModelBSDF
 
     def sample(

@@ -27,15 +27,10 @@ def point_to_extra() -> None:
     """
     if os.environ.get(VARIABLE):
         return
-    started = "drjit" in sys.modules
-    if started and _is_safe():
-        return
-    library = extra_library()
-    if library is None:
-        return
-    if not started:
-        os.environ[VARIABLE] = library
-    elif TooLate not in sys.meta_path:
+    if "drjit" not in sys.modules:
+        if library := extra_library():
+            os.environ[VARIABLE] = library
+    elif (version() is None or problem()) and extra_library() and TooLate not in sys.meta_path:
         sys.meta_path.insert(0, TooLate)
 
 
@@ -91,8 +86,10 @@ def loaded_file() -> str | None:
 
 def problem() -> str | None:
     """One sentence with the cure if the LLVM in use aborts the process on this machine, else None."""
-    found = version()
-    if found is None or not _aborts(found):
+    import drjit as dr
+
+    found, since_3_9 = version(), tuple(map(int, dr.__version__.split(".")[:2])) > (1, 3)
+    if found is None or found[0] not in ABORTING_MAJORS or not since_3_9 or not _has_avx512():
         return None
     return f"LLVM {dotted(found)} aborts the process when it renders on this machine (AVX-512): {cure()}."
 
@@ -100,7 +97,7 @@ def problem() -> str | None:
 def cure() -> str:
     """What to do where the LLVM in use is missing or unsafe."""
     chosen, library = os.environ.get(VARIABLE), extra_library()
-    if chosen and (library is None or not _same_file(chosen, library)):
+    if chosen and os.path.realpath(chosen) != library:
         return f"unset {VARIABLE} (it names {chosen})" + ("" if library else f", then {install_advice()}")
     if library:
         return "restart Python and import mi_brdfs first, before mitsuba"
@@ -123,18 +120,6 @@ def dotted(found: tuple[int, int, int]) -> str:
     return ".".join(map(str, found))
 
 
-def _is_safe() -> bool:
-    found = version()
-    return found is not None and not _aborts(found)
-
-
-def _aborts(found: tuple[int, int, int]) -> bool:
-    import drjit as dr
-
-    since_3_9 = tuple(map(int, dr.__version__.split(".")[:2])) > (1, 3)
-    return found[0] in ABORTING_MAJORS and since_3_9 and _has_avx512()
-
-
 @cache
 def _has_avx512() -> bool:
     try:
@@ -143,10 +128,6 @@ def _has_avx512() -> bool:
     except OSError:
         return False  # not Linux: no affected machine known
     return "avx512f" in flags.split()
-
-
-def _same_file(a: str, b: str) -> bool:
-    return os.path.realpath(a) == os.path.realpath(b)
 
 
 @cache

@@ -7,8 +7,11 @@ import importlib
 import json
 import pkgutil
 import re
+import signal
+import threading
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -27,8 +30,8 @@ from ..parameters import published
 from ..parameters.messages import meant
 from ..tabulated.tabulated import Tabulated
 from . import llvm
-from .bsdf import bsdf_class
-from .integrator import integrator_class
+from .bsdf import ModelBSDF, variant_class
+from .integrator import PixelCentreIntegrator
 
 Registered = TypeVar("Registered", bound=type[Model] | type[Term])
 
@@ -272,7 +275,26 @@ def _on_variant(old: str | None, new: str | None) -> None:
         if old is not None:  # as where Mitsuba itself refuses a variant, which it does before it changes
             mi.set_variant(old)
         raise
-    _register_for(new)
+    with _ctrl_c_held():
+        _register_for(new)
+
+
+@contextmanager
+def _ctrl_c_held() -> Iterator[None]:
+    """Let Ctrl-C wait until the end: imports that it interrupts print tracebacks, and half of the plugins would be
+    registered."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield  # it does not interrupt
+        return
+    pressed = []
+    signal.signal(signal.SIGINT, lambda *_: pressed.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if pressed:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _register_for(active: str) -> None:
@@ -291,9 +313,10 @@ def _register_in(variant: str) -> None:
         if issubclass(plugin, Model):
             if name not in known and variant == mi.variant() and _is_foreign(name):
                 warnings.warn(f'mi_brdfs replaces the BSDF "{name}", registered by another package.', stacklevel=2)
-            module.register_bsdf(name, bsdf_class(plugin, module.BSDF))
+            module.register_bsdf(name, variant_class(plugin, ModelBSDF, module.BSDF))
         else:
-            module.register_integrator(name, integrator_class(plugin, module.SamplingIntegrator))
+            integrator = variant_class(plugin, PixelCentreIntegrator, module.SamplingIntegrator)
+            module.register_integrator(name, integrator)
         known[name] = plugin
 
 

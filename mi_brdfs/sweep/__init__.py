@@ -14,7 +14,6 @@ It needs ``pip install 'mi_brdfs[sweep]'``, and for more than one process ``mi_b
 from ..cluster import ClusterError
 from ..measured import FileError
 from .plan import Outcome, Sweep
-from .store import Store, StoreWarning
-from .table import MEDIANS, csv, medians
+from .store import MEDIANS, Store, StoreWarning, csv, medians
 
 __all__ = ["MEDIANS", "ClusterError", "FileError", "Outcome", "Store", "StoreWarning", "Sweep", "csv", "medians"]

@@ -104,16 +104,15 @@ class Wall:
         for metric, rows in self.cells.items():
             contents = list(rows)
             for first in range(0, len(contents), ROWS):
-                some = [self._row(content, rows[content]) for content in contents[first : first + ROWS]]
+                some = []
+                for content in contents[first : first + ROWS]:
+                    name, cells = printable(Path(self.sweep.files[content]).name), rows[content]
+                    some.append(Row({0: name}, [*map(self._picture, cells)], [cell.caption for cell in cells]))
                 number = f"_{first // ROWS + 1}" if len(contents) > ROWS else ""
                 path = self.sweep.folder / f"wall_{metric}{number}.jpg"
                 write(mi.Bitmap(np.array(sheet(some))), path)
                 found.append(path)
         return found
-
-    def _row(self, content: str, cells: list[Cell]) -> Row:
-        name = printable(Path(self.sweep.files[content]).name)
-        return Row({0: name}, [self._picture(cell) for cell in cells], [cell.caption for cell in cells])
 
     def _picture(self, cell: Cell) -> Image.Image:
         path = self._path(cell)
@@ -126,18 +125,18 @@ class Wall:
         return self.folder / f"{cell.key}.png"
 
 
-def _cell(bsdf: dict[str, Any], caption: str, identity: str) -> Cell:
-    return Cell(digest([identity, SIZE, SPP, mi.variant()]), bsdf, caption)
-
-
 def _measured(file: str, content: str) -> Cell:
     bsdf = {"type": "tabulated", "filename": str(Path(file).absolute())}
-    return _cell(bsdf, "measured", f"{versions()} {content}")._replace(content=content)
+    return Cell(_key(f"{versions()} {content}"), bsdf, "measured", content)
 
 
 def _fit(model: str, row: dict[str, Any], least: float) -> Cell:
-    best = ", best" if row["error"] == least else ""
-    return _cell(json.loads(row["bsdf"]), f"{model}\n{row['error']:.3g}{best}", f"{row['versions']} {row['bsdf']}")
+    caption = f"{model}\n{row['error']:.3g}{', best' if row['error'] == least else ''}"
+    return Cell(_key(f"{row['versions']} {row['bsdf']}"), json.loads(row["bsdf"]), caption)
+
+
+def _key(identity: str) -> str:
+    return digest([identity, SIZE, SPP, mi.variant()])
 
 
 def picture(bsdf: dict[str, Any], content: str | None) -> np.ndarray:

@@ -80,7 +80,10 @@ def spectral(run: Run) -> Findings:
                 got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
                 coloured = _load(run.given | _coloured(greys))
                 every = replace(run, probe=coloured, angles=(), given=None)
-                one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, given=None)
+                # Few tests, but judged as strictly as those of this run: they are as many more.
+                one = replace(
+                    run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, given=None, significance=run.level
+                )
                 failed = {
                     check: [it for it in check(again) if it.verdict == "fail"]
                     for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))

@@ -16,7 +16,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mi_brdfs.cli.variants import set_tracing_variant
+from mi_brdfs.cli.options import set_tracing_variant
 from mi_brdfs.doctor import versions
 from mi_brdfs.mitsuba import llvm
 

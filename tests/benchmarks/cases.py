@@ -24,16 +24,9 @@ class Case:
     comparable."""
 
     @property
-    def other(self) -> Plugin:
-        """The built-in, of a case that has one."""
-        if self.builtin is None:
-            raise ValueError(f"{self.name} has no built-in to be compared with")
-        return self.builtin
-
-    @property
     def beside(self) -> str:
         """Return the names of both."""
-        return f"{self.name} / {self.other['type']}" + ("" if self.same else ", another model")
+        return f"{self.name} / {self.builtin['type']}" + ("" if self.same else ", another model")
 
 
 def case(name: str, builtin: Plugin | None = None, same: bool = False, **given: Any) -> Case:

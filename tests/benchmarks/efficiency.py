@@ -28,7 +28,7 @@ def efficiency(cases: Sequence[Case] = CASES) -> Iterator[Figure]:
     gains: dict[str, list[float]] = {}
     for case in cases:
         ours = samplings(case.bsdf)
-        theirs = samplings(case.other)[WHOLE].least() if case.same else np.empty(0)
+        theirs = samplings(case.builtin)[WHOLE].least() if case.same else np.empty(0)
         lobes = {name: part for name, part in ours.items() if name != WHOLE and part.albedo.any()}
         if len(lobes) < 2:
             lobes = {}  # the whole is a single lobe
@@ -40,13 +40,13 @@ def efficiency(cases: Sequence[Case] = CASES) -> Iterator[Figure]:
                 else:
                     targets = [Target("≥", 0.95 if angle <= 60 else 0.85, "each lobe")]
                 if name == WHOLE and case.same:
-                    targets.append(Target("≥", float(theirs[k]), f"that of {case.other['type']}"))
+                    targets.append(Target("≥", float(theirs[k]), f"that of {case.builtin['type']}"))
                 if name == WHOLE and case.name in UP_TO_60 and angle <= 60:
                     targets.append(Target("≥", UP_TO_60[case.name], "walter up to 60°"))
                 yield Figure("efficiency", subject, f"{angle}°", float(eta), targets=tuple(targets))
         if case.same:
             gain = float(np.mean(ours[WHOLE].least() / theirs))
-            gains.setdefault(f"{case.bsdf['type']} over {case.other['type']}", []).append(gain)
+            gains.setdefault(f"{case.bsdf['type']} over {case.builtin['type']}", []).append(gain)
             yield Figure("efficiency", case.name, GAIN, gain)
             for angle, eta in zip(ANGLES, theirs, strict=True):
                 yield Figure("efficiency", case.beside, f"{angle}°", float(eta))

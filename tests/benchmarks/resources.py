@@ -12,8 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from mi_brdfs.bench.first import SIZE, in_new_process
-from mi_brdfs.bench.pictures import sphere
+from mi_brdfs.bench.pictures import FIRST_SIZE, in_new_process, sphere
 from mi_brdfs.probe.arrays import launched_kernels
 
 from .cases import CASES, Case, Plugin, defaults
@@ -48,7 +47,7 @@ def recompiles(cases: Sequence[Case] = CASES) -> Iterator[Figure]:
 def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
     """Return ``(parameters, changed, loaded)``: the number of parameters changed, and of kernels compiled for that and
     for loading the scene again."""
-    scene = sphere(bsdf, SIZE)
+    scene = sphere(bsdf, FIRST_SIZE)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         loaded = mi.load_dict(scene)
         known = _launched(loaded)
@@ -101,7 +100,7 @@ def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[flo
         seconds.append([])
         for bsdf in bsdfs:
             start = thread_time()
-            dr.eval(mi.render(mi.load_dict(sphere(bsdf, SIZE)), spp=1, seed=seed))
+            dr.eval(mi.render(mi.load_dict(sphere(bsdf, FIRST_SIZE)), spp=1, seed=seed))
             dr.sync_thread()
             seconds[-1].append(thread_time() - start)
         memory += _resident()

@@ -10,8 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from mi_brdfs.bench.first import first_pictures
-from mi_brdfs.bench.pictures import SIZE, render, render_in_turn, sphere
+from mi_brdfs.bench.pictures import SIZE, first_pictures, render, render_in_turn, sphere
 from mi_brdfs.bench.statistics import deviations, in_turn, median_interval, time_variance
 from mi_brdfs.probe.arrays import Array
 
@@ -72,8 +71,8 @@ def first() -> Iterator[Figure]:
     Targets: 1.15 for one model, 1.3 for all of them.
     """
     for case in pairs():
-        seconds = first_pictures([[case.bsdf], [case.other]], FIRST_ROUNDS)
-        target = Target("≤", 1.15, case.other["type"])
+        seconds = first_pictures([[case.bsdf], [case.builtin]], FIRST_ROUNDS)
+        target = Target("≤", 1.15, case.builtin["type"])
         yield from _compared("first", case.name, "first picture", seconds, target, 2, " s")
     models = defaults()
     seconds = first_pictures([models, (2 * BUILT_INS)[: len(models)]], FIRST_ROUNDS_OF_ALL)
@@ -92,11 +91,11 @@ def scalar() -> Iterator[Figure]:
     try:
         with mi.variant_context("scalar_rgb"):
             for case in (case for case in pairs() if case.name in SCALAR_AT_MOST):
-                bsdfs, seconds = (case.bsdf, case.other), np.zeros((2, SCALAR_ROUNDS))
+                bsdfs, seconds = (case.bsdf, case.builtin), np.zeros((2, SCALAR_ROUNDS))
                 for k, seed in in_turn(2, SCALAR_ROUNDS):
                     seconds[k, seed], _ = render(sphere(bsdfs[k], SCALAR_SIZE), seed, SCALAR_SPP)
                 times = 1e6 * seconds / (SCALAR_SIZE**2 * SCALAR_SPP)
-                target = Target("≤", SCALAR_AT_MOST[case.name], case.other["type"])
+                target = Target("≤", SCALAR_AT_MOST[case.name], case.builtin["type"])
                 yield from _compared("scalar", case.name, "time", times, target, 1, " µs a sample")
     finally:
         dr.set_thread_count(threads)

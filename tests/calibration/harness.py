@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from mi_brdfs.lobes import LambertLobe, Lobe
-from mi_brdfs.lobes.mixture import Mixture
+from mi_brdfs.lobes import LambertLobe, Lobe, Mixture
 from mi_brdfs.probe.arrays import sample_arguments, vectors
 from mi_brdfs.probe.directions import direction
 from mi_brdfs.probe.variates import lattice, sampling_efficiency

@@ -3,7 +3,7 @@ under D65, and as smooth as these allow (the least squared differences of neighb
 
     python tests/calibration/rgb_basis.py [--check]
 
-Writes mi_brdfs/measured/basis.py; with --check, exits with 1 if that is not what it would write.
+Writes mi_brdfs/tabulated/basis.py; with --check, exits with 1 if that is not what it would write.
 
 I. Mallett and C. Yuksel, Spectral primary decomposition for rendering with sRGB reflectance, Eurographics Symposium on
 Rendering 2019, doi:10.2312/sr.20191216, pose the problem.

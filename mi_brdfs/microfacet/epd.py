@@ -9,12 +9,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ...math import EPSILON, SMALL, reciprocal_gamma, safe_sqrt
-from ...parameters import Number
-from ..facet import Facet
-from ..laws import LARGEST_TAN2, power_32
-from ..terms import Isotropic
-from .gtr import ROUGHNESS
+from ..math import EPSILON, SMALL, reciprocal_gamma, safe_sqrt
+from ..parameters import Number
+from .facet import Facet
+from .laws import LARGEST_TAN2, power_32
+from .terms import ROUGHNESS, Isotropic
 
 
 class EPD(Isotropic):

@@ -8,11 +8,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ...math import expm1_ratio
-from ...parameters import Number
-from ..facet import Facet
-from ..laws import cosine_power, cosine_power_cdf, inverse_cosine_power_cdf, power_32, root_32
-from ..terms import Isotropic
+from ..math import expm1_ratio
+from ..parameters import Number
+from .facet import Facet
+from .laws import cosine_power, cosine_power_cdf, inverse_cosine_power_cdf, power_32, root_32
+from .terms import Isotropic
 
 
 class HemiEPD(Isotropic):
