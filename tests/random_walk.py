@@ -12,6 +12,7 @@ the stretched space where the roughness is 1: (alpha_u x, alpha_v y, z).
 The visible normals of GGX are drawn with the spherical caps of J. Dupuy and A. Benyoub, "Sampling visible GGX normals
 with spherical caps", 2023, doi:10.1111/cgf.14867, those of Beckmann by rejection in the space of slopes.
 """
+
 import math
 
 import numpy as np
@@ -31,8 +32,8 @@ def smith_lambda(distribution, alpha_u, alpha_v, w):
     """Return Smith's Lambda, signed, for directions `w` (3, n): Lambda(-w) = -1 - Lambda(w)."""
     z, r = _stretch(w, alpha_u, alpha_v)[2:]
     height = np.abs(z)
-    with np.errstate(divide='ignore', over='ignore'):  # a horizontal ray has an infinite Lambda
-        if distribution == 'ggx':
+    with np.errstate(divide="ignore", over="ignore"):  # a horizontal ray has an infinite Lambda
+        if distribution == "ggx":
             # (sqrt(1 + (r/z)^2) - 1) / 2 without its cancellation.
             upward = r * r / (2 * height * (height + np.hypot(height, r)))
         else:
@@ -63,13 +64,16 @@ def _tilted_gaussian(a, rng):
         choice, u = rng.random((2, c.size))
         rayleigh = np.sqrt(rng.standard_exponential(c.size))  # density 2 v exp(-v^2)
         # a >= 0: propose a exp(-t^2) on the whole line plus t exp(-t^2) on t > 0; only t < 0 can be rejected.
-        gaussian = choice * (c * math.sqrt(math.pi) + .5) < c * math.sqrt(math.pi)
-        above = np.where(gaussian, math.sqrt(.5) * rng.standard_normal(c.size), rayleigh)
+        gaussian = choice * (c * math.sqrt(math.pi) + 0.5) < c * math.sqrt(math.pi)
+        above = np.where(gaussian, math.sqrt(0.5) * rng.standard_normal(c.size), rayleigh)
         # a < 0: with v = a + t the density is v exp(-v^2) exp(2 a v); propose it without the one or the other factor.
-        steep = c < -.75
-        v = np.where(steep, rng.standard_gamma(2, c.size) / (2 * np.maximum(-c, .75)), rayleigh)
-        chance = np.where(c < 0, np.exp(np.where(steep, -v * v, 2 * np.minimum(c, 0) * v)),
-                          1 + np.minimum(above, 0) / np.maximum(c, TINY))
+        steep = c < -0.75
+        v = np.where(steep, rng.standard_gamma(2, c.size) / (2 * np.maximum(-c, 0.75)), rayleigh)
+        chance = np.where(
+            c < 0,
+            np.exp(np.where(steep, -v * v, 2 * np.minimum(c, 0) * v)),
+            1 + np.minimum(above, 0) / np.maximum(c, TINY),
+        )
         t[todo] = np.where(c < 0, v - c, above)
         todo = todo[u >= chance]
     return t
@@ -80,7 +84,7 @@ def _beckmann_normals(x, y, z, r, rng):
     # A normal (t, s, 1), with t along the azimuth of w, has the density exp(-t^2 - s^2) / pi and is seen under
     # z + r t: s is plainly Gaussian, and t has the density of _tilted_gaussian with the cotangent of w.
     t = _tilted_gaussian(z / r, rng)
-    s = math.sqrt(.5) * rng.standard_normal(z.size)
+    s = math.sqrt(0.5) * rng.standard_normal(z.size)
     azimuth = np.arctan2(y, x)
     cos_phi, sin_phi = np.cos(azimuth), np.sin(azimuth)
     return np.stack((t * cos_phi - s * sin_phi, t * sin_phi + s * cos_phi, np.ones_like(z)))
@@ -88,8 +92,8 @@ def _beckmann_normals(x, y, z, r, rng):
 
 def visible_normals(distribution, alpha_u, alpha_v, w, rng):
     """Draw a normal from those visible from each of the directions `w` (3, n), which may lie below the horizon."""
-    draw = _ggx_normals if distribution == 'ggx' else _beckmann_normals
-    m = draw(*_stretch(w, alpha_u, alpha_v), rng) * np.array([[alpha_u], [alpha_v], [1.]])
+    draw = _ggx_normals if distribution == "ggx" else _beckmann_normals
+    m = draw(*_stretch(w, alpha_u, alpha_v), rng) * np.array([[alpha_u], [alpha_v], [1.0]])
     return m / np.sqrt(np.sum(m * m, axis=0))
 
 
@@ -99,8 +103,8 @@ def walk(distribution, alpha_u, alpha_v, wi, fresnel, count, rng, orders=20):
     `wi` is the unit vector towards the light, above the surface; `fresnel` maps cosines (n,) to reflectances (n,) or
     (n, channels). Both results have the shape (orders,) or (orders, channels).
     """
-    if distribution not in ('ggx', 'beckmann'):
-        raise ValueError(f'unknown distribution: {distribution!r}')
+    if distribution not in ("ggx", "beckmann"):
+        raise ValueError(f"unknown distribution: {distribution!r}")
     ray = np.repeat(-np.asarray(wi, float)[:, None], count, axis=1)
     channels = np.shape(fresnel(np.ones(1)))[1:]
     weight = np.ones((count, *channels))
@@ -113,7 +117,7 @@ def walk(distribution, alpha_u, alpha_v, wi, fresnel, count, rng, orders=20):
         ray = ray + 2 * cosine * normal
         weight = weight * fresnel(cosine)
         # The next collision: C1' = C1 (1 - U)^(-1/Lambda), and -log(1 - U) is exponential. C1' >= 1 is no collision.
-        with np.errstate(divide='ignore', over='ignore'):  # Lambda = 0: the ray leaves
+        with np.errstate(divide="ignore", over="ignore"):  # Lambda = 0: the ray leaves
             log_c1 = log_c1 + rng.standard_exponential(log_c1.size) / smith_lambda(distribution, alpha_u, alpha_v, ray)
         inside = ~(log_c1 >= 0)  # a NaN would stay inside and show as lost energy
         total[order] = weight[~inside].sum(axis=0)

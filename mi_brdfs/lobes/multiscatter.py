@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, Spectrum, clamp, select
-from ..microfacet.escape import Escape, Tables, textures
+from ..microfacet.escape import Escape, Walks, textures
+from ..microfacet.shadowing import Smith
 from ..parameters import Choice, ParameterError
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
-
-if TYPE_CHECKING:
-    from ..model import Model
 
 
 class MultipleScattering(Lobe):
@@ -24,30 +21,31 @@ class MultipleScattering(Lobe):
     colour: with C = 1 all that the lobe loses is reflected (C. Kulla and A. Conty, Revisiting physically based shading
     at Imageworks, in: Physically based shading in theory and practice, SIGGRAPH 2017 courses). Reciprocal.
 
-    Draw from the cosine on rough surfaces, and uniformly on smooth ones, which lose most of the light at grazing angles.
+    Draw from the cosine on rough surfaces, and uniformly on smooth ones, which lose light at grazing angles above all.
     """
 
-    def __init__(self, lobe: MicrofacetLobe, tables: Tables) -> None:
+    def __init__(self, lobe: MicrofacetLobe, walks: Walks) -> None:
         self.reflectance, self.fresnel, self.anisotropic = lobe.reflectance, lobe.fresnel, lobe.anisotropic
-        alphas = lobe.shadowing.alpha_u, lobe.shadowing.alpha_v
-        self.of, self.mean = functools.partial(tables.of, *alphas), tables.mean_of(*alphas)
-        self.uniform = 1 - dr.minimum(dr.sqrt(alphas[0] * alphas[1]), 1)
+        self.walks, self.mean = walks, walks.mean
+        self.uniform = 1 - dr.minimum(dr.sqrt(walks.smith.alpha_u * walks.smith.alpha_v), 1)
 
     def colour(self, i: Escape, o: Escape) -> Spectrum:
         """Return C for what becomes of light from both directions; it is 1 if F is."""
         raise NotImplementedError(f"{type(self).__name__} does not define colour.")
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
-        i, typical = self.of(wi), Escape(self.mean.lost, self.mean.second, self.mean.schlick, self.mean.dip)
+        i, typical = self.walks.of(wi), Escape(self.mean.lost, self.mean.second, self.mean.schlick, self.mean.dip)
         return self.reflectance * self.colour(i, typical) * i.lost
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
-        i, o, cosine = self.of(wi), self.of(wo), wo.z * dr.inv_pi
+        i, o, cosine = self.walks.of(wi), self.walks.of(wo), wo.z * dr.inv_pi
         scale = i.lost * o.lost / dr.maximum(self.mean.lost, EPSILON)
         return self.reflectance * self.colour(i, o) * (scale * cosine), dr.lerp(cosine, dr.inv_two_pi, self.uniform)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        uniform, cosine = (warp(v) for warp in (mi.warp.square_to_uniform_hemisphere, mi.warp.square_to_cosine_hemisphere))
+        uniform, cosine = (
+            warp(v) for warp in (mi.warp.square_to_uniform_hemisphere, mi.warp.square_to_cosine_hemisphere)
+        )
         return select(u < self.uniform, uniform, cosine)
 
 
@@ -78,13 +76,12 @@ class KullaContyLobe(MultipleScattering):
         return mean * mean * (1 - lost) / (1 - mean * lost)
 
 
-def turquin(lobe: MicrofacetLobe, tables: Tables) -> Lobe:
+def turquin(lobe: MicrofacetLobe, walks: Walks) -> Lobe:
     """Return a lobe scaled by 1 + F(1) (1 - E(wi)) / E(wi), which is not reciprocal (E. Turquin, Practical multiple
     scattering compensation for microfacet models, 2019)."""
-    of = functools.partial(tables.of, lobe.shadowing.alpha_u, lobe.shadowing.alpha_v)
 
     def scale(wi: mi.Vector3f, wo: Any = None) -> Spectrum:
-        lost = of(wi).lost
+        lost = walks.of(wi).lost
         return 1 + lobe.fresnel(mi.Float(1)) * (lost / dr.maximum(1 - lost, EPSILON))
 
     scaled = WeightedLobe(lobe, scale, scale)
@@ -92,24 +89,25 @@ def turquin(lobe: MicrofacetLobe, tables: Tables) -> Lobe:
     return scaled
 
 
-WAYS: dict[str, Callable[[MicrofacetLobe, Tables], tuple[Lobe, ...]]] = {
-    "none": lambda lobe, tables: (lobe,),
-    "walk": lambda lobe, tables: (lobe, WalkLobe(lobe, tables)),
-    "kulla-conty": lambda lobe, tables: (lobe, KullaContyLobe(lobe, tables)),
-    "turquin": lambda lobe, tables: (turquin(lobe, tables),),
+WAYS: dict[str, Callable[[MicrofacetLobe, Walks], tuple[Lobe, ...]]] = {
+    "none": lambda lobe, walks: (lobe,),
+    "walk": lambda lobe, walks: (lobe, WalkLobe(lobe, walks)),
+    "kulla-conty": lambda lobe, walks: (lobe, KullaContyLobe(lobe, walks)),
+    "turquin": lambda lobe, walks: (turquin(lobe, walks),),
 }
 MULTISCATTER = Choice(tuple(WAYS), "with Smith's shadowing term: light that facets reflect more than once")
 
 
-def multiscattering(model: Model, lobe: MicrofacetLobe) -> tuple[Lobe, ...]:
+def multiscattering(model: Any, lobe: MicrofacetLobe) -> tuple[Lobe, ...]:
     """Return a lobe of a model with what its ``multiscatter`` adds."""
     if model.multiscatter == "none":
         return (lobe,)
-    if lobe.shadowing.escape is None:
+    smith = lobe.shadowing
+    if not isinstance(smith, Smith):
         raise ParameterError(
             f'{model.plugins[0]}: multiscatter = "{model.multiscatter}" is known for Smith\'s shadowing term only; '
-            'take it with that, or leave it out.'
+            "take it with that, or leave it out."
         )
     if not model.captured:
-        model.captured += textures(lobe.shadowing.escape)
-    return WAYS[model.multiscatter](lobe, Tables(*model.captured))
+        model.captured += textures(smith)
+    return WAYS[model.multiscatter](lobe, Walks(smith, *model.captured))

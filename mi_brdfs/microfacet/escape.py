@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..math import EPSILON, clamp
+from .shadowing import Smith
 
 FILE = Path(__file__).with_name("escape.npz")
 ROUGHEST = 3.2
@@ -58,41 +59,44 @@ class MeanEscape(NamedTuple):
     """of cosθ_d (1 - cosθ_d)⁶."""
 
 
-class Tables:
-    """The :func:`textures` of a distribution with one of its Smith terms, and what they say."""
+class Walks:
+    """What the :func:`textures` say of walks on a surface with Smith's term."""
 
-    def __init__(self, towards: Any, mean: Any) -> None:
-        self.towards, self.mean = towards, mean
+    def __init__(self, smith: Smith, towards: Any, mean: Any) -> None:
+        self.smith, self.towards = smith, towards
+        at = [_texel(_compressed(alpha), mean.shape[0]) for alpha in (smith.alpha_v, smith.alpha_u)]
+        root, second, third, schlick, dip, *_ = mean.eval(mi.Point2f(*at))
+        self.mean = MeanEscape(dr.square(root), second, third, schlick, dip)
 
-    def of(self, alpha_u: mi.Float, alpha_v: mi.Float, v: mi.Vector3f) -> Escape:
+    def of(self, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
-        u2, v2, x2, y2 = (dr.square(each) for each in (alpha_u, alpha_v, v.x, v.y))
+        u2, v2, x2, y2 = (dr.square(each) for each in (self.smith.alpha_u, self.smith.alpha_v, v.x, v.y))
         cos = v.z * dr.rsqrt(dr.maximum(v.z * v.z + u2 * x2 + v2 * y2, EPSILON))
         # At the normal all azimuths are one.
         inverse = dr.rcp(x2 + y2 + 2 * UPRIGHT)
         x2, y2 = (x2 + UPRIGHT) * inverse, (y2 + UPRIGHT) * inverse
         along2, across2 = u2 * x2 + v2 * y2, u2 * y2 + v2 * x2
         at = [cos, _compressed(dr.sqrt(along2)), _compressed(dr.sqrt(across2))]
-        k = self.towards.eval(mi.Point3f(*reversed([_texel(x, n) for x, n in zip(at, self.towards.shape)])))
+        k = self.towards.eval(
+            mi.Point3f(*reversed([_texel(x, n) for x, n in zip(at, self.towards.shape[:3], strict=True)]))
+        )
         rho2 = 1 - u2 * v2 / (along2 * across2)
         lost = k[0] + rho2 * (k[1] + rho2 * k[2])
         second, schlick, dip = k[3] + rho2 * k[4], k[5] + rho2 * k[6], k[7]
         return Escape(clamp(lost, 0, 1), clamp(second, 0, 1), schlick, dip)
 
-    def mean_of(self, alpha_u: mi.Float, alpha_v: mi.Float) -> MeanEscape:
-        at = [_texel(_compressed(alpha), self.mean.shape[0]) for alpha in (alpha_v, alpha_u)]
-        root, second, third, schlick, dip, *_ = self.mean.eval(mi.Point2f(*at))
-        return MeanEscape(dr.square(root), second, third, schlick, dip)
 
-
-def textures(name: str) -> list[Any]:
-    """Return tables as textures of the active variant."""
+def textures(smith: Smith) -> list[Any]:
+    """Return the tables for one of Smith's terms, as textures of the active variant."""
+    name = f"{smith.facets}-{'correlated' if smith.correlated else 'separable'}"
     # Accelerated look-ups of CUDA would interpolate with eight bits.
     options = {"use_accel": False, "wrap_mode": dr.WrapMode.Clamp}
     with np.load(FILE) as data:
-        towards = np.concatenate([data[name], data[f"{name.partition('-')[0]}-walk"]], axis=-1)
+        towards = np.concatenate([data[name], data[f"{smith.facets}-walk"]], axis=-1)
         mean = data[f"{name}-mean"]
-    return [kind(mi.TensorXf(np.float32(it)), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))]
+    return [
+        kind(mi.TensorXf(np.float32(it)), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))
+    ]
 
 
 def _compressed(alpha: Any) -> Any:

@@ -26,8 +26,8 @@ class MetallicRoughness(Model):
     * direct: g(x) = x/(x (1-k) + k) with k = (r+1)²/8, which Karis uses for analytic lights. It darkens smooth surfaces
       at grazing angles: for C = 1, metallic = 1 and r = 0.1 the albedo is 0.34 at 80°.
     * ibl: the same with k = r²/2, which he uses for image-based lighting; it is nearly Smith's term.
-    * smith: Smith's term for GGX, separable, as in ``walter``; with it, ``multiscatter`` says what becomes of light that
-      facets reflect more than once, as in ``microfacet``.
+    * smith: Smith's term for GGX, separable, as in ``walter``; with it, ``multiscatter`` says what becomes of light
+      that facets reflect more than once, as in ``microfacet``.
 
     The factor 1-F of the diffuse lobe is common practice, as in the glTF 2.0 specification; Karis's notes have
     Lambert's lobe without it. It removes the light reflected by the facets between wi and wo, not all the light

@@ -55,8 +55,8 @@ class Microfacet(Model):
     * none: it is lost
     * walk: a second lobe returns it, ρs C (1-E(wi)) (1-E(wo)) / (π (1-Ē)), where E(w) is the albedo for F = 1 and Ē its
       mean. Its colour C is that of a random walk on the surface (Heitz, Hanika, d'Eon and Dachsbacher 2016,
-      doi:10.1145/2897824.2925943), C = F₁(wi) F₁(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), with tabulated means F₁ and F₂ of F at
-      the ends of a path and between them, and probabilities p and q that light escapes at its second reflection and
+      doi:10.1145/2897824.2925943), C = F₁(wi) F₁(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), with tabulated means F₁ and F₂ of F
+      at the ends of a path and between them, and probabilities p and q that light escapes at its second reflection and
       at each later one; p = p(wi) + p(wo) - p̄, so that f is reciprocal
     * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
     * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
@@ -69,9 +69,10 @@ class Microfacet(Model):
     (hepd with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and
     the specular lobe of ``metallicroughness`` (ggx with smith).
 
-    Reciprocal, except for turquin. With ρd + ρs <= 1 vcavity conserves energy for every D, and smith and smith-correlated for beckmann and
-    ggx; for the others see the table below. The more αu and αv differ, the less schlick shadows. For Ashikhmin and
-    Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later papers and public code. One-sided.
+    Reciprocal, except for turquin. With ρd + ρs <= 1 vcavity conserves energy for every D, and smith and
+    smith-correlated for beckmann and ggx; for the others see the table below. The more αu and αv differ, the less
+    schlick shadows. For Ashikhmin and Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later
+    papers and public code. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
     so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and

@@ -1,5 +1,5 @@
-"""The tables of multiple scattering: how much light escapes from Smith's surfaces at the first reflection, by quadrature
-in float64, and what becomes of the rest, by random walks.
+"""The tables of multiple scattering: how much light escapes from Smith's surfaces at the first reflection, by
+quadrature in float64, and what becomes of the rest, by random walks.
 
     python tests/calibration/escape.py [--check]
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import sys
+
 from harness import parser
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import erfc, erfinv
@@ -251,8 +252,8 @@ def walk_tables(shape: str, count: int) -> dict[str, RegularGridInterpolator]:
 
 
 def first_table(shape: str, correlated: bool) -> np.ndarray:
-    """Return 1 - E as the coefficients of a parabola in ρ², shape (cosines, along, across, 3); for Blinn's facets, which
-    are isotropic, (cosines, along, 1, 3)."""
+    """Return 1 - E as the coefficients of a parabola in ρ², shape (cosines, along, across, 3); for Blinn's facets,
+    which are isotropic, (cosines, along, 1, 3)."""
     cos = np.linspace(0, 1, COSINES)
     if shape == "blinn":
         values = np.array([[blinn_lost(correlated, direction(c, a, a, 0)[0], a) for a in alphas(ALPHAS)] for c in cos])
