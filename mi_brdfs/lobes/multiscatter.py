@@ -24,10 +24,13 @@ class MultipleScattering(Lobe):
     Draw from the cosine on rough surfaces, and uniformly on smooth ones, which lose light at grazing angles above all.
     """
 
+    SMOOTH = 8
+    """1/α of surfaces of which one direction in e is uniform; 4 and 16 cost .01 of efficiency at some α."""
+
     def __init__(self, lobe: MicrofacetLobe, walks: Walks) -> None:
         self.reflectance, self.fresnel, self.anisotropic = lobe.reflectance, lobe.fresnel, lobe.anisotropic
         self.walks, self.mean = walks, walks.mean
-        self.uniform = 1 - dr.minimum(dr.sqrt(walks.smith.alpha_u * walks.smith.alpha_v), 1)
+        self.uniform = dr.exp(-self.SMOOTH * dr.sqrt(walks.smith.alpha_u * walks.smith.alpha_v))
 
     def colour(self, i: Escape, o: Escape) -> Spectrum:
         """Return C for what becomes of light from both directions; it is 1 if F is."""

@@ -29,7 +29,7 @@ ROUGHEST = 3.2
 """The largest tabulated α: that of Burley's most anisotropic facets."""
 
 
-UPRIGHT = 0.01
+UPRIGHT = 1e-3
 """The sin²θ below which the azimuth counts less and less: what is tabulated changes little with it there."""
 
 
@@ -73,8 +73,9 @@ class Walks:
         u2, v2, x2, y2 = (dr.square(each) for each in (self.smith.alpha_u, self.smith.alpha_v, v.x, v.y))
         cos = v.z * dr.rsqrt(dr.maximum(v.z * v.z + u2 * x2 + v2 * y2, EPSILON))
         # At the normal all azimuths are one.
-        inverse = dr.rcp(x2 + y2 + 2 * UPRIGHT)
-        x2, y2 = (x2 + UPRIGHT) * inverse, (y2 + UPRIGHT) * inverse
+        even = UPRIGHT * dr.square(dr.square(v.z))
+        inverse = dr.rcp(dr.maximum(x2 + y2 + 2 * even, EPSILON))
+        x2, y2 = (x2 + even) * inverse, (y2 + even) * inverse
         along2, across2 = u2 * x2 + v2 * y2, u2 * y2 + v2 * x2
         at = [cos, _compressed(dr.sqrt(along2)), _compressed(dr.sqrt(across2))]
         k = self.towards.eval(

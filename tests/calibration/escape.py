@@ -295,7 +295,7 @@ def mean_table(shape: str, first: np.ndarray, walked: dict[str, RegularGridInter
         u2, v2 = alpha[i] ** 2, alpha[i if shape == "blinn" else j] ** 2
         c, x2 = NODES[:, None], np.cos(phi) ** 2
         stretched = c / np.sqrt(c * c + (u2 * x2 + v2 * (1 - x2)) * (1 - c * c))
-        x2 = ((1 - c * c) * x2 + UPRIGHT) / (1 - c * c + 2 * UPRIGHT)
+        x2 = ((1 - c * c) * x2 + UPRIGHT * c**4) / (1 - c * c + 2 * UPRIGHT * c**4)
         along2, across2 = u2 * x2 + v2 * (1 - x2), u2 * (1 - x2) + v2 * x2
         place = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
         rho2 = np.maximum(1 - u2 * v2 / (along2 * across2), 0)
