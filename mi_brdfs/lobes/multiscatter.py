@@ -25,7 +25,8 @@ class MultipleScattering(Lobe):
     """
 
     SMOOTH = 8
-    """1/α of surfaces of which one direction in e is uniform; 4 and 16 cost .01 of efficiency at some α."""
+    """1/α of surfaces of which one direction in e is uniform. Efficiencies are within .01 for 4 to 16; the cosine alone
+    costs .04 at α = .05 and 80°."""
 
     def __init__(self, lobe: MicrofacetLobe, walks: Walks) -> None:
         self.reflectance, self.fresnel, self.anisotropic = lobe.reflectance, lobe.fresnel, lobe.anisotropic
