@@ -6,7 +6,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads that
 import pytest
 from catalogue import OTHER_VARIANTS
 
-from mi_brdfs.mitsuba.registry import MODELS
+from mi_brdfs.mitsuba.registry import KIT, MODELS
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -35,11 +35,13 @@ def llvm_rgb():
 
 @pytest.fixture
 def as_before():
-    """Names of plugins go back to whom they belonged to; Mitsuba itself cannot forget one."""
-    models = dict(MODELS)
+    """Names of plugins and words of the kit go back to whom they belonged to; Mitsuba itself cannot forget one."""
+    tables = [MODELS, *(table for choice in KIT.values() for table in (choice.words, choice.terms))]
+    former = [dict(table) for table in tables]
     yield
-    MODELS.clear()
-    MODELS.update(models)
+    for table, was in zip(tables, former, strict=True):
+        table.clear()
+        table.update(was)
 
 
 @pytest.fixture(scope="module", params=["llvm_ad_rgb", *OTHER_VARIANTS])

@@ -229,7 +229,7 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     right = command("check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
     assert right.exit_code == 0, right.stderr
     wrong = command("check", "slate", "--import", "faulty.py", "--only", "reciprocity", "-j", jobs)
-    assert wrong.exit_code == 1 and "reciprocity, whole: f from" in wrong.stdout
+    assert wrong.exit_code == 1 and "reciprocity, whole: f is" in wrong.stdout
 
 
 @pytest.mark.parametrize(

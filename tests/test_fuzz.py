@@ -188,7 +188,7 @@ class FuzzedPlugin:
     """A plugin with some options, whose quantities differ from lane to lane, each ``lanes`` of which are filled in one
     of ``examples`` ways. A range without an end has ``largest``."""
 
-    def __init__(self, model, options, largest, examples, lanes=LANES, seed=0):
+    def __init__(self, model, options, largest, examples=1, lanes=LANES, seed=0):
         self.given = {"type": model.plugins[0], **options.words}
         self.quantities, self.largest, self.lanes = options.quantities, largest, lanes
         self.textures = {quantity.name: per_lane() for quantity in self.quantities}

@@ -9,8 +9,9 @@ from support import call, hemisphere
 import mi_brdfs
 from mi_brdfs.microfacet import Fresnel, Shadowing
 from mi_brdfs.microfacet.distributions import Beckmann
-from mi_brdfs.mitsuba.registry import KIT
 from mi_brdfs.parameters import Number
+
+pytestmark = pytest.mark.usefixtures("as_before")
 
 
 class Steep(Beckmann):
@@ -38,17 +39,6 @@ class Squared(Fresnel):
 
     def __call__(self, cos):
         return self.edge * dr.square(1 - cos)
-
-
-@pytest.fixture(autouse=True)
-def as_before():
-    """The kit forgets the words."""
-    tables = [table for choice in KIT.values() for table in (choice.words, choice.terms)]
-    former = [dict(table) for table in tables]
-    yield
-    for table, was in zip(tables, former, strict=True):
-        table.clear()
-        table.update(was)
 
 
 def values(**given):

@@ -84,6 +84,8 @@ class ConductorName(Parameter):
     """The indices of one of Mitsuba's conductors, by its name; "none" stands for no Fresnel term. Evaluated, η and k,
     or None."""
 
+    role = "fresnel"
+
     def __init__(self, limits: Mapping[str, Range], text: str):
         super().__init__(text)
         self.limits = limits
