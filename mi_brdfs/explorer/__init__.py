@@ -18,7 +18,7 @@ from urllib.parse import quote
 from ..mitsuba.registry import presets
 from ..probe.sources import is_measured
 from .materials import plain
-from .state import Bsdf
+from .state import MEASURED, PRESET, Bsdf
 
 __all__ = ["explore"]
 
@@ -74,8 +74,8 @@ def _bsdf(subject: str | dict[str, Any]) -> Bsdf:
     if isinstance(subject, dict):
         return plain(subject)
     if subject in presets():
-        return {"type": "preset", "name": subject}
-    return {"type": "tabulated", "file": subject} if is_measured(subject) else {"type": subject}
+        return {"type": PRESET, "name": subject}
+    return {"type": MEASURED, "file": subject} if is_measured(subject) else {"type": subject}
 
 
 def _name(subject: str | dict[str, Any]) -> str:
