@@ -1,30 +1,17 @@
 """``mi-brdfs fit``, as a user types it."""
 
 import json
-import os
 import re
 
 import drjit as dr
 import mitsuba as mi
 import pytest
 from support import ROOT
-from test_cli import interrupted, run
-from typer.testing import CliRunner
+from test_cli import interrupted, invoke, run
 
-from mi_brdfs.cli import app
 from mi_brdfs.mitsuba.errors import unwrapped_ctrl_c
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
-
-
-def invoke(*arguments, cwd):
-    """A command in this process."""
-    before = os.getcwd()
-    os.chdir(cwd)
-    try:
-        return CliRunner().invoke(app, [str(argument) for argument in arguments])
-    finally:
-        os.chdir(before)
 
 
 def test_ranks_models_and_writes_rows(tmp_path):

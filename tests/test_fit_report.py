@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from support import ROOT
-from test_cli import run
-from test_fit_command import invoke
+from test_cli import invoke, run
 from test_validation_html import Page
 
 from mi_brdfs.fit import FitError, appearance, fit, report
