@@ -52,7 +52,7 @@ def _check_sampled(run: Run, outcome: Outcome, part: Part, incident: Incident) -
             told = f"for light from {incident.name} sampled_{told}"
             outcome.fault(told, wi=incident.vector(int(wrong.argmax())), seed=SEED)
     _check_eta(outcome, incident, samples)
-    if len(allowed) > 1:
+    if len(allowed) > 1 and samples.lit.any():
         _check_drawn(run, outcome, incident, samples)
 
 

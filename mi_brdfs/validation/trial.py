@@ -27,6 +27,8 @@ CAPS = 2, 4, 8
 """The radii of caps that are tested, in degrees."""
 DOUBTFUL = 64
 """The most cells of a suspect over which the density is integrated anew."""
+HORIZON = 6e-8
+"""The |cosθ| at which float32 tells a direction from the horizon."""
 CONFIRMED = 2
 """Directions that fail before the others need no second look."""
 
@@ -159,6 +161,8 @@ def _trials(
         # What is rejected may look as if it were drawn: let the integral decide whether black samples count.
         integral = partition.integrals.sum()
         counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
+        # No cell holds the density of what a rounding error lifts out of the horizon.
+        counted &= abs(samples.wo[:, 2]) > HORIZON
         counts = partition.histogram(samples.wo[counted])
         trial = Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once))
         if turn and len(doubtful := trial.doubtful):
