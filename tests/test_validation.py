@@ -125,6 +125,10 @@ FALSE_ALARMS = {
         {"type": "lafortune", "cz": -1.5, "exponent": 0.0, "diffuse_reflectance": 0.2},
         ["pdf", "chi2"],
     ),
+    "a narrow lobe far below the horizon": (
+        {"type": "lafortune", "cx": 1.5, "cy": -1.5, "cz": -1.5, "exponent": 11546.6, "normalization": "none"},
+        ["pdf", "chi2"],
+    ),
     "two lobes, both black": (
         {"type": "microfacet", "diffuse_reflectance": 0.0, "int_ior": "water", "ext_ior": "water"},
         ["components"],

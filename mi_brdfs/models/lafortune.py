@@ -114,7 +114,9 @@ class LafortuneLobe(PowerLobe):
         cos2 = dr.square(frame.axis.z)
         sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # 1 - c² would have no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
-        return depth > sin2, 0.5 * dr.log(sin2), depth
+        log_s = 0.5 * dr.log(sin2)
+        # Of what is deeper float32 holds no value, and its steps of t are too coarse.
+        return (depth > sin2) & (self.exponent * log_s > -80), log_s, depth
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         _, log_s, depth = self._buried(self.frame(wi))
