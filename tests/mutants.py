@@ -317,6 +317,28 @@ def reflectance(change, at=lambda si: si):
     return adapted(eval_diffuse_reflectance=lambda own, self, si, active: change(own(self, at(si), active)))
 
 
+def asks_for_values(own, self, ctx, si, wo, active):
+    """A shortcut if all directions lie below the horizon."""
+    return own(self, ctx, si, wo, active if dr.any(wo.z > 0) else False)
+
+
+def follows_no_update(own, self, ctx, si, u, v, active):
+    """sample draws as it did before its exponent was set."""
+    now = self.textures["exponent"].eval_1(si)
+    self.first = getattr(self, "first", dr.mean(now))
+    return own(self, ctx, si, u, mi.Point2f(v.x * dr.minimum(now / self.first, 1), v.y), active)
+
+
+def as_bright_as_others(texture, si, active):
+    """Darker where others are brighter."""
+    value = texture.eval(si, active)
+    return value * (0.5 + 0.5 * dr.minimum(1, value.x / dr.maximum(dr.mean(value.x), 1e-6)))
+
+
+def of_the_highlight(own, self, si, active):
+    return self.textures["specular_reflectance"].eval(si, active)
+
+
 def ignored_masks(own, self, ctx, si, active):
     return own(self, mi.BSDFContext(), si, active)
 
@@ -722,6 +744,12 @@ MUTANTS = [
     ),
     mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
     mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
+    mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
+    mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),
+    mutant("values asked for", "recorded", Ward, adapted(eval_pdf=asks_for_values)),
+    mutant(
+        "reflectance of the highlight", "reflectance", Phong, adapted(eval_diffuse_reflectance=of_the_highlight), **TWO
+    ),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
     mutant("cosines in light tracing", "mode", Lambert, adapted(eval_pdf=cosines_in_light_tracing)),

@@ -51,6 +51,70 @@ def test_mutants_are_caught(mutant):
             assert ("seed" in finding.at) == (finding.check in ("weight", "chi2")) or finding.check == "horizon"
 
 
+def turned(matrix, light, viewer):
+    return mi.mueller.rotator(0.3) @ matrix
+
+
+def beyond_its_intensity(matrix, light, viewer):
+    return 1.3 * matrix - 0.3 * mi.mueller.depolarizer(matrix[0, 0])
+
+
+def in_frames_of_the_facet(matrix, light, viewer):
+    h = dr.normalize(viewer - light)
+    axes = [dr.normalize(dr.cross(h, w)) for w in (light, viewer)]
+    frames = [mi.mueller.stokes_basis(w) for w in (light, viewer)]
+    return mi.mueller.rotate_mueller_basis(matrix, light, frames[0], axes[0], viewer, frames[1], axes[1])
+
+
+@pytest.mark.parametrize("fault", [None, turned, beyond_its_intensity, in_frames_of_the_facet])
+def test_mueller_matrices(fault):
+    """Of a rough conductor, with and without faults."""
+    for variant in ("llvm_ad_spectral_polarized", "llvm_ad_rgb"):
+        mi.set_variant(variant)
+        given = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.3, "material": "Au"}
+
+        class Metal(mi.BSDF):
+            def __init__(self, props, given=given):
+                mi.BSDF.__init__(self, props)
+                self.metal = mi.load_dict(given)
+                self.m_components, self.m_flags = [int(self.metal.flags())], int(self.metal.flags())
+
+            def eval(self, ctx, si, wo, active=True):
+                value = self.metal.eval(ctx, si, wo, active)
+                return fault(value, -wo, si.wi) if fault and mi.is_polarized else value
+
+            def pdf(self, *arguments):
+                return self.metal.pdf(*arguments)
+
+        mi.register_bsdf("wrapped_metal", Metal)
+    report = check({"type": "wrapped_metal"}, only="polarization")
+    assert report.verdict("polarization") == ("fail" if fault else "pass"), report
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("says", [0.3, 0.7])
+def test_what_goes_straight_through(says):
+    class Veil(mi.BSDF):
+        """It lets .3 of the light through, and absorbs the rest."""
+
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | sides), int(mi.BSDFFlags.Null | sides)]
+            self.m_flags = self.m_components[0] | self.m_components[1]
+
+        def sample(self, ctx, si, u, v, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo, bs.pdf, bs.eta, bs.sampled_component, bs.sampled_type = -si.wi, 1, 1, 1, int(mi.BSDFFlags.Null)
+            return bs, dr.select(active & (u < 0.5), mi.Color3f(0.6), 0)
+
+        def eval_null_transmission(self, si, active=True):
+            return mi.Color3f(says)
+
+    mi.register_bsdf("veil", Veil)
+    assert check({"type": "veil"}, only="null").verdict("null") == ("pass" if says == 0.3 else "fail")
+
+
 @pytest.mark.slow
 def test_a_dict_is_checked_where_no_variant_is_active():
     code = "import mi_brdfs; print(mi_brdfs.validation.check({'type': 'lambert'}, only=['weight']).passed)"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -13,7 +16,7 @@ from ..probe.variates import random
 from .outcome import Findings, Outcome, relative, told
 from .report import Finding
 from .run import Run
-from .updates import attach, traced_floats, value_of
+from .updates import attach, restored, set_value, traced_floats, value_of
 
 COUNT = 2000
 
@@ -151,6 +154,58 @@ def mode(run: Run) -> Findings:
         yield outcome.finding("Light may be traced from either end.")
 
 
+def recorded(run: Run) -> Findings:
+    """Check that renderers can record it in their loops: ``eval``, ``pdf``, ``eval_pdf`` and ``sample`` ask for no
+    values of arrays. There are none in a loop that is recorded, where it is an error to read an array, to branch by one
+    in Python, or to take a mean over the lanes."""
+    part, bsdf = run.probe.whole, run.probe.bsdf
+    outcome = Outcome("recorded", part.name)
+    wi, wo, variates = scattered(COUNT, 68, part.sides), scattered(COUNT, 69, part.sides), random(COUNT, 70)
+    calls: dict[str, Callable[..., Any]] = {
+        "eval": lambda si, wo, u, v: bsdf.eval(part.context, si, wo, True),
+        "pdf": lambda si, wo, u, v: bsdf.pdf(part.context, si, wo, True),
+        "eval_pdf": lambda si, wo, u, v: bsdf.eval_pdf(part.context, si, wo, True),
+        "sample": lambda si, wo, u, v: bsdf.sample(part.context, si, u, v, True),
+    }
+    for name, call in calls.items():
+        si, *others = interaction(wi), vectors(wo), *sample_arguments(variates)
+        dr.eval(call(si, *others))  # what it prepares once
+        si.wi, *others = (each * mi.Float(0.9999999) for each in (si.wi, *others))  # not computed yet
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            call(si, *others)
+            if dr.kernel_history([dr.KernelType.JIT, dr.KernelType.BlockReduce]):
+                outcome.fault(f"{name} asks for the values of an array, so that no renderer can record it in a loop")
+    yield outcome.finding("It asks for no values of arrays.")
+
+
+def null(run: Run) -> Findings:
+    """Check that ``eval_null_transmission``, by which shadow rays go through, is what ``sample`` sends straight on."""
+    probe, part = run.probe, run.probe.whole
+    if not int(probe.bsdf.flags()) & int(mi.BSDFFlags.Null):
+        yield Finding("null", part.name, "skip", "Nothing goes straight through.")
+        return
+    outcome, u = Outcome("null", part.name), random(1 << 14, 75)
+    for incident in run.incidents(part):
+        si = interaction(np.tile(incident.wi, (len(u), 1)))
+        bs, weight = probe.bsdf.sample(mi.BSDFContext(), si, *sample_arguments(u), True)
+        weight = dr.select((bs.sampled_type & int(mi.BSDFFlags.Null)) != 0, weight, 0)
+        got = numbers(probe.bsdf.eval_null_transmission(si, True), len(u))[0]
+        each = numbers(weight, len(u))
+        # Six standard errors: a false alarm once in 1e8.
+        error = abs(got - each.mean(axis=0)) - 6 * each.std(axis=0) / np.sqrt(len(u)) - 1e-4
+        if (error > 0).any():
+            k = int(np.argmax(error))
+            outcome.fault(
+                f"eval_null_transmission is {got[k]:.4g} for light from {incident.name}, but samples that go straight "
+                f"through weigh {each[:, k].mean():.4g} in the mean",
+                float(error[k]),
+                wi=incident.wi,
+                seed=75,
+            )
+    yield outcome.finding("As much as its samples.")
+
+
 LAMBERTIAN = 1e-3
 """How far f may change for a reflectance to be known exactly."""
 
@@ -158,7 +213,8 @@ LAMBERTIAN = 1e-3
 def reflectance(run: Run) -> Findings:
     """Check that ``eval_diffuse_reflectance``, which denoisers and renderers of albedos ask for, is finite and in [0,
     1]. Where f is constant it is π f, and of other diffuse plugins of ours, the albedo at normal incidence within 5 %.
-    What is Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
+    Where there are diffuse components besides others, it follows no parameter that these do not follow. What is
+    Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
     probe, part = run.probe, run.probe.whole
     outcome, normal = Outcome("reflectance", part.name), np.array([0, 0, part.sides[0]], np.float32)
     try:
@@ -192,7 +248,30 @@ def reflectance(run: Run) -> Findings:
             samples = probe.sample(part, normal, random(1 << 14, 74))
             albedo = (samples.weight * (samples.wo[:, 2:] * normal[2] > 0)).mean(axis=0)
             _compare(outcome, got, np.minimum(albedo, 1), 0.05, "the albedo at normal incidence is")
+        if not diffuse:
+            _check_followed(run, outcome, normal)
     yield outcome.finding(f"It is {', '.join(f'{channel:.3g}' for channel in got)}.")
+
+
+def _check_followed(run: Run, outcome: Outcome, normal: Array) -> None:
+    """Check that ``eval_diffuse_reflectance`` follows no parameter that no diffuse component follows."""
+    parts = [part for part in run.probe.components if part.has(mi.BSDFFlags.Diffuse)]
+    wi, wo = (scattered(200, seed, run.probe.whole.sides) for seed in (76, 77))
+
+    def found() -> tuple[Array, Array]:
+        values = [run.probe.eval(part, wi, wo) for part in parts]
+        return run.probe.diffuse_reflectance(normal[None]), np.array(values)
+
+    if not parts or not found()[1].any():
+        return
+    params, keys, _ = traced_floats(run, "reflectance")
+    before, values = found()
+    for key in keys:
+        with restored(params, key) as original:
+            set_value(params, key, 0.9 * original + 0.01)
+            after, changed = found()
+        if relative(after, before).max() > 1e-2 and relative(changed, values, 1e-3).max() < 1e-4:
+            outcome.fault(f"it follows {key}, which no diffuse component follows", np.inf)
 
 
 def _compare(outcome: Outcome, got: Array, expected: Array, tolerance: float, words: str) -> None:

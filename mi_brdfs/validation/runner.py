@@ -17,7 +17,7 @@ from ..probe.directions import angles_of, scattered
 from ..probe.sources import find_sources, name_of
 from ..probe.variates import random
 from ..variants import activated, is_measurable
-from . import components, contract, derivatives, energy, sampling, spectral, textures, updates, values
+from . import components, contract, derivatives, energy, polarization, sampling, spectral, textures, updates, values
 from .incidents import SCATTERED, all_over, incidents
 from .outcome import Findings, Outcome, told
 from .report import Finding, Report
@@ -45,9 +45,12 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         updates.recompiles,
         contract.active,
         contract.mode,
+        contract.recorded,
+        contract.null,
         contract.reflectance,
         spectral.colours,
         spectral.spectral,
+        polarization.polarization,
     )
 }
 """The checks by name, in the order in which they run; the docstring of each says what it checks and how strictly."""

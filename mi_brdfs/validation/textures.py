@@ -25,7 +25,8 @@ def textures(run: Run) -> Findings:
     """Check that a parameter given as a texture acts as its value at the surface point does, wherever that is, also
     outside the unit square. Constant parameters become bitmaps of random texels, and given textures stay. All over them
     ``eval`` and ``eval_diffuse_reflectance`` are what they are where each texture has the value of the point
-    everywhere, and weights are eval/pdf, to float32's rounding. For this the BSDF must be given as a dict."""
+    everywhere, and no other than if fewer points are evaluated; and weights are eval/pdf, to float32's rounding. For
+    this the BSDF must be given as a dict."""
     if run.given is None:
         yield Finding("textures", "whole", "skip", "To replace its parameters by textures, its dict is needed.")
         return
@@ -60,8 +61,11 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     # The one has its values wherever it is asked: let it be asked elsewhere.
     other = BSDFProbe(load(given | constant))
     lit, why = samples.lit[:, None], "where its textures have the values of this point everywhere"
+    value, few = real.eval(part, wi, wo, uv), slice(COUNT // 8)
+    alone = real.eval(part, wi[few], wo[few], uv[few])
     for name, got, expected, but in (
-        ("eval", real.eval(part, wi, wo, uv), other.eval(part, wi, wo), why),
+        ("eval", value, other.eval(part, wi, wo), why),
+        ("eval", value[few], alone, "if fewer points are evaluated at once"),
         ("eval_diffuse_reflectance", real.diffuse_reflectance(wi, uv), other.diffuse_reflectance(wi), why),
         ("the weight times pdf", samples.weight * samples.pdf[:, None] * lit, samples.value * lit, "is eval"),
     ):

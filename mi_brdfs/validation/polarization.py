@@ -1,0 +1,93 @@
+"""The check of Mueller matrices, in polarized variants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from ..mitsuba.errors import unwrapped_ctrl_c
+from ..probe.arrays import Array, interaction, numbers, vectors
+from ..probe.bsdf import load
+from ..probe.directions import hemisphere, on_side
+from .outcome import Findings, Outcome, told
+from .report import Finding
+from .run import Run
+
+COUNT = 2000
+TOLERANCE = 1e-3
+"""Of elements, in parts of the intensity: they come of differences in float32."""
+STATES = 64
+BACK = np.array([1, 1, -1, 1])
+"""The signs of the Stokes parameters for light that goes back along its way."""
+
+
+def polarization(run: Run) -> Findings:
+    """Check Mueller matrices: light of any polarization becomes light that is at most fully polarized; if directions
+    are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
+    NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
+    frames that turn, too. For this the BSDF must be given as a dict."""
+    part, name = run.probe.whole, "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
+    if run.given is None:
+        yield Finding("polarization", part.name, "skip", "To load it in a polarized variant, its dict is needed.")
+        return
+    if name not in mi.variants():
+        yield Finding("polarization", part.name, "skip", f"It takes the variant {name}.")
+        return
+    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (101, 102))
+    # About the mirror direction, where most BSDFs that polarize have their light.
+    near = wi * [-1, -1, 1] + 0.1 * hemisphere(COUNT, 103)
+    wo[::2] = (near / np.linalg.norm(near, axis=1, keepdims=True))[::2]
+    outcome = Outcome("polarization", part.name)
+    with mi.variant_context(name):
+        try:
+            with unwrapped_ctrl_c():
+                bsdf = load(run.given)
+                matrix = _mueller(bsdf, wi, wo)
+                if not isinstance(matrix, mi.Spectrum):
+                    yield Finding("polarization", part.name, "skip", "It returns no Mueller matrices.")
+                    return
+                matrices, turned = _of_f(matrix, wo), _of_f(_turned(bsdf, wi, wo), wo)
+                back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
+        except (RuntimeError, TypeError) as error:
+            yield Finding("polarization", part.name, "skip", f"It does not work in {name}: {told(error)}.")
+            return
+    intensity = np.maximum(matrices[..., 0, 0], 1e-30)
+    states = np.random.default_rng(104).normal(size=(STATES, 3))
+    states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)
+    made = matrices @ states.T
+    degree = ((np.linalg.norm(made[..., 1:, :], axis=-2) - made[..., 0, :]) / intensity[..., None]).max(axis=-1)
+    why = "some light would be polarized more than fully"
+    outcome.wrong(degree * (degree > TOLERANCE), "the excess of eval's Mueller matrix", degree, why, wi, wo)
+    same = np.quantile(abs(turned - matrices)[..., 0, 0] / intensity, 0.99) < TOLERANCE
+    for law, other, words in (
+        (not part.has(mi.BSDFFlags.NonSymmetric), back, "if its directions are exchanged"),
+        (same, turned, "if its directions are turned about the normal"),
+    ):
+        difference = abs(other - matrices).max(axis=(-2, -1)) / intensity
+        # Those of grazing facets and of narrow lobes have few digits.
+        wrong = difference * (law and np.quantile(difference, 0.99) > TOLERANCE)
+        name = f"the change of eval's Mueller matrix {words}"
+        outcome.wrong(wrong, name, difference, "in parts of the intensity", wi, wo)
+    yield outcome.finding("Mueller matrices are physical.")
+
+
+def _mueller(bsdf: Any, wi: Array, wo: Array) -> Any:
+    """Return the Mueller matrix of light from wo to wi, in the reference frames that Mitsuba gives these."""
+    return bsdf.eval(mi.BSDFContext(), interaction(wi), vectors(wo), True)
+
+
+def _turned(bsdf: Any, wi: Array, wo: Array) -> Any:
+    """Return the same of directions that are turned about the normal, in frames that are turned with them."""
+    turn, basis = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]], np.float32), mi.mueller.stokes_basis
+    light, viewer = vectors(-wo @ turn.T), vectors(wi @ turn.T)
+    frames = [vectors(numbers(basis(vectors(w)), len(w)).astype(np.float32) @ turn.T) for w in (-wo, wi)]
+    matrix = _mueller(bsdf, wi @ turn.T, wo @ turn.T)
+    return mi.mueller.rotate_mueller_basis(matrix, light, basis(light), frames[0], viewer, basis(viewer), frames[1])
+
+
+def _of_f(matrix: Any, wo: Array) -> Array:
+    """Return elements, shape (N, channels, 4, 4), without the cosine."""
+    rows = [[numbers(mi.UnpolarizedSpectrum(matrix[i, j]), len(wo)) for j in range(4)] for i in range(4)]
+    return np.moveaxis(np.array(rows, np.float64), (0, 1), (-2, -1)) / abs(wo[:, 2, None, None, None])
