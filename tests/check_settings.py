@@ -30,8 +30,8 @@ from mi_brdfs.parameters.colours import evaluate_colour
 from mi_brdfs.probe.arrays import interaction, numbers
 from mi_brdfs.probe.bsdf import BSDFProbe, load
 from mi_brdfs.probe.directions import hemisphere
-from mi_brdfs.probe.variates import lattice
 from mi_brdfs.probe.parameter_space import FARTHEST, Dimension
+from mi_brdfs.probe.variates import lattice
 from mi_brdfs.validation import check
 
 BRIGHT = "albedo", "reciprocity", "gradients", "updates"
