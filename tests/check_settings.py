@@ -34,7 +34,7 @@ from mi_brdfs.probe.parameter_space import FARTHEST, Dimension
 from mi_brdfs.probe.variates import lattice
 from mi_brdfs.validation import check
 
-BRIGHT = "albedo", "reciprocity", "gradients", "updates"
+BRIGHT = "albedo", "reciprocity", "gradients", "updates", "polarization"
 """What fails where a setting is too bright."""
 VARIANTS = "llvm_ad_rgb", "llvm_ad_rgb", "llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_spectral_polarized"
 BUILT_INS = [

@@ -335,10 +335,6 @@ def as_bright_as_others(texture, si, active):
     return value * (0.5 + 0.5 * dr.minimum(1, value.x / dr.maximum(dr.mean(value.x), 1e-6)))
 
 
-def of_the_highlight(own, self, si, active):
-    return self.textures["specular_reflectance"].eval(si, active)
-
-
 def ignored_masks(own, self, ctx, si, active):
     return own(self, mi.BSDFContext(), si, active)
 
@@ -747,9 +743,6 @@ MUTANTS = [
     mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
     mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),
     mutant("values asked for", "recorded", Ward, adapted(eval_pdf=asks_for_values)),
-    mutant(
-        "reflectance of the highlight", "reflectance", Phong, adapted(eval_diffuse_reflectance=of_the_highlight), **TWO
-    ),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
     mutant("cosines in light tracing", "mode", Lambert, adapted(eval_pdf=cosines_in_light_tracing)),

@@ -213,8 +213,7 @@ LAMBERTIAN = 1e-3
 def reflectance(run: Run) -> Findings:
     """Check that ``eval_diffuse_reflectance``, which denoisers and renderers of albedos ask for, is finite and in [0,
     1]. Where f is constant it is π f, and of other diffuse plugins of ours, the albedo at normal incidence within 5 %.
-    What is
-    Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
+    What is Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
     probe, part = run.probe, run.probe.whole
     outcome, normal = Outcome("reflectance", part.name), np.array([0, 0, part.sides[0]], np.float32)
     try:

@@ -21,6 +21,8 @@ from .run import Run
 from .updates import attach, restored, set_value, traced_floats, value_of
 
 TOLERANCE = 0.02
+LOST = 3
+"""How many times its last digit a value may be off, as of formulas whose terms cancel."""
 COUNT = 2000
 
 
@@ -114,7 +116,7 @@ def gradients(run: Run) -> Findings:
         fd = np.clip(ad, low, high)
         error, size = abs(ad - fd).sum(), max(abs(fd).sum(), abs(ad).sum())
         outcome.data = {"error": float(error), "size": float(size)}
-        if error > TOLERANCE * size + noise.sum():
+        if error > TOLERANCE * size + LOST * noise.sum():
             k = np.nonzero(trusted)[0][int(np.argmax(abs(ad - fd)))]
             outcome.fault(
                 f"its derivatives are off by {error / size:.0%}: those of eval average {abs(ad).mean():.3g} in size, "
