@@ -143,6 +143,7 @@ SWEEPS: dict[str, list[Sweep]] = {
         sweep("alpha_v", 0.02, 0.05, 0.1, 0.2, 0.4, alpha_u=0.1, material="Au"),
         sweep("material", "Ag", "Al", "Au", "Cu", "W", alpha=0.2),
         sweep("int_ior", 1.1, 1.33, 1.5, 2.0, 3.0, diffuse_reflectance=GREEN, alpha=0.15),
+        sweep("multiscatter", "none", "walk", "kulla-conty", "turquin", material="Au", alpha=0.8),
     ],
     "ward": [
         sweep("alpha", 0.02, 0.05, 0.1, 0.2, 0.4, diffuse_reflectance=RED),

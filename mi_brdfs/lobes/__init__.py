@@ -3,9 +3,11 @@
 from .diffuse import LambertLobe, over_diffuse
 from .lobe import Lobe, Mixture, WeightedLobe
 from .microfacet import MicrofacetLobe
+from .multiscatter import MULTISCATTER, multiscattering
 from .power import PowerLobe, PowerResponseLobe
 
 __all__ = [
+    "MULTISCATTER",
     "LambertLobe",
     "Lobe",
     "MicrofacetLobe",
@@ -13,5 +15,6 @@ __all__ = [
     "PowerLobe",
     "PowerResponseLobe",
     "WeightedLobe",
+    "multiscattering",
     "over_diffuse",
 ]

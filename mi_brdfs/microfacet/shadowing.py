@@ -76,6 +76,9 @@ class Smith(Shadowing):
     smithian = True
     conserving = True
 
+    facets: ClassVar[str]
+    """Whose walks are tabulated (:mod:`.escape`)."""
+
     def __init__(self, alpha_u: mi.Float, alpha_v: mi.Float, correlated: bool) -> None:
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated
 
@@ -98,6 +101,8 @@ class Smith(Shadowing):
 class SmithGGX(Smith):
     """Λ = ½(√(1 + 1/a²) - 1) with 1/a² = ((αu v_x)² + (αv v_y)²)/v_z²: exact for GGX."""
 
+    facets = "ggx"
+
     def stretched(self, v: mi.Vector3f) -> mi.Float:
         return dr.sqrt(self.slope2(v) + v.z * v.z)
 
@@ -108,6 +113,8 @@ class SmithBeckmann(Smith):
     That is ½ i(a)/a, where i(a) = exp(-a²)/√π - a erfc(a), the integral of erfc from a on, is fitted by an eighth power
     to 3e-8 (tests/calibration/smith_beckmann.py), in a tenth of the time of the error function and the exponential.
     """
+
+    facets = "beckmann"
 
     FIT = (1, 0.221556308, 0.0959011886, 0.0280231588, 5.94910138e-3, 9.66725376e-4, 6.13396596e-4, -1.03606616e-4,
            4.20437499e-5)  # fmt: skip
@@ -122,6 +129,8 @@ class SmithBeckmann(Smith):
 class SmithBlinn(Smith):
     """Walter et al.'s rational approximation of Beckmann's Λ, which they use for Blinn's distribution with
     a = √(n/2 + 1) cosθ/sinθ: 1 + Λ = (1 + 2.276 a + 2.577 a²)/(3.535 a + 2.181 a²) for a < 1.6, and 1 otherwise."""
+
+    facets = "blinn"
 
     def __init__(self, exponent: mi.Float, correlated: bool) -> None:
         alpha = dr.rsqrt(0.5 * exponent + 1)

@@ -115,12 +115,24 @@ class Isotropic(Distribution):
 class Fresnel(Term):
     """A Fresnel reflectance, called with the cosine."""
 
+    DIP = 1 / 7
+    """The cosine at which conductors reflect less than Schlick's approximation, about."""
+
     def __call__(self, cos: mi.Float) -> Spectrum:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
+
+    def mean(self, schlick: Any, dip: Any) -> Spectrum:
+        """Return the mean reflectance of facets over which (1 - cosθ)⁵ has the mean ``schlick``, and cosθ (1 - cosθ)⁶
+        the mean ``dip``. It is exact for combinations of these, such as Schlick's reflectance; that of conductors
+        (Lazányi and Szirmay-Kalos 2005) and others is replaced by the combination with its values at 0, 82 and 90°."""
+        normal, grazing = self(mi.Float(1)), self(mi.Float(0))
+        m = 1 - self.DIP
+        below = (normal + (grazing - normal) * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
+        return normal + (grazing - normal) * schlick - below * dip
 
     def forward(self, distribution: Distribution, wi: mi.Vector3f) -> Any:
         """Return the forward directions to draw besides half vectors, if there are such."""

@@ -3,7 +3,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import Lobe, MicrofacetLobe
+from ..lobes import MULTISCATTER, Lobe, MicrofacetLobe, multiscattering
 from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, Spectrum, choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
@@ -44,9 +44,12 @@ class Burley(Model):
     and specular lobe for spec_tint = 1 or metallic = 1; otherwise it has the exact Fresnel reflectance instead of
     F(f0). Its clear coat is 4 cosθ_i cosθ_o times this one.
 
-    Reciprocal. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the defaults, 1.60 for roughness = 1 and,
-    with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv for roughness = 0.17 and
-    anisotropic = 1, all beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a clear coat. One-sided.
+    ``multiscatter`` says what becomes of light that the facets of D reflect more than once, as in ``microfacet``.
+
+    Reciprocal, except for ``multiscatter`` = turquin. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the
+    defaults, 1.60 for roughness = 1 and, with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv
+    for roughness = 0.17 and anisotropic = 1, all beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a
+    clear coat. One-sided.
 
     Sampling: for the base lobe the cosine with a few uniform directions, for the sheen a density of its own, for the
     clear coat an antithetic pair of half vectors and for the specular lobe one of visible normals, one of the pair
@@ -78,6 +81,7 @@ class Burley(Model):
     sheen_tint = Number(0.5, (0, 1), "tint of the sheen towards the hue of C")
     clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; omitted by default")
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
+    multiscatter = MULTISCATTER
     rotation = Rotation()
 
     def __init__(self, props: mi.Properties) -> None:
@@ -98,7 +102,7 @@ class Burley(Model):
         facets = GGX(*alpha)
         specular = MicrofacetLobe(1, facets, facets.smith(correlated=False), Schlick(f0))
         specular.anisotropic = self.is_stretched
-        lobes.append(specular)
+        lobes += multiscattering(self, specular)
         if p.clearcoat is not None:
             narrow = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss))
             lobes.append(CoatLobe(0.25 * p.clearcoat, narrow, CoatShadowing(), Schlick(0.04)))

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import drjit as dr
 
-from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
+from ..lobes import MULTISCATTER, LambertLobe, Lobe, MicrofacetLobe, WeightedLobe, multiscattering
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
@@ -26,7 +26,8 @@ class MetallicRoughness(Model):
     * direct: g(x) = x/(x (1-k) + k) with k = (r+1)²/8, which Karis uses for analytic lights. It darkens smooth surfaces
       at grazing angles: for C = 1, metallic = 1 and r = 0.1 the albedo is 0.34 at 80°.
     * ibl: the same with k = r²/2, which he uses for image-based lighting; it is nearly Smith's term.
-    * smith: Smith's term for GGX, separable, as in ``walter``.
+    * smith: Smith's term for GGX, separable, as in ``walter``; with it, ``multiscatter`` says what becomes of light
+      that facets reflect more than once, as in ``microfacet``.
 
     The factor 1-F of the diffuse lobe is common practice, as in the glTF 2.0 specification; Karis's notes have
     Lambert's lobe without it. It removes the light reflected by the facets between wi and wo, not all the light
@@ -55,6 +56,7 @@ class MetallicRoughness(Model):
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
     roughness = Number(0.5, (0.01, 1), "roughness r; its square is the facets' α")
     shadowing = Choice(("direct", "ibl", "smith"), "shadowing term")
+    multiscatter = MULTISCATTER
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))
@@ -68,4 +70,4 @@ class MetallicRoughness(Model):
             lambda wi, wo: 1 - fresnel(Facet.between(wi, wo).cos_d),
             lambda wi: 1 - fresnel(1),  # few pairs of directions graze their half vector
         )
-        return diffuse, MicrofacetLobe(1, GGX(alpha, alpha), shadowing, fresnel)
+        return diffuse, *multiscattering(self, MicrofacetLobe(1, GGX(alpha, alpha), shadowing, fresnel))

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import mitsuba as mi
 
-from ..lobes import Lobe, MicrofacetLobe, over_diffuse
+from ..lobes import MULTISCATTER, Lobe, MicrofacetLobe, multiscattering, over_diffuse
 from ..microfacet import shadowing
 from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, HemiEPD
 from ..model import Model, Values
@@ -49,14 +49,31 @@ class Microfacet(Model):
     F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``),
     Schlick's approximation for ``f0``, and 1 if none of them is given.
 
+    With smith and smith-correlated, ``multiscatter`` says what becomes of light that facets reflect more than once. The
+    larger α, the more: for GGX with α = 1 and F = 1 the facets' lobe reflects 0.31 at normal incidence.
+
+    * none: it is lost
+    * walk: a second lobe returns it, ρs C (1-E(wi)) (1-E(wo)) / (π (1-Ē)), where E(w) is the albedo for F = 1 and Ē its
+      mean. Its colour C is that of a random walk on the surface (Heitz, Hanika, d'Eon and Dachsbacher 2016,
+      doi:10.1145/2897824.2925943), C = F₁(wi) F₁(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), with tabulated means F₁ and F₂ of F
+      at the ends of a path and between them, and probabilities p and q that light escapes at its second reflection and
+      at each later one; p = p(wi) + p(wo) - p̄, so that f is reciprocal
+    * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
+    * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
+
+    For F = 1 all of them conserve energy within 0.005 up to 85° and αu : αv = 8 : 1, which is the error of the tables.
+    The albedo of walk is that of the simulated walk within 0.005 up to 60°, and 0.02 at 80°, for Schlick's reflectance
+    and metals.
+
     Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
     with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``
     (hepd with vcavity, or with implicit for variant dsbrdf), ``low`` with normalization unit (abc with vcavity), and
     the specular lobe of ``metallicroughness`` (ggx with smith).
 
-    Reciprocal. With ρd + ρs <= 1 vcavity conserves energy for every D, and smith and smith-correlated for beckmann and
-    ggx; for the others see the table below. The more αu and αv differ, the less schlick shadows. For Ashikhmin and
-    Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later papers and public code. One-sided.
+    Reciprocal, except for turquin. With ρd + ρs <= 1 vcavity conserves energy for every D, and smith and
+    smith-correlated for beckmann and ggx; for the others see the table below. The more αu and αv differ, the less
+    schlick shadows. For Ashikhmin and Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later
+    papers and public code. One-sided.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
     so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and
@@ -96,6 +113,7 @@ class Microfacet(Model):
         "shadowing term G",
     )
     fresnel = FresnelSet()
+    multiscatter = MULTISCATTER
     rotation = Rotation()
     preset = Preset()
 
@@ -112,4 +130,4 @@ class Microfacet(Model):
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         distribution = p.distribution()
         specular = MicrofacetLobe(p.specular_reflectance, distribution, p.shadowing(distribution), p.fresnel)
-        return over_diffuse(p.diffuse_reflectance, specular)
+        return over_diffuse(p.diffuse_reflectance, *multiscattering(self, specular))

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from ..lobes import Lobe, MicrofacetLobe, over_diffuse
+from ..lobes import MULTISCATTER, Lobe, MicrofacetLobe, multiscattering, over_diffuse
 from ..microfacet.distributions import GGX
 from ..model import Model, Values
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
@@ -22,9 +22,11 @@ class Walter(Model):
     1/(1+Λ(wi)+Λ(wo)) (correlated). F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics
     (``int_ior`` over ``ext_ior``), Schlick's approximation for ``f0``, and 1 if none of them is given.
 
-    Reciprocal. Energy-conserving with ρd + ρs <= 1: the lobe's albedo stays below ρs, and far below for rough surfaces,
-    as light is reflected only once (α = 1, F = 1: 0.31 ρs at normal incidence). Same as Mitsuba's ``roughconductor``
-    with ``distribution="ggx"`` (separable), except that polarized variants depolarise the light. One-sided.
+    Reciprocal, except for ``multiscatter`` = turquin. Energy-conserving with ρd + ρs <= 1: the lobe's albedo stays
+    below ρs, and far below for rough surfaces, as light is reflected only once (α = 1, F = 1: 0.31 ρs at normal
+    incidence), unless ``multiscatter`` says what becomes of the rest, as in ``microfacet``. Same as Mitsuba's
+    ``roughconductor`` with ``distribution="ggx"`` (separable), except that polarized variants depolarise the light.
+    One-sided.
 
     Sampling: an antithetic pair of visible normals, bounded and tilted towards the normal, one chosen by how much each
     reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
@@ -46,10 +48,11 @@ class Walter(Model):
     alpha = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
     fresnel = FresnelSet()
     shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")
+    multiscatter = MULTISCATTER
     rotation = Rotation()
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         facets = GGX(*p.alpha)
         shadowing = facets.smith(correlated=self.shadowing == "correlated")
         specular = MicrofacetLobe(p.specular_reflectance, facets, shadowing, p.fresnel)
-        return over_diffuse(p.diffuse_reflectance, specular)
+        return over_diffuse(p.diffuse_reflectance, *multiscattering(self, specular))
