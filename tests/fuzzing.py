@@ -10,7 +10,7 @@ from typing import NamedTuple
 from hypothesis import Phase, given, settings
 
 from mi_brdfs.mitsuba.registry import brought_terms
-from mi_brdfs.parameters import ConductorName, Index, PerLobe, Quantity, Rotation
+from mi_brdfs.parameters import ConductorName, Index, OneTerm, PerLobe, Quantity, Rotation
 
 
 def examples(count, drawn):
@@ -48,10 +48,23 @@ def typical(quantity) -> float:
 
 
 def ways(parameters) -> list[Options]:
-    """Ways to give some parameters together, as many as it takes for each alternative of each of them."""
-    each = [alternatives(parameter) for parameter in parameters]
-    count = max((len(known) for known in each), default=1)
-    return [reduce(or_, (known[k % len(known)] for known in each), Options({})) for k in range(count)]
+    """Ways to give some parameters together, as many as it takes for each alternative of each of them. Of distributions
+    each way takes the one that waited longest, of those that its shadowing term is known for."""
+    each = {it: alternatives(it) for it in parameters if it.name != "distribution"}
+    waiting = [(it, way) for it in parameters if it.name == "distribution" for way in alternatives(it)]
+    shadowing = next((it.terms for it in each if it.name == "shadowing" and isinstance(it, OneTerm)), {})
+    found = []
+    for k in range(max(1, len(waiting), *map(len, each.values()))):
+        options = reduce(or_, (known[k % len(known)] for known in each.values()), Options({}))
+        term = shadowing.get(options.words.get("shadowing"))
+        for it, way in waiting:
+            if term is None or term.suits(it.terms[way.words["distribution"]]):
+                waiting.remove((it, way))
+                waiting.append((it, way))
+                options = way | options
+                break
+        found.append(options)
+    return found
 
 
 def alternatives(parameter) -> list[Options]:

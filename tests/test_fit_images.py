@@ -101,7 +101,8 @@ def test_a_scene_and_a_material_to_go_on_with():
     assert steps[-1][0] == steps[-1][1] and sorted(steps) == steps
     assert found.bsdfs == {
         "ball.bsdf": {
-            "type": "walter", "shadowing": "correlated", "specular_reflectance": 1.0, "f0": pytest.approx(0.3),
+            "type": "walter", "shadowing": "correlated", "multiscatter": "none", "specular_reflectance": 1.0,
+            "f0": pytest.approx(0.3),
             "alpha": pytest.approx(0.2, rel=0.02), "diffuse_reflectance": pytest.approx(0.3, rel=0.02),
         }
     }  # fmt: skip

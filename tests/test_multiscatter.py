@@ -99,7 +99,7 @@ def test_samples_are_as_good_as_they_were(name):
     {"type": "microfacet", "shadowing": "vcavity"}, {"type": "metallicroughness", "shadowing": "ibl"},
 ])  # fmt: skip
 def test_other_shadowing_terms_are_refused(given):
-    with pytest.raises(RuntimeError, match="known for Smith's shadowing term only"):
+    with pytest.raises(RuntimeError, match="multiscatter does not belong to shadowing"):
         mi.load_dict({**given, "multiscatter": "walk"})
 
 

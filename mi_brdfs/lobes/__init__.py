@@ -3,11 +3,10 @@
 from .diffuse import LambertLobe, over_diffuse
 from .lobe import Lobe, Mixture, WeightedLobe
 from .microfacet import MicrofacetLobe
-from .multiscatter import MULTISCATTER, multiscattering
+from .multiscatter import multiscattering
 from .power import PowerLobe, PowerResponseLobe
 
 __all__ = [
-    "MULTISCATTER",
     "LambertLobe",
     "Lobe",
     "MicrofacetLobe",

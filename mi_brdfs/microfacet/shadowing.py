@@ -11,10 +11,12 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import TINY
-from ..parameters import Number
+from ..parameters import Choice, Number
 from .facet import Cosines, Facet
 from .sampling import Mixture, Pair, UniformDirections, clipped_normals
 from .terms import Directions, Distribution, Fresnel, Term
+
+MULTISCATTER = Choice(("none", "walk", "kulla-conty", "turquin"), "what becomes of light that facets reflect again")
 
 
 class Shadowing(Term):
@@ -147,6 +149,7 @@ class SmithOfDistribution(Shadowing):
     """The separable Smith term that belongs to a distribution."""
 
     word = "smith"
+    parameters = {"multiscatter": MULTISCATTER}
     correlated: ClassVar[bool] = False
 
     @classmethod

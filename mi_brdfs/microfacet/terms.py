@@ -132,7 +132,7 @@ class Fresnel(Term):
         normal, grazing = self(mi.Float(1)), self(mi.Float(0))
         m = 1 - self.DIP
         below = (normal + (grazing - normal) * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
-        return normal + (grazing - normal) * schlick - below * dip
+        return dr.maximum(normal + (grazing - normal) * schlick - below * dip, 0)
 
     def forward(self, distribution: Distribution, wi: mi.Vector3f) -> Any:
         """Return the forward directions to draw besides half vectors, if there are such."""

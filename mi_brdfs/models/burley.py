@@ -3,13 +3,13 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import MULTISCATTER, Lobe, MicrofacetLobe, multiscattering
+from ..lobes import Lobe, MicrofacetLobe, multiscattering
 from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, Spectrum, choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.shadowing import Shadowing
+from ..microfacet.shadowing import MULTISCATTER, Shadowing
 from ..model import Model, Values
 from ..parameters import Number, Reflectance, Rotation
 

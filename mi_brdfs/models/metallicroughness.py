@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import drjit as dr
 
-from ..lobes import MULTISCATTER, LambertLobe, Lobe, MicrofacetLobe, WeightedLobe, multiscattering
+from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe, multiscattering
 from ..microfacet.distributions import GGX
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.shadowing import SchlickSmith, Shadowing, SmithGGX
+from ..microfacet.shadowing import MULTISCATTER, SchlickSmith, Shadowing, SmithGGX
 from ..model import Model, Values
-from ..parameters import Choice, Number, Reflectance
+from ..parameters import Number, OneOf, Reflectance
 
 
 class MetallicRoughness(Model):
@@ -55,8 +55,7 @@ class MetallicRoughness(Model):
     base_color = Reflectance(0.5, "base colour C")
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
     roughness = Number(0.5, (0.01, 1), "roughness r; its square is the facets' α")
-    shadowing = Choice(("direct", "ibl", "smith"), "shadowing term")
-    multiscatter = MULTISCATTER
+    shadowing = OneOf({"direct": {}, "ibl": {}, "smith": {"multiscatter": MULTISCATTER}}, "shadowing term")
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import mitsuba as mi
 
-from ..lobes import MULTISCATTER, Lobe, MicrofacetLobe, multiscattering, over_diffuse
+from ..lobes import Lobe, MicrofacetLobe, multiscattering, over_diffuse
 from ..microfacet import shadowing
 from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, HemiEPD
 from ..model import Model, Values
@@ -113,7 +113,6 @@ class Microfacet(Model):
         "shadowing term G",
     )
     fresnel = FresnelSet()
-    multiscatter = MULTISCATTER
     rotation = Rotation()
     preset = Preset()
 

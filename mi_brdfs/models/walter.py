@@ -1,7 +1,8 @@
 from __future__ import annotations
 
-from ..lobes import MULTISCATTER, Lobe, MicrofacetLobe, multiscattering, over_diffuse
+from ..lobes import Lobe, MicrofacetLobe, multiscattering, over_diffuse
 from ..microfacet.distributions import GGX
+from ..microfacet.shadowing import MULTISCATTER
 from ..model import Model, Values
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
 

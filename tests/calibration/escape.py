@@ -336,6 +336,7 @@ if __name__ == "__main__":
         print(f"{FILE}: {FILE.stat().st_size} bytes")
         sys.exit()
     with np.load(FILE) as kept:
-        errors = {name: float(abs(tables[name].astype(float) - kept[name]).max()) for name in tables}
+        # By the mean, as what little light does is noise.
+        errors = {name: float(abs(tables[name].astype(float) - kept[name]).mean()) for name in tables}
     print(*(f"{name}: {error:.4f}" for name, error in errors.items()), sep="\n")
-    sys.exit(max(errors.values()) > 0.05)
+    sys.exit(max(errors.values()) > 0.01)
