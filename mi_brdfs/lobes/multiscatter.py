@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, clamp, expm1, log1p, safe_sqrt
+from ..math import EPSILON, Spectrum, expm1, log1p, safe_sqrt
 from ..microfacet.escape import Escape, Walks, textures
 from ..microfacet.shadowing import Smith
 from .lobe import Lobe, WeightedLobe
@@ -63,7 +63,7 @@ class WalkLobe(MultipleScattering):
     """
 
     def colour(self, i: Escape, o: Escape) -> Spectrum:
-        second, between = clamp(i.second + o.second - self.mean.second, 0, 1), self._reflectance(self.mean)
+        second, between = dr.clip(i.second + o.second - self.mean.second, 0, 1), self._reflectance(self.mean)
         later = between * self.mean.third / (1 - between * (1 - self.mean.third))
         return self._reflectance(i) * self._reflectance(o) * (second + (1 - second) * later)
 

@@ -21,7 +21,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, clamp
+from ..math import EPSILON
 from .shadowing import Smith
 
 FILE = Path(__file__).with_name("escape.npz")
@@ -84,7 +84,7 @@ class Walks:
         rho2 = 1 - u2 * v2 / (along2 * across2)
         lost = k[0] + rho2 * (k[1] + rho2 * k[2])
         second, schlick, dip = k[3] + rho2 * k[4], k[5] + rho2 * k[6], k[7]
-        return Escape(clamp(lost, 0, 1), clamp(second, 0, 1), schlick, dip)
+        return Escape(dr.clip(lost, 0, 1), dr.clip(second, 0, 1), schlick, dip)
 
 
 def textures(smith: Smith) -> list[Any]:
@@ -102,7 +102,7 @@ def textures(smith: Smith) -> list[Any]:
 
 def _compressed(alpha: Any) -> Any:
     """Return a place in [0, 1]: nodes are denser on smooth surfaces."""
-    return clamp((1 + 1 / ROUGHEST) * alpha / (1 + alpha), 0, 1)
+    return dr.clip((1 + 1 / ROUGHEST) * alpha / (1 + alpha), 0, 1)
 
 
 def _texel(x: mi.Float, count: int) -> mi.Float:
