@@ -53,7 +53,7 @@ REJECTED = [
     ("roughdiffuse", {"use_fast_approx": 1}, "roughdiffuse: use_fast_approx = 1 is a number; it must be true or false."),
     ("microfacet", {"gamma": 2}, 'microfacet: gamma does not belong to distribution = "beckmann", which has alpha, alpha_u and alpha_v of its own.'),
     ("microfacet", {"distribution": "gtr", "alpha_u": 0.1}, 'alpha_u does not belong to distribution = "gtr", which has alpha and gamma'),
-    ("microfacet", {"kurt_exponent": 0.2}, 'kurt_exponent does not belong to shadowing = "smith", which has no parameter of its own.'),
+    ("microfacet", {"kurt_exponent": 0.2}, 'kurt_exponent does not belong to shadowing = "smith", which has multiscatter of its own.'),
     ("microfacet", {"distribution": "phong"}, 'microfacet: distribution = "phong" is unknown; it must be one of "beckmann", "ggx"'),
     ("microfacet", {"distribution": "abc"}, 'shadowing = "smith" is not known for distribution = "abc"; take it with beckmann, ggx or blinn,'),
     ("microfacet", {"distribution": "hepd", "shadowing": "schlick"}, 'shadowing = "schlick" is not known for distribution = "hepd"; take it with'),
