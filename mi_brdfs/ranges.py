@@ -47,6 +47,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     if optimizer is not None:
         for key, value in inside.items():
             optimizer[key] = value
+        inside = {key: optimizer[key] for key in inside}  # they keep copies, and want the gradients of those
     params.update(inside)
 
 

@@ -227,6 +227,8 @@ def test_a_new_lobe_is_like_the_last_and_the_others_stay(client):
 def test_a_preset_is_its_plugin_with_its_values(client):
     (told,) = of(client.show({"type": "preset", "name": "ngan/ward/blue-acrylic"}, views=[]), "subject")
     assert told["bsdf"]["type"] == "ward" and told["bsdf"]["alpha"] > 0
+    beside = {"type": "preset", "name": "ngan/ward/blue-acrylic", "alpha": 0.7, "lobes": "1"}
+    assert Materials().expanded(beside) == {**told["bsdf"], "alpha": 0.7}
 
 
 def test_the_copied_xml_and_dict_give_the_same_picture(client):

@@ -13,6 +13,7 @@ from pathlib import Path
 from urllib.parse import unquote
 from urllib.request import urlopen
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from latency import Page, alone, edited, serving
@@ -285,13 +286,20 @@ def test_a_notebook_gets_its_page_and_ends_it(address, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.chdir(tmp_path.parent)
     shutil.copy(LOFT, "-x.bsdf")
-    page = explore(
-        {"type": "ward", "alpha": 0.3, "specular_reflectance": {"type": "rgb", "value": [1, 0, 0]}}, "-x.bsdf"
-    )
+    red, grey = ({"type": "rgb", "value": value} for value in ([1, 0, 0], 0.5))
+    ward = {"type": "ward", "alpha": np.float32(0.3), "specular_reflectance": red, "diffuse_reflectance": grey}
+    page = explore(ward, "-x.bsdf", Path("-x.bsdf"))
     assert "<iframe" in page._repr_html_() and "alpha" in page.address
     own, _, state = page.address.partition("#")
-    subject = json.loads(unquote(state))["subjects"][1]["bsdf"]
-    connected(own, lambda it, hello, client: it.send(subject))
+    first, *files = (it["bsdf"] for it in json.loads(unquote(state))["subjects"])
+    assert first["specular_reflectance"] == [1, 0, 0] and first["diffuse_reflectance"] == [0.5] * 3
+
+    async def conversation(page, hello, client):
+        for file in files:
+            await page.send(file, views=["polar"])
+            await page.until("polar")
+
+    connected(own, conversation)
     assert {"http://localhost:*", "vscode-webview:"} <= set(frame_ancestors(own).split())
     assert frame_ancestors(address) == "'none'"
     assert list(tmp_path.iterdir())
@@ -301,6 +309,40 @@ def test_a_notebook_gets_its_page_and_ends_it(address, tmp_path, monkeypatch):
     page.close()
     with pytest.raises(OSError):
         connected(own, lambda it, hello, client: it.send({"type": "lambert"}))
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_notebook_is_told_what_cannot_be_shown(monkeypatch):
+    """Before there is a server."""
+    monkeypatch.setattr(subprocess, "Popen", None)
+    for given, sentence in [
+        *((it, "cannot be shown; give a dict") for it in (None, 5, {}, {"type": 5}, mi.load_dict({"type": "ward"}))),
+        ({"type": "wrd"}, "no BSDF 'wrd' here; did you mean 'ward'"),
+        ("wrd", "no BSDF 'wrd' here; did you mean 'ward'"),
+        ({"type": "ward", "alpha": {"type": "checkerboard"}}, "alpha must be a number"),
+        ({"type": "twosided", "bsdf": {"type": "ward"}}, "bsdf must be a number"),
+        ({"type": "tabulated"}, "A file is not here"),
+        ({"type": "ward", "file": 3, "alpha": [1]}, "alpha must be a number"),
+    ]:
+        with pytest.raises(ValueError, match=sentence):
+            explore(given)
+    with pytest.raises(ValueError, match="A page shows 4 BSDFs at most, not 5"):
+        explore(*["ward"] * 5)
+
+
+def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
+    started = []
+
+    class Mute(subprocess.Popen):
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            self.stdout.close()
+            started.append(self)
+
+    monkeypatch.setattr(subprocess, "Popen", Mute)
+    with pytest.raises(ValueError, match="closed file"):
+        explore("ward")
+    assert started[0].returncode is not None
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -105,11 +105,11 @@ class Problem:
         optimizer = mi.ad.Adam(lr=1)
         for key in self.keys.values():
             optimizer[key] = self.params[key]
+        self.params.update(optimizer)
         for step in range(steps):
             decay = first * 0.5 ** (6 * step / steps)
             rates = {self.keys[n]: decay * min(high - low, 50) for n, (low, high) in self.limits().items()}
             optimizer.set_learning_rate(rates)
-            self.params.update(optimizer)
             dr.backward(dr.sum(self.losses()))
             optimizer.step()
             self.params.update(optimizer)
@@ -217,11 +217,12 @@ def test_a_limit_without_a_derivative_is_left(given, name, start, target):
     for projected in (False, True):
         optimizer = mi.ad.Adam(lr=0.1)
         optimizer[key] = mi.Float(start)
+        params.update(optimizer)
         lowest = start
         for _ in range(200):
-            params.update(optimizer)
             dr.backward(dr.mean(dr.square(dr.asinh(values()) - dr.asinh(expected))))
             optimizer.step()
+            params.update(optimizer)
             lowest = min(lowest, optimizer[key][0])
             if projected:
                 mi_brdfs.project(params, optimizer)

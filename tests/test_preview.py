@@ -37,6 +37,22 @@ def test_a_stage_that_is_not_there():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
+def test_words_are_shown_and_what_is_no_bsdf_is_refused():
+    name = "ngan/ward/blue-acrylic"
+    by_word, by_dict = (small_picture(mi.load_dict(mi_brdfs.preview_scene(it))) for it in (name, mi_brdfs.preset(name)))
+    np.testing.assert_allclose(by_word, by_dict, rtol=1e-4)
+    with mi.variant_context("scalar_rgb"):
+        other = mi.load_dict({"type": "ward"})
+    for given, sentence in [
+        *((it, "is no BSDF; give a dict") for it in ({}, None, 5, {"type": 5})),
+        *((it, "is not a BSDF of llvm_ad_rgb") for it in (other, {"type": "sphere"})),
+        ("wrad", 'no plugin "wrad"; did you mean "ward"'),
+    ]:
+        with pytest.raises(ValueError, match=sentence):
+            mi_brdfs.preview_scene(given)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
 def test_gold_looks_like_gold_and_no_picture_is_blown_out():
     """Orange yellow, light and dark, in a picture that is nowhere much brighter than white paper."""
     image = small_picture(mi.load_dict(mi_brdfs.preview_scene(GOLD)), 64)

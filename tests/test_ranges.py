@@ -93,18 +93,38 @@ def test_project_puts_all_of_a_scene_into_range():
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_project_keeps_an_optimizer_going():
-    """Its variables are put into range and stay differentiable; what it does not hold is left alone."""
+    """Its variables are put into range, and the next gradients are theirs; what it does not hold is left alone."""
     bsdf = mi.load_dict({"type": "ward"})
     params = mi.traverse(bsdf)
-    optimizer = mi.ad.Adam(lr=2.0)
+    optimizer = mi.ad.Adam(lr=0.5)
     optimizer["alpha.value"] = params["alpha.value"]
     params["diffuse_reflectance.value"] = 5.0
-    for _ in range(3):
-        params.update(optimizer)
+    params.update(optimizer)
+    for _ in range(100):
         dr.backward(dr.square(params["alpha.value"] - 0.7))
+        slope = 2 * (optimizer["alpha.value"] - 0.7)
+        assert dr.grad(optimizer["alpha.value"])[0] == slope[0] != 0
+        optimizer.set_learning_rate(0.95 * optimizer.learning_rate())
         optimizer.step()
         params.update(optimizer)
         mi_brdfs.project(params, optimizer)
         assert 1e-4 <= optimizer["alpha.value"][0] <= 1 and dr.all(optimizer["alpha.value"] == params["alpha.value"])
-        assert dr.grad_enabled(params["alpha.value"])
+    assert optimizer["alpha.value"][0] == pytest.approx(0.7, abs=0.01)
     assert params["diffuse_reflectance.value"] == 5
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_project_keeps_an_optimizer_of_a_scene_going():
+    """The gradients of pictures are those of its variables, too."""
+    scene = mi.load_dict(mi_brdfs.preview_scene({"type": "ward", "alpha": 0.9}))
+    params = mi.traverse(scene)
+    key = next(key for key in params.keys() if key.endswith("alpha.value"))
+    optimizer = mi.ad.Adam(lr=0.5)
+    optimizer[key] = params[key]
+    params.update(optimizer)
+    for _ in range(3):
+        dr.backward(-dr.mean(mi.render(scene, params, spp=1)))
+        assert dr.grad(optimizer[key])[0] != 0
+        optimizer.step()
+        params.update(optimizer)
+        mi_brdfs.project(params, optimizer)

@@ -301,8 +301,18 @@ def test_one_fault_is_one_sentence():
 
 def test_arguments_that_are_wrong_or_short(llvm_rgb):
     assert check("lambert", only="finite", angles=30).passed
-    for bsdf in (["ward"], {}, [], None, 3, {"type": "sphere"}, "scenes/first_light.xml"):
+    assert check("ngan/ward/blue-acrylic", only="finite").passed
+    with mi.variant_context("scalar_rgb"):
+        other = mi.load_dict({"type": "ward"})
+    for bsdf in (["ward"], {}, {"type": 5}, [], None, 3, {"type": "sphere"}, other, "scenes/first_light.xml"):
         with pytest.raises(ValueError, match=r"no BSDF|not a BSDF|materials; name one"):
+            check(bsdf, only="finite")
+    for bsdf, sentence in (
+        ("wrad", '^there is no plugin "wrad"; did you mean "ward"[?]$'),
+        ({"type": "ward", "alpa": 1}, "^ward: unknown parameter alpa; did you mean alpha[?].*$"),
+        ({"type": "ward", "alpha": "x"}, '^ward: alpha = "x" is a string; .*$'),
+    ):
+        with pytest.raises(ValueError, match=sentence):
             check(bsdf, only="finite")
     for wrong in ({"angles": "30"}, {"angles": [None]}, {"significance": "x"}, {"only": 3}, {"only": "finit"}):
         with pytest.raises(ValueError, match=r"\.$|there are finite"):

@@ -12,13 +12,15 @@ import json
 import subprocess
 import sys
 from html import escape
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from ..mitsuba.registry import presets
+from ..parameters.messages import brief
 from ..probe.sources import is_measured
-from .materials import plain
-from .state import MEASURED, PRESET, Bsdf
+from .materials import Materials, plain
+from .state import MEASURED, PRESET, SUBJECTS, Bsdf, checked
 
 __all__ = ["explore"]
 
@@ -41,7 +43,7 @@ class Page:
         self._process.wait()
 
 
-def explore(*subjects: str | dict[str, Any]) -> Page:
+def explore(*subjects: str | Path | dict[str, Any]) -> Page:
     """Start the explorer, and return its page, which a notebook on this machine shows; elsewhere open its ``address``.
 
     Its server is another process: models that a notebook registers are not known there. It ends with
@@ -52,31 +54,51 @@ def explore(*subjects: str | dict[str, Any]) -> Page:
             the names of plugins and of published materials, and paths of measured files. By default, ``walter``.
 
     Raises:
+        ValueError: if there are more, or one is none of these.
         RuntimeError: if it cannot start, with what it said.
     """
-    words = [it for it in subjects if isinstance(it, str) and is_measured(it) and it not in presets()]
+    if len(subjects) > SUBJECTS:
+        raise ValueError(f"A page shows {SUBJECTS} BSDFs at most, not {len(subjects)}.")
+    state = {"subjects": [_subject(it) for it in subjects]}
+    words = [it["bsdf"]["file"] for it in state["subjects"] if it["bsdf"]["type"] == MEASURED]
     command = [sys.executable, "-m", "mi_brdfs", "explore", "--port", "0", "--no-browser", "--notebook", "--", *words]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stdout and process.stderr
-    address = process.stdout.readline().strip()
-    if not address:
+    try:
+        address = process.stdout.readline().strip()
+        if not address:
+            raise RuntimeError(process.stderr.read().strip())
+    except BaseException:
+        process.terminate()
         process.wait()
-        raise RuntimeError(process.stderr.read().strip())
-    if subjects:
-        state = {"subjects": [{"bsdf": _bsdf(it), "name": _name(it)} for it in subjects]}
-        address += "#" + quote(json.dumps(state))
-    return Page(process, address)
+        raise
+    return Page(process, f"{address}#{quote(json.dumps(state))}" if subjects else address)
 
 
-def _bsdf(subject: str | dict[str, Any]) -> Bsdf:
+def _subject(given: str | Path | dict[str, Any]) -> dict[str, Any]:
+    """Return what a page knows a BSDF by.
+
+    Raises:
+        ValueError: if it cannot be shown.
+    """
+    subject = str(given.absolute()) if isinstance(given, Path) else given
+    if not (isinstance(subject, str) or (isinstance(subject, dict) and isinstance(subject.get("type"), str))):
+        raise ValueError(
+            f"{brief(repr(given))} cannot be shown; give a dict such as {{'type': 'ward'}}, the name of a plugin or of "
+            "a published material, or the path of a measured file."
+        )
     if isinstance(subject, dict):
-        return plain(subject)
-    if subject in presets():
-        return {"type": PRESET, "name": subject}
-    return {"type": MEASURED, "file": subject} if is_measured(subject) else {"type": subject}
+        bsdf, name = plain(subject), subject["type"]
+    else:
+        bsdf, name = _named(subject), subject.rpartition("/")[2]
+    if not (isinstance(subject, str) and bsdf["type"] == MEASURED):  # the server knows files
+        Materials().expanded(checked(bsdf))
+    return {"bsdf": bsdf, "name": name}
 
 
-def _name(subject: str | dict[str, Any]) -> str:
-    return str(subject["type"]) if isinstance(subject, dict) else subject.rpartition("/")[2]
+def _named(word: str) -> Bsdf:
+    if word in presets():
+        return {"type": PRESET, "name": word}
+    return {"type": MEASURED, "file": word} if is_measured(word) else {"type": word}

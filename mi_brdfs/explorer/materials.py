@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from ..mitsuba.errors import one_line
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
@@ -42,8 +43,8 @@ class Materials:
     """Materials of XML files, which take long to load."""
 
     def expanded(self, bsdf: Bsdf) -> Bsdf:
-        """Return a plugin dict with what its short forms stand for: a published material, the example of a model of
-        which only the type is given, another number of lobes.
+        """Return a plugin dict with what its short forms stand for: a published material, beside which other members
+        replace its own, the example of a model of which only the type is given, another number of lobes.
 
         Raises:
             StateError: if there is no such type, file or material.
@@ -51,9 +52,11 @@ class Materials:
         kind = bsdf["type"]
         if kind == PRESET:
             try:
-                return plain(preset(str(bsdf.get("name", ""))))
+                published = plain(preset(str(bsdf.get("name", ""))))
             except ValueError as error:
                 raise StateError(str(error)) from None
+            given = {name: value for name, value in bsdf.items() if name not in ("type", "name")}
+            return self.expanded(published | given)
         if kind in (MEASURED, GIVEN):
             self._source(bsdf)
             return bsdf
@@ -151,8 +154,15 @@ def kinds() -> list[dict[str, str]]:
 
 
 def plain(bsdf: Mapping[str, Any]) -> Bsdf:
-    """Return a plugin dict with its colours as [r, g, b]."""
-    return {name: list(value["value"]) if isinstance(value, dict) else value for name, value in bsdf.items()}
+    """Return a plugin dict with its colours as [r, g, b] and its numbers as Python's."""
+    return {name: _plain(value) for name, value in bsdf.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict) and value.get("type") == "rgb":
+        numbers = np.ravel(value.get("value", ())).tolist()
+        return numbers * 3 if len(numbers) == 1 else numbers
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def properties(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,18 +9,20 @@ import mitsuba as mi
 import numpy as np
 
 from ..parameters.messages import listed
+from ..probe.sources import check_given, described, load_described
 from .body import CENTRE, turned_body
 from .studio import environment
 
 
-def preview_scene(bsdf: dict | mi.BSDF, stage: str = "studio") -> dict:
+def preview_scene(bsdf: str | dict | mi.BSDF, stage: str = "studio") -> dict:
     """Return the dict of a scene that shows a material: ``mi.render(mi.load_dict(preview_scene({"type": "ward"})))``.
 
     A turned body stands on a checkered ground: a ball, with a flat facet that mirrors one direction and a groove, on a
     foot; dp_du runs around its axis. The ball is in the middle of the picture, of 512 x 512 pixels and 128 samples.
 
     Args:
-        bsdf: the material, a plugin dict or a loaded BSDF.
+        bsdf: the material: a plugin dict, the name of a plugin or of a published material, the path of a measured
+            file, or a loaded BSDF of the active variant.
         stage: the light. ``studio``, an environment with something to reflect: a softbox on the left, a window with
             bars on the right, strips behind, a horizon; no radiance is above 4, and white paper is about 1. ``lamp``,
             two small lamps in the dark, for the shape of highlights and their tails. ``point``, one point light on the
@@ -30,10 +32,11 @@ def preview_scene(bsdf: dict | mi.BSDF, stage: str = "studio") -> dict:
         A dict for ``mi.load_dict``, to be changed at will before loading; it belongs to the active variant.
 
     Raises:
-        ValueError: if there is no such stage.
+        ValueError: if there is no such stage, or for what is no BSDF or cannot be loaded.
     """
     if stage not in STAGES:
         raise ValueError(f"there is no stage {stage!r}; there are {listed(tuple(STAGES))}")
+    check_given(bsdf)
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 2 if stage == "point" else 6},
@@ -44,7 +47,7 @@ def preview_scene(bsdf: dict | mi.BSDF, stage: str = "studio") -> dict:
             "film": {"type": "hdrfilm", "width": 512, "height": 512},
             "sampler": {"type": "independent", "sample_count": 128},
         },
-        "body": turned_body(bsdf),
+        "body": turned_body(load_described(described(bsdf))),
         "ground": _ground(),
         **STAGES[stage](),
     }

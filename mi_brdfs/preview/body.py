@@ -22,7 +22,7 @@ AZIMUTH, ELEVATION, ANGLE = np.radians(-78), np.radians(50), np.radians(17)
 BEVEL = 0.004
 
 
-def turned_body(bsdf: dict | mi.BSDF) -> mi.Mesh:
+def turned_body(bsdf: mi.BSDF) -> mi.Mesh:
     """Return the body, with u around its axis and v along it."""
     foot, knob = _smooth(FOOT, 72), _smooth(KNOB, 56)
     low, high = np.arcsin((np.array([foot[-1, 1], knob[0, 1]]) - CENTRE) / RADIUS)
@@ -77,7 +77,7 @@ def _cut(positions: np.ndarray, normals: np.ndarray) -> None:
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
 
 
-def _mesh(positions: np.ndarray, normals: np.ndarray, uv: np.ndarray, bsdf: dict | mi.BSDF) -> mi.Mesh:
+def _mesh(positions: np.ndarray, normals: np.ndarray, uv: np.ndarray, bsdf: mi.BSDF) -> mi.Mesh:
     """Return the mesh of a grid of vertices."""
     rings, columns = positions.shape[:2]
     corner = np.arange(rings - 1)[:, None] * columns + np.arange(columns - 1)
@@ -85,7 +85,7 @@ def _mesh(positions: np.ndarray, normals: np.ndarray, uv: np.ndarray, bsdf: dict
     faces = np.stack([corner, right, up + 1, corner, up + 1, up], axis=-1).reshape(-1, 3)
 
     props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    props["bsdf"] = bsdf
     mesh = mi.Mesh("body", rings * columns, len(faces), props, has_vertex_normals=True, has_vertex_texcoords=True)
     params = mi.traverse(mesh)
     params["vertex_positions"] = positions.astype(np.float32).ravel()

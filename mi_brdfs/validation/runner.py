@@ -12,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.bsdf import BSDFProbe, load
+from ..probe.bsdf import BSDFProbe
 from ..probe.directions import angles_of, scattered
-from ..probe.sources import find_sources, name_of
+from ..probe.sources import check_given, described, load_described, name_of
 from ..probe.variates import random
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, polarization, sampling, spectral, textures, updates, values
@@ -84,8 +84,8 @@ def check(
     Random numbers are fixed: the same BSDF gives the same report.
 
     Args:
-        bsdf: a plugin dict, the name of a plugin, the path of a measured file, or a loaded BSDF, which must belong to
-            the active variant.
+        bsdf: a plugin dict, the name of a plugin or of a published material, the path of a measured file, or a loaded
+            BSDF, which must belong to the active variant.
         name: what the report calls it; by default its type.
         angles: of incidence, in degrees, in [0, 90): one or several.
         significance: the probability, in (0, 1), that a BSDF without faults fails one of the statistical tests of this
@@ -96,8 +96,8 @@ def check(
         on_progress: called after each check.
 
     Raises:
-        ValueError: for what is no BSDF, an unknown name of a check, an angle or a significance out of range, or a
-            loaded BSDF that cannot be checked in the active variant.
+        ValueError: for what is no BSDF or cannot be loaded, an unknown name of a check, an angle or a significance out
+            of range, or a loaded BSDF that cannot be checked in the active variant.
     """
     wanted = list(CHECKS) if only is None else _several(only)
     if unknown := [word for word in wanted if word not in CHECKS]:
@@ -106,7 +106,7 @@ def check(
     if not (isinstance(significance, (int, float)) and 0 < significance < 1):
         raise ValueError(f"The significance must be a number in (0, 1), not {significance!r}.")
     with _measurable(bsdf):
-        bsdf = _described(bsdf)
+        bsdf = described(bsdf)
         probe, given = _probe(bsdf), bsdf if isinstance(bsdf, dict) else None
         run = Run(probe, angles, significance, conserves, given)
         findings = [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
@@ -137,7 +137,7 @@ def compare(
     """
     angles = checked_angles(angles)
     with _measurable(bsdf, other):
-        bsdf, other = _described(bsdf), _described(other)
+        bsdf, other = described(bsdf), described(other)
         run = Run(_probe(bsdf), angles, SIGNIFICANCE, None, None)
         return Report(name or _name(bsdf), [_against(run, _probe(other), other_name or _name(other))])
 
@@ -198,12 +198,7 @@ def _several(given: Any) -> list[Any]:
 def _measurable(*bsdfs: str | dict[str, Any] | mi.BSDF) -> AbstractContextManager:
     """Return a context in whose variant some BSDFs can be measured."""
     for bsdf in bsdfs:
-        # Without a variant there is no mi.BSDF yet.
-        is_object = hasattr(bsdf, "eval_pdf")
-        if not (is_object or isinstance(bsdf, str) or (isinstance(bsdf, dict) and "type" in bsdf)):
-            raise ValueError(
-                f"{bsdf!r} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a loaded BSDF."
-            )
+        check_given(bsdf)
     if is_measurable(mi.variant()):
         return nullcontext()
     if not all(isinstance(bsdf, (str, dict)) for bsdf in bsdfs):
@@ -212,21 +207,8 @@ def _measurable(*bsdfs: str | dict[str, Any] | mi.BSDF) -> AbstractContextManage
     return activated(VARIANT)
 
 
-def _described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF:
-    """Return the only BSDF that a word stands for, and anything else as it is."""
-    if not isinstance(bsdf, str):
-        return bsdf
-    sources = list(find_sources(bsdf))
-    if len(sources) > 1:
-        raise ValueError(f"{bsdf} has {len(sources)} materials; name one of them, such as {sources[0].word}.")
-    return sources[0].load()
-
-
 def _probe(bsdf: dict[str, Any] | mi.BSDF) -> BSDFProbe:
-    loaded = load(bsdf) if isinstance(bsdf, dict) else bsdf
-    if not isinstance(loaded, mi.BSDF):
-        raise ValueError(f"{bsdf['type'] if isinstance(bsdf, dict) else type(bsdf).__name__} is not a BSDF.")
-    return BSDFProbe(loaded)
+    return BSDFProbe(load_described(bsdf))
 
 
 def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:
