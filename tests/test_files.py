@@ -5,8 +5,10 @@ import errno
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 import warnings
 from contextlib import contextmanager
 
@@ -23,6 +25,20 @@ from mi_brdfs.sweep import Sweep, plan, store
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 FITTED = "--model", "lambert", "--starts", "1"
+
+
+# --- Ends ------------------------------------------------------------------------------------------------------------
+
+
+def test_sigterm_leaves_nothing_of_a_file_that_is_written(tmp_path):
+    """Also where `timeout` sends it, which does so twice."""
+    process = subprocess.Popen(command("convert", "ward", "it.binary"), cwd=tmp_path, stderr=subprocess.PIPE)
+    while not list(tmp_path.iterdir()):
+        time.sleep(0.001)
+    for _ in range(2):
+        process.send_signal(signal.SIGTERM)
+    assert (process.communicate()[1], process.returncode) == (b"", 143)
+    assert not list(tmp_path.iterdir())
 
 
 # --- Full disks -----------------------------------------------------------------------------------------------------

@@ -401,13 +401,14 @@ def test_ctrl_c_ends_the_command_at_once():
     assert (process.returncode, stdout, stderr) == (130, "", "Interrupted; nothing was written.\n")
 
 
-def test_jobs_end_with_a_command_that_is_killed():
+@pytest.mark.parametrize("sent", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_jobs_end_with_a_command_that_is_killed(sent):
     """They hold its output open."""
     command = [sys.executable, "-m", "mi_brdfs", "check", "ward", "walter", "-j", "2"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     while sum("--multiprocessing-fork" in it.cmdline() for it in psutil.Process(process.pid).children()) < 2:
         time.sleep(0.05)
-    process.kill()
+    process.send_signal(sent)
     process.communicate(timeout=20)
 
 
