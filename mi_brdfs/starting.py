@@ -1,10 +1,13 @@
-"""Ctrl-C while the command ``mi-brdfs`` starts."""
+"""Ctrl-C and SIGTERM where an exception does not do: while the command ``mi-brdfs`` starts, and in imports."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,6 +26,38 @@ def raise_on_ctrl_c() -> None:
     """Let Ctrl-C raise KeyboardInterrupt again, for a command that has begun."""
     if signal.getsignal(signal.SIGINT) is _end:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def exit_on_sigterm() -> None:
+    """Let SIGTERM raise SystemExit, so that nothing is left of what is half written."""
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _exit)
+
+
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM wait until the end: imports that they interrupt print tracebacks, or make other errors of
+    them."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
+    if threading.current_thread() is not threading.main_thread():
+        yield  # they do not interrupt
+        return
+    received: list[int] = []
+    for number in handlers:
+        signal.signal(number, lambda number, _: received.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    if received:
+        signal.raise_signal(received[0])
+
+
+def _exit(number: int, _: object) -> None:
+    signal.signal(number, signal.SIG_IGN)  # `timeout` sends it twice
+    sys.exit(128 + number)
 
 
 def _end(*_: object) -> None:

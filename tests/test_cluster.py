@@ -1,5 +1,6 @@
 """Workers return what this process would have, also when some are killed; what cannot work is refused in a sentence."""
 
+import gc
 import json
 import os
 import shutil
@@ -128,6 +129,7 @@ def test_killed_workers_cost_no_task_and_a_failure_is_one_tasks(ctrl_c):
         if results.keys() >= set(map(str, range(10))):
             break
     assert len(worker_processes()) == 2
+    assert not [it for it in gc.callbacks if "GCDiagnosis" in repr(it)]  # it swallows Ctrl-C
     before = time.perf_counter()
     iterator.close()
     assert not worker_processes()
@@ -135,6 +137,23 @@ def test_killed_workers_cost_no_task_and_a_failure_is_one_tasks(ctrl_c):
     assert results.pop("3") == Failed("3 is not a number that I like")
     assert all(result[:2] == (int(key), "llvm_ad_rgb") for key, result in results.items())
     assert len({result[2] for result in results.values()} - {os.getpid()}) >= 2
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_waits_until_dask_is_imported(monkeypatch):
+    """Some of its modules make an ImportError of it."""
+
+    class Struck:
+        def find_spec(self, name, *_):
+            if name == client.__name__:
+                os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(mi_brdfs.cluster, "client", client)
+    monkeypatch.delitem(sys.modules, client.__name__)
+    monkeypatch.setattr(sys, "meta_path", [Struck(), *sys.meta_path])
+    with pytest.raises(KeyboardInterrupt):
+        run(powers, {}, workers=1)
+    assert client.__name__ in sys.modules
 
 
 @pytest.mark.slow

@@ -5,24 +5,42 @@ import errno
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 import warnings
 from contextlib import contextmanager
 
 import mitsuba as mi
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from support import ROOT
 from test_cli import SCENE, command
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app, main, options
+from mi_brdfs.plot.command import write as write_figure
 from mi_brdfs.rendering.output import write
 from mi_brdfs.sweep import Sweep, plan, store
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 FITTED = "--model", "lambert", "--starts", "1"
+
+
+# --- Ends ------------------------------------------------------------------------------------------------------------
+
+
+def test_sigterm_leaves_nothing_of_a_file_that_is_written(tmp_path):
+    """Also where `timeout` sends it, which does so twice."""
+    process = subprocess.Popen(command("convert", "ward", "it.binary"), cwd=tmp_path, stderr=subprocess.PIPE)
+    while not list(tmp_path.iterdir()):
+        time.sleep(0.001)
+    for _ in range(2):
+        process.send_signal(signal.SIGTERM)
+    assert (process.communicate()[1], process.returncode) == (b"", 143)
+    assert not list(tmp_path.iterdir())
 
 
 # --- Full disks -----------------------------------------------------------------------------------------------------
@@ -40,6 +58,12 @@ def full_disk():
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+def curve():
+    figure = Figure()
+    figure.add_subplot().plot(np.random.default_rng(1).random(100))
+    return figure
+
+
 def noise(kind):
     return mi.Bitmap(np.random.default_rng(1).integers(0, 255, (9, 9, 3)).astype(kind))
 
@@ -52,11 +76,12 @@ def noise(kind):
         # Smaller than the buffer that a file is written from.
         ("picture.exr", lambda path: write(noise(np.float32), path)),
         ("picture.png", lambda path: write(noise(np.uint8), path)),
+        ("figure.pdf", lambda path: write_figure(curve(), path)),
     ],
 )
 def test_a_full_disk_leaves_what_was_there(name, write, tmp_path, capsys):
     (tmp_path / name).write_text("before")
-    with pytest.raises((OSError, RuntimeError)), full_disk():
+    with pytest.raises(OSError if name == "figure.pdf" else (OSError, RuntimeError)), full_disk():
         write(tmp_path / name)
     assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
 

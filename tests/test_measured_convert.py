@@ -46,6 +46,20 @@ def test_it_says_what_is_lost(tmp_path):
         assert word in loss
 
 
+def test_it_says_what_was_not_measured(tmp_path):
+    file, rows = tmp_path / "x.csv", []
+    for i, o, d in np.ndindex(3, 8, 7):
+        f = "nan" if d == 3 and o == 2 else -0.5 if o == 1 else 0.5
+        rows.append(f"{20 + 10 * i},{12 * o},{30 * d},{f}")
+    file.write_text("\n".join(["theta_i_deg,theta_o_deg,delta_phi_deg,f", *rows]))
+    assert convert(file, tmp_path / "y.csv").losses == (
+        "12 % of its values were negative and became 0.",
+        "1.8 % of its values were missing; they are filled in from those around them, with 0 where there are none.",
+        "It was measured for θi 20 to 40°; what lies beyond has the values at the border.",
+        "What was measured at one wavelength became grey.",
+    )
+
+
 def measurement(f, channels, wavelengths=None):
     """Values at the nodes of a coarse grid of polar angles."""
     polar, azimuth = Axis(np.radians(np.arange(5, 90, 10))), Axis(np.radians(np.arange(0, 181, 20)))
@@ -71,7 +85,8 @@ def test_scattered_samples_are_put_on_a_grid(tmp_path):
     wi, wo = (hemisphere(400, seed, 0.2).astype(np.float64) for seed in (5, 6))
     samples = Samples(wi, wo, np.full((400, 3), 0.25), anisotropic=False)
     result = convert(Measurement("some file", "test", samples), tmp_path / "x.binary")
-    assert result.losses == () and result.largest < 1e-6
+    (loss,) = result.losses
+    assert "θi 1.865 to 78.46° and θo 4.601 to 78.21°" in loss and result.largest < 1e-6
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import time
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import psutil
 import pytest
 from mutants import MUTANTS, TWO, Mutant, changed, lambert, of_others
 from support import shared
@@ -473,6 +474,17 @@ def test_ctrl_c_ends_the_command_at_once():
     process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=10)
     assert (process.returncode, stdout, stderr) == (130, "", "Interrupted; nothing was written.\n")
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_jobs_end_with_a_command_that_is_killed(sent):
+    """They hold its output open."""
+    command = [sys.executable, "-m", "mi_brdfs", "check", "ward", "walter", "-j", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    while sum("--multiprocessing-fork" in it.cmdline() for it in psutil.Process(process.pid).children()) < 2:
+        time.sleep(0.05)
+    process.send_signal(sent)
+    process.communicate(timeout=20)
 
 
 @pytest.mark.slow

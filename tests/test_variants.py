@@ -17,6 +17,7 @@ from catalogue import ROWS
 from support import call, hemisphere, is_scalar, sphere
 
 import mi_brdfs
+from mi_brdfs import starting
 from mi_brdfs.mitsuba import registry
 from mi_brdfs.mitsuba.registry import own_models
 
@@ -198,18 +199,23 @@ def there_and_back(variants):
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_waits_until_all_plugins_are_registered(monkeypatch):
+@pytest.mark.parametrize("sent, raised", [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)])
+def test_signals_wait_until_all_plugins_are_registered(sent, raised, monkeypatch):
     register, registered = registry._register_for, []
 
     def struck(variant):
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), sent)
         register(variant)
         registered.append(variant)
 
-    monkeypatch.setattr(registry, "_register_for", struck)
     mi.set_variant("scalar_rgb")
-    with pytest.raises(KeyboardInterrupt):
-        mi.set_variant("llvm_ad_rgb")
+    monkeypatch.setattr(registry, "_register_for", struck)
+    former = signal.signal(signal.SIGTERM, starting._exit)
+    try:
+        with pytest.raises(raised):
+            mi.set_variant("llvm_ad_rgb")
+    finally:
+        signal.signal(signal.SIGTERM, former)
     assert registered[-1:] == ["llvm_ad_rgb"]
 
 

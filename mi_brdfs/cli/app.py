@@ -18,7 +18,7 @@ import typer
 from .. import __version__
 from ..mitsuba import guests
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..starting import raise_on_ctrl_c
+from ..starting import exit_on_sigterm, raise_on_ctrl_c
 from .terminal import Exit, err, fail, out
 
 app = typer.Typer(
@@ -35,6 +35,7 @@ def main() -> None:
     if sys.stdout is None:  # a daemon may have closed it
         sys.stdout = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
     cast(TextIOWrapper, sys.stdout).reconfigure(errors="surrogateescape")  # names of files need not be UTF-8
+    exit_on_sigterm()
     try:
         app(prog_name="mi-brdfs")
     except OSError as error:

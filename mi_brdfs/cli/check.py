@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import signal
+import threading
 import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, connection, get_context, parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -177,12 +179,21 @@ def _check_one(source: BSDFSource, settings: Settings, on_progress: Any = lambda
 
 
 def _start_job(variant: str, sources: list[str]) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as for a shell's background job
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
     warnings.simplefilter("ignore", EnergyWarning)
     for source in sources:
         guests.import_models(source)
     mi.set_variant(variant)
+
+
+def _end_with_parent() -> None:
+    """End this process with the one that started it, however that ends."""
+    parent = parent_process()
+    assert parent
+    connection.wait([parent.sentinel])
+    os._exit(Exit.ERROR)
 
 
 def _print_reports(sources: list[BSDFSource], reports: list[Report], settings: Settings) -> None:

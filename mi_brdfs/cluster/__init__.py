@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from ..starting import signals_held
 from .worker import Failed, call
 
 __all__ = ["ClusterError", "Failed", "run"]
@@ -59,10 +60,11 @@ def run(
     pairs = iter(tasks.items() if isinstance(tasks, Mapping) else tasks)
     if not workers and not scheduler:
         return ((key, call(function, (*shared, *arguments))) for key, arguments in pairs)
-    try:
-        import distributed  # noqa: F401
-    except ImportError:
-        raise ImportError('workers need the extra "cluster": pip install "mi_brdfs[cluster]"') from None
-    from .client import run_on_workers
+    with signals_held():
+        try:
+            import distributed  # noqa: F401
+        except ImportError:
+            raise ImportError('workers need the extra "cluster": pip install "mi_brdfs[cluster]"') from None
+        from .client import run_on_workers
 
     return run_on_workers(function, pairs, workers, scheduler, threads, shared)

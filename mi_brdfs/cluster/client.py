@@ -19,6 +19,7 @@ from typing import Any
 import dask
 from distributed import CancelledError, Client, Future, LocalCluster, futures_of
 from distributed.comm import connect
+from distributed.gc import disable_gc_diagnosis
 from distributed.scheduler import KilledWorker
 from distributed.utils import LoopRunner, sync
 
@@ -68,6 +69,7 @@ def run_on_workers(
             cluster = stack.enter_context(
                 LocalCluster(n_workers=0, processes=True, host="127.0.0.1", scheduler_port=0, dashboard_address=None)
             )
+            disable_gc_diagnosis()  # what Python calls while it collects garbage swallows Ctrl-C
             client = stack.enter_context(Client(cluster, timeout=CONNECTING))
             here = setup(threads or (os.cpu_count() or 1) // workers)
             processes = _Processes(cluster.scheduler_address, workers)

@@ -1,5 +1,4 @@
-"""The server of the page: HTTP for its files and uploads, a websocket for a session; from a free port to Ctrl-C or
-SIGTERM."""
+"""The server of the page: HTTP for its files and uploads, a websocket for a session; from a free port to Ctrl-C."""
 
 from __future__ import annotations
 
@@ -8,9 +7,7 @@ import contextlib
 import errno
 import logging
 import re
-import signal
 import socket
-import sys
 import tempfile
 from collections import ChainMap
 from collections.abc import Callable
@@ -255,7 +252,6 @@ def serve(
     notebook: bool,
 ) -> None:
     """Serve pages, to a notebook if that asks for them, until Ctrl-C; ``ready`` is called with their address."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     engine = Engine(variant, user)
     port = on.getsockname()[1]
     explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])), notebook)

@@ -22,12 +22,16 @@ from .coordinates import spherical, turned_about_normal
 from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
+from .report.counts import census
+from .report.summary import ends
 from .scattered import as_grid
 from .source import Source, batches
 
 PAIRS = 1 << 15
 BAKED_TO = 80
 """The angle, in degrees, up to which a conversion is judged."""
+NEAR_NORMAL = 10
+"""The angle up to which a measurement may leave out the normal, in degrees, without a word."""
 GREY = "What was measured at one wavelength became grey."
 ALIKE = 1e-3
 """By what part of its peak f may change where it counts as the same."""
@@ -45,7 +49,7 @@ class Conversion:
     largest: float
     """The largest error, outside one cell of the peak."""
     losses: tuple[str, ...]
-    """What the file does not hold, a sentence each."""
+    """What the file does not hold, and what it holds that was not measured, a sentence each."""
 
     def __str__(self) -> str:
         error = (
@@ -132,7 +136,7 @@ def _source(given: Any) -> tuple[Source, list[str]]:
     if isinstance(given, (str, Path)):
         given = read(given)
     if isinstance(given, Measurement):
-        return _of_measurement(given), []
+        return _of_measurement(given), list(_not_measured(given))
     probe = _probe(given)
     return _baked(probe), list(_left_out(probe))
 
@@ -142,8 +146,29 @@ def _of_measurement(measurement: Measurement) -> Source:
     if not grid.usable.any():
         raise ValueError(f"{named(measurement.path)} has no positive value: there is nothing to write")
     source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
-    stated = measurement.wavelengths is None or np.isfinite(measurement.wavelengths).all()
-    return source if stated else source.rgb()
+    return source.rgb() if _is_unstated(measurement.wavelengths) else source
+
+
+def _is_unstated(wavelengths: Array | None) -> bool:
+    return wavelengths is not None and not np.isfinite(wavelengths).all()
+
+
+def _not_measured(measurement: Measurement) -> Iterator[str]:
+    """Yield what of a measurement means nothing, or is not there, and is made up."""
+    data, found = measurement.data, census(measurement.data)
+    if found.above.negative and not (isinstance(data, Grid) and data.signed):
+        yield f"{_percent(found.above.negative / found.above.values)} of its values were negative and became 0."
+    if found.above.missing:
+        yield (
+            f"{_percent(found.above.missing / found.above.values)} of its values were missing; they are filled in from "
+            "those around them, with 0 where there are none."
+        )
+    ranges = [("θi", *ends(data, "theta_i", found.theta_i)), ("θo", *ends(data, "theta_o", found.theta_o))]
+    told = [f"{name} {low:.4g} to {high:.4g}°" for name, low, high in ranges if low > NEAR_NORMAL or high < BAKED_TO]
+    if told:
+        yield f"It was measured for {' and '.join(told)}; what lies beyond has the values at the border."
+    if _is_unstated(measurement.wavelengths):
+        yield GREY
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:

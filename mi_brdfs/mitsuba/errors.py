@@ -12,16 +12,17 @@ from .registry import plugin_names
 
 @contextmanager
 def unwrapped_ctrl_c() -> Iterator[None]:
-    """Raise the KeyboardInterrupt that is the cause of another exception: of a RuntimeError if it reaches the Python
-    functions that Dr.Jit and Mitsuba call, of others if it reaches the import of a compiled module."""
+    """Raise the KeyboardInterrupt, or the SystemExit of SIGTERM, that is the cause of another exception: of a
+    RuntimeError if it reaches the Python functions that Dr.Jit and Mitsuba call, of others if it reaches the import of
+    a compiled module."""
     try:
         yield
     except Exception as error:
         cause: BaseException | None = error
-        while cause and not isinstance(cause, KeyboardInterrupt):
+        while cause and not isinstance(cause, (KeyboardInterrupt, SystemExit)):
             cause = cause.__cause__ or cause.__context__
         if cause:
-            raise KeyboardInterrupt from error
+            raise type(cause)(*cause.args) from error
         raise
 
 

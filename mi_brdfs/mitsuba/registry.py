@@ -7,11 +7,8 @@ import importlib
 import json
 import pkgutil
 import re
-import signal
-import threading
 import warnings
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -28,6 +25,7 @@ from ..model import Energy, Model, Plugin, full_name
 from ..models.microfacet import Microfacet
 from ..parameters import published
 from ..parameters.messages import meant
+from ..starting import signals_held
 from ..tabulated.tabulated import Tabulated
 from . import llvm
 from .bsdf import ModelBSDF, variant_class
@@ -275,26 +273,8 @@ def _on_variant(old: str | None, new: str | None) -> None:
         if old is not None:  # as where Mitsuba itself refuses a variant, which it does before it changes
             mi.set_variant(old)
         raise
-    with _ctrl_c_held():
+    with signals_held():  # else half of the plugins would be registered
         _register_for(new)
-
-
-@contextmanager
-def _ctrl_c_held() -> Iterator[None]:
-    """Let Ctrl-C wait until the end: imports that it interrupts print tracebacks, and half of the plugins would be
-    registered."""
-    handler = signal.getsignal(signal.SIGINT)
-    if not callable(handler) or threading.current_thread() is not threading.main_thread():
-        yield  # it does not interrupt
-        return
-    pressed = []
-    signal.signal(signal.SIGINT, lambda *_: pressed.append(True))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-    if pressed:
-        signal.raise_signal(signal.SIGINT)
 
 
 def _register_for(active: str) -> None:

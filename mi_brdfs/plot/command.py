@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -92,5 +93,7 @@ def write(figure: Any, path: Path) -> None:
     if path.suffix.lower() in PAGES:
         page.write(figure, path)
     else:
+        data = BytesIO()  # where a disk is full, writers of formats raise other errors than OSError
+        figure.savefig(data, format=path.suffix[1:].lower(), dpi=DPI)
         with replacing(path) as part:
-            figure.savefig(part, dpi=DPI)
+            part.write_bytes(data.getvalue())
