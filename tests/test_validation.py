@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 import psutil
 import pytest
-from mutants import MUTANTS, TWO, Mutant, changed, lambert, of_others
+from mutants import MUTANTS, TWO, Mutant, changed, diffuse, lambert, of_others
 from support import shared
 from typer.testing import CliRunner
 
@@ -245,6 +245,22 @@ def test_no_false_alarm(name):
     assert not report.failures and report.judged, report
     if name in ALL_PASS:
         assert {finding.verdict for finding in report.findings if finding.subject != "wi and wo"} == {"pass"}, report
+
+
+def halves(wi, wo):
+    return dr.select(wi.x * wo.x > 0, 1, 0.2)
+
+
+def glints(wi, wo):
+    cell = dr.floor(40 * dr.normalize(wi + wo))
+    return dr.select(((mi.Int(cell.x) + mi.Int(cell.y)) & 1) == 0, 1, 0.2)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("pattern", [halves, glints])
+def test_patterns_that_jump_everywhere_do_not_jump_at_the_normal(pattern):
+    (finding,) = check(Mutant("pattern", (), diffuse(pattern)).register(), only="continuity").findings
+    assert finding.verdict == "pass" and "At other directions it jumps, too" in finding.message, finding
 
 
 @pytest.mark.slow
