@@ -10,6 +10,7 @@ from support import ROOT
 from test_cli import interrupted, invoke, run
 
 from mi_brdfs.mitsuba.errors import unwrapped_ctrl_c
+from mi_brdfs.starting import Terminated
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 
@@ -65,7 +66,7 @@ def test_ctrl_c_that_a_kernel_wraps_is_no_failure():
 
         dr.while_loop((mi.UInt(0),), lambda i: i < 3, body)
 
-    for error in KeyboardInterrupt(), SystemExit(143):
+    for error in KeyboardInterrupt(), Terminated(143):
         with pytest.raises(type(error)) as raised, unwrapped_ctrl_c():
             record(error)
         assert raised.value.args == error.args
