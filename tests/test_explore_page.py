@@ -313,6 +313,7 @@ def test_a_notebook_gets_its_page_and_ends_it(address, tmp_path, monkeypatch):
         (["ward", "--environment", "none.exr"], "no such file"),
         (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
+        (["lambert", "--host", "203.0.113.1"], "mi-brdfs: 203.0.113.1 port 0: "),
         (["lambert", "--export", "/dev/full"], "cannot write /dev/full: No space left on device"),
         ([str(ROOT / "scenes" / "catalogue.xml")], "has several materials; name one of"),
     ],
