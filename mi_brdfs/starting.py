@@ -12,6 +12,10 @@ from itertools import pairwise
 from pathlib import Path
 
 
+class Terminated(SystemExit):
+    """SIGTERM was received."""
+
+
 def end_on_ctrl_c() -> None:
     """In the command's process, let Ctrl-C end it in a sentence: the compiled modules that are imported first make any
     exception of it, or none."""
@@ -29,7 +33,7 @@ def raise_on_ctrl_c() -> None:
 
 
 def exit_on_sigterm() -> None:
-    """Let SIGTERM raise SystemExit, so that nothing is left of what is half written."""
+    """Let SIGTERM raise an exception, so that nothing is left of what is half written."""
     if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         signal.signal(signal.SIGTERM, _exit)
 
@@ -57,7 +61,7 @@ def signals_held() -> Iterator[None]:
 
 def _exit(number: int, _: object) -> None:
     signal.signal(number, signal.SIG_IGN)  # `timeout` sends it twice
-    sys.exit(128 + number)
+    raise Terminated(128 + number)
 
 
 def _end(*_: object) -> None:

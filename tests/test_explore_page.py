@@ -355,6 +355,7 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
         (["ward", "--environment", "none.exr"], "no such file"),
         (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
+        (["lambert", "--host", "203.0.113.1"], "mi-brdfs: 203.0.113.1 port 0: "),
         (["lambert", "--export", "/dev/full"], "cannot write /dev/full: No space left on device"),
         ([str(ROOT / "scenes" / "catalogue.xml")], "has several materials; name one of"),
     ],

@@ -112,10 +112,15 @@ def test_a_sweep_tells_of_a_full_disk(tmp_path, monkeypatch):
 
     monkeypatch.setattr(store.parquet, "write_table", write_table)
     done = swept(tmp_path / "made")
-    assert done.exit_code == 1 and done.stderr.splitlines() == [
-        f"mi-brdfs: cannot write to {tmp_path / 'made'}: No space left on device",
-        "0 of 1 fits are finished; the same command tries the others again.",
-    ]
+    assert (
+        done.exit_code == 1
+        and done.stdout == ""
+        and done.stderr.splitlines()
+        == [
+            f"mi-brdfs: cannot write to {tmp_path / 'made'}: No space left on device",
+            "0 of 1 fits are finished; the same command tries the others again.",
+        ]
+    )
     assert not list((tmp_path / "made" / "results").iterdir())
 
 

@@ -10,6 +10,7 @@ from support import ROOT
 from test_cli import interrupted, invoke, run
 
 from mi_brdfs.mitsuba.errors import unwrapped_ctrl_c
+from mi_brdfs.starting import Terminated
 
 LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 
@@ -56,6 +57,14 @@ def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
+def test_earlier_fits_stay_where_nothing_is_fitted(tmp_path):
+    (tmp_path / "fits.json").write_text("before")
+    (tmp_path / "bad.bsdf").touch()
+    done = invoke("fit", "bad.bsdf", "--model", "lambert", "--json", "fits.json", cwd=tmp_path)
+    assert done.exit_code == 1 and (tmp_path / "fits.json").read_text() == "before"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
 def test_ctrl_c_that_a_kernel_wraps_is_no_failure():
     """Dr.Jit makes a RuntimeError of all that Python functions raise while it records them."""
 
@@ -65,7 +74,7 @@ def test_ctrl_c_that_a_kernel_wraps_is_no_failure():
 
         dr.while_loop((mi.UInt(0),), lambda i: i < 3, body)
 
-    for error in KeyboardInterrupt(), SystemExit(143):
+    for error in KeyboardInterrupt(), Terminated(143):
         with pytest.raises(type(error)) as raised, unwrapped_ctrl_c():
             record(error)
         assert raised.value.args == error.args

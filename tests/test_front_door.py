@@ -237,6 +237,7 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     [
         (None, "--import guest.py: no such file"),
         ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model, nor a term"),
+        ("import sys\nsys.exit(7)", "--import guest.py: line 2: SystemExit: 7"),
         ("\n1 / 0", "--import guest.py: line 2: ZeroDivisionError: division by zero"),
         ("def f(:", "--import guest.py: line 1: invalid syntax"),
         (GUEST.replace("Chalk(", "Ward("), 'the name "ward" belongs to mi_brdfs.models.ward.Ward'),

@@ -1,6 +1,8 @@
 """The gallery: its sweeps, what it writes, and the pictures in the documentation."""
 
+import errno
 import html
+import os
 import re
 import signal
 import subprocess
@@ -301,6 +303,22 @@ def test_an_error_is_one_line(folder, arguments, status, text):
     assert done.exit_code == status and done.stdout == ""
     assert done.stderr.startswith(f"mi-brdfs: {text}") and done.stderr.count("\n") == 1
     assert [path.name for path in folder.iterdir()] == ["taken"]
+
+
+def test_a_picture_has_a_largest_size():
+    done = run("ward", "--size", 99999999)
+    assert done.exit_code == 2 and "16384" in done.stderr
+
+
+def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, monkeypatch):
+    def refused(dir):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr("mi_brdfs.gallery.TemporaryFile", refused)
+    monkeypatch.setattr("mi_brdfs.gallery.shot", lambda *_: pytest.fail("it renders"))
+    done = run("ward", "-o", "made")
+    assert done.exit_code == 1
+    assert done.stderr == "mi-brdfs: cannot write to the folder made: Read-only file system\n"
 
 
 @pytest.mark.parametrize("package", ["PIL", "mitsuba_oidn", "jinja2"])

@@ -70,6 +70,8 @@ def test_the_result_is_exactly_the_sum_of_the_raw_passes(variant, monkeypatch):
         integrator.seeds, integrator.counts = [], []
         render(given, spp=sum(counts))
         assert integrator.counts == counts
+    sizes, total = module._pass_sizes(sensors[0].sampler(), 9 * 10**12 + 1, 4)
+    assert total == 9 * 10**12 + 1 and next(iter(sizes)) == 4  # without a list of them
 
 
 def test_passes_agree_with_one_render_of_the_same_total(variant):

@@ -276,6 +276,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
         (("--seed", "1;2"), 2, "--seed 1;2: write whole numbers, 0 or larger, as in 0,1,2"),
         (("--table", "html"), 2, "--table html: there is no such table; there are md, csv"),
         (("--workers", 2, "--scheduler", "tcp://here:1"), 2, "give --workers or --scheduler; "),
+        (("--scheduler", ""), 2, "--scheduler: give the address of one, tcp://HOST:PORT"),
         (("--variant", "scalar_rgb"), 2, "this needs a vectorized and unpolarized variant, not scalar_rgb"),
         (("nowhere.bsdf",), 1, "nowhere.bsdf: No such file or directory."),
     ],

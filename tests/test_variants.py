@@ -199,7 +199,7 @@ def there_and_back(variants):
 
 
 @pytest.mark.usefixtures("ctrl_c")
-@pytest.mark.parametrize("sent, raised", [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)])
+@pytest.mark.parametrize("sent, raised", [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, starting.Terminated)])
 def test_signals_wait_until_all_plugins_are_registered(sent, raised, monkeypatch):
     register, registered = registry._register_for, []
 

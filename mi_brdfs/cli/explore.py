@@ -54,7 +54,7 @@ def explore(
         fail(f"--environment {environment}: no such file", Exit.USAGE)
     chosen = set_tracing_variant(variant, "_rgb")
 
-    from ..explorer.server import listening, serve
+    from ..explorer.server import PortError, listening, serve
     from ..explorer.stages import UserScene
 
     file, _, material = (scene or "").partition(".xml:")
@@ -67,7 +67,7 @@ def explore(
     if export:
         _export(export, user, sources, state)
         return
-    with failing(Exit.USAGE, about="--port"):
+    with failing(Exit.USAGE, PortError):
         on = listening(host, port)
 
     def ready(address: str) -> None:

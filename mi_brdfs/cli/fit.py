@@ -105,7 +105,8 @@ def fit_(
         print_ranking(own)
     if len(ranked) > 1 and len(names) > 1:
         print_medians(ranked)
-    write_json(json_file, [it.to_dict() for own in ranked for it in own])
+    if fits:
+        write_json(json_file, [it.to_dict() for own in ranked for it in own])
     finished = len({(it.file, it.bsdf["type"]) for it in fits})
     interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(names)} fits were finished."
     if complete and not seen:

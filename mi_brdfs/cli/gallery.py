@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import AnyVariant, set_variant
+from .options import MOST_PIXELS, AnyVariant, set_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
@@ -24,7 +24,9 @@ def gallery(
     spp: Annotated[
         int, typer.Option(min=1, help="Samples per pixel, rounded up to a power of 4; the pictures are denoised.")
     ] = 16,
-    size: Annotated[int, typer.Option(min=16, help="Width and height of each picture, in pixels.")] = 256,
+    size: Annotated[
+        int, typer.Option(min=16, max=MOST_PIXELS, help="Width and height of each picture, in pixels.")
+    ] = 256,
     presets: Annotated[
         bool, typer.Option("--presets", help="Also render each model's published materials: TYPE_presets.jpg.")
     ] = False,

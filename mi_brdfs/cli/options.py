@@ -37,6 +37,18 @@ def file_option(name: str, help: str, metavar: str = "FILE") -> Any:
     return typer.Option(*names, metavar=metavar, help=help, callback=checked)
 
 
+def scheduler_option(doing: str) -> Any:
+    """Return an option for the address of a Dask scheduler."""
+
+    def checked(address: str | None) -> str | None:
+        if address == "":
+            fail("--scheduler: give the address of one, tcp://HOST:PORT", Exit.USAGE)
+        return address
+
+    help = f"{doing} on the workers of a Dask scheduler, tcp://HOST:PORT."
+    return typer.Option(metavar="ADDRESS", help=help, callback=checked)
+
+
 Parameters = Annotated[
     list[str] | None,
     parameters_option(
@@ -55,6 +67,8 @@ TracingVariant = Annotated[
     str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
 ]
 """The option --variant of commands that measure."""
+MOST_PIXELS = 16384
+"""The largest width and height of a picture."""
 KINDS = {
     "": "a vectorized and unpolarized variant",
     "_rgb": "an rgb variant",

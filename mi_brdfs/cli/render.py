@@ -10,7 +10,7 @@ import typer
 
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
-from .options import AnyVariant, parameters_of, parameters_option, set_variant
+from .options import AnyVariant, parameters_of, parameters_option, scheduler_option, set_variant
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing
 
@@ -36,10 +36,7 @@ def render(
         int | None,
         typer.Option(metavar="N", min=1, help="Render with N processes of one thread each, on this machine."),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Render on the workers of a Dask scheduler, tcp://HOST:PORT."),
-    ] = None,
+    scheduler: Annotated[str | None, scheduler_option("Render")] = None,
 ) -> None:
     """Render a scene progressively; Ctrl-C keeps the finished passes."""
     if workers and scheduler:

@@ -11,7 +11,7 @@ import typer
 
 from ..preview import STAGES, preview_scene
 from .app import command
-from .options import AnyVariant, Parameters, parameters_of, set_variant, source_of
+from .options import MOST_PIXELS, AnyVariant, Parameters, parameters_of, set_variant, source_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing
 
@@ -28,7 +28,9 @@ def show(
     parameters: Parameters = None,
     stage: Annotated[str, typer.Option(metavar="STAGE", help=f"The light: {', '.join(STAGES)}.")] = "studio",
     output: Output = None,
-    size: Annotated[int, typer.Option(min=16, help="Width and height of the picture, in pixels.")] = 512,
+    size: Annotated[
+        int, typer.Option(min=16, max=MOST_PIXELS, help="Width and height of the picture, in pixels.")
+    ] = 512,
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: 128, or as --time says.")] = None,
     seconds: Seconds = None,
     denoise: Denoise = False,

@@ -14,7 +14,7 @@ import typer
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
 from .fit import Cut, Files, Models, Starts
-from .options import TracingVariant, set_tracing_variant
+from .options import TracingVariant, scheduler_option, set_tracing_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
@@ -41,9 +41,7 @@ def sweep(
     workers: Annotated[
         int | None, typer.Option(min=0, help="Processes; 0 for none but this. Default: one for each core, up to 8.")
     ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Fit on the workers of a Dask scheduler, tcp://HOST:PORT.")
-    ] = None,
+    scheduler: Annotated[str | None, scheduler_option("Fit")] = None,
     render: Annotated[
         bool, typer.Option("--render", help="Also render the materials and their fits: wall_METRIC.jpg.")
     ] = False,
@@ -95,11 +93,9 @@ def sweep(
             err.print(f"mi-brdfs: {errors[-1]}")
         except KeyboardInterrupt:
             complete = False
-    if table == "csv":
-        for line in csv(plan.rows()):
+    if plan.finished():
+        for line in csv(plan.rows()) if table == "csv" else [medians(plan.rows(MEDIANS))]:
             out.print(line)
-    else:
-        out.print(medians(plan.rows(MEDIANS)))
     kept = f"{plan.finished()} of {plan.total} fits" + (
         f" and {wall.finished()} of {wall.total} pictures" if wall else ""
     )

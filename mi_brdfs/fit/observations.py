@@ -92,9 +92,12 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
     lowest = math.cos(math.radians(cut))
     if not np.any((wi[:, 2] > 0) & (wo[:, 2] > 0)):
         raise FitError(f"{name}: no pair of directions has both above the horizon.")
-    kept = np.flatnonzero((wi[:, 2] >= lowest) & (wo[:, 2] >= lowest) & (solid_angle > 0))
-    if not len(kept):
+    within = (wi[:, 2] >= lowest) & (wo[:, 2] >= lowest)
+    if not within.any():
         raise FitError(f"{name}: all pairs of directions are beyond the cut at {cut:g}°; give a larger one.")
+    kept = np.flatnonzero(within & (solid_angle > 0))
+    if not len(kept):
+        raise FitError(f"{name}: its pairs of directions within the cut at {cut:g}° cover no solid angle.")
     kept = rng.permutation(kept)[:pairs]
     wi, wo, f, solid_angle = wi[kept], wo[kept], f[kept], solid_angle[kept]
     missing = ~np.isfinite(f)

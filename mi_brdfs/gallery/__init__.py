@@ -14,6 +14,7 @@ import os
 from collections.abc import Callable, Iterable
 from itertools import groupby, islice
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NamedTuple
 
 import mitsuba as mi
@@ -77,6 +78,7 @@ def gallery(
     entries = [Entry(model, with_presets) for model in by_family(find_models(types))]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    TemporaryFile(dir=folder).close()  # or the error comes before the pictures
     done, total = 0, sum(len(entry.bsdfs) + len(entry.presets) for entry in entries)
     try:
         for entry in entries:

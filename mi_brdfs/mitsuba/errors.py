@@ -7,19 +7,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ..parameters.messages import brief, meant, printable
+from ..starting import Terminated
 from .registry import plugin_names
 
 
 @contextmanager
 def unwrapped_ctrl_c() -> Iterator[None]:
-    """Raise the KeyboardInterrupt, or the SystemExit of SIGTERM, that is the cause of another exception: of a
+    """Raise the KeyboardInterrupt, or the exception of SIGTERM, that is the cause of another exception: of a
     RuntimeError if it reaches the Python functions that Dr.Jit and Mitsuba call, of others if it reaches the import of
     a compiled module."""
     try:
         yield
     except Exception as error:
         cause: BaseException | None = error
-        while cause and not isinstance(cause, (KeyboardInterrupt, SystemExit)):
+        while cause and not isinstance(cause, (KeyboardInterrupt, Terminated)):
             cause = cause.__cause__ or cause.__context__
         if cause:
             raise type(cause)(*cause.args) from error

@@ -14,6 +14,7 @@ from typing import Any
 
 from ..microfacet.terms import Term
 from ..model import Model
+from ..starting import Terminated
 from .registry import all_models, brought_terms, is_own, models_in, register, terms_in
 
 ENTRY_POINTS = "mi_brdfs.models"
@@ -48,7 +49,9 @@ def import_models(target: str) -> None:
         raise ImportError("no such file")
     try:
         module = _of_file(path) if path else importlib.import_module(target)
-    except Exception as error:
+    except Terminated:
+        raise
+    except (Exception, SystemExit) as error:
         raise ImportError(_sentence(error, path)) from None
     found = _brought_by(module)
     if not found:
@@ -86,7 +89,7 @@ def _of_file(path: Path) -> ModuleType:
     return module
 
 
-def _sentence(error: Exception, path: Path | None = None) -> str:
+def _sentence(error: BaseException, path: Path | None = None) -> str:
     """Return what went wrong, and in which line of a file."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if path and Path(frame.filename).resolve() == path.resolve()]

@@ -92,8 +92,7 @@ def render(
         if seconds is not None and spp is None:
             counts, total = itertools.repeat(_rounded(sampler, _power_of_2(limit))), None
         else:
-            counts = _pass_sizes(sampler, spp or own_count, limit)
-            total = sum(counts)
+            counts, total = _pass_sizes(sampler, spp or own_count, limit)
         done, raw, start = 0, 0, time.perf_counter()
         ahead, behind = itertools.tee(counts)
         jobs = ((_pass_seed(seed, index), count) for index, count in enumerate(ahead))
@@ -194,13 +193,13 @@ def _pixel_count(film: mi.Film, particles: bool) -> int:
     return int(np.prod(np.array(film.crop_size()) + border))
 
 
-def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> list[int]:
-    """Return the samples per pixel of each pass: powers of two up to ``limit`` and a rest, rounded as the sampler
-    does."""
+def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> tuple[Iterable[int], int]:
+    """Return the samples per pixel of each pass, powers of two up to ``limit`` and a rest, rounded as the sampler does,
+    and their sum."""
     full = _rounded(sampler, min(spp, _power_of_2(limit)))
-    sizes = [full] * (spp // full)
-    rest = spp - sum(sizes)
-    return [*sizes, _rounded(sampler, rest)] if rest else sizes
+    count, rest = divmod(spp, full)
+    last = [_rounded(sampler, rest)] if rest else []
+    return itertools.chain(itertools.repeat(full, count), last), count * full + sum(last)
 
 
 def _power_of_2(limit: int) -> int:
