@@ -21,8 +21,10 @@ def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
     given as rgb: Mitsuba stores the coefficients of a spectrum there, which have no range.
 
     Raises:
-        ValueError: if the BSDF is not from this package.
+        ValueError: if the BSDF is not from this package, or none of the active variant.
     """
+    if not isinstance(bsdf, mi.BSDF):
+        raise ValueError(f"{type(bsdf).__name__} is not a BSDF of {mi.variant()}; give a loaded BSDF.")
     if not _is_ours(bsdf):
         raise ValueError(f"{bsdf.class_name()} declares no ranges: it is not a BSDF of mi_brdfs.")
     return dict(_ranges(mi.traverse(bsdf)))
@@ -41,7 +43,14 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
         params: what ``mi.traverse`` returned for a scene, a shape or a BSDF.
         optimizer: an optimizer such as ``mi.ad.Adam``, with variables named like the parameters. With it, only these
             are projected.
+
+    Raises:
+        ValueError: if these are no such parameters, or those of another variant than the active one.
     """
+    if not isinstance(params, mi.SceneParameters):
+        raise ValueError(f"{type(params).__name__} holds no parameters; give what mitsuba.traverse returns for it.")
+    if any(hasattr(node, "model") and hasattr(node, "eval_pdf") and not _is_ours(node) for node in params.hierarchy):
+        raise ValueError(f"These parameters are not of {mi.variant()}; activate the variant that they were loaded in.")
     source = params if optimizer is None else optimizer
     inside = {key: _projected(source[key], limits) for key, limits in _ranges(params) if key in source}
     if optimizer is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import uuid
 from collections.abc import Iterator
@@ -18,6 +19,8 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
         yield path
         return
     target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "There is no folder", str(target.parent))
     part = target.with_name(f".{uuid.uuid4().hex}{target.suffix}")
     try:
         yield part

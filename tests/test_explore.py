@@ -138,6 +138,11 @@ def test_no_type_or_word_of_a_page_reads_a_file(llvm_rgb):
         pass
 
 
+def test_a_colour_in_place_of_a_word_is_told(client):
+    (told,) = of(client.show({"type": "ward", "variant": [1, 1, 1]}, views=[]), "subject")
+    assert told["error"].startswith("ward: variant ")
+
+
 # --- Subjects ---------------------------------------------------------------------------------------------------------
 
 

@@ -126,6 +126,11 @@ def test_what_cannot_be_is_refused(tmp_path, given, name, words):
     assert [path.name for path in tmp_path.iterdir()] == ["folder.binary"]
 
 
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=f"There is no folder: '{tmp_path}/none'$"):
+        convert({"type": "lambert"}, tmp_path / "none" / "x.binary")
+
+
 def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(tmp_path, monkeypatch):
     path = tmp_path / "x.binary"
     convert({"type": "lambert"}, path)

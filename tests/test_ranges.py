@@ -51,6 +51,20 @@ def test_ranges_by_traverse_key(variant):
         mi_brdfs.ranges(mi.load_dict({"type": "diffuse"}))
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_what_has_no_ranges_is_told():
+    with mi.variant_context("scalar_rgb"):
+        other = mi.load_dict({"type": "ward"})
+        params = mi.traverse(other)
+    for given, kind in ({"type": "ward"}, "dict"), (None, "NoneType"), (other, "Ward"):
+        with pytest.raises(ValueError, match=f"{kind} is not a BSDF of llvm_ad_rgb; give a loaded BSDF"):
+            mi_brdfs.ranges(given)
+    with pytest.raises(ValueError, match=r"Scene holds no parameters; give what mitsuba\.traverse"):
+        mi_brdfs.project(mi.load_dict({"type": "scene"}))
+    with pytest.raises(ValueError, match="not of llvm_ad_rgb; activate the variant that they were loaded in"):
+        mi_brdfs.project(params)
+
+
 def test_coefficients_of_spectra_have_no_range():
     """They may be anything; numbers and measured spectra have their range in spectral variants, too."""
     red = {"type": "rgb", "value": [0.9, 0.1, 0.1]}

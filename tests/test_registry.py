@@ -99,3 +99,11 @@ def test_examples_on_the_manual_pages_load(name):
     given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
     with mi.variant_context("scalar_rgb"):
         assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
+
+
+@pytest.mark.parametrize("brought", [mi_brdfs.Model, int, None])
+def test_only_subclasses_are_registered(brought):
+    known = mi_brdfs.list_models()
+    with pytest.raises(TypeError, match=r"register takes a subclass of mi_brdfs\.Model, or of a term"):
+        mi_brdfs.register(brought)
+    assert mi_brdfs.list_models() == known

@@ -58,7 +58,8 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
         elif parameter.words:
             yield _choice(parameter.names[0], parameter.text, tuple(parameter.words), bsdf, group, parameter.names[1:])
             word = bsdf.get(parameter.names[0], next(iter(parameter.words)))
-            yield from _controls(parameter.words.get(word, {}).values(), bsdf, group)
+            own = parameter.words.get(word, {}) if isinstance(word, str) else {}
+            yield from _controls(own.values(), bsdf, group)
         elif parameter.tried:
             control = _choice(parameter.names[0], parameter.text, parameter.tried, bsdf, group)
             yield control | {"value": bsdf.get(parameter.names[0]), "default": None, "optional": True}

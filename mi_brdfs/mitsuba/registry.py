@@ -67,7 +67,7 @@ def register(brought: Registered, *, replace: bool = False) -> Registered:
         TypeError: if it is not such a class.
         ValueError: if a name is taken or invalid, or a model has no docstring.
     """
-    if isinstance(brought, type) and issubclass(brought, Model):
+    if isinstance(brought, type) and issubclass(brought, Model) and brought is not Model:
         _register_model(brought, replace)
     elif isinstance(brought, type) and issubclass(brought, (Distribution, Shadowing, Fresnel)):
         _register_term(brought, replace)

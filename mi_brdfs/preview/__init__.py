@@ -8,8 +8,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ..given import check_given, described, load_described
 from ..parameters.messages import listed
-from ..probe.sources import check_given, described, load_described
 from .body import CENTRE, turned_body
 from .studio import environment
 

@@ -134,7 +134,7 @@ def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, A
         missed = np.where(peaks > 2 * highest.max(axis=1), count * peaks * 2 * np.pi**2 * 4.0**-level, 0)
         share = len(pilot) * precise
         surplus = abs(held - share)
-        split |= (missed > 1) | (surplus > 3 * np.sqrt(share + 1) + 2)
+        split |= (missed > 1) | (surplus > 3 * np.sqrt(np.maximum(share, 0) + 1) + 2)
         if split.sum() > MOST:  # singular along a line, or wrong everywhere
             urgency = split * np.maximum(np.maximum(error, missed), surplus)
             split &= urgency >= np.partition(urgency, -MOST)[-MOST]

@@ -11,10 +11,11 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ..given import check_given, described, load_described
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.bsdf import BSDFProbe
 from ..probe.directions import angles_of, scattered
-from ..probe.sources import check_given, described, load_described, name_of
+from ..probe.sources import name_of
 from ..probe.variates import random
 from ..variants import activated, is_measurable
 from . import components, contract, derivatives, energy, polarization, sampling, spectral, textures, updates, values

@@ -1,0 +1,64 @@
+"""BSDFs as functions take them: a plugin dict, a word or a loaded BSDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mitsuba as mi
+
+from .mitsuba.errors import one_line
+from .probe.bsdf import load
+from .probe.sources import find_sources
+
+
+def check_given(bsdf: Any) -> None:
+    """Raise a ValueError unless something is a plugin dict, a word or a loaded BSDF."""
+    # Without a variant there is no mi.BSDF yet.
+    is_object = hasattr(bsdf, "eval_pdf")
+    if not (is_object or isinstance(bsdf, str) or (isinstance(bsdf, dict) and isinstance(bsdf.get("type"), str))):
+        raise ValueError(
+            f"{bsdf!r} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a loaded BSDF."
+        )
+
+
+def described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF:
+    """Return the only BSDF that a word stands for, and anything else as it is.
+
+    Raises:
+        ValueError: if it stands for none or for several, or what Mitsuba says where it cannot be loaded.
+    """
+    if not isinstance(bsdf, str):
+        return bsdf
+    with _as_value_error():
+        sources = list(find_sources(bsdf))
+        if len(sources) > 1:
+            raise ValueError(f"{bsdf} has {len(sources)} materials; name one of them, such as {sources[0].word}.")
+        return sources[0].load()
+
+
+def load_described(bsdf: dict[str, Any] | mi.BSDF) -> mi.BSDF:
+    """Return a BSDF that is given as a dict, which may be loaded again, or loaded.
+
+    Raises:
+        ValueError: if it is none of the active variant, or what Mitsuba says where it cannot be loaded.
+    """
+    if isinstance(bsdf, dict):
+        with _as_value_error():
+            loaded = load(bsdf)
+    else:
+        loaded = bsdf
+    if not isinstance(loaded, mi.BSDF):
+        kind = bsdf["type"] if isinstance(bsdf, dict) else type(bsdf).__name__
+        raise ValueError(f"{kind} is not a BSDF of {mi.variant()}.")
+    return loaded
+
+
+@contextmanager
+def _as_value_error() -> Iterator[None]:
+    """Raise what Mitsuba says as a ValueError, in one line."""
+    try:
+        yield
+    except (RuntimeError, TypeError) as error:
+        raise ValueError(one_line(error)) from error
