@@ -98,7 +98,8 @@ def write(path: Path, source: Source) -> None:
         fine = np.append(np.arange(0, 90, 2.5), 89)
         angles = theta, fine, np.append(np.arange(0, 140, 10.0), np.arange(140, 181, 2.5)), np.zeros(1)
     source.check_size(math.prod(map(len, angles)), MOST_VALUES)
-    names = "rgb" if source.wavelengths is None else [f"{w:.10g}nm" for w in source.wavelengths]
+    known = source.wavelengths is None or np.all(np.isfinite(source.wavelengths))
+    names = ["f"] if not known else "rgb" if source.wavelengths is None else [f"{w:.10g}nm" for w in source.wavelengths]
     with path.open("w", encoding="utf-8") as file:
         file.write("# quantity: f\n")
         if source.material:
