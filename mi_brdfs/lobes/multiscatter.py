@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..math import EPSILON, Spectrum, expm1, log1p, safe_sqrt
-from ..microfacet.escape import Escape, Walks, textures
+from ..microfacet.escape import Escape, MeanEscape, Walks, textures
 from ..microfacet.shadowing import Smith
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
@@ -33,13 +33,13 @@ class MultipleScattering(Lobe):
         self.b = self.GRAZING * lost * dr.sqrt(lost)
         self.norm = log1p(dr.rcp(self.b))
 
-    def colour(self, i: Escape, o: Escape) -> Spectrum:
-        """Return C for what becomes of light from both directions; it is 1 if F is."""
+    def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
+        """Return C for what becomes of light from both directions, or of the mean one; it is 1 if F is."""
         raise NotImplementedError(f"{type(self).__name__} does not define colour.")
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
-        i, typical = self.walks.of(wi), Escape(self.mean.lost, self.mean.second, self.mean.schlick, self.mean.dip)
-        return self.reflectance * self.colour(i, typical) * i.lost
+        i = self.walks.of(wi)
+        return self.reflectance * self.colour(i, self.mean) * i.lost
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         i, o = self.walks.of(wi), self.walks.of(wo)
@@ -62,7 +62,7 @@ class WalkLobe(MultipleScattering):
     p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk.
     """
 
-    def colour(self, i: Escape, o: Escape) -> Spectrum:
+    def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
         second, between = dr.clip(i.second + o.second - self.mean.second, 0, 1), self._reflectance(self.mean)
         later = between * self.mean.third / (1 - between * (1 - self.mean.third))
         return self._reflectance(i) * self._reflectance(o) * (second + (1 - second) * later)
@@ -75,7 +75,7 @@ class KullaContyLobe(MultipleScattering):
     """Kulla and Conty's colour, a geometric series in the means F̄ = 2 ∫ F cosθ dcosθ and Ē:
     C = F̄² Ē / (1 - F̄ (1 - Ē))."""
 
-    def colour(self, i: Escape, o: Escape) -> Spectrum:
+    def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
         mean, lost = self.fresnel.mean(1 / 21, 1 / 126), self.mean.lost
         return mean * mean * (1 - lost) / (1 - mean * lost)
 

@@ -27,8 +27,6 @@ from .shadowing import Smith
 FILE = Path(__file__).with_name("escape.npz")
 ROUGHEST = 3.2
 """The largest tabulated α: that of Burley's most anisotropic facets."""
-
-
 UPRIGHT = 1e-3
 """The sin²θ below which the azimuth counts less and less: what is tabulated changes little with it there."""
 
