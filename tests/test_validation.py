@@ -174,6 +174,10 @@ FALSE_ALARMS = {
         ["gradients"],
     ),
     "turns that float32 hardly knows": ({"type": "ward", "rotation": 1e4, "alpha_v": 0.01}, ["gradients"]),
+    "beyond what a choice leaves of a range": (
+        {"type": "cooktorrance", "distribution": "blinn", "alpha": 1.5},
+        ["gradients"],
+    ),
     "narrow along and across": ({"type": "walter", "alpha_u": 0.0041, "alpha_v": 0.00035}, NARROW),
     "diffuse lobe beside facets": ({"type": "walter", "diffuse_reflectance": 0.9, "f0": 0.9}, ["albedo"]),
     "texels beyond a limit": (

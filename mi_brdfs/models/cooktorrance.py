@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 import drjit as dr
+import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
-from ..math import clamp
 from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
 from ..microfacet.shadowing import VCavity
 from ..model import Model, Values
@@ -59,10 +59,14 @@ class CookTorrance(Model):
     normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
     preset = Preset()
 
+    def __init__(self, props: mi.Properties) -> None:
+        super().__init__(props)
+        if self.distribution == "blinn":
+            self.ranges["alpha"] = self.parameters["alpha"].ranges["alpha"] = (1e-4, 1)
+
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         α = p.alpha
         if self.distribution == "blinn":
-            α = clamp(α, 1e-4, 1)
             distribution: Distribution = Blinn(2 / dr.square(α) - 2)
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)

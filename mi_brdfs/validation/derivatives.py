@@ -92,9 +92,10 @@ def gradients(run: Run) -> Findings:
                 size = min(size, 1)  # many turns are as few
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
-            candidates = [(0, 1), (0, 0.1), (0, 0.01), (10 * step, 1), (-10 * step, 1)]
-            # At the end of a range, the derivative that leads an optimiser inwards need not be that of the values.
             least, most = (float(extreme(np.array(original))) for extreme in (np.min, np.max))
+            into = min(highest - most, 0) + max(lowest - least, 0)
+            candidates = [(into, 1), (into, 0.1), (into, 0.01), (into + 10 * step, 1), (into - 10 * step, 1)]
+            # At the end of a range, the derivative that leads an optimiser inwards need not be that of the values.
             inner = [each for each in candidates if lowest < least + each[0] and most + each[0] < highest]
             for shift, part_of in inner or candidates:
                 set_value(params, key, original + shift)
