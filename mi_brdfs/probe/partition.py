@@ -40,19 +40,30 @@ class Partition:
     y: Array
     """The place of each cell in the grid of its level."""
     integrals: Array
+    errors: Array
+    """How far these were off with fewer nodes, or what they may miss of a line that none of the nodes is on."""
 
     def refined(self, density: Callable[[Array], Array], cells: Array) -> Partition:
         """Return it with the integrals over some cells by far more nodes: those of Gauss's rule see a jump or a line
         across a cell to a tenth of it only."""
-        fine = (np.arange(FINE) + 0.5) / FINE
+        coarse, fine = (self._means(density, cells, count) for count in (FINE // 2, FINE))
+        integrals, errors = self.integrals.copy(), self.errors.copy()
+        integrals[cells], errors[cells] = fine, abs(fine - coarse)
+        return replace(self, integrals=integrals, errors=errors)
+
+    def _means(self, density: Callable[[Array], Array], cells: Array, count: int) -> Array:
+        """Return the integrals over some cells by the mean of so many nodes along each side."""
+        nodes = (np.arange(count) + 0.5) / count
         size = 2.0 ** -self.level[cells]
-        px = (self.x[cells, None, None] + fine[:, None] + 0 * fine) * size[:, None, None]
-        py = (self.y[cells, None, None] + fine + 0 * fine[:, None]) * size[:, None, None]
+        px = (self.x[cells, None, None] + nodes[:, None] + 0 * nodes) * size[:, None, None]
+        py = (self.y[cells, None, None] + nodes + 0 * nodes[:, None]) * size[:, None, None]
         w, jacobian = _to_sphere(np.stack([px.ravel(), py.ravel()], axis=-1), self.axis)
-        values = (density(w.astype(np.float32)) * jacobian).reshape(len(cells), -1)
-        integrals = self.integrals.copy()
-        integrals[cells] = values.mean(axis=1) * size * size
-        return replace(self, integrals=integrals)
+        return (density(w.astype(np.float32)) * jacobian).reshape(len(cells), -1).mean(axis=1) * size * size
+
+    def only(self, cells: Array) -> Partition:
+        """Return some of its cells, which cover less than the sphere."""
+        fields = ("starts", "level", "x", "y", "integrals", "errors")
+        return replace(self, **{name: getattr(self, name)[cells] for name in fields})
 
     def histogram(self, w: Array) -> Array:
         """Count the directions in each cell."""
@@ -140,15 +151,17 @@ def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, A
             split &= urgency >= np.partition(urgency, -MOST)[-MOST]
         if level == LAST_LEVEL:
             split[:] = False
-        done.append((np.full((~split).sum(), level), x[~split], y[~split], precise[~split]))
+        whole = ~split
+        doubt = np.maximum(error, missed) / count
+        done.append((np.full(whole.sum(), level), *(field[whole] for field in (x, y, precise, doubt))))
         x, y, integrals = qx[split].ravel(), qy[split].ravel(), parts[split].ravel()
         if not len(x):
             break
-    levels, x, y, integrals = (np.concatenate(column) for column in zip(*done, strict=True))
+    levels, x, y, integrals, errors = (np.concatenate(column) for column in zip(*done, strict=True))
     shift = LAST_LEVEL - levels
     starts = _interleaved(x << shift, y << shift)
     order = np.argsort(starts)
-    return Partition(axis, starts[order], levels[order], x[order], y[order], integrals[order])
+    return Partition(axis, starts[order], *(field[order] for field in (levels, x, y, integrals, errors)))
 
 
 def _slots(points: Array, x: Array, y: Array, level: int) -> tuple[Array, Array]:

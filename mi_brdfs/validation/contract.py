@@ -11,7 +11,7 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
-from ..probe.directions import hemisphere, on_side, scattered
+from ..probe.directions import angles_of, hemisphere, on_side, scattered
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative, told
 from .report import Finding
@@ -180,7 +180,8 @@ def recorded(run: Run) -> Findings:
 
 
 def null(run: Run) -> Findings:
-    """Check that ``eval_null_transmission``, by which shadow rays go through, is what ``sample`` sends straight on."""
+    """Check that samples of type Null go straight on, and that ``eval_null_transmission``, by which shadow rays go
+    through, is their weight."""
     probe, part = run.probe, run.probe.whole
     if not int(probe.bsdf.flags()) & int(mi.BSDFFlags.Null):
         yield Finding("null", part.name, "skip", "Nothing goes straight through.")
@@ -189,7 +190,17 @@ def null(run: Run) -> Findings:
     for incident in run.incidents(part):
         si = interaction(np.tile(incident.wi, (len(u), 1)))
         bs, weight = probe.bsdf.sample(mi.BSDFContext(), si, *sample_arguments(u), True)
-        weight = dr.select((bs.sampled_type & int(mi.BSDFFlags.Null)) != 0, weight, 0)
+        through = (bs.sampled_type & int(mi.BSDFFlags.Null)) != 0
+        weight = dr.select(through, weight, 0)
+        bent = numbers(dr.select(through, dr.norm(bs.wo + si.wi), 0), len(u)).ravel()
+        if bent.max() > 1e-3:
+            wo = np.stack([numbers(x, len(u)).ravel() for x in bs.wo])[:, np.argmax(bent)]
+            outcome.fault(
+                f"samples of type Null go to {angles_of(wo)} for light from {incident.name}, and not straight on",
+                float(bent.max()),
+                wi=incident.wi,
+                seed=75,
+            )
         got = numbers(probe.bsdf.eval_null_transmission(si, True), len(u))[0]
         each = numbers(weight, len(u))
         # Six standard errors: a false alarm once in 1e8.

@@ -33,7 +33,9 @@ def chi2(run: Run) -> Findings:
                     wi=trial.incident.wi,
                     seed=trial.seed,
                 )
-        yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}.")
+        left_out = max(trial.left_out for trial in own)
+        aside = f"; up to {left_out:.0%} of the samples lie in lines too narrow to be integrated" * (left_out > 0.01)
+        yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}{aside}.")
 
 
 def pdf(run: Run) -> Findings:
@@ -47,8 +49,8 @@ def pdf(run: Run) -> Findings:
         for trial in run.trials(part):
             name = trial.incident.name
             noise = sqrt(max(trial.share * (1 - trial.share), 1 / trial.count) / trial.count)
-            excess = max(abs(trial.integral - trial.share) - 1e-3, 0) / noise
-            largest = max(largest, abs(trial.integral - trial.share))
+            excess = max(trial.mismatch - 1e-3, 0) / noise
+            largest = max(largest, trial.mismatch)
             outcome.data[name] = {"integral": trial.integral, "drawn": trial.share}
             if not erfc(excess / sqrt(2)) >= run.level:
                 outcome.fault(

@@ -46,6 +46,10 @@ class Trial:
     """How many samples there are."""
     seed: int = 0
     """That of their variates."""
+    left_out: float = 0
+    """The part of the samples in cells that do not count, as the integrals over them are not precise."""
+    doubt: float = 0
+    """How far the other integrals may be off together."""
 
     @property
     def axis(self) -> Array:
@@ -53,14 +57,24 @@ class Trial:
         return azimuth_axis(self.incident.wi)
 
     @property
+    def settled(self) -> Array:
+        """Whether the integral over a cell is known to less than the deviation of its samples."""
+        return self.count * self.partition.errors <= 0.2 * np.sqrt(np.maximum(self.expected, 1))
+
+    @property
     def share(self) -> float:
-        """The part of the samples that is drawn."""
+        """The part of the samples that is drawn, in the cells that count."""
         return float(self.counts.sum()) / self.count
 
     @property
     def integral(self) -> float:
-        """The integral of the density over the sphere."""
+        """The integral of the density over these."""
         return float(self.partition.integrals.sum())
+
+    @property
+    def mismatch(self) -> float:
+        """How far the two are apart, besides the doubt."""
+        return max(abs(self.integral - self.share) - self.doubt, 0)
 
     @cached_property
     def expected(self) -> Array:
@@ -99,7 +113,7 @@ class Trial:
 
     def fails(self, p_value: float, error: float) -> bool:
         """Return whether it fails for a significance and a tolerance of the integral."""
-        return not (self.test.p_value > p_value and abs(self.integral - self.share) < error)
+        return not (self.test.p_value > p_value and self.mismatch < error)
 
     @property
     def deviation(self) -> str:
@@ -165,8 +179,11 @@ def _trials(
         counted &= abs(samples.wo[:, 2]) > HORIZON
         counts = partition.histogram(samples.wo[counted])
         trial = Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once))
-        if turn and len(doubtful := trial.doubtful):
-            finer = partition.refined(partial(density, k), doubtful)
-            trial = replace(trial, partition=finer)
+        if turn:
+            if len(doubtful := trial.doubtful):
+                trial = replace(trial, partition=partition.refined(partial(density, k), doubtful))
+            settled = trial.settled
+            rest = replace(trial, partition=trial.partition.only(settled), counts=counts[settled])
+            trial = replace(rest, left_out=trial.share - rest.share, doubt=float(rest.partition.errors.sum()))
         found.append(trial)
     return found

@@ -166,18 +166,21 @@ def eval_pdf(run: Run) -> Findings:
 
 
 def reciprocity(run: Run) -> Findings:
-    """Check that f(wi, wo) = f(wo, wi) for reflection, unless the component is flagged NonSymmetric: at generic pairs,
-    and at pairs that the sampler draws, where narrow lobes are."""
+    """Check that f(wi, wo) = f(wo, wi), unless the component is flagged NonSymmetric: at generic pairs, and at pairs
+    that the sampler draws, where narrow lobes are."""
     for part in run.probe.parts:
-        if part.has(mi.BSDFFlags.NonSymmetric) or not part.has(mi.BSDFFlags.Reflection):
-            reason = "is flagged NonSymmetric" if part.has(mi.BSDFFlags.NonSymmetric) else "does not reflect"
+        places = [(side, side) for side in part.sides] if part.has(mi.BSDFFlags.Reflection) else []
+        if part.has(mi.BSDFFlags.Transmission):
+            places.append((1, -1))
+        if part.has(mi.BSDFFlags.NonSymmetric) or not places:
+            reason = "is flagged NonSymmetric" if places else "goes straight through"
             yield Finding("reciprocity", part.name, "skip", f"Not checked, as it {reason}.")
             continue
         outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.rounding(part), 0.0
-        for side in part.sides:
-            wi, wo = on_side(hemisphere(8000, 8), side), on_side(hemisphere(8000, 9), side)
+        for side, other in places:
+            wi, wo = on_side(hemisphere(8000, 8), side), on_side(hemisphere(8000, 9), other)
             drawn = run.probe.sample(part, wi, random(8000, 10)).wo
-            near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * side > 0.01)
+            near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * other > 0.01)
             wo[near] = drawn[near]
             # Of both, times the two cosines.
             forth = run.probe.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
