@@ -147,7 +147,7 @@ def mode(run: Run) -> Findings:
                 outcome.wrong(error, "in the mode Importance eval", got, why, wi, wo, expected=expected)
             if samples.lit.any():
                 reflected, value = samples.weight * samples.pdf[:, None], samples.value
-                error = abs(reflected - value).max(axis=1) / np.maximum(value.max(axis=1), 1e-9) * samples.lit
+                error = abs(reflected - value).max(axis=1) / np.maximum(abs(value).max(axis=1), 1e-9) * samples.lit
                 if np.quantile(error[samples.lit], 0.99) > tolerance:
                     name = "in the mode Importance a weight times pdf"
                     outcome.wrong(error, name, reflected, "is eval", wi, samples.wo, expected=value, seed=67)
