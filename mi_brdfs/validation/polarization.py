@@ -72,7 +72,7 @@ def polarization(run: Run) -> Findings:
         (not part.has(mi.BSDFFlags.NonSymmetric), back, "if its directions are exchanged"),
         (same, turned, "if its directions are turned about the normal"),
     ):
-        difference = abs(other - matrices).max(axis=(-2, -1)) / intensity
+        difference = abs(other - matrices).max(axis=(-2, -1)) / np.maximum(intensity, other[..., 0, 0])
         # Those of grazing facets and of narrow lobes have few digits.
         wrong = difference * (law and np.quantile(difference, 0.99) > TOLERANCE)
         name = f"the change of eval's Mueller matrix {words}"
