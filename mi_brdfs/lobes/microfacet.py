@@ -67,7 +67,7 @@ class MicrofacetLobe(Lobe):
             nearer = self.NEARER
         nearer = nearer * versine * safe_sqrt(versine * slope2)
         # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
-        fresnel = self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9))
+        fresnel = self.fresnel.estimate(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9))
         if (forward := self.fresnel.forward(self.distribution, wi)) is not None:
             fresnel += forward.reflectance
         return self.reflectance * (fresnel * seen)

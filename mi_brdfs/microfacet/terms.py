@@ -26,6 +26,8 @@ class Term:
     parameters: ClassVar[Mapping[str, Parameter]] = {}
     """The declarations that go with the word, by name. The class is called with their values by name; an anisotropic
     one comes as NAME_u and NAME_v."""
+    needed: ClassVar[tuple[str, ...]] = ()
+    """The names of those without which the others mean nothing."""
 
     @classmethod
     def of_values(cls: type[T], values: Mapping[str, Any]) -> T:
@@ -75,6 +77,10 @@ class Distribution(Term):
         """The α that Schlick's stand-in for Smith's shadowing goes by, or None if there is no such."""
         return None
 
+    def widened(self, spread: mi.Float) -> Distribution:
+        """Return the same facets with the roughness √α' = √α + ``spread`` (1 - √α); a rougher one than 1 stays."""
+        raise NotImplementedError(f"{type(self).__name__} does not define widened.")
+
     def smith(self, correlated: bool) -> Any:
         """Smith's shadowing term that belongs to this distribution, or None if that is not known."""
         return None
@@ -101,6 +107,12 @@ class Distribution(Term):
         raise NotImplementedError(f"{type(self).__name__} does not define inverse_cdf.")
 
 
+def widened_roughness(alpha: mi.Float, spread: mi.Float) -> mi.Float:
+    """Return the α' of :meth:`Distribution.widened`."""
+    root = dr.sqrt(alpha)
+    return dr.square(root + spread * dr.maximum(1 - root, 0))
+
+
 class Isotropic(Distribution):
     """A distribution whose own parameters replace the roughness."""
 
@@ -120,6 +132,10 @@ class Fresnel(Term):
 
     def __call__(self, cos: mi.Float) -> Spectrum:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
+
+    def estimate(self, cos: mi.Float) -> Spectrum:
+        """Return about the reflectance; it must not vanish at one angle alone."""
+        return self(cos)
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         """Return the approximate luminance of the reflectance, as one number for samplers."""
