@@ -59,11 +59,10 @@ class Microfacet(Model):
     Two words change the lobe of the facets. With ``haze`` = h and ``haze_spread`` = s it is (1-h) times this one and h
     times one of rougher facets, √α' = √α + s (1-√α), where α < 1 (P. Barla, R. Pacanowski and P. Vangorp, A composite
     BRDF model for hazy gloss, Computer Graphics Forum 37(4), 2018, doi:10.1111/cgf.13475, as OpenPBR 1.2 words it); not
-    for abc and hepd. With ``retroreflectivity`` = r, f is (1-r) f(wi, wo) + r f(wi', wo), where wi' = (-x, -y, z) is the
-    mirror direction of wi: that share of the light goes back where it came from (M. Raab, L. Belcour, F. Liu and
+    for abc and hepd. With ``retroreflectivity`` = r it is (1-r) f(wi, wo) + r f(wi', wo), where wi' = (-x, -y, z) is
+    the mirror direction of wi: that share of the light goes back where it came from (M. Raab, L. Belcour, F. Liu and
     J. Portsmouth, The minimal retroreflective microfacet model, Journal of Computer Graphics Techniques 15(1), 2026).
-    It has the albedo of the lobe. Fits leave them, f82, f90 and the exponent as they are, unless they are given
-    as "free".
+    The albedo stays. Fits leave these, f82, f90 and the exponent as they are, unless they are given as "free".
 
     With smith and smith-correlated, ``multiscatter`` says what becomes of light that facets reflect more than once. The
     larger α, the more: for GGX with α = 1 and F = 1 the facets' lobe reflects 0.31 at normal incidence.
