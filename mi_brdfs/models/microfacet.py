@@ -75,6 +75,9 @@ class Microfacet(Model):
     schlick shadows. For Ashikhmin and Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later
     papers and public code. One-sided.
 
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does. All else
+    depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
+
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
     so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and
     otherwise those of D, with a few uniform directions at grazing if steep facets may reflect most there.
