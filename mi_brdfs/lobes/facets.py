@@ -75,6 +75,14 @@ class RetroreflectiveLobe(Lobe):
         rest = 1 - self.share
         return value * rest + back * self.share, pdf * rest + back_pdf * self.share
 
+    def mueller_pdf(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, x_i: mi.Vector3f, x_o: mi.Vector3f
+    ) -> tuple[mi.Spectrum, mi.Float]:
+        value, pdf = self.eval_pdf(wi, wo)
+        matrix, _ = self.lobe.mueller_pdf(wi, wo, x_i, x_o)
+        matrix = matrix * (1 - self.share)
+        return matrix + mi.depolarizer(value - matrix[0, 0]), pdf
+
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         back, u = choose(u, self.share)
         return self.lobe.sample(dr.select(back, self._mirrored(wi), wi), u, v)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, leaving, luminance, safe_sqrt, square
+from ..math import EPSILON, TINY, Spectrum, leaving, luminance, safe_sqrt, square
 from ..parameters import Colour, ConductorName, FresnelSet, Index, Number, Reflectance
 from .forward import ForwardDirections
 from .terms import Distribution, Fresnel
@@ -69,6 +69,20 @@ class Schlick(Fresnel):
         return Schlick(luminance(self.f0), None, f90, self.exponent)(cos)
 
 
+def _mueller(f: Spectrum, a: Spectrum, b: Spectrum, cos: mi.Float) -> tuple[Spectrum, ...]:
+    """Return F, B, C and S (:meth:`Fresnel.mueller`) from F and a - ib = √(n² - sin²θ), where n is the index η - ik.
+
+    By Fresnel's equations, for fields ∝ exp(iωt) and p on the side of the facet's normal, r_p/r_s = (sin²θ - (a - ib)
+    cosθ)/(sin²θ + (a - ib) cosθ) (D. Clarke, Stellar polarimetry, 2010, appendix A), so that B = (|r_s|² - |r_p|²)/2
+    and C + iS = r_p r_s* are to F as 2 a sin²θ cosθ, sin⁴θ - (a² + b²) cos²θ and 2 b sin²θ cosθ to sin⁴θ + (a² + b²)
+    cos²θ.
+    """
+    sin2, a, b = 1 - cos * cos, a * cos, b * cos
+    sin4, q2 = sin2 * sin2, a * a + b * b
+    scale = f / (sin4 + q2)
+    return f, 2 * sin2 * a * scale, (sin4 - q2) * scale, 2 * sin2 * b * scale
+
+
 class Dielectric(Fresnel):
     """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
     Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
@@ -90,6 +104,10 @@ class Dielectric(Fresnel):
 
     def __call__(self, cos: mi.Float) -> mi.Float:
         return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
+
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+        g2 = self.eta * self.eta - 1 + cos * cos
+        return _mueller(self(cos), safe_sqrt(g2), safe_sqrt(-g2), cos)
 
     @staticmethod
     def _reflectance(eta: mi.Float, cos: mi.Float) -> mi.Float:
@@ -138,6 +156,13 @@ class Conductor(Fresnel):
         even_p, odd_p = modulus * cos2 + sin2 * sin2, odd_s * sin2
         p = (even_p - odd_p) / dr.maximum(even_p + odd_p, EPSILON)
         return 0.5 * s * (1 + p)
+
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+        real, ab = self.eta * self.eta - self.k * self.k - (1 - cos * cos), self.eta * self.k
+        # The smaller one of a and b as their product over the larger one, which keeps its digits.
+        larger = dr.sqrt(dr.maximum(0.5 * (safe_sqrt(real * real + 4 * ab * ab) + dr.abs(real)), TINY))
+        smaller, steep = ab / larger, real > 0
+        return _mueller(self(cos), dr.select(steep, larger, smaller), dr.select(steep, smaller, larger), cos)
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         # Of channels that differ much the mean index may reflect next to nothing where they do.

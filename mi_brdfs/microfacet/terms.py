@@ -150,6 +150,17 @@ class Fresnel(Term):
         below = (normal + (grazing - normal) * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
         return dr.maximum(normal + (grazing - normal) * schlick - below * dip, 0)
 
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...] | None:
+        """Return ``(F, B, C, S)``, of which a facet's Mueller matrix consists if Stokes vectors have their first axis
+        along s, perpendicular to the plane of incidence; or None, the default, if the facet depolarises.
+
+            ⎛ F  B  0  0 ⎞
+            ⎜ B  F  0  0 ⎟
+            ⎜ 0  0  C -S ⎟
+            ⎝ 0  0  S  C ⎠
+        """
+        return None
+
     def forward(self, distribution: Distribution, wi: mi.Vector3f) -> Any:
         """Return the forward directions to draw besides half vectors, if there are such."""
         return None

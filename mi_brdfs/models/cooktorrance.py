@@ -38,6 +38,9 @@ class CookTorrance(Model):
     Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. For the paper's sum of several D of different
     roughness, use ``blendbsdf``. One-sided.
 
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does; ``f0``,
+    F = 1 and the diffuse lobe depolarise it.
+
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 

@@ -38,7 +38,7 @@ class MetallicRoughness(Model):
 
     Reciprocal. Energy-conserving for metallic = 1. Otherwise a bright surface gains energy towards grazing angles, more
     so if smoother: for C = 1, metallic = 0 and r = 0.5 or 0.1, the albedo reaches 1.00 or 1.08 (direct), 1.10 or 1.57
-    (ibl), 1.12 or 1.72 (smith). One-sided.
+    (ibl), 1.12 or 1.72 (smith). One-sided. Depolarises.
 
     Sampling: for the diffuse lobe the cosine, for the specular lobe an antithetic pair of visible normals, one chosen
     by how much each reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.

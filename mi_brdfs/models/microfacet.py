@@ -62,7 +62,8 @@ class Microfacet(Model):
     for abc and hepd. With ``retroreflectivity`` = r it is (1-r) f(wi, wo) + r f(wi', wo), where wi' = (-x, -y, z) is
     the mirror direction of wi: that share of the light goes back where it came from (M. Raab, L. Belcour, F. Liu and
     J. Portsmouth, The minimal retroreflective microfacet model, Journal of Computer Graphics Techniques 15(1), 2026).
-    The albedo stays. Fits leave these, f82, f90 and the exponent as they are, unless they are given as "free".
+    The albedo stays; what goes back is unpolarized. Fits leave these, f82, f90 and the exponent as they are, unless they
+    are given as "free".
 
     With smith and smith-correlated, ``multiscatter`` says what becomes of light that facets reflect more than once. The
     larger α, the more: for GGX with α = 1 and F = 1 the facets' lobe reflects 0.31 at normal incidence.
@@ -89,6 +90,9 @@ class Microfacet(Model):
     smith-correlated for beckmann and ggx; for the others see the table below. The more αu and αv differ, the less
     schlick shadows. For Ashikhmin and Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later
     papers and public code. One-sided.
+
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does. All else
+    depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
     so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and

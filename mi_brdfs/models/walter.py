@@ -28,8 +28,10 @@ class Walter(Model):
     Reciprocal, except for ``multiscatter`` = turquin. Energy-conserving with ρd + ρs <= 1: the lobe's albedo stays
     below ρs, and far below for rough surfaces, as light is reflected only once (α = 1, F = 1: 0.31 ρs at normal
     incidence), unless ``multiscatter`` says what becomes of the rest, as in ``microfacet``. Same as Mitsuba's
-    ``roughconductor`` with ``distribution="ggx"`` (separable), except that polarized variants depolarise the light.
-    One-sided.
+    ``roughconductor`` with ``distribution="ggx"`` (separable), in polarized variants, too. One-sided.
+
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does. All else
+    depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
     Sampling: an antithetic pair of visible normals, bounded and tilted towards the normal, one chosen by how much each
     reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
