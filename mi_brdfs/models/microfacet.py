@@ -62,8 +62,8 @@ class Microfacet(Model):
     for abc and hepd. With ``retroreflectivity`` = r it is (1-r) f(wi, wo) + r f(wi', wo), where wi' = (-x, -y, z) is
     the mirror direction of wi: that share of the light goes back where it came from (M. Raab, L. Belcour, F. Liu and
     J. Portsmouth, The minimal retroreflective microfacet model, Journal of Computer Graphics Techniques 15(1), 2026).
-    The albedo stays; what goes back is unpolarized. Fits leave these, f82, f90 and the exponent as they are, unless they
-    are given as "free".
+    The albedo stays; what goes back is unpolarized. Fits leave these, f82, f90 and the exponent as they are, unless
+    given as "free".
 
     With smith and smith-correlated, ``multiscatter`` says what becomes of light that facets reflect more than once. The
     larger α, the more: for GGX with α = 1 and F = 1 the facets' lobe reflects 0.31 at normal incidence.
