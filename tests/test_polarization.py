@@ -5,6 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 import scipy.stats
+from generate import polarization
 from support import call, direction, hemisphere, interaction, is_scalar, numbers
 
 from mi_brdfs.lobes import WeightedLobe
@@ -400,3 +401,30 @@ def test_stokes_pictures_are_those_of_roughconductor():
     mean, error = theirs.mean(axis=0), theirs.std(axis=0) / np.sqrt(len(theirs))
     for k in range(4):
         assert (abs(mean[..., k]) > 10 * error[..., k]).mean() > 0.1, k
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_what_the_page_says_of_its_picture():
+    """Edges aside: glass polarises nearly fully in a ring, chalk not at all, and of all only gold turns the field."""
+    s = polarization.stokes(polarization.SCENE, 64, width="120", height="60")
+    linear, circular = polarization.polarized(s)
+    y, x = np.mgrid[:60, :120]
+    for name, middle, least, most in (("glass", 19, 0.9, 1.001), ("chalk", 60, 0, 1e-6), ("gold", 101, 0.6, 0.9)):
+        ball = np.hypot(x - middle, y - 26) < 14
+        assert least <= linear[ball].max() <= most, name
+        assert linear[26, middle] < 0.03, name
+        left, right = (circular[ball & side & (y > 26)] for side in (x < middle, x > middle))
+        if name == "gold":
+            assert left.min() < -0.2 and right.max() > 0.2
+        else:
+            assert max(abs(left).max(), abs(right).max()) < 0.01, name
+    assert linear[-4:].mean() > 1.5 * linear[:4].mean() > 0.3  # the floor: nearer to Brewster's angle below
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_picture_shows_the_scene():
+    """Rendered anew with few samples, the picture differs by its noise, and as JPEG has it."""
+    stored = np.array(mi.Bitmap(str(polarization.PICTURE)), np.float64) / 255
+    now = np.array(polarization.picture(polarization.SCENE, spp=64), np.float64) / 255
+    assert abs(stored - now).mean() < 0.02, "stale: run python docs/generate balls"
