@@ -17,7 +17,10 @@ from .microfacet import MicrofacetLobe
 from .multiscatter import multiscattering
 
 HAZE = Number(None, (0, 1), "share of a second, wider lobe of the facets; omitted by default", sought=False)
-HAZE_SPREAD = Number(0.5, (0, 1), "how wide that is: from the first one's roughness √α (0) to 1", sought=False)
+SPREAD = 0.5
+HAZE_SPREAD = Number(
+    None, (0, 1), f"how wide that is: from the first one's roughness √α (0) to 1; {SPREAD} if omitted", sought=False
+)
 RETROREFLECTIVITY = Number(
     None, (0, 1), "share of the light of the facets that goes back where it came from; omitted by default", sought=False
 )
@@ -43,7 +46,8 @@ def facet_lobes(
     """
     shares: list[tuple[Any, Distribution]] = [(1, distribution)]
     if p.haze is not None:
-        shares = [(1 - p.haze, distribution), (p.haze, distribution.widened(p.haze_spread))]
+        spread = SPREAD if p.haze_spread is None else p.haze_spread
+        shares = [(1 - p.haze, distribution), (p.haze, distribution.widened(spread))]
     lobes: list[Lobe] = []
     for share, facets in shares:
         first, *others = multiscattering(

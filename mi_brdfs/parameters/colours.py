@@ -16,7 +16,7 @@ from .reader import PropertyReader, Range
 
 class Colour(Parameter):
     """A spectral quantity within ``limits``. Without a default it is None where it is not given. Fits leave one that is
-    not ``sought`` as it is, unless asked for it."""
+    not ``sought`` as it is, unless asked for it, and so do searches for the largest albedo."""
 
     def __init__(
         self, default: float | None, limits: Range, text: str, *, role: str | None = None, sought: bool = True

@@ -29,7 +29,7 @@ class Number(Parameter):
     An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and evaluates to a pair, of the same
     object twice where it was given alone; with ``lone_default``, one of the pair alone leaves the other at the default.
     One with another ``spelling`` may be given as that instead. Without a default it is None where it is not given. Fits
-    leave one that is not ``sought`` as it is, unless asked for it.
+    leave one that is not ``sought`` as it is, unless asked for it, and so do searches for the largest albedo.
     """
 
     def __init__(
