@@ -84,6 +84,6 @@ def alternatives(parameter) -> list[Options]:
         known = [Options({parameter.name: "Au"})]
     elif isinstance(parameter, Index):
         known.append(Options({parameter.name: "water"}))
-    elif isinstance(parameter, Rotation) or not known:
+    elif isinstance(parameter, Rotation) or not known or not getattr(parameter, "sought", True):
         known.append(Options({}))
     return known

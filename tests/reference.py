@@ -138,6 +138,14 @@ def fresnel_schlick(cos, f0):
     return f0 + (1 - f0) * (1 - cos) ** 5
 
 
+def fresnel_generalized_schlick(cos, f0, f82=1, f90=1, exponent=5):
+    """Schlick's approximation with the reflectance f90 at grazing and another exponent; at cos = 1/7 it is tinted by
+    f82 (MaterialX specification 1.39, generalized_schlick_bsdf), and never negative."""
+    dip = 1 / 7
+    schlick, at_dip = (f0 + (f90 - f0) * (1 - c) ** exponent for c in (cos, dip))
+    return np.maximum(schlick - cos * (1 - cos) ** 6 * at_dip * (1 - f82) / (dip * (1 - dip) ** 6), 0)
+
+
 @_brdf
 def lambert(i, o, reflectance):
     """Lambert 1760: f = rho / pi."""

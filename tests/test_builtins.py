@@ -26,11 +26,8 @@ PAIRS = {
 @pytest.mark.parametrize("pair", PAIRS)
 def test_same_values(pair, variant):
     """To float32 round-off: both round the half vector, by some 1e-7, and D has slope 4/α at most: 4e-5 at α = .01.
-    A conductor keeps polarization in Mitsuba and not here, so the polarized case compares F = 1 and diffuse only."""
-    ours, theirs = PAIRS[pair]
-    if mi.is_polarized and "alpha" in ours and pair != "none":
-        pytest.skip("Mitsuba's conductors polarize")
-    ours, theirs = mi.load_dict(ours), mi.load_dict(theirs)
+    Of polarized light these are the intensities: test_polarization has the rest."""
+    ours, theirs = map(mi.load_dict, PAIRS[pair])
     count = 100 if is_scalar() else 20_000
     wi, wo = hemisphere(count, 1), hemisphere(count, 2)
     near = wi[::2] * [-1, -1, 1] + 0.02 * wo[::2]

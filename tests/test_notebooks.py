@@ -145,6 +145,16 @@ def coming_from_mitsuba_06(names):
     assert names["difference"] < 1e-4  # of the same scene with the names of Mitsuba 3
 
 
+def where_does_the_light_go(names):
+    """What is stated in the pages of the ways, within the noise of walks of 200,000 rays."""
+    worst = names["worst"]
+    assert worst["none"] > 0.5 and worst["walk"] < 0.008
+    assert 0.02 < worst["kulla-conty"] < 0.04 and 0.03 < worst["turquin"] < 0.055
+    for way, low, high in (("none", 0.14, 0.17), ("walk", 0.495, 0.505)):
+        middle = np.array(names["balls"][way][2])[44:52, 44:52].mean()
+        assert low < middle < high  # of a light of 0.5
+
+
 def anatomy_of_a_microfacet_brdf(names):
     """The white furnace: Blinn's D without the 4, whose integral at normal incidence is 4 (n + 2^(-n/2))/(n+4)."""
     picture = names["picture"]

@@ -148,8 +148,6 @@ def test_rotation_turns_counter_clockwise_from_dp_du(variant):
 @pytest.mark.parametrize("material", ["Au", "Cu", "none"])
 def test_materials_are_mitsubas(material, variant):
     """In spectral and in mono variants, too, where Mitsuba makes something else of the same spectra."""
-    if mi.is_polarized:
-        pytest.skip("Mitsuba's conductors polarize")
     ours = mi.load_dict({"type": "walter", "material": material})
     theirs = mi.load_dict({"type": "roughconductor", "distribution": "ggx", "material": material})
     wi, wo, ctx = direction(20)[None], direction(25, 180)[None], mi.BSDFContext()

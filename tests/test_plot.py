@@ -519,6 +519,7 @@ WRONG = {
     "angles": (["ward", "--angles", "ten"], 2, "--angles ten: write degrees"),
     "one angle": (["ward", "--kind", "sphere", "--angles", "1,2"], 2, "sphere shows one angle"),
     "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale does not apply to albedo"),
+    "no azimuth": (["ward", "--azimuth", "nan"], 2, "--azimuth nan: give degrees"),
     "no maximum": (["ward", "--kind", "hemisphere", "--normalize"], 2, "--normalize does not apply to hemisphere"),
     "no channels": (["ward", "--kind", "sphere", "--rgb"], 2, "--rgb does not apply to sphere"),
     "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),

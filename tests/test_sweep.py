@@ -273,7 +273,8 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     [
         (("--model", "wart"), 2, "There is no model 'wart'; did you mean 'ward'?"),
         (("--metric", "log,loglog"), 2, "There is no metric 'loglog'; did you mean 'log'?"),
-        (("--seed", "1;2"), 2, "--seed 1;2: write whole numbers, 0 or larger, as in 0,1,2"),
+        (("--seed", "1;2"), 2, "--seed 1;2: write whole numbers from 0 to 2^63 - 1, as in 0,1,2"),
+        (("--seed", "1,99999999999999999999"), 2, "write whole numbers from 0 to 2^63 - 1"),
         (("--table", "html"), 2, "--table html: there is no such table; there are md, csv"),
         (("--workers", 2, "--scheduler", "tcp://here:1"), 2, "give --workers or --scheduler; "),
         (("--scheduler", ""), 2, "--scheduler: give the address of one, tcp://HOST:PORT"),

@@ -10,7 +10,7 @@ import typer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from generate import bench, models, notebooks, readme, scenes, shading
+from generate import bench, models, notebooks, polarization, readme, scenes, shading
 from generate.made import ROOT, Page, Picture
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
@@ -19,7 +19,8 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 def everything() -> list[Page | Picture]:
     """Return all generated files, each after its sources."""
     pages = [*scenes.pages(), *models.pages(), *readme.pages(), *bench.pages()]
-    return [*pages, *models.pictures(), *scenes.pictures(), *shading.pictures(), *notebooks.pictures()]
+    drawn = [*models.pictures(), *scenes.pictures(), *shading.pictures(), *polarization.pictures()]
+    return [*pages, *drawn, *notebooks.pictures()]
 
 
 def main(

@@ -45,7 +45,7 @@ labels are the ids of shapes. `-Dspp=64`, `-Dwidth=640`, `-Dheight=360` and
 `-Dmax_depth=4` change the defaults at the top of a scene; `legacy_06` has none. Objects are listed from left to
 right and from top to bottom. `textures/make_textures.py` makes the textures; [measured](measured/LICENSE) has
 measured files, with their licence. [shading](shading/README.md) has scenes shaded as in the textbooks, beside the same
-scenes path-traced.
+scenes path-traced, and [polarization](polarization/README.md) one of polarized light.
 """
 
 

@@ -41,6 +41,8 @@ FILES = {
     "scenes/README.md": "scenes",
     "scenes/shading": "shading",
     "scenes/shading/README.md": "shading",
+    "scenes/polarization": "polarization",
+    "scenes/polarization/README.md": "polarization",
     "notebooks": "notebooks/index",
     "notebooks/README.md": "notebooks/index",
 }
@@ -74,8 +76,9 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
         if (ROOT / file).is_file():
             pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
     pages["folklore"] = ("docs/folklore.md", pages["folklore"][1].replace("## What", "# What", 1))
-    shading = re.sub(r"^## \[(\w+)\]\((.*)\)$", r"## \1\n\n[\2](\2)", pages["shading"][1], flags=re.MULTILINE)
-    pages["shading"] = ("scenes/shading/README.md", shading)
+    for page in ("shading", "polarization"):
+        text = re.sub(r"^## \[(\w+)\]\((.*)\)$", r"## \1\n\n[\2](\2)", pages[page][1], flags=re.MULTILINE)
+        pages[page] = (f"scenes/{page}/README.md", text)
     pages["scenes"] = ("scenes/README.md", _scenes())
     pages["gallery"] = ("mi_brdfs/models/README.md", _gallery())
     pages["reference/index"] = ("mi_brdfs/models/README.md", _reference())
@@ -117,7 +120,7 @@ def _guide() -> dict[str, str]:
 def _contents() -> Iterator[str]:
     for caption, pages in {
         "Guide": [page for page in GUIDE if page.startswith("guide/")],
-        "Gallery": ["gallery", "scenes", "shading"],
+        "Gallery": ["gallery", "scenes", "shading", "polarization"],
         "Notebooks": ["notebooks/index"],
         "Reference": ["reference/index", "folklore"],
         "More": ["extending", "sampling", "bench", "development"],

@@ -15,6 +15,7 @@ import typer
 
 from .. import writing
 from ..mitsuba import llvm
+from ..starting import signals_held
 from ..variants import is_measurable
 from .terminal import Exit, err, fail, failing
 
@@ -162,7 +163,9 @@ def set_variant(wanted: str | None) -> str:
             err.print(f"mi-brdfs: using scalar_rgb, which is slow: {text}")
             continue
         try:
-            mi.set_variant(name)
+            # Ctrl-C would make an ImportError of this import, and another variant would be taken.
+            with signals_held():
+                mi.set_variant(name)
             return name
         except ImportError:
             continue

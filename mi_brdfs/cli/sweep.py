@@ -113,8 +113,8 @@ def _numbers(text: str) -> list[int]:
         found = [int(number) for number in text.split(",")]
     except ValueError:
         found = [-1]
-    if min(found) < 0:
-        fail(f"--seed {text}: write whole numbers, 0 or larger, as in 0,1,2", Exit.USAGE)
+    if min(found) < 0 or max(found) >= 1 << 63:
+        fail(f"--seed {text}: write whole numbers from 0 to 2^63 - 1, as in 0,1,2", Exit.USAGE)
     return list(dict.fromkeys(found))
 
 

@@ -250,7 +250,11 @@ def _check_workers(client: Client, address: str, here: Setup) -> None:
             f"The scheduler at {address} has no workers; start some: dask worker {address} --nthreads 1"
         ) from None
     try:
-        found = client.run(versions)
+        found = client.sync(client._run, versions, callback_timeout=JOINING)
+    except TimeoutError:
+        raise ClusterError(
+            f"A worker of the scheduler at {address} has not answered for {JOINING:.0f} s; end or restart it."
+        ) from None
     except Exception as error:
         raise ClusterError(_of_worker(error)) from None
     for worker, nthreads in client.nthreads().items():

@@ -59,7 +59,9 @@ def fit(
     of the data: also parameters without a default, as the diffuse lobe that a model may have; models without one, as
     the diffuse ones, get none. Anisotropic data have the values for both tangent directions and the rotation; numbers
     that would make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the parameters of
-    ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none".
+    ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none". Words that later papers added to
+    the models of facets (f82, f90, schlick_exponent, haze, haze_spread, retroreflectivity) and the index outside stay
+    as they are, unless they are given as "free".
 
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are
@@ -75,7 +77,8 @@ def fit(
             of their cells, and scattered ones alike.
         model: the name of a plugin of this package or of a guest, or several.
         metric: "log", "l2", "ngan", "cube-root", "bieron-l2" or "bieron-log".
-        given: parameters that are fixed, by name, None to leave one out; words of choices, a tuple for a fit of each.
+        given: parameters that are fixed, by name, None to leave one out, "free" to seek one that is not sought
+            otherwise; words of choices, a tuple for a fit of each.
             They hold for the models that have them.
         tied: parameters that equal another one, as ``{"cy": "cx"}``.
         start: a plugin dict to start from, besides others, or several. No fit is worse than any of them.

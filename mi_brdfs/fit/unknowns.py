@@ -22,6 +22,9 @@ SMALLEST, LARGEST = 1e-3, 1e6
 EDGE = 1e-5
 """How near to its ends a share is sought, as a part of its range; so near, it counts as at the end."""
 
+FREE = "free"
+"""Given for a parameter that fits do not seek of themselves."""
+
 
 class Scale(NamedTuple):
     """u of x, x of u, and dx/du of x, for numbers with the sum of the ends of their range."""
@@ -181,7 +184,8 @@ def configurations(
     anisotropic: bool,
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
-    with the default of those that are not given. Names that it does not have are left out.
+    with the default of those that are not given. Names that it does not have are left out. Numbers and colours that are
+    ``FREE`` are sought even if fits leave them as they are.
 
     Raises:
         FitError: if there is no such word, or nothing is left to fit.
@@ -196,12 +200,13 @@ def configurations(
         for word in words[choice]:
             if word not in allowed:
                 raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
-    fixed = {key: value for key, value in given.items() if key not in words}
+    freed = {key for key, value in given.items() if isinstance(value, str) and value == FREE and key not in words}
+    fixed = {key: value for key, value in given.items() if key not in {*words, *freed}}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
     found = []
     for combination in _combinations(model.declared(), words, fixed):
         free = _free(model.declared(), combination, lobes)
-        unknowns = [u for parameter in free for u in _unknowns_of(parameter, fixed, channels, anisotropic)]
+        unknowns = [u for parameter in free for u in _unknowns_of(parameter, fixed, freed, channels, anisotropic)]
         usable = {u.name for u in unknowns}
         if missing := {*tied, *tied.values()} - usable:
             raise FitError(
@@ -265,12 +270,14 @@ def _free(declared: Iterable[Parameter], words: Mapping[str, Any], lobes: int) -
             yield parameter
 
 
-def _unknowns_of(parameter: Parameter, fixed: Mapping[str, Any], channels: int, anisotropic: bool) -> Iterator[Unknown]:
+def _unknowns_of(
+    parameter: Parameter, fixed: Mapping[str, Any], freed: set[str], channels: int, anisotropic: bool
+) -> Iterator[Unknown]:
     """Yield the unknowns of a parameter: none if it is given under one of its names, and both of a pair where the data
     are anisotropic."""
     if any(name in fixed for name in parameter.names):
         return
     for quantity in parameter.quantities(pairs=anisotropic):
-        if quantity.sought and (anisotropic or not quantity.turns):
+        if (quantity.sought or quantity.name in freed) and (anisotropic or not quantity.turns):
             for channel in range(channels) if quantity.colour and channels > 1 else (None,):
                 yield unknown_of(quantity, channel)

@@ -1,9 +1,9 @@
 """The lobes of BRDFs, which can be evaluated, sampled and mixed."""
 
 from .diffuse import LambertLobe, over_diffuse
+from .facets import facet_lobes
 from .lobe import Lobe, Mixture, WeightedLobe
 from .microfacet import MicrofacetLobe
-from .multiscatter import multiscattering
 from .power import PowerLobe, PowerResponseLobe
 
 __all__ = [
@@ -14,6 +14,6 @@ __all__ = [
     "PowerLobe",
     "PowerResponseLobe",
     "WeightedLobe",
-    "multiscattering",
+    "facet_lobes",
     "over_diffuse",
 ]

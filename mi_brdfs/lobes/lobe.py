@@ -41,6 +41,14 @@ class Lobe:
         """Return ``(value, pdf)``: f |cosθ_o|, and the density with which :meth:`sample` draws ``wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define eval_pdf.")
 
+    def mueller_pdf(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, x_i: mi.Vector3f, x_o: mi.Vector3f
+    ) -> tuple[mi.Spectrum, mi.Float]:
+        """Return the same in polarized variants, with a Mueller matrix for light from ``wo`` to ``wi``, whose Stokes
+        vectors have the first axes ``x_o`` and ``x_i``. By default, and if the lobe transmits, it depolarises."""
+        value, pdf = self.eval_pdf(wi, wo)
+        return mi.depolarizer(mi.UnpolarizedSpectrum(value)), pdf
+
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         """Draw a direction ``wo`` from three uniform variates, ``u`` and ``v = (v.x, v.y)``. It may lie beyond the
         horizon, where the lobe is zero."""
@@ -52,7 +60,7 @@ class Lobe:
         wi.z > 0 and wo.z < 0, as always.
 
         The default is sampled like the lobe itself; override it if that misses directions."""
-        return self if self.reciprocal else AdjointLobe(self)
+        return self if self.reciprocal and not mi.is_polarized else AdjointLobe(self)
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         """Return the lobe's colour times its Fresnel reflectance for the mirror direction of ``wi``, regardless of its
@@ -61,7 +69,7 @@ class Lobe:
 
 
 class AdjointLobe(Lobe):
-    """f(wo, wi) of a non-reciprocal lobe, sampled like the lobe."""
+    """f(wo, wi) of a non-reciprocal lobe, or one with Mueller matrices, sampled like the lobe."""
 
     reciprocal = False
 
@@ -75,6 +83,13 @@ class AdjointLobe(Lobe):
         value, _ = self.lobe.eval_pdf(self._mirrored(wo), self._mirrored(wi))
         _, pdf = self.lobe.eval_pdf(wi, wo)
         return value * (abs(wo.z) / dr.maximum(wi.z, EPSILON)), pdf
+
+    def mueller_pdf(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, x_i: mi.Vector3f, x_o: mi.Vector3f
+    ) -> tuple[mi.Spectrum, mi.Float]:
+        matrix, _ = self.lobe.mueller_pdf(self._mirrored(wo), self._mirrored(wi), x_o, x_i)
+        _, pdf = self.lobe.eval_pdf(wi, wo)
+        return matrix * (abs(wo.z) / dr.maximum(wi.z, EPSILON)), pdf
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.lobe.sample(wi, u, v)
@@ -100,6 +115,12 @@ class WeightedLobe(Lobe):
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         value, pdf = self.lobe.eval_pdf(wi, wo)
         return value * self.g(wi, wo), pdf
+
+    def mueller_pdf(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, x_i: mi.Vector3f, x_o: mi.Vector3f
+    ) -> tuple[mi.Spectrum, mi.Float]:
+        matrix, pdf = self.lobe.mueller_pdf(wi, wo, x_i, x_o)
+        return mi.Spectrum(mi.UnpolarizedSpectrum(self.g(wi, wo))) @ matrix, pdf
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self.lobe.sample(wi, u, v)
@@ -130,12 +151,13 @@ class Mixture:
             dr.select(black, count, energy) * scale for count, energy in zip(counts, energies, strict=True)
         ]
 
-    def eval_pdf(self, wo: mi.Vector3f, transmitted: bool) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
-        """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k."""
-        total, density = mi.UnpolarizedSpectrum(0), 0.0
+    def eval_pdf(self, wo: mi.Vector3f, transmitted: bool, *axes: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
+        """Return ``(value, pdf)`` of all lobes of one side: Σ f_k |cosθ_o| and Σ P_k pdf_k. In polarized variants it
+        takes the first axes of Stokes vectors, too (:meth:`Lobe.mueller_pdf`)."""
+        total, density = mi.Spectrum(0), 0.0
         for probability, lobe in zip(self.probabilities, self.lobes, strict=True):
             if lobe.transmits == transmitted:
-                value, pdf = lobe.eval_pdf(self.wi, wo)
+                value, pdf = lobe.mueller_pdf(self.wi, wo, *axes) if axes else lobe.eval_pdf(self.wi, wo)
                 total, density = total + value, density + probability * pdf
         return total, density
 

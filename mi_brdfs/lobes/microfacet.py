@@ -67,16 +67,31 @@ class MicrofacetLobe(Lobe):
             nearer = self.NEARER
         nearer = nearer * versine * safe_sqrt(versine * slope2)
         # Not 1: Schlick's reflectance with f0 = 0 must not vanish.
-        fresnel = self.fresnel(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9))
+        fresnel = self.fresnel.estimate(dr.minimum(dr.sqrt(cos * cos + nearer), 0.9))
         if (forward := self.fresnel.forward(self.distribution, wi)) is not None:
             fresnel += forward.reflectance
         return self.reflectance * (fresnel * seen)
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         facet = Facet.between(wi, wo)
-        # The last factor is the same for all facets of wi, so Dr.Jit computes it once.
-        facets = self.distribution.eval(facet) * self.shadowing(facet) * (0.25 / facet.cos_i)
+        facets = self._facets(facet)
         return self.reflectance * (self.fresnel(facet.cos_d) * facets), self._sampler(wi).pdf(facet)
+
+    def mueller_pdf(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, x_i: mi.Vector3f, x_o: mi.Vector3f
+    ) -> tuple[mi.Spectrum, mi.Float]:
+        facet = Facet.between(wi, wo)
+        elements = self.fresnel.mueller(facet.cos_d)
+        if elements is None:
+            return super().mueller_pdf(wi, wo, x_i, x_o)
+        facets = self._facets(facet)
+        scaled = tuple(self.reflectance * (element * facets) for element in elements)
+        return facet.mueller(scaled, x_i, x_o), self._sampler(wi).pdf(facet)
+
+    def _facets(self, facet: Facet) -> mi.Float:
+        """Return D G / (4 cosθ_i)."""
+        # The last factor is the same for all facets of wi, so Dr.Jit computes it once.
+        return self.distribution.eval(facet) * self.shadowing(facet) * (0.25 / facet.cos_i)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         return self._sampler(wi).draw(u, v)

@@ -80,6 +80,17 @@ class KullaContyLobe(MultipleScattering):
         return mean * mean * (1 - lost) / (1 - mean * lost)
 
 
+class TurquinLobe(WeightedLobe):
+    """A lobe times a factor that adds unpolarized light."""
+
+    def mueller_pdf(
+        self, wi: mi.Vector3f, wo: mi.Vector3f, x_i: mi.Vector3f, x_o: mi.Vector3f
+    ) -> tuple[mi.Spectrum, mi.Float]:
+        value, pdf = self.eval_pdf(wi, wo)
+        matrix, _ = self.lobe.mueller_pdf(wi, wo, x_i, x_o)
+        return matrix + mi.depolarizer(value - matrix[0, 0]), pdf
+
+
 def turquin(lobe: MicrofacetLobe, walks: Walks) -> Lobe:
     """Return a lobe scaled by 1 + F(1) (1 - E(wi)) / E(wi), which is not reciprocal (E. Turquin, Practical multiple
     scattering compensation for microfacet models, 2019)."""
@@ -88,7 +99,7 @@ def turquin(lobe: MicrofacetLobe, walks: Walks) -> Lobe:
         lost = walks.of(wi).lost
         return 1 + lobe.fresnel(mi.Float(1)) * (lost / dr.maximum(1 - lost, EPSILON))
 
-    scaled = WeightedLobe(lobe, scale, scale)
+    scaled = TurquinLobe(lobe, scale, scale)
     scaled.reciprocal = False
     return scaled
 

@@ -89,5 +89,7 @@ class BinaryFile:
                 "it is truncated, or of another format"
             )
         values = np.fromfile(self.path, dtype=dtype, count=int(count), offset=self.offset)
+        if len(values) < count:
+            raise self.error(f"{what} are missing; the file became shorter while it was read")
         self.offset += needed
         return values

@@ -29,7 +29,7 @@ from .laws import (
     versine_of_tan2,
 )
 from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
-from .terms import ROUGHNESS, Distribution, HalfVectors, Isotropic
+from .terms import ROUGHNESS, Distribution, HalfVectors, Isotropic, widened_roughness
 from .visible import VisibleNormals
 
 __all__ = [
@@ -40,11 +40,26 @@ __all__ = [
 ANISOTROPIC_ROUGHNESS = Number(0.1, (1e-4, 2), "roughness α of the facets", anisotropic=True)
 
 
-class Beckmann(Distribution):
+class Elliptical(Distribution):
+    """A distribution that is the same for all roughnesses but for the stretch of its slopes."""
+
+    parameters = {"alpha": ANISOTROPIC_ROUGHNESS}
+
+    def roughness(self) -> mi.Float:
+        return dr.sqrt(self.alpha_u * self.alpha_v)
+
+    def widened(self, spread: mi.Float) -> Distribution:
+        u = widened_roughness(self.alpha_u, spread)
+        v = u if self.alpha_v is self.alpha_u else widened_roughness(self.alpha_v, spread)
+        wide = type(self)(u, v)
+        wide.anisotropic = self.anisotropic
+        return wide
+
+
+class Beckmann(Elliptical):
     """D = exp(-((h_x/αu)² + (h_y/αv)²)/h_z²) / (π αu αv h_z⁴); q = D cosθ_h."""
 
     word = "beckmann"
-    parameters = {"alpha": ANISOTROPIC_ROUGHNESS}
 
     def eval(self, facet: Facet) -> mi.Float:
         cos2 = dr.maximum(dr.square(facet.cos_h), 1e-6)  # no facets are that steep; its powers must not underflow
@@ -57,18 +72,14 @@ class Beckmann(Distribution):
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return -log_complement(complement) / g
 
-    def roughness(self) -> mi.Float | None:
-        return dr.sqrt(self.alpha_u * self.alpha_v)
-
     def smith(self, correlated: bool) -> Smith:
         return SmithBeckmann(self.alpha_u, self.alpha_v, correlated)
 
 
-class GGX(Distribution):
+class GGX(Elliptical):
     """D = 1/(π αu αv ((h_x/αu)² + (h_y/αv)² + h_z²)²) (Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206)."""
 
     word = "ggx"
-    parameters = {"alpha": ANISOTROPIC_ROUGHNESS}
     LOSS = 2.3
     long_tailed = True
 
@@ -82,9 +93,6 @@ class GGX(Distribution):
 
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return c / (dr.maximum(complement, TINY) * g)
-
-    def roughness(self) -> mi.Float | None:
-        return dr.sqrt(self.alpha_u * self.alpha_v)
 
     def smith(self, correlated: bool) -> Smith:
         return SmithGGX(self.alpha_u, self.alpha_v, correlated)
@@ -116,8 +124,11 @@ class Blinn(Isotropic):
     def inverse_cdf(self, c: mi.Float, complement: mi.Float, g: mi.Float) -> mi.Float:
         return inverse_cosine_power_cdf(complement, self.exponent + 2)
 
-    def roughness(self) -> mi.Float | None:
+    def roughness(self) -> mi.Float:
         return dr.rsqrt(0.5 * self.exponent + 1)
+
+    def widened(self, spread: mi.Float) -> Distribution:
+        return Blinn(2 * dr.square(dr.rcp(widened_roughness(self.roughness(), spread))) - 2)
 
     def smith(self, correlated: bool) -> Smith:
         return SmithBlinn(self.exponent, correlated)
@@ -172,8 +183,11 @@ class GTR(Isotropic):
     def mean_square_slope(self) -> mi.Float:
         return self.alpha2
 
-    def roughness(self) -> mi.Float | None:
+    def roughness(self) -> mi.Float:
         return self.alpha
+
+    def widened(self, spread: mi.Float) -> Distribution:
+        return GTR(widened_roughness(self.alpha, spread), self.law.gamma)
 
     def eval(self, facet: Facet) -> mi.Float:
         return self.law.eval(facet.sin2_h) * dr.inv_pi / self.law.norm

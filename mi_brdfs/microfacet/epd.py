@@ -13,7 +13,7 @@ from ..math import EPSILON, SMALL, reciprocal_gamma, safe_sqrt
 from ..parameters import Number
 from .facet import Facet
 from .laws import LARGEST_TAN2, power_32
-from .terms import ROUGHNESS, Isotropic
+from .terms import ROUGHNESS, Distribution, Isotropic, widened_roughness
 
 
 class EPD(Isotropic):
@@ -50,6 +50,9 @@ class EPD(Isotropic):
         slopes = [far * self.GROWTH**step for step in self.STEPS]
         heights = [fall(x) * self._rest(t) / law.eval(t) for x, t in zip([0, *powers], [0, *slopes], strict=True)]
         self.ramps = Ramps([law.cdf(t) for t in slopes[:-1]], heights)
+
+    def widened(self, spread: mi.Float) -> Distribution:
+        return EPD(widened_roughness(self.alpha, spread), self.gamma)
 
     def _limited(self, tan2: mi.Float) -> mi.Float:
         return dr.minimum(tan2, 1e16)  # of which derivatives take the square

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..math import SMALL, normalize_or
+from ..math import SMALL, Spectrum, normalize_or
 
 
 class Cosines(NamedTuple):
@@ -63,6 +63,20 @@ class Facet:
         """Return the facet mirrored about the normal, which reflects the same ``wi``."""
         return self.reflecting(self.wi, mi.Vector3f(-self.h.x, -self.h.y, self.h.z))
 
+    def mueller(self, elements: tuple[Spectrum, ...], x_i: mi.Vector3f, x_o: mi.Vector3f) -> mi.Spectrum:
+        """Return the matrix R(φ_i) M R(φ_o)ᵀ of :meth:`Fresnel.mueller`'s elements, for light from ``wo`` to ``wi``
+        whose Stokes vectors have the first axes ``x_o`` and ``x_i``: φ_o and φ_i are the angles from these to s."""
+        f, b, c, s = elements
+        # Near wi = wo its digits are lost: there any axis will do that is the same for both.
+        axis = dr.cross(self.wi, self.wo)
+        (ci, si), (co, so) = _double_angle(axis, x_i, self.wi), _double_angle(axis, x_o, -self.wo)
+        return mi.Spectrum(
+            f, b * co, b * so, 0,
+            b * ci, ci * f * co + si * c * so, ci * f * so - si * c * co, si * s,
+            b * si, si * f * co - ci * c * so, si * f * so + ci * c * co, -ci * s,
+            0, -s * so, s * co, c,
+        )  # fmt: skip
+
     @property
     def cos_i(self) -> mi.Float:
         return self.wi.z
@@ -88,3 +102,9 @@ class Facet:
     @property
     def tan2_h(self) -> mi.Float:
         return self.sin2_h / dr.square(self.cos_h)
+
+
+def _double_angle(axis: mi.Vector3f, x: mi.Vector3f, forward: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
+    """Return cosine and sine of twice the angle from ``x`` to an axis, counter-clockwise for whom the light meets."""
+    cos, sin = normalize_or(dr.dot(axis, x), dr.dot(axis, dr.cross(forward, x)), (1, 0))
+    return cos * cos - sin * sin, 2 * cos * sin

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import Spectrum, leaving, luminance, safe_sqrt, square
-from ..parameters import Colour, ConductorName, FresnelSet, Index, Reflectance
+from ..math import EPSILON, TINY, Spectrum, leaving, luminance, safe_sqrt, square
+from ..parameters import Colour, ConductorName, FresnelSet, Index, Number, Reflectance
 from .forward import ForwardDirections
 from .terms import Distribution, Fresnel
 
@@ -26,23 +26,61 @@ class Unit(Fresnel):
 
 
 class Schlick(Fresnel):
-    """F = f0 + (1 - f0)(1 - cosθ)⁵ (Schlick 1994, doi:10.1111/1467-8659.1330233)."""
+    """F = f0 + (f90 - f0)(1 - cosθ)ᵖ, p = 5 and f90 = 1 (Schlick 1994, doi:10.1111/1467-8659.1330233), less a multiple
+    of cosθ (1 - cosθ)⁶ such that f82 is the ratio to that at cosθ = 1/7, about 82° (P. Kutz, M. Hašan and D. Edmondson,
+    Novel aspects of the Adobe Standard Material, 2021; OpenPBR 1.1)."""
 
     word = "schlick"
+    needed = ("f0",)
     parameters = {
         "f0": Reflectance(None, "Schlick's approximation with this reflectance at normal incidence", role="fresnel"),
-    }
+        "f82": Reflectance(None, "tint of this at 82°, as metals have; omitted by default", sought=False),
+        "f90": Reflectance(None, "the reflectance at grazing; 1 if omitted", sought=False),
+        "schlick_exponent": Number(None, (1, 20), "the exponent of Schlick's approximation; 5 if omitted",
+                                   sought=False),
+    }  # fmt: skip
 
-    def __init__(self, f0: Spectrum) -> None:
-        self.f0 = f0
+    def __init__(
+        self, f0: Spectrum, f82: Spectrum | None = None, f90: Spectrum | None = None, schlick_exponent: Any = None
+    ) -> None:
+        self.f0, self.f82, self.f90, self.exponent = f0, f82, f90, schlick_exponent
 
     def __call__(self, cos: mi.Float) -> Any:
+        if self.f82 is None:
+            return self.estimate(cos)
+        m = 1 - self.DIP
+        dip = (1 - self.f82) * self.estimate(mi.Float(self.DIP)) / (self.DIP * m**6)
+        m2 = dr.square(dr.maximum(1 - cos, 0))
+        return dr.maximum(self.estimate(cos) - dip * (cos * m2 * m2 * m2), 0)
+
+    def estimate(self, cos: mi.Float) -> Any:
         m = dr.maximum(1 - cos, 0)
-        m2 = m * m
-        return self.f0 + (1 - self.f0) * (m2 * m2 * m)
+        if self.exponent is None:
+            m2 = m * m
+            power = m2 * m2 * m
+        else:
+            power = dr.power(dr.maximum(m, EPSILON), self.exponent)
+        return self.f0 + ((1 if self.f90 is None else self.f90) - self.f0) * power
 
     def brightness(self, cos: mi.Float) -> mi.Float:
-        return Schlick(luminance(self.f0))(cos)
+        if self.f82 is not None:
+            return super().brightness(cos)
+        f90 = None if self.f90 is None else luminance(self.f90)
+        return Schlick(luminance(self.f0), None, f90, self.exponent)(cos)
+
+
+def _mueller(f: Spectrum, a: Spectrum, b: Spectrum, cos: mi.Float) -> tuple[Spectrum, ...]:
+    """Return F, B, C and S (:meth:`Fresnel.mueller`) from F and a - ib = √(n² - sin²θ), where n is the index η - ik.
+
+    By Fresnel's equations, for fields ∝ exp(iωt) and p on the side of the facet's normal, r_p/r_s = (sin²θ - (a - ib)
+    cosθ)/(sin²θ + (a - ib) cosθ) (D. Clarke, Stellar polarimetry, 2010, appendix A), so that B = (|r_s|² - |r_p|²)/2
+    and C + iS = r_p r_s* are to F as 2 a sin²θ cosθ, sin⁴θ - (a² + b²) cos²θ and 2 b sin²θ cosθ to sin⁴θ + (a² + b²)
+    cos²θ.
+    """
+    sin2, a, b = 1 - cos * cos, a * cos, b * cos
+    sin4, q2 = sin2 * sin2, a * a + b * b
+    scale = f / (sin4 + q2)
+    return f, 2 * sin2 * a * scale, (sin4 - q2) * scale, 2 * sin2 * b * scale
 
 
 class Dielectric(Fresnel):
@@ -67,6 +105,10 @@ class Dielectric(Fresnel):
     def __call__(self, cos: mi.Float) -> mi.Float:
         return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
 
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+        g2 = self.eta * self.eta - 1 + cos * cos
+        return _mueller(self(cos), safe_sqrt(g2), safe_sqrt(-g2), cos)
+
     @staticmethod
     def _reflectance(eta: mi.Float, cos: mi.Float) -> mi.Float:
         step = eta * eta - 1
@@ -90,6 +132,7 @@ class Conductor(Fresnel):
 
     RANGES = {"eta": (0.01, 100), "k": (0, 100)}
     word = "conductor"
+    needed: ClassVar[tuple[str, ...]] = ("eta", "k")
     parameters = {
         "eta": Colour(None, RANGES["eta"], "index of refraction η of a conductor, relative to the exterior",
                       role="fresnel"),
@@ -108,10 +151,18 @@ class Conductor(Fresnel):
         modulus = safe_sqrt(real * real + 4 * eta2 * k2)
         a = safe_sqrt(0.5 * (modulus + real))
         even_s, odd_s = modulus + cos2, 2 * cos * a
-        s = dr.maximum(even_s - odd_s, 0) / (even_s + odd_s)  # rounding may leave less
+        # Rounding may leave less than 0, and an index of 1 has nothing but 0 at grazing.
+        s = dr.maximum(even_s - odd_s, 0) / dr.maximum(even_s + odd_s, EPSILON)
         even_p, odd_p = modulus * cos2 + sin2 * sin2, odd_s * sin2
-        p = (even_p - odd_p) / (even_p + odd_p)
+        p = (even_p - odd_p) / dr.maximum(even_p + odd_p, EPSILON)
         return 0.5 * s * (1 + p)
+
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+        real, ab = self.eta * self.eta - self.k * self.k - (1 - cos * cos), self.eta * self.k
+        # The smaller one of a and b as their product over the larger one, which keeps its digits.
+        larger = dr.sqrt(dr.maximum(0.5 * (safe_sqrt(real * real + 4 * ab * ab) + dr.abs(real)), TINY))
+        smaller, steep = ab / larger, real > 0
+        return _mueller(self(cos), dr.select(steep, larger, smaller), dr.select(steep, smaller, larger), cos)
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         # Of channels that differ much the mean index may reflect next to nothing where they do.
@@ -124,6 +175,7 @@ class NamedConductor(Conductor):
     """One of Mitsuba's conductors."""
 
     word = "material"
+    needed = ()
     parameters = {"material": ConductorName(Conductor.RANGES, "a conductor by name; none means F = 1")}
 
     @classmethod

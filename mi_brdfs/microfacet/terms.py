@@ -26,6 +26,8 @@ class Term:
     parameters: ClassVar[Mapping[str, Parameter]] = {}
     """The declarations that go with the word, by name. The class is called with their values by name; an anisotropic
     one comes as NAME_u and NAME_v."""
+    needed: ClassVar[tuple[str, ...]] = ()
+    """The names of those without which the others mean nothing."""
 
     @classmethod
     def of_values(cls: type[T], values: Mapping[str, Any]) -> T:
@@ -75,6 +77,10 @@ class Distribution(Term):
         """The α that Schlick's stand-in for Smith's shadowing goes by, or None if there is no such."""
         return None
 
+    def widened(self, spread: mi.Float) -> Distribution:
+        """Return the same facets with the roughness √α' = √α + ``spread`` (1 - √α); a rougher one than 1 stays."""
+        raise NotImplementedError(f"{type(self).__name__} does not define widened.")
+
     def smith(self, correlated: bool) -> Any:
         """Smith's shadowing term that belongs to this distribution, or None if that is not known."""
         return None
@@ -101,6 +107,12 @@ class Distribution(Term):
         raise NotImplementedError(f"{type(self).__name__} does not define inverse_cdf.")
 
 
+def widened_roughness(alpha: mi.Float, spread: mi.Float) -> mi.Float:
+    """Return the α' of :meth:`Distribution.widened`."""
+    root = dr.sqrt(alpha)
+    return dr.square(root + spread * dr.maximum(1 - root, 0))
+
+
 class Isotropic(Distribution):
     """A distribution whose own parameters replace the roughness."""
 
@@ -121,6 +133,10 @@ class Fresnel(Term):
     def __call__(self, cos: mi.Float) -> Spectrum:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
+    def estimate(self, cos: mi.Float) -> Spectrum:
+        """Return about the reflectance; it must not vanish at one angle alone."""
+        return self(cos)
+
     def brightness(self, cos: mi.Float) -> mi.Float:
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
@@ -133,6 +149,17 @@ class Fresnel(Term):
         m = 1 - self.DIP
         below = (normal + (grazing - normal) * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
         return dr.maximum(normal + (grazing - normal) * schlick - below * dip, 0)
+
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...] | None:
+        """Return ``(F, B, C, S)``, of which a facet's Mueller matrix consists if Stokes vectors have their first axis
+        along s, perpendicular to the plane of incidence; or None, the default, if the facet depolarises.
+
+            ⎛ F  B  0  0 ⎞
+            ⎜ B  F  0  0 ⎟
+            ⎜ 0  0  C -S ⎟
+            ⎝ 0  0  S  C ⎠
+        """
+        return None
 
     def forward(self, distribution: Distribution, wi: mi.Vector3f) -> Any:
         """Return the forward directions to draw besides half vectors, if there are such."""

@@ -102,10 +102,8 @@ class ModelBSDF:
         return valid, Mixture(enabled, wi, frame.mirrored), components, frame
 
     @staticmethod
-    def _eval_pdf(
-        valid: mi.Bool, mixture: Mixture, frame: LobeFrame, wo: mi.Vector3f
-    ) -> tuple[mi.UnpolarizedSpectrum, mi.Float]:
-        value, pdf, z = mi.UnpolarizedSpectrum(0), mi.Float(0), frame.mirror(wo).z
+    def _eval_pdf(valid: mi.Bool, mixture: Mixture, frame: LobeFrame, wo: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
+        value, pdf, z = mi.Spectrum(0), mi.Float(0), frame.mirror(wo).z
         for transmitted in sorted({lobe.transmits for lobe in mixture.lobes}):
             here = select(z < 0 if transmitted else z > 0, valid, False)
             if frame.mirrored is not None:
@@ -113,7 +111,9 @@ class ModelBSDF:
             if here is False:
                 continue
             harmless = frame.mirror(mi.Vector3f(0, 0, -1 if transmitted else 1))
-            side = mixture.eval_pdf(frame.to_local(select(here, wo, harmless)), transmitted)
+            local = frame.to_local(select(here, wo, harmless))
+            axes = frame.stokes_axes(mixture.wi, local) if mi.is_polarized else ()
+            side = mixture.eval_pdf(local, transmitted, *axes)
             value, pdf = value + select(here, side[0], 0), pdf + select(here, side[1], 0)
         return value, pdf
 
@@ -138,7 +138,7 @@ class ModelBSDF:
             component = dr.select(index == k, c, component)
             kind = dr.select(index == k, int(self.kinds[c]), kind)
         bs.sampled_component, bs.sampled_type = component, kind
-        return bs, mi.depolarizer(select(drawn, weight, mi.UnpolarizedSpectrum(0)))
+        return bs, select(drawn, weight, mi.Spectrum(0))
 
     def sample(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, sample1: Any, sample2: Any, active: mi.Bool = True
@@ -155,8 +155,7 @@ class ModelBSDF:
         if evaluated is None:
             return mi.Spectrum(0), mi.Float(0)
         valid, mixture, _, frame = evaluated
-        value, pdf = self._eval_pdf(valid, mixture, frame, _as(mi.Vector3f, wo))
-        return mi.depolarizer(value), pdf
+        return self._eval_pdf(valid, mixture, frame, _as(mi.Vector3f, wo))
 
     def eval(self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: Any, active: mi.Bool = True) -> mi.Spectrum:
         return self.eval_pdf(ctx, si, wo, active)[0]
@@ -179,7 +178,7 @@ class ModelBSDF:
         valid, mixture, _, frame = evaluated
         value, pdf = self._eval_pdf(valid, mixture, frame, _as(mi.Vector3f, wo))
         sampled = self._sample(*evaluated, _as(mi.Float, sample1), _as(mi.Point2f, sample2))
-        return mi.depolarizer(value), pdf, *sampled
+        return value, pdf, *sampled
 
     # --- Other methods of Mitsuba -------------------------------------------------------------------------------------
 
@@ -263,3 +262,8 @@ class LobeFrame:
             return w
         cos, sin = self.cos_sin
         return mi.Vector3f(cos * w.x - sin * w.y, cos * w.y + sin * w.x, w.z)
+
+    def stokes_axes(self, *directions: mi.Vector3f) -> list[mi.Vector3f]:
+        """Return the first axes that Mitsuba gives the Stokes vectors of light along some directions, either way: both
+        in the lobes' frame."""
+        return [self.to_local(mi.mueller.stokes_basis(self.to_world(w))) for w in directions]

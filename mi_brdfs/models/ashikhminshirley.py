@@ -26,7 +26,7 @@ class AshikhminShirley(Model):
 
     Reciprocal. Energy-conserving: the albedo of fs is at most 1 (F = 1), that of fd is Rd (1-Rs) (1-(1-cosθ_i/2)⁵).
     These exponents differ from those of microfacet distributions called "phong" elsewhere, which are normalised with
-    n+2. One-sided.
+    n+2. One-sided. Depolarises.
 
     Sampling: for fs an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair), so that no sample falls below the horizon; for fd the cosine.

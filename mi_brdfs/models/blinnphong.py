@@ -34,7 +34,7 @@ class BlinnPhong(Model):
     As a microfacet model, it has Blinn's distribution D = (n+2)/(2π) cosθ_h^n, F = 1, and the shadowing term G = cosθ_i
     cosθ_o times a constant (cosθ_i alone for ``original``).
 
-    Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided.
+    Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. One-sided. Depolarises.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair), with a few uniform directions at grazing for the original normalization; no

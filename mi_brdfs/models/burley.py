@@ -3,7 +3,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import Lobe, MicrofacetLobe, multiscattering
+from ..lobes import Lobe, MicrofacetLobe, facet_lobes
+from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 from ..lobes.power import AxisFrame
 from ..math import EPSILON, SMALL, TINY, Spectrum, choose, clamp, luminance, safe_sqrt, square
 from ..microfacet.distributions import GGX, Berry
@@ -44,12 +45,13 @@ class Burley(Model):
     and specular lobe for spec_tint = 1 or metallic = 1; otherwise it has the exact Fresnel reflectance instead of
     F(f0). Its clear coat is 4 cosθ_i cosθ_o times this one.
 
-    ``multiscatter`` says what becomes of light that the facets of D reflect more than once, as in ``microfacet``.
+    ``multiscatter`` says what becomes of light that the facets of D reflect more than once, as in ``microfacet``, and
+    ``haze`` and ``retroreflectivity`` are those of ``microfacet``, for the same facets.
 
     Reciprocal, except for ``multiscatter`` = turquin. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the
     defaults, 1.60 for roughness = 1 and, with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv
     for roughness = 0.17 and anisotropic = 1, all beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a
-    clear coat. One-sided.
+    clear coat. One-sided. Depolarises.
 
     Sampling: for the base lobe the cosine with a few uniform directions, for the sheen a density of its own, for the
     clear coat an antithetic pair of half vectors and for the specular lobe one of visible normals, one of the pair
@@ -82,6 +84,7 @@ class Burley(Model):
     clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; omitted by default")
     clearcoat_gloss = Number(1, (0, 1), "gloss of the clear coat: its roughness falls from 0.1 to 0.001")
     multiscatter = MULTISCATTER
+    haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
     rotation = Rotation()
 
     def __init__(self, props: mi.Properties) -> None:
@@ -100,9 +103,8 @@ class Burley(Model):
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
         facets = GGX(*alpha)
-        specular = MicrofacetLobe(1, facets, facets.smith(correlated=False), Schlick(f0))
-        specular.anisotropic = self.is_stretched
-        lobes += multiscattering(self, specular)
+        facets.anisotropic = self.is_stretched
+        lobes += facet_lobes(self, p, 1, facets, lambda it: it.smith(correlated=False), Schlick(f0))
         if p.clearcoat is not None:
             narrow = Berry(dr.lerp(0.1, 0.001, p.clearcoat_gloss))
             lobes.append(CoatLobe(0.25 * p.clearcoat, narrow, CoatShadowing(), Schlick(0.04)))

@@ -3,7 +3,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..lobes import Lobe, MicrofacetLobe, over_diffuse
+from ..lobes import Lobe, facet_lobes, over_diffuse
+from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
 from ..microfacet.shadowing import VCavity
 from ..model import Model, Values
@@ -27,7 +28,8 @@ class CookTorrance(Model):
     * blinn: D = (n+2)/(2π) cosθ_h^n with n = 2/α² - 2; α is limited to 1
 
     F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``, in the
-    paper's form), Schlick's approximation for ``f0``, and 1 if none of them is given. ``normalization`` is
+    paper's form), Schlick's approximation for ``f0``, and 1 if none of them is given. For f82, f90, ``haze`` and
+    ``retroreflectivity`` see ``microfacet``. ``normalization`` is
 
     * modern: as above, where D is an NDF (∫ D cosθ_h = 1) and 4 comes from the Jacobian of the half vector. This agrees
       with the conference version of 1981, which has D/4 and 1/π.
@@ -35,6 +37,9 @@ class CookTorrance(Model):
 
     Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. For the paper's sum of several D of different
     roughness, use ``blendbsdf``. One-sided.
+
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does; ``f0``,
+    F = 1 and the diffuse lobe depolarise it.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
@@ -57,6 +62,7 @@ class CookTorrance(Model):
     fresnel = FresnelSet()
     distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")
     normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
+    haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
     preset = Preset()
 
     def __init__(self, props: mi.Properties) -> None:
@@ -71,5 +77,5 @@ class CookTorrance(Model):
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
         scale = 4 if self.normalization == "tog82" else 1
-        specular = MicrofacetLobe(p.specular_reflectance, distribution, VCavity(), p.fresnel, scale)
-        return over_diffuse(p.diffuse_reflectance, specular)
+        specular = facet_lobes(self, p, p.specular_reflectance, distribution, lambda _: VCavity(), p.fresnel, scale)
+        return over_diffuse(p.diffuse_reflectance, *specular)

@@ -28,7 +28,7 @@ class EON(Model):
     light that the first loses, after several reflections. r = 0 is Lambert's model.
 
     Reciprocal. Energy-conserving: the albedo is ρ E + ρ_ms (1-E), and 1 in all directions for ρ = 1. E is exact here;
-    the paper also has a polynomial fit. One-sided.
+    the paper also has a polynomial fit. One-sided. Depolarises.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions, as in the paper
     (mi_brdfs.lobes.diffuse.RoughDiffuseLobe); no sample falls below the horizon.

@@ -25,6 +25,7 @@ class Kurt(Model):
     Reciprocal. Energy-conserving for κ = 0 with ρd + Σ ks <= 1. Otherwise the albedo diverges at grazing angles: for
     κ = 0.25 and F = 1 it exceeds 1 from 89.9° on for α = 0.3, and from 88° on for α = 1; for κ = 0.5 and α = 0.1 it is
     1.05 at 88° and 3.7 at 89.9°. The power 4 of the cosine in D was not checked against the paper. One-sided.
+    Depolarises.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.

@@ -29,7 +29,7 @@ class Lafortune(Model):
       2π ρ_l Cmax^n/(n+2), which may exceed 1.
 
     Reciprocal. Energy-conserving for ``energy`` with ρd + Σ ρ_l <= 1. For a spectral exponent, use one lobe for each
-    colour. One-sided.
+    colour. One-sided. Depolarises.
 
     Sampling: each lobe nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe), even if its axis lies below the
     horizon (Cz < 0) and only its tail is visible: then a few samples fall below the horizon.

@@ -15,7 +15,7 @@ class Lambert(Model):
     The surface looks equally bright from all directions. Same as Mitsuba's ``diffuse``.
 
     Reciprocal. Energy-conserving: the albedo is ρ. Sampled exactly (cosine-weighted): every weight is ρ. One-sided;
-    nest it in ``twosided`` for both sides.
+    nest it in ``twosided`` for both sides. Depolarises.
 
     Example
     -------

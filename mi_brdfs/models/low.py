@@ -39,6 +39,9 @@ class Low(Model):
     Reciprocal. Energy-conserving for ``unit`` with ρd + A <= 1; otherwise A comes from a fit, and the albedo may be
     above 1. The factor 1/π was inferred from the fits. One-sided.
 
+    In polarized variants the facets polarise the light as a smooth surface does; the smooth variant and the diffuse
+    lobe depolarise it.
+
     Sampling: for microfacet an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); for smooth exactly S, clipped to the disc of projected directions.
     No sample falls below the horizon.

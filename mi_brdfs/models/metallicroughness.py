@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import drjit as dr
 
-from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe, multiscattering
-from ..microfacet.distributions import GGX
+from ..lobes import LambertLobe, Lobe, WeightedLobe, facet_lobes
+from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
+from ..microfacet.distributions import GGX, Distribution
 from ..microfacet.facet import Facet
 from ..microfacet.fresnel import Schlick
-from ..microfacet.shadowing import MULTISCATTER, SchlickSmith, Shadowing, SmithGGX
+from ..microfacet.shadowing import MULTISCATTER, SchlickSmith, Shadowing
 from ..model import Model, Values
 from ..parameters import Number, OneOf, Reflectance
 
@@ -29,13 +30,15 @@ class MetallicRoughness(Model):
     * smith: Smith's term for GGX, separable, as in ``walter``; with it, ``multiscatter`` says what becomes of light
       that facets reflect more than once, as in ``microfacet``.
 
+    ``haze`` and ``retroreflectivity`` are those of ``microfacet``.
+
     The factor 1-F of the diffuse lobe is common practice, as in the glTF 2.0 specification; Karis's notes have
     Lambert's lobe without it. It removes the light reflected by the facets between wi and wo, not all the light
     reflected by the specular lobe.
 
     Reciprocal. Energy-conserving for metallic = 1. Otherwise a bright surface gains energy towards grazing angles, more
     so if smoother: for C = 1, metallic = 0 and r = 0.5 or 0.1, the albedo reaches 1.00 or 1.08 (direct), 1.10 or 1.57
-    (ibl), 1.12 or 1.72 (smith). One-sided.
+    (ibl), 1.12 or 1.72 (smith). One-sided. Depolarises.
 
     Sampling: for the diffuse lobe the cosine, for the specular lobe an antithetic pair of visible normals, one chosen
     by how much each reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
@@ -56,17 +59,21 @@ class MetallicRoughness(Model):
     metallic = Number(0, (0, 1), "from a dielectric (0) to a metal (1), which has no diffuse lobe")
     roughness = Number(0.5, (0.01, 1), "roughness r; its square is the facets' α")
     shadowing = OneOf({"direct": {}, "ibl": {}, "smith": {"multiscatter": MULTISCATTER}}, "shadowing term")
+    haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         fresnel = Schlick(dr.lerp(0.04, p.base_color, p.metallic))
         alpha = dr.square(p.roughness)
-        if self.shadowing == "smith":
-            shadowing: Shadowing = SmithGGX(alpha, alpha, correlated=False)
-        else:
-            shadowing = SchlickSmith(dr.square(p.roughness + 1) / 8 if self.shadowing == "direct" else alpha / 2)
+
+        def shadowing(facets: Distribution) -> Shadowing:
+            if self.shadowing == "smith":
+                return facets.smith(correlated=False)
+            alpha = facets.alpha_u
+            return SchlickSmith(dr.square(dr.sqrt(alpha) + 1) / 8 if self.shadowing == "direct" else alpha / 2)
+
         diffuse = WeightedLobe(
             LambertLobe((1 - p.metallic) * p.base_color),
             lambda wi, wo: 1 - fresnel(Facet.between(wi, wo).cos_d),
             lambda wi: 1 - fresnel(1),  # few pairs of directions graze their half vector
         )
-        return diffuse, *multiscattering(self, MicrofacetLobe(1, GGX(alpha, alpha), shadowing, fresnel))
+        return diffuse, *facet_lobes(self, p, 1, GGX(alpha, alpha), shadowing, fresnel)

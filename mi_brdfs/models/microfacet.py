@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import mitsuba as mi
 
-from ..lobes import Lobe, MicrofacetLobe, multiscattering, over_diffuse
+from ..lobes import Lobe, facet_lobes, over_diffuse
+from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 from ..microfacet import shadowing
-from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, HemiEPD
+from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, Distribution, HemiEPD
 from ..model import Model, Values
 from ..parameters import FresnelSet, OneTerm, ParameterError, Preset, Reflectance, Rotation
 from ..parameters.messages import listed
@@ -47,7 +48,22 @@ class Microfacet(Model):
     * kurt: (cosθ_i cosθ_o)^(1-κ) / (wi·h), κ = ``kurt_exponent`` (2010, doi:10.1145/1722991.1722996)
 
     F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``),
-    Schlick's approximation for ``f0``, and 1 if none of them is given.
+    Schlick's approximation for ``f0``, and 1 if none of them is given. Schlick's is
+
+        F(c) = max(f0 + (f90 - f0) (1-c)ᵖ - a c (1-c)⁶, 0)
+
+    with f90 = 1 and p = ``schlick_exponent`` = 5 unless they are given, and a = 0 without ``f82``: with it, a is such
+    that F at c = 1/7, 82°, is f82 times what it was (P. Kutz, M. Hašan and D. Edmondson, Novel aspects of the Adobe
+    Standard Material, 2021; generalized_schlick_bsdf of MaterialX).
+
+    Two words change the lobe of the facets. With ``haze`` = h and ``haze_spread`` = s it is (1-h) times this one and h
+    times one of rougher facets, √α' = √α + s (1-√α), where α < 1 (P. Barla, R. Pacanowski and P. Vangorp, A composite
+    BRDF model for hazy gloss, Computer Graphics Forum 37(4), 2018, doi:10.1111/cgf.13475, as OpenPBR 1.2 words it); not
+    for abc and hepd. With ``retroreflectivity`` = r it is (1-r) f(wi, wo) + r f(wi', wo), where wi' = (-x, -y, z) is
+    the mirror direction of wi: that share of the light goes back where it came from (M. Raab, L. Belcour, F. Liu and
+    J. Portsmouth, The minimal retroreflective microfacet model, Journal of Computer Graphics Techniques 15(1), 2026).
+    The albedo stays; what goes back is unpolarized. Fits leave these, f82, f90 and the exponent as they are, unless
+    given as "free".
 
     With smith and smith-correlated, ``multiscatter`` says what becomes of light that facets reflect more than once. The
     larger α, the more: for GGX with α = 1 and F = 1 the facets' lobe reflects 0.31 at normal incidence.
@@ -63,7 +79,7 @@ class Microfacet(Model):
 
     For F = 1 all of them conserve energy within 0.005 up to 85° and αu : αv = 8 : 1, which is the error of the tables.
     The albedo of walk is that of the simulated walk within 0.005 up to 60°, and 0.02 at 80°, for Schlick's reflectance
-    and metals.
+    and metals, and within 0.012 for f82 = 0.6 on facets with αu : αv = 8 : 1.
 
     Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
     with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``
@@ -74,6 +90,9 @@ class Microfacet(Model):
     smith-correlated for beckmann and ggx; for the others see the table below. The more αu and αv differ, the less
     schlick shadows. For Ashikhmin and Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later
     papers and public code. One-sided.
+
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does. All else
+    depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
     so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and
@@ -113,6 +132,7 @@ class Microfacet(Model):
         "shadowing term G",
     )
     fresnel = FresnelSet()
+    haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
     rotation = Rotation()
     preset = Preset()
 
@@ -125,8 +145,13 @@ class Microfacet(Model):
                 f'microfacet: shadowing = "{self.shadowing}" is not known for distribution = "{self.distribution}"; '
                 f'take it with {listed(suited)}, or another one such as "vcavity".'
             )
+        widened = [word for word, it in distributions.items() if it.widened is not Distribution.widened]
+        if self.parameters["haze"].textures and self.distribution not in widened:
+            raise ParameterError(
+                f'microfacet: haze is not known for distribution = "{self.distribution}"; take it with '
+                f"{listed(widened)}."
+            )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
-        distribution = p.distribution()
-        specular = MicrofacetLobe(p.specular_reflectance, distribution, p.shadowing(distribution), p.fresnel)
-        return over_diffuse(p.diffuse_reflectance, *multiscattering(self, specular))
+        specular = facet_lobes(self, p, p.specular_reflectance, p.distribution(), p.shadowing, p.fresnel)
+        return over_diffuse(p.diffuse_reflectance, *specular)

@@ -30,7 +30,7 @@ class Minnaert(Model):
       2ρ/(k+1) cosθ_i^k, up to 2ρ.
 
     Reciprocal, except for ``none``. Energy-conserving for k >= 1, and for ``energy`` at any k. The paper is about the
-    exponents; the factor (k+1)/2π is common usage, and could not be compared with it. One-sided.
+    exponents; the factor (k+1)/2π is common usage, and could not be compared with it. One-sided. Depolarises.
 
     Sampling: the inverse cumulative distribution of the cosine, so that every weight is the albedo.
 

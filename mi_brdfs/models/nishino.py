@@ -34,6 +34,9 @@ class Nishino(Model):
     Reciprocal. Energy-conserving for ``microfacet`` with ρd + ρs <= 1. For ``dsbrdf`` the albedo falls towards grazing
     angles, like cos²θ_i for narrow lobes. One-sided.
 
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does; ``f0``,
+    F = 1, ``dsbrdf`` and the diffuse lobe depolarise it.
+
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
 

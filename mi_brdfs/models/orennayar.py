@@ -33,7 +33,7 @@ class OrenNayar(Model):
     and 1.050 (full, σ = 0.3). Rough surfaces lose energy: the albedo at normal incidence is 0.56 and 0.72 for σ = π/2.
     ``eon`` neither gains nor loses.
 
-    Other implementations agree on the constants, which could not be compared with the paper. One-sided.
+    Other implementations agree on the constants, which could not be compared with the paper. One-sided. Depolarises.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions
     (mi_brdfs.lobes.diffuse.RoughDiffuseLobe); no sample falls below the horizon.
@@ -70,7 +70,7 @@ class RoughDiffuse(Model):
     qualitative one.
 
     Reciprocal. Not quite energy-conserving: for ρ = 1 the albedo at grazing angles reaches 1.050 (α = 0.42), or 1.015
-    (α = 0.28) with ``use_fast_approx``. One-sided.
+    (α = 0.28) with ``use_fast_approx``. One-sided. Depolarises.
 
     Sampling: a clipped linearly transformed cosine in a mixture with uniform directions
     (mi_brdfs.lobes.diffuse.RoughDiffuseLobe); no sample falls below the horizon.

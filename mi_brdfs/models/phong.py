@@ -26,8 +26,8 @@ class Phong(Model):
       2ρs/(n+1).
 
     Reciprocal, except for ``original``. Energy-conserving for ``energy`` with ρd + ρs <= 1. Same as ``phong`` of
-    Mitsuba 0.6. One-sided. The lobe is zero from 90° away from r, even for n = 0, which is therefore not Lambert's
-    model.
+    Mitsuba 0.6. One-sided. Depolarises. The lobe is zero from 90° away from r, even for n = 0, which is therefore not
+    Lambert's model.
 
     Sampling: nearly in proportion to f cosθ_o (mi_brdfs.lobes.PowerLobe); no sample falls below the horizon.
 

@@ -43,7 +43,7 @@ class Schlick94(Model):
     perfect mirror, by the weight 4 r (1-r) and the rest.
 
     Reciprocal. Gains energy towards grazing angles: there G of a smooth surface shadows less than facets of that slope
-    do, and the other two variants have no limit, as they divide by cosθ_i. One-sided.
+    do, and the other two variants have no limit, as they divide by cosθ_i. One-sided. Depolarises.
 
     Sampling: for Z A an antithetic pair of half vectors, with azimuths from an ellipse near A, one chosen by how much
     each reflects (mi_brdfs.microfacet.sampling.Pair); for the interreflection its cosθ_o, nearly exact except for S(u);

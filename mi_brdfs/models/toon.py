@@ -34,7 +34,7 @@ class Toon(Model):
       0.2 ρs for the defaults, up to 2ρd and 2ρs for bands as wide as the hemisphere.
 
     Not reciprocal: f diverges like 1/cosθ_o at grazing angles. Energy-conserving for ``energy`` with ρd + ρs <= 1.
-    One-sided.
+    One-sided. Depolarises.
 
     Sampling: the inverse cumulative distributions of the cosines, and the azimuths about r that lie above the horizon.
     The weight of the diffuse lobe is its albedo, that of the specular lobe between half its largest albedo and all of

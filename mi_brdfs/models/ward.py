@@ -39,7 +39,7 @@ class Ward(Model):
     G = Kelemen's, h_z⁴ √(cosθ_i cosθ_o) or h_z⁴; only equation 5b has its own distribution.
 
     Reciprocal. Energy-conserving for ``balanced`` with ρd + ρs <= 1. Same parameters as ``ward`` of Mitsuba 0.6.
-    One-sided.
+    One-sided. Depolarises.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.

@@ -37,7 +37,7 @@ class Wrap(Model):
       1 - (w/(1+w))ⁿ⁺¹ times that: 4/3 ρ and 7/6 ρ for the half-Lambert, up to 4ρ and 2ρ for n = 0.
 
     Not reciprocal, except for (0, 1): f diverges like 1/cosθ_o at grazing angles. Energy-conserving for ``energy``.
-    One-sided: visible from the front only, also on the sphere, which ``twosided`` refuses.
+    One-sided: visible from the front only, also on the sphere, which ``twosided`` refuses. Depolarises.
 
     Sampling: the inverse cumulative distribution of the cosine, so that every weight is the albedo.
 

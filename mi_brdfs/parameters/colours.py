@@ -15,15 +15,18 @@ from .reader import PropertyReader, Range
 
 
 class Colour(Parameter):
-    """A spectral quantity within ``limits``. Without a default it is None where it is not given."""
+    """A spectral quantity within ``limits``. Without a default it is None where it is not given. Fits leave one that is
+    not ``sought`` as it is, unless asked for it, and so do searches for the largest albedo."""
 
-    def __init__(self, default: float | None, limits: Range, text: str, *, role: str | None = None):
+    def __init__(
+        self, default: float | None, limits: Range, text: str, *, role: str | None = None, sought: bool = True
+    ):
         super().__init__(text)
-        self.default, self.limits, self.role = default, limits, role
+        self.default, self.limits, self.role, self.sought = default, limits, role, sought
 
     @property
     def spellings(self) -> list[tuple[Quantity, ...]]:
-        return [(Quantity(self.names[0], self.limits, self.default, self.text, colour=True),)]
+        return [(Quantity(self.names[0], self.limits, self.default, self.text, colour=True, sought=self.sought),)]
 
     def bind(self, reader: PropertyReader) -> Colour:
         (name,) = self.names
@@ -48,8 +51,8 @@ class Colour(Parameter):
 class Reflectance(Colour):
     """A colour in [0, 1]."""
 
-    def __init__(self, default: float | None, text: str, *, role: str | None = None):
-        super().__init__(default, (0, 1), text, role=role)
+    def __init__(self, default: float | None, text: str, *, role: str | None = None, sought: bool = True):
+        super().__init__(default, (0, 1), text, role=role, sought=sought)
 
     @property
     def tried(self) -> tuple[float, ...]:

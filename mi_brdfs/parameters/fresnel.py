@@ -66,10 +66,9 @@ class FresnelSet(OneTerm):
             raise reader.error(
                 first, f"excludes {second}; give one of eta and k, material, f0, int_ior and ext_ior, or none for F = 1"
             )
-        if chosen == ["conductor"]:
-            for name, other in (("eta", "k"), ("k", "eta")):
-                if other not in reader:
-                    raise reader.error(name, f"needs {other} beside it")
+        for needed in self.terms[chosen[0]].needed if chosen else ():
+            if needed not in reader:
+                raise reader.error(given[chosen[0]][0], f"needs {needed} beside it")
         return chosen[0] if chosen else "none"
 
     def _made_of(self, values: dict[str, Any]) -> Any:

@@ -28,7 +28,8 @@ class Number(Parameter):
 
     An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and evaluates to a pair, of the same
     object twice where it was given alone; with ``lone_default``, one of the pair alone leaves the other at the default.
-    One with another ``spelling`` may be given as that instead. Without a default it is None where it is not given.
+    One with another ``spelling`` may be given as that instead. Without a default it is None where it is not given. Fits
+    leave one that is not ``sought`` as it is, unless asked for it, and so do searches for the largest albedo.
     """
 
     def __init__(
@@ -41,9 +42,10 @@ class Number(Parameter):
         lone_default: bool = False,
         spelling: Spelling | None = None,
         role: str | None = None,
+        sought: bool = True,
     ):
         super().__init__(text)
-        self.role = role
+        self.role, self.sought = role, sought
         self.default, self.limits, self.spelling = default, limits, spelling
         self.anisotropic, self.lone_default = anisotropic, lone_default
         self.scale = 1.0
@@ -64,7 +66,8 @@ class Number(Parameter):
 
     @property
     def spellings(self) -> list[tuple[Quantity, ...]]:
-        found: list[tuple[Quantity, ...]] = [(Quantity(self.names[0], self.limits, self.default, self.text),)]
+        alone = Quantity(self.names[0], self.limits, self.default, self.text, sought=self.sought)
+        found: list[tuple[Quantity, ...]] = [(alone,)]
         if self.anisotropic:
             ways = zip(self.pair, ("along dp_du", "across"), strict=True)
             found.append(tuple(Quantity(name, self.limits, self.default, f"{self.text}, {way}") for name, way in ways))
@@ -142,12 +145,12 @@ class Index(Number):
     LIMITS = (0.01, 100)
 
     def __init__(self, substance: str, text: str, *, sought: bool = True):
-        super().__init__(None, self.LIMITS, text, role="fresnel")
-        self.substance, self.is_sought = substance, sought
+        super().__init__(None, self.LIMITS, text, role="fresnel", sought=sought)
+        self.substance = substance
 
     @property
     def spellings(self) -> list[tuple[Quantity, ...]]:
-        return [(Quantity(self.name, self.limits, None, self.text, usual=(1, 3), sought=self.is_sought),)]
+        return [(Quantity(self.name, self.limits, None, self.text, usual=(1, 3), sought=self.sought),)]
 
     def bind(self, reader: PropertyReader) -> Index:
         if self.name in reader and not isinstance(reader.props[self.name], str):

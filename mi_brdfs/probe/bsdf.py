@@ -212,12 +212,19 @@ class BSDFProbe:
 
 def load(given: Mapping[str, Any]) -> Any:
     """Load a plugin dict that may be loaded again. In spectral variants Mitsuba writes the coefficients of spectra into
-    the bitmaps that it is given, and a second time those of the coefficients: give it copies."""
+    the bitmaps that it is given, and a second time those of the coefficients: give it copies.
+
+    Raises:
+        ValueError: if it holds None, at which Mitsuba would end the process.
+    """
     return mi.load_dict(_copied(given))
 
 
 def _copied(given: Any) -> Any:
     if isinstance(given, Mapping):
+        for name, value in given.items():
+            if value is None:
+                raise ValueError(f"{name} is None; leave it out, or give it a value.")
         return {name: _copied(value) for name, value in given.items()}
     return mi.Bitmap(given) if isinstance(given, mi.Bitmap) else given
 

@@ -53,12 +53,12 @@ def view(cosine: Array, azimuth: Array) -> Array:
 
 
 def axes(model: type[Model], given: Mapping[str, Any]) -> list[Dimension]:
-    """Return the numbers that are not ``given``, both of a pair, and the direction of view."""
+    """Return the numbers that are sought and not ``given``, both of a pair, and the direction of view."""
     least = {name: value for word in given.values() for name, value in LEAST.get(word, {}).items()}
     free = []
     for parameter in _parameters(model.declared(), given):
         for it in parameter.quantities(pairs=True):
-            if not (it.colour or it.turns or parameter.name in given):
+            if it.sought and not (it.colour or it.turns or parameter.name in given):
                 low, high = (limit if isfinite(limit) else copysign(FARTHEST, limit) for limit in it.limits)
                 free.append(Dimension(it.name, max(low, least.get(it.name, low)), high))
     return [*free, *VIEW]

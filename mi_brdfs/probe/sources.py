@@ -15,7 +15,7 @@ import numpy as np
 from ..names import check_name, tabulated
 from ..parameters import published
 from ..srgb import decoded
-from .bsdf import BSDFProbe, contained
+from .bsdf import BSDFProbe, contained, load
 from .directions import direction, on_side
 from .variates import random
 
@@ -82,7 +82,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     source = BSDFSource(name, word, str(path) if is_file or is_data else word, None, parameters)
     suffix = "".join(f" {name}={value}" for name, value in parameters.items())
     loaded = source.load()
-    loaded = mi.load_dict(loaded) if isinstance(loaded, dict) else loaded
+    loaded = load(loaded) if isinstance(loaded, dict) else loaded
     if isinstance(loaded, mi.Scene) and is_file:
         names = _distinct([name_of(bsdf) for bsdf in _materials(loaded)])
         if not names:

@@ -41,6 +41,7 @@ class Tabulated(Model):
 
     The energy is the file's: nothing keeps a measurement from reflecting more than it receives. Reciprocal where the
     format is (MERL with half a turn of φd), else as good as the measurement. One-sided.
+    Depolarises.
 
     A file that several BSDFs name is in memory once. With ``differentiable`` a BSDF has its own copy, and
     ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last. Directions
