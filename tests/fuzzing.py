@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from hypothesis import Phase, given, settings
 
+from mi_brdfs.microfacet.terms import Distribution
 from mi_brdfs.mitsuba.registry import brought_terms
 from mi_brdfs.parameters import ConductorName, Index, OneTerm, PerLobe, Quantity, Rotation
 
@@ -62,6 +63,9 @@ def ways(parameters) -> list[Options]:
                 waiting.remove((it, way))
                 waiting.append((it, way))
                 options = way | options
+                if term and it.terms[way.words["distribution"]].widened is Distribution.widened:
+                    kept = tuple(it for it in options.quantities if not it.name.startswith("haze"))
+                    options = options._replace(quantities=kept)
                 break
         found.append(options)
     return found

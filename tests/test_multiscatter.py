@@ -86,6 +86,7 @@ def test_facets_of_no_index_reflect_nothing(way):
         colour = {"type": "rgb", "value": k} if k else k
         found = albedos(facets(way, (0.5, 0.5), eta=1.0, k=colour), ANGLES)
         assert np.isfinite(found).all() and (found[:, 0] < 1e-7).all()
+    assert (albedos(facets(way, (0.5, 0.5), int_ior=1.0, ext_ior=1.0), ANGLES) == 0).all()
 
 
 def test_what_is_smooth_loses_nothing_and_stays_as_it_was():

@@ -119,7 +119,8 @@ class Dielectric(Fresnel):
         difference = step / (g + cos)
         s = dr.square(difference / (g + cos))
         p = dr.square((cos * (g + cos) - 1) / (cos * difference + 1))
-        return dr.select(total, 1, 0.5 * s * (1 + p))
+        # An index of 1 reflects nothing at grazing either.
+        return dr.select(total, dr.select(step < 0, 1, 0), 0.5 * s * (1 + p))
 
     brightness = __call__
 

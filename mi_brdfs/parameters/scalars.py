@@ -123,7 +123,7 @@ class Number(Parameter):
         value = mi.Float(self.default or 0)
         if not self.anisotropic:
             return value
-        return (value, mi.Float(value)) if len(self.textures) == 2 else (value, value)
+        return (value, value + 0.0) if len(self.textures) == 2 else (value, value)  # also in scalar variants another
 
     def rows(self) -> list[ParameterRow]:
         single, range_ = self.names[0], interval(*self.limits)
