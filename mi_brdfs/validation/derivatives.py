@@ -24,7 +24,7 @@ TOLERANCE = 0.02
 LOST = 3
 """How many times its last digit a value may be off, as of formulas whose terms cancel."""
 COUNT = 2000
-TURN = 0.05
+TURN = 0.01
 """The step by which directions are turned, in parts of the width of a lobe."""
 
 
