@@ -47,7 +47,6 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         contract.active,
         contract.mode,
         contract.recorded,
-        contract.calls,
         contract.null,
         contract.reflectance,
         spectral.colours,
