@@ -62,21 +62,14 @@ class Walks:
 
     def __init__(self, smith: Smith, towards: Any, mean: Any) -> None:
         self.smith, self.towards = smith, towards
-        if smith.isotropic:
-            at: Any = mi.Point1f(_texel(_compressed(smith.alpha_u), mean.shape[0]))
-        else:
-            at = mi.Point2f(*(_texel(_compressed(it), mean.shape[0]) for it in (smith.alpha_v, smith.alpha_u)))
-        root, second, third, schlick, dip, *_ = mean.eval(at)
+        at = [_texel(_compressed(alpha), mean.shape[0]) for alpha in (smith.alpha_v, smith.alpha_u)]
+        root, second, third, schlick, dip, *_ = mean.eval(mi.Point2f(*at))
         self.mean = MeanEscape(dr.square(root), second, third, schlick, dip)
 
     def of(self, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
         u2, v2, x2, y2 = (dr.square(each) for each in (self.smith.alpha_u, self.smith.alpha_v, v.x, v.y))
         cos = v.z * dr.rsqrt(dr.maximum(v.z * v.z + u2 * x2 + v2 * y2, EPSILON))
-        if self.smith.isotropic:
-            at = [_compressed(self.smith.alpha_u), cos]
-            k = self.towards.eval(mi.Point2f(*(_texel(x, self.towards.shape[0]) for x in at)))
-            return Escape(*k)
         # At the normal all azimuths are one.
         even = UPRIGHT * dr.square(dr.square(v.z))
         inverse = dr.rcp(dr.maximum(x2 + y2 + 2 * even, EPSILON))
@@ -93,20 +86,16 @@ class Walks:
 
 
 def textures(smith: Smith) -> list[Any]:
-    """Return the tables for one of Smith's terms, as textures of the active variant: for isotropic facets, where α∥ is
-    α⊥ and ρ is 0, with an axis less."""
+    """Return the tables for one of Smith's terms, as textures of the active variant."""
     name = f"{smith.facets}-{'correlated' if smith.correlated else 'separable'}"
     # Accelerated look-ups of CUDA would interpolate with eight bits.
     options = {"use_accel": False, "wrap_mode": dr.WrapMode.Clamp}
     with np.load(FILE) as data:
         towards = np.concatenate([data[name], data[f"{smith.facets}-walk"]], axis=-1)
         mean = data[f"{name}-mean"]
-    kinds: tuple[Any, Any] = (mi.Texture3f, mi.Texture2f)
-    if smith.isotropic:
-        along, across = np.arange(len(mean)), np.arange(len(mean)) % mean.shape[1]  # Blinn's are all isotropic
-        kinds, mean = (mi.Texture2f, mi.Texture1f), mean[along, across]
-        towards = towards[:, along, across][..., [0, 3, 5, 7]]
-    return [kind(mi.TensorXf(np.float32(it)), **options) for kind, it in zip(kinds, (towards, mean), strict=True)]
+    return [
+        kind(mi.TensorXf(np.float32(it)), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))
+    ]
 
 
 def _compressed(alpha: Any) -> Any:

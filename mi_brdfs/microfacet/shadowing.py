@@ -83,7 +83,6 @@ class Smith(Shadowing):
 
     def __init__(self, alpha_u: mi.Float, alpha_v: mi.Float, correlated: bool) -> None:
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated
-        self.isotropic = alpha_u is alpha_v
 
     def slope2(self, v: mi.Vector3f) -> mi.Float:
         """Return (αu v_x)² + (αv v_y)²."""
