@@ -215,5 +215,5 @@ def test_committed_form(path):
 
 def test_every_notebook_has_its_place():
     """In the list that says in which order to read them."""
-    listed = re.findall(r"^\d\. \[.*?\]\((\w+)\.ipynb\)", (FOLDER / "README.md").read_text(encoding="utf-8"), re.M)
+    listed = re.findall(r"^\d+\. \[.*?\]\((\w+)\.ipynb\)", (FOLDER / "README.md").read_text(encoding="utf-8"), re.M)
     assert sorted(listed) == [path.stem for path in NOTEBOOKS]
