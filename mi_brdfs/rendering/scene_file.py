@@ -12,6 +12,7 @@ from typing import Any
 
 import mitsuba as mi
 
+from ..legacy.upgrade import is_new, passing
 from ..names import check_name
 
 RESERVED = ("config", "filename")
@@ -27,6 +28,8 @@ class SceneFile:
     """The values of its ``<default>`` parameters."""
     box_filter: bool = False
     """Whether films get box filters: a denoiser expects pixels that share no samples."""
+    lenient: bool = False
+    """Whether stand-ins take the place of files that a scene of Mitsuba 0.6 lacks."""
     contents: dict[str, bytes] | None = None
     """In a copy, the files by their paths, without the root."""
     names: dict[str, str] = field(default_factory=dict)
@@ -51,18 +54,28 @@ class SceneFile:
     def copied(self) -> SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
         with _looking_in(Path(self.path).parent):
-            state = mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), self.path, **self.parameters)
+            state, text = self._parsed(mi.parser.ParserConfig(mi.variant()), Path(self.path))
             named = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in _file_names(state)}
         names = {name: _rootless(path) for name, path in named.items() if os.path.isfile(path)}
         paths = [self.path, *map(str, state.files), *(path for path in named.values() if os.path.isfile(path))]
         contents = {_rootless(path): Path(path).read_bytes() for path in paths}
-        return SceneFile(_rootless(self.path), self.parameters, self.box_filter, contents, names, _rootless("."))
+        parameters = self.parameters
+        if text is not None:
+            contents[_rootless(self.path)], parameters = text.encode(), {}
+        return SceneFile(_rootless(self.path), parameters, self.box_filter, False, contents, names, _rootless("."))
+
+    def _parsed(self, config: Any, path: Path) -> tuple[Any, str | None]:
+        """Return the parsed scene, and what a scene of Mitsuba 0.6 was upgraded to."""
+        if is_new(path):
+            return mi.parser.parse_file(config, str(path), **self.parameters), None
+        text = passing(path, self.lenient, self.parameters)
+        return mi.parser.parse_string(config, text), text
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         check_name(str(path))
         config = mi.parser.ParserConfig(mi.variant())
         with _looking_in(path.parent, *folders):
-            state = mi.parser.parse_file(config, str(path), **self.parameters)
+            state, _ = self._parsed(config, path)
             for props, key in _file_names(state):
                 props[key] = names.get(props[key], props[key])
             mi.parser.transform_all(config, state)

@@ -1,0 +1,395 @@
+"""Scenes of Mitsuba 0.2 to 0.6 as scenes of Mitsuba 3, with a report of what changed."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import mitsuba as mi
+import numpy as np
+
+from .document import OBJECTS, Element, read_document
+from .rules import KNOWN, NEAREST, RULES, SUCCESSORS, bsdf, colour, number
+from .sheets import modernize
+from .spectra import rgb_of
+
+PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
+COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
+Kind = Literal["changed", "approximated", "dropped", "replaced"]
+
+
+class Change(NamedTuple):
+    """A change, and where in the old scene it was made: ``FILE:LINE``."""
+
+    place: str
+    kind: Kind
+    """``changed`` keeps the meaning, ``approximated`` does not quite, ``dropped`` is left out, and ``replaced`` is a
+    stand-in for a file that is missing."""
+    text: str
+
+
+@dataclass
+class Upgraded:
+    """An upgraded scene."""
+
+    version: str
+    """The version that it had."""
+    xml: str
+    """The scene of Mitsuba 3; as it was, if it is one."""
+    changes: list[Change] = field(default_factory=list)
+
+    def summary(self) -> str:
+        """Return how many changes of each kind there are."""
+        counts = {kind: sum(change.kind == kind for change in self.changes) for kind in Kind.__args__}
+        return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "nothing changed"
+
+    def report(self) -> str:
+        """Return the changes, one a line, those that are the same together, with their places."""
+        places: dict[tuple[str, str], list[str]] = {}
+        for change in self.changes:
+            places.setdefault((change.kind, change.text), []).append(change.place)
+        return "\n".join(f"{kind}: {text} ({', '.join(dict.fromkeys(at))})" for (kind, text), at in places.items())
+
+
+def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.PathLike | None = None,
+            **parameters: Any) -> Upgraded:  # fmt: skip
+    """Return a scene file of Mitsuba 0.2 to 0.6 as one of Mitsuba 3; one of Mitsuba 3 as it is.
+
+    It gives the values that 0.6 gave: colours as linear sRGB, BSDFs scaled down where they would gain energy, emitters of
+    equal light in all channels. What has no successor is approximated or dropped, and said in the report.
+
+    Args:
+        path: the file.
+        lenient: put stand-ins in the place of meshes, textures and volumes that are missing: cubes and grey.
+        folder: where the new scene will lie, to which its file names are relative; by default where the old one does.
+        parameters: the values of its ``<default>`` parameters, which are written out.
+
+    Raises:
+        ValueError: in a sentence with file and line, if the file is no scene or files are missing.
+        OSError: if a file cannot be read.
+    """
+    path = Path(path)
+    if is_new(path):
+        return Upgraded("3", path.read_text(encoding="utf-8"))
+    root, without = read_document(path, {name: str(value) for name, value in parameters.items()}, lenient)
+    version = root.attributes.get("version", "0.2.0").strip()
+    if not re.fullmatch(r"0\.[0-6](\.\d+)*", version):
+        raise ValueError(f"{path}: version {version} is none of 0.2 to 0.6.")
+    work = _Upgrade(path, lenient, Path(folder) if folder is not None else path.parent)
+    for place, name in without:
+        work.changes.append(Change(place, "dropped", f"the include {name}, which is missing"))
+    scene = work.scene(root, tuple(map(int, version.split(".")[:2])))
+    return Upgraded(version, scene.to_xml(), work.changes)
+
+
+def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters: Any) -> Any:
+    """Load a scene file of Mitsuba 0.2 to 0.6 as :func:`upgrade` changes it, or one of Mitsuba 3 as it is. A warning
+    counts the changes, if there are any.
+
+    Raises:
+        ValueError: as :func:`upgrade`.
+        RuntimeError: what Mitsuba says where it cannot load the scene.
+    """
+    from ..rendering.scene_file import SceneFile
+
+    return SceneFile(str(path), {name: str(value) for name, value in parameters.items()}, lenient=lenient).load()
+
+
+def is_new(path: Path) -> bool:
+    """Return whether a file is a scene of Mitsuba 2 or 3, or none, of which Mitsuba knows what to say."""
+    head = path.read_bytes()[:100_000]
+    found = re.search(rb"<scene\b([^>]*)>", head)
+    if not found:
+        return b"\0" not in head  # UTF-16 has them
+    version = re.search(rb"""version\s*=\s*["']\s*(\d+)""", found[1])
+    return bool(version) and int(version[1]) >= 2
+
+
+def passing(path: Path, lenient: bool, parameters: dict[str, str]) -> str:
+    """Return the text of an upgraded scene, for a command that takes it in passing, and warn of changes."""
+    new = upgrade(path, lenient=lenient, **parameters)
+    warnings.warn(
+        f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade shows what changed.",
+        stacklevel=3,
+    )
+    return new.xml
+
+
+class _Upgrade:
+    """The way of one scene, from the parts to the whole."""
+
+    def __init__(self, path: Path, lenient: bool, folder: Path) -> None:
+        self.path, self.lenient, self.folder = path, lenient, folder
+        self.changes: list[Change] = []
+        self.ids: dict[str, Element | None] = {}
+        """What became of the elements with an id; None of those that were left out."""
+        self.missing: list[str] = []
+        self.has_media = False
+
+    def changed(self, element: Element, text: str, kind: Kind = "changed") -> None:
+        self.changes.append(Change(element.place or self.path.name, kind, text))
+
+    def approximated(self, element: Element, text: str) -> None:
+        self.changed(element, text, "approximated")
+
+    def dropped(self, element: Element, text: str) -> None:
+        self.changed(element, text, "dropped")
+
+    def resolved(self, element: Element) -> Element:
+        """Return what a reference refers to, or the element itself."""
+        if element.tag != "ref":
+            return element
+        return self.ids.get(element.attributes.get("id", "")) or element
+
+    # --- The scene ---------------------------------------------------------------------------------------------------
+
+    def scene(self, root: Element, version: tuple[int, int]) -> Element:
+        modernize(root, version, self.changed)
+        self.has_media = any(it.tag == "medium" for it in root.walk())
+        scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
+        self._complete(root, scene)
+        if self.missing:
+            more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
+            raise ValueError(
+                f"{self.missing[0]}{more}; put the files there, or let stand-ins take their place (--lenient)."
+            )
+        return scene
+
+    def _complete(self, root: Element, scene: Element) -> None:
+        """Write out what 0.6 supplies by itself."""
+        root = Element("scene", place=root.place)
+        if not scene.of("integrator"):
+            scene.children.insert(0, Element("integrator", {"type": "direct"}))
+            self.changed(root, "a scene without an integrator has direct")
+        for extra in scene.of("integrator")[:-1]:
+            scene.children.remove(extra)
+            self.dropped(extra, "an integrator before another one")
+        sensors = scene.of("sensor")
+        if not sensors:
+            self.dropped(root, "a scene without a sensor has none: 0.6 sees all of it along z")
+        elif len(sensors) > 1:
+            scene.children.remove(sensors[-1])
+            scene.children.insert(scene.children.index(sensors[0]), sensors[-1])
+            self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
+        lights = [it for it in scene.walk() if it.tag == "emitter"]
+        if not lights:
+            sun = Element("emitter", {"type": "sunsky"}, [number("float", "sun_scale", "2"), number("float", "sky_scale", "2")])
+            turn = Element("transform", {"name": "to_world"}, [Element("rotate", {"y": "1", "angle": "-120"})])
+            sun.children.append(turn)
+            scene.children.append(RULES["emitter", "sunsky"](self, sun))
+            self.changed(root, "a scene without an emitter has sun and sky")
+
+    # --- Elements ----------------------------------------------------------------------------------------------------
+
+    def _parts(self, element: Element) -> list[Element]:
+        return [it for child in element.children if (it := self._part(child, element)) is not None]
+
+    def _part(self, element: Element, parent: Element) -> Element | None:
+        id = element.attributes.get("id", "")
+        if element.tag == "null":
+            self.ids[id] = None
+            return None
+        if element.tag == "alias":
+            self.ids[element.attributes.get("as", "")] = Element("ref", {"id": id}) if self.ids.get(id) else None
+            return None
+        if element.tag == "ref":
+            return self._reference(element, parent)
+        if element.tag in COLOURS:
+            return self._colour(element)
+        if element.tag == "animation":
+            return self._animation(element)
+        if element.tag in PROPERTIES:
+            if element.name == "to_world" and parent.tag == "sensor":
+                _normalize(element)
+            return element
+        if element.tag not in OBJECTS:
+            self.dropped(element, f"<{element.tag}>, which Mitsuba has not")
+            return None
+        name = element.name
+        result = self._object(element)
+        if result is not element:
+            element.attributes.pop("id", None)
+            element.attributes.pop("name", None)
+        if id:
+            self.ids[id] = result
+        if result is None or (result.tag not in OBJECTS and not name):  # a colour that only references need
+            return None
+        result.attributes |= ({"id": id} if id and result.tag in OBJECTS else {}) | ({"name": name} if name else {})
+        return result
+
+    def _reference(self, element: Element, parent: Element) -> Element | None:
+        id = element.attributes.get("id", "")
+        if id not in self.ids:
+            raise ValueError(f"{element.place}: there is no {id!r} before this reference.")
+        target = self.ids[id]
+        while target is not None and target.tag == "ref":
+            id = target.attributes["id"]
+            target = self.ids[id]
+        if target is None:
+            self.dropped(element, "references to what has no successor")
+            return None
+        # What became a colour has no id, and what is scaled differs from what others refer to.
+        if target.tag not in OBJECTS or target.scale:
+            attributes = {name: value for name, value in target.attributes.items() if name != "id"}
+            named = {"name": element.name} if element.name else {}
+            return Element(target.tag, attributes | named, target.children, element.place, target.scale)
+        return Element("ref", {"id": id} | ({"name": element.name} if element.name else {}), place=element.place)
+
+    def _colour(self, element: Element) -> Element:
+        rgb = rgb_of(element, self.path.parent)
+        if element.tag != "rgb" or element.value.strip().startswith("#"):
+            self.changed(element, f"<{element.tag}> is written as linear <rgb>, as 0.6 reads it")
+        return Element("rgb", {"name": element.name, "value": ", ".join(f"{v:.9g}" for v in rgb)}, place=element.place)
+
+    def _animation(self, element: Element) -> Element | None:
+        self.approximated(element, "an animated transform is its first one")
+        first = next(iter(element.of("transform")), None)
+        return first and Element("transform", {"name": element.name}, first.children, element.place)
+
+    def _object(self, element: Element) -> Element | None:
+        """Return what a plugin becomes, or None."""
+        element.children = self._parts(element)
+        kind, was = element.tag, element.type
+        if kind == "subsurface":
+            self.dropped(element, f"the subsurface {was} has no successor")
+            return None
+        if (stand_in := self._without_files(element)) is not element:
+            return stand_in
+        if rule := RULES.get((kind, was)):
+            result = rule(self, element)
+            if result is None or result.tag != kind:
+                return result
+            if result is not element:
+                result.place = element.place
+        else:
+            result = self._succeeded(element)
+        return result and self._cleaned(result)
+
+    def _succeeded(self, element: Element) -> Element | None:
+        """Return a plugin under its name in Mitsuba 3, or what is nearest to it."""
+        kind, was = element.tag, element.type
+        new = SUCCESSORS.get(kind, {}).get(was, was)
+        if not new:
+            self.changed(element, f"the {kind} {was} is the one in it")
+            return next(iter(element.of(kind)), None) or Element(kind, {"type": NEAREST.get(kind, "constvolume")})
+        if new in KNOWN[kind]:
+            if new != was:
+                self.approximated(element, f"the {kind} {was} is {new}")
+            element.type = new
+            return element
+        if kind not in NEAREST:
+            self.dropped(element, f"the {kind} {was} has no successor")
+            return None
+        if kind == "texture":
+            return colour(element.name, 0.5)
+        nearest = "volpath" if kind == "integrator" and self.has_media else NEAREST[kind]
+        self.approximated(element, f"the {kind} {was} is {nearest}")
+        element.type = nearest
+        if kind == "bsdf":
+            element.children = [it for it in element.children if it.name == "reflectance"]
+        return element
+
+    def _cleaned(self, element: Element) -> Element:
+        """Return a plugin without the properties that it does not have in Mitsuba 3, all the way down."""
+        if element.tag not in OBJECTS or element.type not in KNOWN.get(element.tag, {}):
+            return element
+        known = KNOWN[element.tag][element.type].split()
+        kept = []
+        for child in element.children:
+            is_object = child.tag in OBJECTS or child.tag == "ref"
+            free = is_object and (not child.name or child.tag in ("medium", "bsdf", "film", "sampler", "shape", "emitter"))
+            inside = child.name in ("interior", "exterior") or (is_object and "*" in known)
+            if child.name in known or free or inside:
+                if child.scale and child.tag == "texture":
+                    self.approximated(child, "the texture scale of a bitmap has no successor; it is left out")
+                    child.scale = None
+                kept.append(child)
+            elif child.name != "ensure_energy_conservation":
+                self.dropped(child, f"{child.name or child.tag} of {element.type}, which Mitsuba 3 has not")
+        element.children = [self._cleaned(child) for child in kept]
+        return element
+
+    # --- Files -------------------------------------------------------------------------------------------------------
+
+    def _without_files(self, element: Element) -> Element | None:
+        """Return a plugin with the names of its files as Mitsuba 3 finds them, or a stand-in where one is missing."""
+        given = element["filename"]
+        if not given or element.tag not in ("shape", "texture", "emitter", "volume"):
+            return element
+        name = given.value
+        found = self._file(name)
+        if found is not None:
+            given.attributes["value"] = os.path.relpath(found, self.folder) if not os.path.isabs(name) else str(found)
+            return element
+        where = f"{element.place}: there is no file {name}"
+        if not self.lenient:
+            self.missing.append(where)
+        self.changed(element, f"{name} is missing", "replaced")
+        if element.tag == "texture":
+            return colour(element.name, 0.5)
+        if element.tag == "emitter":
+            return Element("emitter", {"type": "constant"}, place=element.place)
+        if element.tag == "volume":
+            return Element("volume", {"type": "constvolume"}, [number("float", "value", "1")], element.place)
+        kept = [it for it in element.children if it.name == "to_world" or it.tag in ("bsdf", "emitter", "ref", "medium")]
+        return Element("shape", {"type": "cube"}, kept, element.place)
+
+    def _file(self, name: str) -> Path | None:
+        """Return the file of a name, which may have been written on Windows."""
+        return next((it for text in (name, name.replace("\\", "/")) if (it := self.path.parent / text).is_file()), None)
+
+    def maxima(self, texture: Element | None, default: float) -> list[float]:
+        """Return the largest value in each channel, as 0.6 knows it."""
+        if texture is None:
+            return [default]
+        texture = self.resolved(texture)
+        if texture.tag in ("rgb", "float"):
+            return [float(v) for v in texture.value.replace(",", " ").split()]
+        if texture.type == "bitmap" and (name := texture["filename"]):
+            bitmap = mi.Bitmap(str(self.folder / name.value))
+            raw = texture.text("raw") == "true"
+            linear = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=bitmap.srgb_gamma() and raw)
+            pixels = np.array(linear)[..., :3]
+            most = np.maximum(pixels.reshape(-1, pixels.shape[-1]).max(axis=0), 0).tolist()
+        elif texture.type == "checkerboard":
+            both = [self.maxima(texture[name], given) for name, given in (("color0", 0.4), ("color1", 0.2))]
+            most = [max(one[k % len(one)] for one in both) for k in range(3)]
+        else:
+            most = [1.0]
+        scale = texture.scale or [1.0]
+        return [most[k % len(most)] * scale[k % len(scale)] for k in range(max(len(most), len(scale)))]
+
+
+def _normalize(transform: Element) -> None:
+    """Take the scale out of the transform of a sensor, in place, which Mitsuba 3 refuses."""
+    if not any(step.tag in ("scale", "matrix") for step in transform.children):
+        return
+    t = importlib.import_module("mitsuba.scalar_rgb").ScalarTransform4f
+    total = np.eye(4)
+    for step in transform.children:
+        total = np.array(_matrix(t, step)) @ total
+    total[:3, :3] /= np.linalg.norm(total[:3, :3], axis=0)
+    transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in total.ravel())})]
+
+
+def _matrix(t: Any, step: Element) -> Any:
+    def triple(default: float) -> list[float]:
+        return [float(step.attributes.get(axis, step.value or default)) for axis in "xyz"]
+
+    def point(name: str) -> list[float]:
+        return [float(v) for v in step.attributes.get(name, "0, 1, 0").replace(",", " ").split()]
+
+    if step.tag == "translate":
+        return t().translate(triple(0)).matrix
+    if step.tag == "scale":
+        return t().scale(triple(1)).matrix
+    if step.tag == "rotate":
+        return t().rotate(triple(0), float(step.attributes.get("angle", 0))).matrix
+    if step.tag == "lookat":
+        return t().look_at(point("origin"), point("target"), point("up")).matrix
+    return np.array([float(v) for v in step.value.replace(",", " ").split()]).reshape(4, 4)
