@@ -5,7 +5,7 @@ status: 0 success, 1 error, 2 wrong usage, 3 if ``check`` could judge nothing, 1
 """
 
 from . import info, presets, measured, doctor, show, render, gallery, plot, explore  # noqa: F401, I001 -- in the order of --help
-from . import convert, fit, sweep, check, energy, bench  # noqa: F401
+from . import convert, upgrade, fit, sweep, check, energy, bench  # noqa: F401
 from .app import app, main
 
 __all__ = ["app", "main"]

@@ -15,7 +15,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..names import check_name, linked
+from .. import legacy
+from ..names import linked
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
 from ..rendering.output import tonemap
@@ -120,8 +121,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
-    check_name(str(user.scene))
-    scene = mi.load_file(str(user.scene))
+    scene = legacy.load(Path(str(user.scene)), {})
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
     shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -111,6 +112,17 @@ def written(value: Any) -> str:
 def snake_case(name: str) -> str:
     """Return a name of 0.6 as Mitsuba 3 writes it: ``int_ior`` for ``intIOR``."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.strip()).lower()
+
+
+def root_of(path: Path) -> tuple[str, dict[str, str]]:
+    """Return the tag and the attributes of a file's root, nothing if it is no XML."""
+    found: list[tuple[str, dict[str, str]]] = []
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda tag, attributes: found.append((tag, attributes))
+    with open(path, "rb") as file, suppress(expat.ExpatError, LookupError):
+        while not found and (part := file.read(65536)):
+            parser.Parse(part)
+    return found[0] if found else ("", {})
 
 
 def read_document(path: Path, given: Mapping[str, str], lenient: bool) -> tuple[Element, list[tuple[str, str]]]:

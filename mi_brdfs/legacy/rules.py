@@ -1,5 +1,5 @@
-"""What becomes of each plugin of Mitsuba 0.6 in Mitsuba 3: what it is called there, which properties it has, and what is
-nearest to those without a successor."""
+"""What becomes of the plugins of Mitsuba 0.6 in Mitsuba 3: their names and properties there, and what is nearest to
+those without a successor."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ ROUGH = "distribution alpha alpha_u alpha_v"
 MESH = "filename face_normals flip_normals to_world"
 CAMERA = "to_world near_clip far_clip focus_distance shutter_open shutter_close"
 PATH = "max_depth rr_depth hide_emitters"
-SKY = """turbidity albedo sun_direction latitude longitude timezone year month day hour minute second sun_scale sky_scale
-    sun_aperture to_world sampling_weight"""
+SKY = """turbidity albedo sun_direction latitude longitude timezone year month day hour minute second sun_scale
+    sky_scale sun_aperture to_world sampling_weight"""
 
 KNOWN: dict[str, dict[str, str]] = {
     "bsdf": {
@@ -97,7 +97,7 @@ class Report(Protocol):
 
 Rule = Callable[[Report, Element], Element | None]
 RULES: dict[tuple[str, str], Rule] = {}
-"""The functions that change a plugin, whose parts have been changed before, and return it, what replaces it, or None."""
+"""The functions that change a plugin, whose parts are those of Mitsuba 3, and return it, what replaces it, or None."""
 
 
 def rule(kind: str, *types: str) -> Callable[[Rule], Rule]:
@@ -175,12 +175,7 @@ def _phong(report: Report, element: Element) -> Element:
 def _ward(report: Report, element: Element) -> Element:
     variant = element.pop("variant")
     element.set("string", "variant", variant.value.strip().lower() if variant else "balanced")
-    if "alpha" in element and ("alpha_u" in element or "alpha_v" in element):
-        alpha = element.pop("alpha")
-        for name in ("alpha_u", "alpha_v"):
-            if name not in element:
-                element.set(alpha.tag, name, alpha.value)
-        report.changed(element, "alpha of ward is what alphaU and alphaV are where they are not given")
+    pair_of_alpha(report, element)
     return scaled_down(report, element, "diffuse_reflectance", "specular_reflectance")
 
 
@@ -252,11 +247,19 @@ def rough_alpha(report: Report, element: Element) -> None:
         element.set("string", "distribution", "beckmann")
         if given != "beckmann":
             report.approximated(element, f"distribution {given} of {element.type} is beckmann of the same alpha")
-    if "alpha" in element and ("alpha_u" in element or "alpha_v" in element):
-        alpha = element.pop("alpha")
-        for name in ("alpha_u", "alpha_v"):
-            if name not in element:
-                element.set(alpha.tag, name, alpha.value)
+    pair_of_alpha(report, element)
+
+
+def pair_of_alpha(report: Report, element: Element) -> None:
+    """0.6 takes alpha for what is not given of the pair beside it."""
+    alpha = element["alpha"]
+    if alpha is None or not ("alpha_u" in element or "alpha_v" in element):
+        return
+    element.pop("alpha")
+    for name in ("alpha_u", "alpha_v"):
+        if name not in element:
+            element.set(alpha.tag, name, alpha.value)
+    report.changed(element, f"alpha of {element.type} is what alphaU and alphaV are where they are not given")
 
 
 @rule("bsdf", "bumpmap")
@@ -317,13 +320,17 @@ def _coating(report: Report, element: Element) -> Element:
         raise ValueError(f"{element.place}: {element.type} has no BSDF in it.")
     rough = element.type == "roughcoating"
     inner = report.resolved(parts[0])
-    kept = [it for name in ("int_ior", "ext_ior", "specular_reflectance", "alpha", "distribution") if (it := element[name])]
+    kept = [
+        it for name in ("int_ior", "ext_ior", "specular_reflectance", "alpha", "distribution") if (it := element[name])
+    ]
     if inner.type in ("diffuse", "roughdiffuse"):
         # The coat of a diffuse base is what plastic is.
         report.approximated(element, f"{element.type} over {inner.type} is plastic, without absorption in the coat")
         plastic = bsdf("roughplastic" if rough else "plastic", *kept, number("boolean", "nonlinear", "true"))
         if reflectance := inner["reflectance"]:
-            under = Element(reflectance.tag, {**reflectance.attributes, "name": "diffuse_reflectance"}, reflectance.children)
+            under = Element(
+                reflectance.tag, {**reflectance.attributes, "name": "diffuse_reflectance"}, reflectance.children
+            )
             under.attributes.pop("id", None)
             plastic.children.append(under)
         if not rough:
@@ -332,7 +339,9 @@ def _coating(report: Report, element: Element) -> Element:
         return plastic
     index = element.number("int_ior", 1.5) / element.number("ext_ior", 1.0)
     share = min(max(0.5 * ((index - 1) / (index + 1)) ** 2 + 0.05, 0.02), 0.5)
-    report.approximated(element, f"{element.type} is a mixture with a mirror, of the coat's mean reflectance, at all angles")
+    report.approximated(
+        element, f"{element.type} is a mixture with a mirror, of the coat's mean reflectance, at all angles"
+    )
     mirror = bsdf("roughconductor" if rough else "conductor", number("string", "material", "none"))
     mirror.children += [it for it in kept if rough and it.name in ("alpha", "distribution")]
     rough_alpha(report, mirror)
@@ -470,7 +479,11 @@ def _collimated(report: Report, element: Element) -> Element:
     light = [v / (math.pi * radius**2) for v in (channels(power) if power and power.tag == "rgb" else [1.0])]
     world = element["to_world"] or Element("transform", {"name": "to_world"})
     world.children.insert(0, Element("scale", {"value": f"{radius:g}"}))
-    return Element("shape", {"type": "disk"}, [world, Element("emitter", {"type": "directionalarea"}, [colour("radiance", *light)])])
+    return Element(
+        "shape",
+        {"type": "disk"},
+        [world, Element("emitter", {"type": "directionalarea"}, [colour("radiance", *light)])],
+    )
 
 
 # --- Integrators, films, sensors ----------------------------------------------------------------------------------
@@ -567,8 +580,13 @@ def _homogeneous(report: Report, element: Element) -> Element:
     material = element.pop("material")
     if "sigma_t" not in given:
         if material or not given:
-            report.approximated(element, f"the medium {material.value if material else ''} has the coefficients of skin")
-        scattered, absorbed = (given.get(name, skin if not given else [0.0]) for name, skin in zip(("sigma_s", "sigma_a"), SKIN, strict=True))
+            report.approximated(
+                element, f"the medium {material.value if material else ''} has the coefficients of skin"
+            )
+        scattered, absorbed = (
+            given.get(name, skin if not given else [0.0])
+            for name, skin in zip(("sigma_s", "sigma_a"), SKIN, strict=True)
+        )
         scattered, absorbed = ((it * 3)[:3] if len(it) == 1 else it for it in (scattered, absorbed))
         extinct = [s + a for s, a in zip(scattered, absorbed, strict=True)]
         given = {"sigma_t": extinct, "albedo": [s / t if t else 0.0 for s, t in zip(scattered, extinct, strict=True)]}

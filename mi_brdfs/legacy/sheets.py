@@ -32,6 +32,7 @@ NAMES = {
     ("ward", "alpha_y"): "alpha_v",
     ("roughplastic", "alpha_b"): "alpha",
     ("roughconductor", "alpha_b"): "alpha",
+    ("roughconductor", "ior"): "eta",
     ("roughdielectric", "alpha_b"): "alpha",
     ("area", "intensity"): "radiance",
     ("constant", "intensity"): "radiance",
@@ -45,12 +46,12 @@ NAMES = {
 """Properties that were renamed, by the type, if it matters."""
 
 
-def modernize(scene: Element, version: tuple[int, int], say: Callable[[Element, str], None]) -> None:
+def modernize(scene: Element, minor: int, say: Callable[[Element, str], None]) -> None:
     """Change a scene of version 0.2 to 0.5 in place to one of 0.6."""
     for element in list(scene.walk()):
-        if version < (0, 3):
+        if minor < 3:
             _from_2(element)
-        if version < (0, 4):
+        if minor < 4:
             _from_3(element, say)
         if element.tag == "bsdf" and element.type == "bump":
             element.type = "bumpmap"
@@ -68,18 +69,16 @@ def _from_2(element: Element) -> None:
             amount = element.number(f"{colour}_amount", 1)
             element.pop(f"{colour}_amount")
             name = f"{colour}_reflectance"
-            if name not in element:
+            inner = element.pop(name)
+            if inner is None:
                 element.set("spectrum", name, amount * default)
-            elif amount != 1:
-                inner = element.pop(name)
+            else:
                 scaled = Element("texture", {"type": "scale", "name": name}, [inner], element.place)
                 inner.attributes["name"] = "value"
                 scaled.set("float", "scale", amount)
                 element.children.append(scaled)
     if element.tag == "bsdf" and element.type == "mirror":
         element.set("string", "material", "Cr")
-    if element.tag == "bsdf" and element.type == "roughmetal" and (ior := element["ior"]):
-        ior.attributes["name"] = "eta"
 
 
 def _look_at(element: Element) -> list[Element]:
@@ -87,7 +86,10 @@ def _look_at(element: Element) -> list[Element]:
     if element.tag != "lookat" or "ox" not in element.attributes:
         return [element]
     given = element.attributes
-    points = {name: [given.get(k + axis, "0") for axis in "xyz"] for name, k in zip(("origin", "target", "up"), "otu")}
+    points = {
+        name: [given.get(k + axis, "0") for axis in "xyz"]
+        for name, k in (("origin", "o"), ("target", "t"), ("up", "u"))
+    }
     mirror = Element("scale", {"x": "-1"})
     return [mirror, Element("lookat", {name: ", ".join(it) for name, it in points.items()}, place=element.place)]
 

@@ -21,9 +21,13 @@ def rgb_of(element: Element, folder: Path) -> list[float]:
     try:
         rgb = _channels(element, folder)
     except (ValueError, OSError) as error:
-        raise ValueError(f"{element.place}: <{element.tag}> {element.name} has no colour that can be read: {error}.") from None
+        raise ValueError(
+            f"{element.place}: <{element.tag}> {element.name} has no colour that can be read: {error}."
+        ) from None
     if len(rgb) not in (1, 3) or not np.isfinite(rgb).all():
-        raise ValueError(f"{element.place}: <{element.tag}> {element.name} = {element.value} has not one or three numbers.")
+        raise ValueError(
+            f"{element.place}: <{element.tag}> {element.name} = {element.value} has not one or three numbers."
+        )
     return rgb
 
 
@@ -49,8 +53,8 @@ def _channels(element: Element, folder: Path) -> list[float]:
 
 
 def _of_light(wavelengths: np.ndarray, values: np.ndarray) -> list[float]:
-    """Return the linear sRGB of a spectrum, linear between its wavelengths in nm and 0 beyond, whose Y is its mean under
-    the observer's; no illuminant is part of it."""
+    """Return the linear sRGB of a spectrum without an illuminant, linear between its wavelengths in nm and 0 beyond, of
+    which Y is the mean under the observer's."""
     if not (np.diff(wavelengths) > 0).all():
         raise ValueError("wavelengths must increase")
     fine, weights = _observer()

@@ -6,21 +6,25 @@ import importlib
 import os
 import re
 import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import mitsuba as mi
 import numpy as np
 
-from .document import OBJECTS, Element, read_document
-from .rules import KNOWN, NEAREST, RULES, SUCCESSORS, bsdf, colour, number
+from ..names import check_name
+from .document import OBJECTS, Element, read_document, root_of
+from .rules import KNOWN, NEAREST, RULES, SUCCESSORS, colour, number
 from .sheets import modernize
 from .spectra import rgb_of
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
 COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
 Kind = Literal["changed", "approximated", "dropped", "replaced"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class Change(NamedTuple):
@@ -45,7 +49,7 @@ class Upgraded:
 
     def summary(self) -> str:
         """Return how many changes of each kind there are."""
-        counts = {kind: sum(change.kind == kind for change in self.changes) for kind in Kind.__args__}
+        counts = {kind: sum(change.kind == kind for change in self.changes) for kind in KINDS}
         return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "nothing changed"
 
     def report(self) -> str:
@@ -60,8 +64,8 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
             **parameters: Any) -> Upgraded:  # fmt: skip
     """Return a scene file of Mitsuba 0.2 to 0.6 as one of Mitsuba 3; one of Mitsuba 3 as it is.
 
-    It gives the values that 0.6 gave: colours as linear sRGB, BSDFs scaled down where they would gain energy, emitters of
-    equal light in all channels. What has no successor is approximated or dropped, and said in the report.
+    It gives the values that 0.6 gave: colours as linear sRGB, BSDFs scaled down where they would gain energy, emitters
+    whose channels are equal. What has no successor is approximated or dropped, and the report says so.
 
     Args:
         path: the file.
@@ -77,13 +81,14 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     if is_new(path):
         return Upgraded("3", path.read_text(encoding="utf-8"))
     root, without = read_document(path, {name: str(value) for name, value in parameters.items()}, lenient)
-    version = root.attributes.get("version", "0.2.0").strip()
-    if not re.fullmatch(r"0\.[0-6](\.\d+)*", version):
+    is_old = any(it.tag in ("camera", "luminaire") for it in root.walk())
+    version = root.attributes.get("version", "0.2.0" if is_old else "0.6.0").strip()
+    if not (found := re.fullmatch(r"0\.([0-6])(\.\d+)*", version)):
         raise ValueError(f"{path}: version {version} is none of 0.2 to 0.6.")
     work = _Upgrade(path, lenient, Path(folder) if folder is not None else path.parent)
     for place, name in without:
         work.changes.append(Change(place, "dropped", f"the include {name}, which is missing"))
-    scene = work.scene(root, tuple(map(int, version.split(".")[:2])))
+    scene = work.scene(root, int(found[1]))
     return Upgraded(version, scene.to_xml(), work.changes)
 
 
@@ -95,29 +100,48 @@ def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters:
         ValueError: as :func:`upgrade`.
         RuntimeError: what Mitsuba says where it cannot load the scene.
     """
-    from ..rendering.scene_file import SceneFile
+    return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient)
 
-    return SceneFile(str(path), {name: str(value) for name, value in parameters.items()}, lenient=lenient).load()
+
+def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> Any:
+    """Load a scene file, old or new."""
+    with looking_in(path.parent):
+        config = mi.parser.ParserConfig(mi.variant())
+        state, _ = parsed(config, path, lenient, parameters)
+        mi.parser.transform_all(config, state)
+        return mi.parser.instantiate(config, state)
+
+
+def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
+    """Return a scene file as Mitsuba's parser has it, and the text of an upgraded one."""
+    check_name(str(path))
+    if is_new(path):
+        return mi.parser.parse_file(config, str(path), **parameters), None
+    new = upgrade(path, lenient=lenient, **parameters)
+    warnings.warn(
+        f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade says what.", stacklevel=3
+    )
+    return mi.parser.parse_string(config, new.xml), new.xml
+
+
+@contextmanager
+def looking_in(*folders: Path) -> Iterator[None]:
+    """Look for files in these folders first, and forget these and those that a scene adds."""
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    for folder in reversed(folders):
+        resolver.prepend("" if folder == Path(".") else str(folder))  # messages show it in front of names
+    mi.set_file_resolver(resolver)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
 
 
 def is_new(path: Path) -> bool:
     """Return whether a file is a scene of Mitsuba 2 or 3, or none, of which Mitsuba knows what to say."""
-    head = path.read_bytes()[:100_000]
-    found = re.search(rb"<scene\b([^>]*)>", head)
-    if not found:
-        return b"\0" not in head  # UTF-16 has them
-    version = re.search(rb"""version\s*=\s*["']\s*(\d+)""", found[1])
-    return bool(version) and int(version[1]) >= 2
-
-
-def passing(path: Path, lenient: bool, parameters: dict[str, str]) -> str:
-    """Return the text of an upgraded scene, for a command that takes it in passing, and warn of changes."""
-    new = upgrade(path, lenient=lenient, **parameters)
-    warnings.warn(
-        f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade shows what changed.",
-        stacklevel=3,
-    )
-    return new.xml
+    tag, attributes = root_of(path)
+    return tag != "scene" or attributes.get("version", "0").strip()[:1] not in "01"
 
 
 class _Upgrade:
@@ -148,10 +172,13 @@ class _Upgrade:
 
     # --- The scene ---------------------------------------------------------------------------------------------------
 
-    def scene(self, root: Element, version: tuple[int, int]) -> Element:
-        modernize(root, version, self.changed)
+    def scene(self, root: Element, minor: int) -> Element:
+        modernize(root, minor, self.changed)
         self.has_media = any(it.tag == "medium" for it in root.walk())
-        scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
+        parts = self._parts(root)
+        for extra in (it for it in parts if it.tag in PROPERTIES):
+            self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 has not")
+        scene = Element("scene", {"version": "3.0.0"}, [it for it in parts if it.tag not in PROPERTIES])
         self._complete(root, scene)
         if self.missing:
             more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
@@ -173,15 +200,18 @@ class _Upgrade:
         if not sensors:
             self.dropped(root, "a scene without a sensor has none: 0.6 sees all of it along z")
         elif len(sensors) > 1:
-            scene.children.remove(sensors[-1])
+            scene.children = [it for it in scene.children if it is not sensors[-1]]
             scene.children.insert(scene.children.index(sensors[0]), sensors[-1])
             self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
         lights = [it for it in scene.walk() if it.tag == "emitter"]
         if not lights:
-            sun = Element("emitter", {"type": "sunsky"}, [number("float", "sun_scale", "2"), number("float", "sky_scale", "2")])
+            sun = Element(
+                "emitter", {"type": "sunsky"}, [number("float", "sun_scale", "2"), number("float", "sky_scale", "2")]
+            )
             turn = Element("transform", {"name": "to_world"}, [Element("rotate", {"y": "1", "angle": "-120"})])
             sun.children.append(turn)
-            scene.children.append(RULES["emitter", "sunsky"](self, sun))
+            RULES["emitter", "sunsky"](self, sun)
+            scene.children.append(sun)
             self.changed(root, "a scene without an emitter has sun and sky")
 
     # --- Elements ----------------------------------------------------------------------------------------------------
@@ -195,7 +225,7 @@ class _Upgrade:
             self.ids[id] = None
             return None
         if element.tag == "alias":
-            self.ids[element.attributes.get("as", "")] = Element("ref", {"id": id}) if self.ids.get(id) else None
+            self.ids[element.attributes.get("as", "")] = self.ids.get(id)
             return None
         if element.tag == "ref":
             return self._reference(element, parent)
@@ -211,7 +241,13 @@ class _Upgrade:
             self.dropped(element, f"<{element.tag}>, which Mitsuba has not")
             return None
         name = element.name
-        result = self._object(element)
+        try:
+            result = self._object(element)
+        except ValueError as error:
+            said = str(error)
+            raise ValueError(
+                said if ".xml:" in said else f"{element.place}: {element.tag} {element.type}: {said}"
+            ) from None
         if result is not element:
             element.attributes.pop("id", None)
             element.attributes.pop("name", None)
@@ -227,9 +263,6 @@ class _Upgrade:
         if id not in self.ids:
             raise ValueError(f"{element.place}: there is no {id!r} before this reference.")
         target = self.ids[id]
-        while target is not None and target.tag == "ref":
-            id = target.attributes["id"]
-            target = self.ids[id]
         if target is None:
             self.dropped(element, "references to what has no successor")
             return None
@@ -238,7 +271,11 @@ class _Upgrade:
             attributes = {name: value for name, value in target.attributes.items() if name != "id"}
             named = {"name": element.name} if element.name else {}
             return Element(target.tag, attributes | named, target.children, element.place, target.scale)
-        return Element("ref", {"id": id} | ({"name": element.name} if element.name else {}), place=element.place)
+        return Element(
+            "ref",
+            {"id": target.attributes["id"]} | ({"name": element.name} if element.name else {}),
+            place=element.place,
+        )
 
     def _colour(self, element: Element) -> Element:
         rgb = rgb_of(element, self.path.parent)
@@ -302,7 +339,9 @@ class _Upgrade:
         kept = []
         for child in element.children:
             is_object = child.tag in OBJECTS or child.tag == "ref"
-            free = is_object and (not child.name or child.tag in ("medium", "bsdf", "film", "sampler", "shape", "emitter"))
+            free = is_object and (
+                not child.name or child.tag in ("medium", "bsdf", "film", "sampler", "shape", "emitter")
+            )
             inside = child.name in ("interior", "exterior") or (is_object and "*" in known)
             if child.name in known or free or inside:
                 if child.scale and child.tag == "texture":
@@ -336,7 +375,9 @@ class _Upgrade:
             return Element("emitter", {"type": "constant"}, place=element.place)
         if element.tag == "volume":
             return Element("volume", {"type": "constvolume"}, [number("float", "value", "1")], element.place)
-        kept = [it for it in element.children if it.name == "to_world" or it.tag in ("bsdf", "emitter", "ref", "medium")]
+        kept = [
+            it for it in element.children if it.name == "to_world" or it.tag in ("bsdf", "emitter", "ref", "medium")
+        ]
         return Element("shape", {"type": "cube"}, kept, element.place)
 
     def _file(self, name: str) -> Path | None:
@@ -373,13 +414,15 @@ def _normalize(transform: Element) -> None:
     total = np.eye(4)
     for step in transform.children:
         total = np.array(_matrix(t, step)) @ total
-    total[:3, :3] /= np.linalg.norm(total[:3, :3], axis=0)
+    u, _, v = np.linalg.svd(total[:3, :3])
+    total[:3, :3] = u @ v
     transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in total.ravel())})]
 
 
 def _matrix(t: Any, step: Element) -> Any:
     def triple(default: float) -> list[float]:
-        return [float(step.attributes.get(axis, step.value or default)) for axis in "xyz"]
+        given = [float(v) for v in step.value.replace(",", " ").split()] or [default]
+        return [float(step.attributes.get(axis, given[k % len(given)])) for k, axis in enumerate("xyz")]
 
     def point(name: str) -> list[float]:
         return [float(v) for v in step.attributes.get(name, "0, 1, 0").replace(",", " ").split()]

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..names import check_name, tabulated
+from .. import legacy
+from ..names import tabulated
 from ..parameters import published
 from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load
@@ -49,8 +50,7 @@ class BSDFSource(NamedTuple):
         if is_measured(self.source):
             return tabulated(self.path) | values
         if self.source.endswith(".xml"):
-            check_name(self.source)
-            loaded = mi.load_file(self.source, **self.parameters)
+            loaded = legacy.load(Path(self.source), self.parameters)
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
             return mi.load_string(_versioned(self.source), **self.parameters)

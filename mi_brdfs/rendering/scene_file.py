@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,8 +10,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..legacy.upgrade import is_new, passing
-from ..names import check_name
+from ..legacy.upgrade import looking_in, parsed
 
 RESERVED = ("config", "filename")
 """Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""
@@ -53,8 +50,9 @@ class SceneFile:
 
     def copied(self) -> SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
-        with _looking_in(Path(self.path).parent):
-            state, text = self._parsed(mi.parser.ParserConfig(mi.variant()), Path(self.path))
+        with looking_in(Path(self.path).parent):
+            config = mi.parser.ParserConfig(mi.variant())
+            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
             named = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in _file_names(state)}
         names = {name: _rootless(path) for name, path in named.items() if os.path.isfile(path)}
         paths = [self.path, *map(str, state.files), *(path for path in named.values() if os.path.isfile(path))]
@@ -64,18 +62,10 @@ class SceneFile:
             contents[_rootless(self.path)], parameters = text.encode(), {}
         return SceneFile(_rootless(self.path), parameters, self.box_filter, False, contents, names, _rootless("."))
 
-    def _parsed(self, config: Any, path: Path) -> tuple[Any, str | None]:
-        """Return the parsed scene, and what a scene of Mitsuba 0.6 was upgraded to."""
-        if is_new(path):
-            return mi.parser.parse_file(config, str(path), **self.parameters), None
-        text = passing(path, self.lenient, self.parameters)
-        return mi.parser.parse_string(config, text), text
-
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
-        check_name(str(path))
         config = mi.parser.ParserConfig(mi.variant())
-        with _looking_in(path.parent, *folders):
-            state, _ = self._parsed(config, path)
+        with looking_in(path.parent, *folders):
+            state, _ = parsed(config, path, self.lenient, self.parameters)
             for props, key in _file_names(state):
                 props[key] = names.get(props[key], props[key])
             mi.parser.transform_all(config, state)
@@ -93,20 +83,6 @@ def _file_names(state: Any) -> list[tuple[mi.Properties, str]]:
 def _rootless(path: str) -> str:
     absolute = Path(os.path.abspath(path))
     return absolute.relative_to(absolute.anchor).as_posix()
-
-
-@contextmanager
-def _looking_in(*folders: Path) -> Iterator[None]:
-    """Look for files in these folders first, and forget these and those that a scene adds."""
-    before = mi.file_resolver()
-    resolver = mi.FileResolver(before)
-    for folder in reversed(folders):
-        resolver.prepend("" if folder == Path(".") else str(folder))  # messages show it in front of names
-    mi.set_file_resolver(resolver)
-    try:
-        yield
-    finally:
-        mi.set_file_resolver(before)
 
 
 def _set_box_filters(state: Any) -> None:

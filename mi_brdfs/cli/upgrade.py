@@ -1,0 +1,36 @@
+"""``mi-brdfs upgrade``"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import command
+from .options import file_option, parameters_of, parameters_option, write_text
+from .terminal import Exit, err, failing, out
+
+
+@command()
+def upgrade(
+    old: Annotated[Path, typer.Argument(metavar="OLD.xml", help="A scene of Mitsuba 0.2 to 0.6.")],
+    output: Annotated[
+        Path | None, file_option("-o", "The scene of Mitsuba 3 to write. Default: the standard output.", "NEW.xml")
+    ] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Put cubes and grey in the place of meshes and textures that are missing.")
+    ] = False,
+    define: Annotated[list[str] | None, parameters_option("Set a <default> parameter of the scene.")] = None,
+) -> None:
+    """Write an old scene as one of Mitsuba 3, and say what changed, line by line."""
+    from ..legacy import upgrade  # imports numpy
+
+    with failing(Exit.ERROR, ValueError, OSError):
+        new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
+    for line in [*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]:
+        err.print(line, markup=False, highlight=False, soft_wrap=True)
+    if output:
+        write_text(output, new.xml)
+    else:
+        out.print(new.xml, markup=False, highlight=False, soft_wrap=True, end="")
