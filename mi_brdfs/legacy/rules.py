@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from .document import Element
+
+if TYPE_CHECKING:
+    from .upgrade import Work
 
 DIELECTRIC = "int_ior ext_ior specular_reflectance specular_transmittance"
 METAL = "material eta k specular_reflectance"
@@ -78,6 +81,15 @@ SUCCESSORS = {
 }
 """The types that another one replaces; an empty one the plugin nested in it."""
 
+RENAMED = {
+    ("heterogeneous", "density"): "sigma_t", ("mitchell", "b"): "B", ("mitchell", "c"): "C",
+    ("hdrfilm", "high_quality_edges"): "sample_border", ("ldrfilm", "high_quality_edges"): "sample_border",
+    ("independent", "scramble"): "seed", ("multijitter", "scramble"): "seed",
+    ("difftrans", "transmittance"): "base_color", ("difftrans", "diffuse_transmittance"): "base_color",
+    ("normalmap", ""): "normalmap",
+}  # fmt: skip
+"""Properties with another name, by the type of the plugin."""
+
 NEAREST = {
     "integrator": "path", "sampler": "independent", "film": "hdrfilm", "rfilter": "gaussian", "sensor": "perspective",
     "phase": "isotropic", "bsdf": "diffuse",
@@ -85,17 +97,7 @@ NEAREST = {
 """What replaces a plugin that is not known; of the other kinds it is left out."""
 
 
-class Report(Protocol):
-    """What a rule may tell and ask."""
-
-    def changed(self, element: Element, text: str) -> None: ...
-    def approximated(self, element: Element, text: str) -> None: ...
-    def dropped(self, element: Element, text: str) -> None: ...
-    def resolved(self, element: Element) -> Element: ...
-    def maxima(self, texture: Element | None, default: float) -> list[float]: ...
-
-
-Rule = Callable[[Report, Element], Element | None]
+Rule = Callable[["Work", Element], Element | None]
 RULES: dict[tuple[str, str], Rule] = {}
 """The functions that change a plugin, whose parts are those of Mitsuba 3, and return it, what replaces it, or None."""
 
@@ -127,19 +129,19 @@ def channels(element: Element) -> list[float]:
 # --- BSDFs ------------------------------------------------------------------------------------------------------
 
 
-def scaled_down(report: Report, element: Element, *names: str) -> Element:
+def scaled_down(work: Work, element: Element, *names: str) -> Element:
     """Return a BSDF whose reflectances of these names, which have maxima in each channel, add up to at most 1: where
     they do not, 0.6 scales all by .99 over the largest sum."""
     if not names:
         return element
     if (given := element.pop("ensure_energy_conservation")) and given.value.strip().lower() == "false":
         return element
-    each = [report.maxima(element[name], DEFAULTS.get((element.type, name), 1.0)) for name in names]
+    each = [work.maxima(element[name], DEFAULTS.get((element.type, name), 1.0)) for name in names]
     most = max(sum(one[k % len(one)] for one in each) for k in range(3))
     if most <= 1 + 1e-6:  # as in single precision, where .7 + .3 is 1
         return element
     factor = 0.99 / most
-    report.changed(element, f"{' + '.join(names)} of {element.type} is above 1, which 0.6 scales down to .99")
+    work.changed(element, f"{' + '.join(names)} of {element.type} is above 1, which 0.6 scales down to .99")
     textures = [name for name in names if (it := element[name]) and it.tag not in ("rgb", "float")]
     for name in names:
         if name not in textures:
@@ -167,45 +169,48 @@ DEFAULTS = {
 
 
 @rule("bsdf", "phong")
-def _phong(report: Report, element: Element) -> Element:
-    return scaled_down(report, element, "diffuse_reflectance", "specular_reflectance")
+def _phong(work: Work, element: Element) -> Element:
+    return scaled_down(work, element, "diffuse_reflectance", "specular_reflectance")
 
 
 @rule("bsdf", "ward")
-def _ward(report: Report, element: Element) -> Element:
+def _ward(work: Work, element: Element) -> Element:
     variant = element.pop("variant")
     element.set("string", "variant", variant.value.strip().lower() if variant else "balanced")
-    pair_of_alpha(report, element)
-    return scaled_down(report, element, "diffuse_reflectance", "specular_reflectance")
+    pair_of_alpha(work, element)
+    return scaled_down(work, element, "diffuse_reflectance", "specular_reflectance")
 
 
 @rule("bsdf", "roughdiffuse", "diffuse")
-def _diffuse(report: Report, element: Element) -> Element:
+def _diffuse(work: Work, element: Element) -> Element:
     other = element.pop("diffuse_reflectance")
     if other and "reflectance" not in element:
         other.attributes["name"] = "reflectance"
         element.children.append(other)
-        report.changed(element, f"diffuseReflectance of {element.type} is reflectance")
-    return scaled_down(report, element, "reflectance")
+        work.changed(element, f"diffuseReflectance of {element.type} is reflectance")
+    if (texture := element["reflectance"]) and texture.scale and max(texture.scale) <= 1:
+        factor, texture.scale = sum(texture.scale) / len(texture.scale), None
+        return dimmed(scaled_down(work, element, "reflectance"), factor)
+    return scaled_down(work, element, "reflectance")
 
 
 @rule("bsdf", "plastic", "roughplastic", "dielectric", "thindielectric", "roughdielectric")
-def _dielectric(report: Report, element: Element) -> Element:
-    rough_alpha(report, element)
+def _dielectric(work: Work, element: Element) -> Element:
+    rough_alpha(work, element)
     if element.type == "roughplastic" and (alpha := element["alpha"]) and alpha.tag not in ("float", "integer"):
         element.set("float", "alpha", 0.1)
-        report.approximated(element, "alpha of roughplastic cannot be a texture; it is .1")
+        work.approximated(element, "alpha of roughplastic cannot be a texture; it is .1")
     names = [name for name in KNOWN["bsdf"][element.type].split() if "_reflectance" in name or "_trans" in name]
     for name in names:
         if name in element:
-            element = scaled_down(report, element, name)
+            element = scaled_down(work, element, name)
             if element.type == "blendbsdf":
                 return element
     return element
 
 
 @rule("bsdf", "conductor", "roughconductor")
-def _conductor(report: Report, element: Element) -> Element:
+def _conductor(work: Work, element: Element) -> Element:
     exterior = element.pop("ext_eta")
     index = {"air": 1.000277, "vacuum": 1.0, "water": 1.333}.get(exterior.value.strip().lower()) if exterior else None
     if exterior and index is None and exterior.tag == "float":
@@ -214,25 +219,25 @@ def _conductor(report: Report, element: Element) -> Element:
         for name in ("eta", "k"):
             if (value := element[name]) and value.tag in ("rgb", "float") and index:
                 element.set("rgb", name, [v / index for v in channels(value)])
-                report.changed(element, f"{name} of {element.type} is divided by extEta")
+                work.changed(element, f"{name} of {element.type} is divided by extEta")
     if exterior and not ("eta" in element and index):
-        report.approximated(element, f"{element.type} is as in air: extEta has no successor")
+        work.approximated(element, f"{element.type} is as in air: extEta has no successor")
     if not {"material", "eta"} & {child.name for child in element.children}:
         element.set("string", "material", "Cu")
-        report.changed(element, f"{element.type} without a material is copper, as in 0.6")
+        work.changed(element, f"{element.type} without a material is copper, as in 0.6")
     if element.text("distribution") in ("phong", "as"):
-        return _blinn(report, element)
-    rough_alpha(report, element)
-    return scaled_down(report, element, *["specular_reflectance"] * ("specular_reflectance" in element))
+        return _blinn(work, element)
+    rough_alpha(work, element)
+    return scaled_down(work, element, *["specular_reflectance"] * ("specular_reflectance" in element))
 
 
-def _blinn(report: Report, element: Element) -> Element:
+def _blinn(work: Work, element: Element) -> Element:
     """0.6 converts α to the exponent of the cosine: n = 2/α² - 2."""
     given, alone = element.text("distribution"), element.number("alpha", 0.1)
     pair = [element.number(name, alone) for name in ("alpha_u", "alpha_v")]
-    report.changed(element, f"distribution {given} of roughconductor is blinn of microfacet")
+    work.changed(element, f"distribution {given} of roughconductor is blinn of microfacet")
     if pair[0] != pair[1]:
-        report.approximated(element, "anisotropic roughness of that distribution is its geometric mean")
+        work.approximated(element, "anisotropic roughness of that distribution is its geometric mean")
     element.type = "microfacet"
     element.pop("distribution", "alpha", "alpha_u", "alpha_v")
     element.set("string", "distribution", "blinn")
@@ -241,16 +246,16 @@ def _blinn(report: Report, element: Element) -> Element:
     return element
 
 
-def rough_alpha(report: Report, element: Element) -> None:
+def rough_alpha(work: Work, element: Element) -> None:
     """Change the roughness of a BSDF to what Mitsuba 3 takes."""
     if (given := element.text("distribution")) and given != "ggx":
         element.set("string", "distribution", "beckmann")
         if given != "beckmann":
-            report.approximated(element, f"distribution {given} of {element.type} is beckmann of the same alpha")
-    pair_of_alpha(report, element)
+            work.approximated(element, f"distribution {given} of {element.type} is beckmann of the same alpha")
+    pair_of_alpha(work, element)
 
 
-def pair_of_alpha(report: Report, element: Element) -> None:
+def pair_of_alpha(work: Work, element: Element) -> None:
     """0.6 takes alpha for what is not given of the pair beside it."""
     alpha = element["alpha"]
     if alpha is None or not ("alpha_u" in element or "alpha_v" in element):
@@ -259,73 +264,68 @@ def pair_of_alpha(report: Report, element: Element) -> None:
     for name in ("alpha_u", "alpha_v"):
         if name not in element:
             element.set(alpha.tag, name, alpha.value)
-    report.changed(element, f"alpha of {element.type} is what alphaU and alphaV are where they are not given")
+    work.changed(element, f"alpha of {element.type} is what alphaU and alphaV are where they are not given")
 
 
 @rule("bsdf", "bumpmap")
-def _bumpmap(report: Report, element: Element) -> Element:
-    textures = [it for it in element.of("texture", "ref") if report.resolved(it).tag == "texture"]
+def _bumpmap(work: Work, element: Element) -> Element:
+    textures = [it for it in element.of("texture", "ref") if work.resolved(it).tag == "texture"]
     inner = [it for it in element.of("bsdf", "ref") if it not in textures]
     if not textures and inner:
-        report.dropped(element, "a bumpmap without a texture")
+        work.dropped(element, "a bumpmap without a texture")
         return inner[0]
     for texture in textures:
-        target = report.resolved(texture)
+        target = work.resolved(texture)
         if target.scale:
             element.set("float", "scale", sum(target.scale) / len(target.scale))
             target.scale = None
-            report.changed(element, "the texture scale in bumpmap is its parameter scale")
+            work.changed(element, "the texture scale in bumpmap is its parameter scale")
         if target.type == "bitmap" and "raw" not in target:
             target.set("boolean", "raw", True)
-            report.changed(target, "the bitmap of bumpmap is read as linear numbers")
+            work.changed(target, "the bitmap of bumpmap is read as linear numbers")
     return element
 
 
 @rule("bsdf", "normalmap")
-def _normalmap(report: Report, element: Element) -> Element:
+def _normalmap(work: Work, element: Element) -> Element:
     for texture in element.of("texture"):
-        texture.attributes["name"] = "normalmap"
         texture.set("boolean", "raw", True)
     return element
 
 
 @rule("bsdf", "mixturebsdf")
-def _mixture(report: Report, element: Element) -> Element:
-    parts = element.of("bsdf", "ref")
-    given = element.pop("weights")
-    weights = [float(v) for v in given.value.replace(",", " ").split()] if given else []
+@rule("phase", "mixturephase")
+def _mixture(work: Work, element: Element) -> Element:
+    parts, given = element.of(element.tag, "ref"), element.pop("weights")
+    weights = channels(given) if given else []
     if len(weights) != len(parts) or not parts or min(weights) < 0:
-        raise ValueError(f"{element.place}: mixturebsdf has {len(parts)} BSDFs and {len(weights)} weights.")
+        raise ValueError(f"there are {len(parts)} parts and {len(weights)} weights")
     total = sum(weights)
-    if total < 1 - 1e-6:
+    if element.tag == "bsdf" and total < 1 - 1e-6:  # the rest absorbs
         parts, weights = [*parts, bsdf("diffuse", colour("reflectance", 0))], [*weights, 1 - total]
-    report.changed(element, "mixturebsdf is blendbsdf, nested for more than two")
-    return _nested("bsdf", "blendbsdf", parts, weights)
-
-
-def _nested(tag: str, type: str, parts: list[Element], weights: list[float]) -> Element:
-    """Return a mixture of several as mixtures of two, the weight of the second first."""
+    blend = {"bsdf": "blendbsdf", "phase": "blendphase"}[element.tag]
+    work.changed(element, f"{element.type} is {blend}, nested for more than two")
     result, total = parts[-1], weights[-1]
     for part, weight in zip(parts[-2::-1], weights[-2::-1], strict=True):
         total += weight
         share = 1 - weight / total if total > 0 else 0.5
-        result = Element(tag, {"type": type}, [number("float", "weight", f"{share:.9g}"), part, result])
+        result = Element(element.tag, {"type": blend}, [number("float", "weight", f"{share:.9g}"), part, result])
     return result
 
 
 @rule("bsdf", "coating", "roughcoating")
-def _coating(report: Report, element: Element) -> Element:
+def _coating(work: Work, element: Element) -> Element:
     parts = element.of("bsdf", "ref")
     if not parts:
-        raise ValueError(f"{element.place}: {element.type} has no BSDF in it.")
+        raise ValueError("there is no BSDF in it")
     rough = element.type == "roughcoating"
-    inner = report.resolved(parts[0])
+    inner = work.resolved(parts[0])
     kept = [
         it for name in ("int_ior", "ext_ior", "specular_reflectance", "alpha", "distribution") if (it := element[name])
     ]
     if inner.type in ("diffuse", "roughdiffuse"):
         # The coat of a diffuse base is what plastic is.
-        report.approximated(element, f"{element.type} over {inner.type} is plastic, without absorption in the coat")
+        work.approximated(element, f"{element.type} over {inner.type} is plastic, without absorption in the coat")
         plastic = bsdf("roughplastic" if rough else "plastic", *kept, number("boolean", "nonlinear", "true"))
         if reflectance := inner["reflectance"]:
             under = Element(
@@ -335,48 +335,38 @@ def _coating(report: Report, element: Element) -> Element:
             plastic.children.append(under)
         if not rough:
             plastic.pop("alpha", "distribution")
-        rough_alpha(report, plastic)
+        rough_alpha(work, plastic)
         return plastic
     index = element.number("int_ior", 1.5) / element.number("ext_ior", 1.0)
     share = min(max(0.5 * ((index - 1) / (index + 1)) ** 2 + 0.05, 0.02), 0.5)
-    report.approximated(
+    work.approximated(
         element, f"{element.type} is a mixture with a mirror, of the coat's mean reflectance, at all angles"
     )
     mirror = bsdf("roughconductor" if rough else "conductor", number("string", "material", "none"))
     mirror.children += [it for it in kept if rough and it.name in ("alpha", "distribution")]
-    rough_alpha(report, mirror)
+    rough_alpha(work, mirror)
     return bsdf("blendbsdf", number("float", "weight", f"{share:.4g}"), parts[0], mirror)
 
 
 @rule("bsdf", "difftrans")
-def _difftrans(report: Report, element: Element) -> Element:
-    report.approximated(element, "difftrans is principledthin, which transmits only")
-    given = element.pop("transmittance", "diffuse_transmittance")
-    thin = bsdf("principledthin", number("float", "diff_trans", "2"))
-    if given:
-        given.attributes["name"] = "base_color"
-    thin.children.append(given or colour("base_color", 0.5))
-    return thin
-
-
-@rule("bsdf", "hk", "irawan")
-def _without_successor(report: Report, element: Element) -> Element:
-    report.approximated(element, f"{element.type} has no successor; it is diffuse, of reflectance .5")
-    return bsdf("diffuse", colour("reflectance", 0.5))
+def _difftrans(work: Work, element: Element) -> Element:
+    work.approximated(element, "difftrans is principledthin, which transmits only")
+    given = element["base_color"] or colour("base_color", 0.5)
+    return bsdf("principledthin", number("float", "diff_trans", "2"), given)
 
 
 # --- Textures ----------------------------------------------------------------------------------------------------
 
 
 @rule("texture", "bitmap")
-def _bitmap(report: Report, element: Element) -> Element:
+def _bitmap(work: Work, element: Element) -> Element:
     _to_uv(element)
     gamma = element.pop("gamma", "srgb")
     if gamma and gamma.tag == "float" and float(gamma.value) == 1:
         element.set("boolean", "raw", True)
-        report.changed(element, "gamma 1 of bitmap is raw")
+        work.changed(element, "gamma 1 of bitmap is raw")
     elif gamma and gamma.tag == "float" and float(gamma.value) > 0 and float(gamma.value) != 2.2:
-        report.approximated(element, f"gamma {gamma.value} of bitmap is that of its file, as a rule sRGB")
+        work.approximated(element, f"gamma {gamma.value} of bitmap is that of its file, as a rule sRGB")
     if element.text("filter_type") and element.text("filter_type") != "nearest":
         element.set("string", "filter_type", "bilinear")
     wrap = element.pop("wrap_mode_u", "wrap_mode_v") or element["wrap_mode"]
@@ -384,12 +374,12 @@ def _bitmap(report: Report, element: Element) -> Element:
         mode = wrap.value.strip().lower()
         element.set("string", "wrap_mode", mode if mode in ("repeat", "mirror", "clamp") else "clamp")
         if mode in ("zero", "one"):
-            report.approximated(element, f"wrapMode {mode} of bitmap is clamp")
+            work.approximated(element, f"wrapMode {mode} of bitmap is clamp")
     return element
 
 
 @rule("texture", "checkerboard")
-def _checkerboard(report: Report, element: Element) -> Element:
+def _checkerboard(work: Work, element: Element) -> Element:
     _to_uv(element)
     return element
 
@@ -409,34 +399,25 @@ def _to_uv(element: Element) -> None:
 
 
 @rule("texture", "scale")
-def _scale(report: Report, element: Element) -> Element:
+def _scale(work: Work, element: Element) -> Element:
     factor = element.pop("scale")
     by = channels(factor) if factor else [1.0]
     rest = [child for child in element.children if child.tag in ("rgb", "float", "texture", "ref")]
     if not rest:
         return colour(element.name, *by)
-    inner = report.resolved(rest[0])
+    inner = work.resolved(rest[0])
     if inner.tag in ("rgb", "float"):
         value = channels(inner)
-        report.changed(element, "the texture scale of a colour is the product")
+        work.changed(element, "the texture scale of a colour is the product")
         return colour(element.name, *[value[k % len(value)] * by[k % len(by)] for k in range(max(len(value), len(by)))])
     before = inner.scale or [1.0]
     scale = [before[k % len(before)] * by[k % len(by)] for k in range(max(len(before), len(by)))]
     return Element(inner.tag, dict(inner.attributes), list(inner.children), element.place, scale)
 
 
-@rule("texture", "gridtexture", "wireframe", "curvature")
-def _texture_without_successor(report: Report, element: Element) -> Element:
-    names = {"gridtexture": ("color0", 0.2), "wireframe": ("interior_color", 0.5)}
-    name, default = names.get(element.type, ("", 0.5))
-    report.approximated(element, f"the texture {element.type} has no successor; it is a constant colour")
-    given = element[name]
-    return colour(element.name, *(channels(given) if given and given.tag == "rgb" else [default]))
-
-
 @rule("texture", "vertexcolors")
-def _vertex_colors(report: Report, element: Element) -> Element:
-    report.changed(element, "vertexcolors is mesh_attribute, of vertex_color")
+def _vertex_colors(work: Work, element: Element) -> Element:
+    work.changed(element, "vertexcolors is mesh_attribute, of vertex_color")
     name = element.name
     element.type, element.children = "mesh_attribute", []
     element.attributes["name"] = name
@@ -448,7 +429,7 @@ def _vertex_colors(report: Report, element: Element) -> Element:
 
 
 @rule("emitter", "sun", "sky", "sunsky")
-def _sunsky(report: Report, element: Element) -> Element:
+def _sunsky(work: Work, element: Element) -> Element:
     kind = element.type
     element.type = "sunsky"
     scale = element.pop("scale")
@@ -467,13 +448,13 @@ def _sunsky(report: Report, element: Element) -> Element:
         element.children.append(turned)
     # Z is up there, and Y in 0.6.
     turned.children.insert(0, Element("rotate", {"x": "1", "angle": "-90"}))
-    report.approximated(element, f"{kind} is sunsky, turned to where Y is up; it has other data")
+    work.approximated(element, f"{kind} is sunsky, turned to where Y is up; it has other data")
     return element
 
 
 @rule("emitter", "collimated")
-def _collimated(report: Report, element: Element) -> Element:
-    report.approximated(element, "collimated is a disk of radius .001 that shines straight on")
+def _collimated(work: Work, element: Element) -> Element:
+    work.approximated(element, "collimated is a disk of radius .001 that shines straight on")
     radius = 1e-3
     power = element["power"]
     light = [v / (math.pi * radius**2) for v in (channels(power) if power and power.tag == "rgb" else [1.0])]
@@ -489,52 +470,28 @@ def _collimated(report: Report, element: Element) -> Element:
 # --- Integrators, films, sensors ----------------------------------------------------------------------------------
 
 
-@rule("integrator", "field", "multichannel")
-def _field(report: Report, element: Element) -> Element:
-    words = {"position": "position", "relposition": "position", "distance": "depth", "geonormal": "geo_normal",
-             "shnormal": "sh_normal", "uv": "uv", "albedo": "albedo", "shapeindex": "shape_index",
-             "primindex": "prim_index"}  # fmt: skip
-    if element.type == "field":
-        word = words.get(element.text("field"), "depth")
-        element.children = [number("string", "aovs", f"{word}:{word}")]
-    else:
-        inner = element.of("integrator")
-        aovs = [it.value for each in inner if each.type == "aov" and (it := each["aovs"])]
-        element.children = [*(each for each in inner if each.type != "aov"), number("string", "aovs", ",".join(aovs))]
-    report.changed(element, f"{element.type} is aov")
-    element.type = "aov"
-    return element
-
-
 @rule("film", "hdrfilm", "ldrfilm", "mfilm", "tiledhdrfilm")
-def _film(report: Report, element: Element) -> Element:
-    if element.type == "ldrfilm":
+def _film(work: Work, element: Element) -> Element:
+    if element.type != "hdrfilm":
         element.pop("file_format")
-        report.changed(element, "ldrfilm is hdrfilm, whose values are linear; mi-brdfs render also writes a PNG")
-    elif element.type != "hdrfilm":
-        element.pop("file_format")
-        report.changed(element, f"{element.type} is hdrfilm")
-    if element.type == "mfilm":
-        for name in ("width", "height"):
-            if name not in element:
-                element.set("integer", name, 1)
+        work.changed(element, f"{element.type} is hdrfilm, whose values are linear; mi-brdfs render writes a PNG, too")
+    for name in ("width", "height"):
+        if element.type == "mfilm" and name not in element:
+            element.set("integer", name, 1)
     element.type = "hdrfilm"
-    if border := element.pop("high_quality_edges"):
-        element.set("boolean", "sample_border", border.value.strip().lower() == "true")
-        report.changed(element, "highQualityEdges of a film is sample_border")
-    if formats := element.pop("pixel_format"):
-        first = formats.value.split(",")[0].strip().lower()
-        first = {"luminancealpha": "luminance_alpha", "spectrum": "rgb", "spectrumalpha": "rgba"}.get(first, first)
-        element.set("string", "pixel_format", first)
-        if "," in formats.value or "spectrum" in formats.value.lower():
-            report.approximated(element, f"pixelFormat {formats.value} is {first}")
+    if given := element.pop("pixel_format"):
+        word = given.value.split(",")[0].strip().lower()
+        word = {"luminancealpha": "luminance_alpha", "spectrum": "rgb", "spectrumalpha": "rgba"}.get(word, word)
+        element.set("string", "pixel_format", word)
+        if word.replace("_", "") != given.value.strip().lower():
+            work.approximated(element, f"pixelFormat {given.value} is {word}")
     return element
 
 
 @rule("sensor", "perspective", "thinlens", "perspective_rdist")
-def _perspective(report: Report, element: Element) -> Element:
+def _perspective(work: Work, element: Element) -> Element:
     if element.type == "perspective_rdist":
-        report.approximated(element, "perspective_rdist is perspective, without distortion")
+        work.approximated(element, "perspective_rdist is perspective, without distortion")
         element.type = "perspective"
     if "fov" not in element and "focal_length" not in element:
         element.pop("fov_axis")
@@ -543,27 +500,10 @@ def _perspective(report: Report, element: Element) -> Element:
 
 
 @rule("phase", "hg")
-def _hg(report: Report, element: Element) -> Element:
+def _hg(work: Work, element: Element) -> Element:
     if (g := element["g"]) and g.tag != "float":
-        report.approximated(element, "g of hg cannot vary; it is 0.8")
+        work.approximated(element, "g of hg cannot vary; it is 0.8")
         element.pop("g")
-    return element
-
-
-@rule("rfilter", "mitchell")
-def _mitchell(report: Report, element: Element) -> Element:
-    for child in element.children:
-        child.attributes["name"] = child.name.upper()
-    return element
-
-
-@rule("sampler", "halton", "hammersley", "sobol", "faure", "independent", "stratified", "ldsampler")
-def _sampler(report: Report, element: Element) -> Element:
-    if scramble := element.pop("scramble"):
-        element.set("integer", "seed", max(int(float(scramble.value)), 0))
-    if element.type in SUCCESSORS["sampler"]:
-        report.changed(element, f"the sampler {element.type} is multijitter")
-        element.type = "multijitter"
     return element
 
 
@@ -575,14 +515,12 @@ the default of 0.6."""
 
 
 @rule("medium", "homogeneous")
-def _homogeneous(report: Report, element: Element) -> Element:
+def _homogeneous(work: Work, element: Element) -> Element:
     given = {name: channels(it) for name in ("sigma_s", "sigma_a", "sigma_t", "albedo") if (it := element.pop(name))}
     material = element.pop("material")
     if "sigma_t" not in given:
         if material or not given:
-            report.approximated(
-                element, f"the medium {material.value if material else ''} has the coefficients of skin"
-            )
+            work.approximated(element, f"the medium {material.value if material else ''} has the coefficients of skin")
         scattered, absorbed = (
             given.get(name, skin if not given else [0.0])
             for name, skin in zip(("sigma_s", "sigma_a"), SKIN, strict=True)
@@ -590,29 +528,10 @@ def _homogeneous(report: Report, element: Element) -> Element:
         scattered, absorbed = ((it * 3)[:3] if len(it) == 1 else it for it in (scattered, absorbed))
         extinct = [s + a for s, a in zip(scattered, absorbed, strict=True)]
         given = {"sigma_t": extinct, "albedo": [s / t if t else 0.0 for s, t in zip(scattered, extinct, strict=True)]}
-        report.changed(element, "sigmaS and sigmaA of a medium are sigma_t and albedo")
+        work.changed(element, "sigmaS and sigmaA of a medium are sigma_t and albedo")
     # Colours are at most 1 there; the scale carries the rest.
     most = max(*given["sigma_t"], 1e-9) if max(given["sigma_t"]) > 1 else 1.0
     element.set("rgb", "sigma_t", [v / most for v in given["sigma_t"]])
     element.set("rgb", "albedo", given.get("albedo", [0.75]))
     element.set("float", "scale", element.number("scale", 1) * most)
     return element
-
-
-@rule("medium", "heterogeneous")
-def _heterogeneous(report: Report, element: Element) -> Element:
-    for child in element.children:
-        if child.name == "density":
-            child.attributes["name"] = "sigma_t"
-            report.changed(element, "density of a heterogeneous medium is sigma_t")
-    return element
-
-
-@rule("phase", "mixturephase")
-def _mixture_phase(report: Report, element: Element) -> Element:
-    parts, given = element.of("phase", "ref"), element.pop("weights")
-    weights = channels(given) if given else []
-    if len(weights) != len(parts) or not parts:
-        raise ValueError(f"{element.place}: mixturephase has {len(parts)} phase functions and {len(weights)} weights.")
-    report.changed(element, "mixturephase is blendphase, nested for more than two")
-    return _nested("phase", "blendphase", parts, weights)

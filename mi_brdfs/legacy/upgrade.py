@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 import warnings
@@ -17,7 +16,7 @@ import numpy as np
 
 from ..names import check_name
 from .document import OBJECTS, Element, read_document, root_of
-from .rules import KNOWN, NEAREST, RULES, SUCCESSORS, colour, number
+from .rules import KNOWN, NEAREST, RENAMED, RULES, SUCCESSORS, colour, number
 from .sheets import modernize
 from .spectra import rgb_of
 
@@ -85,7 +84,7 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     version = root.attributes.get("version", "0.2.0" if is_old else "0.6.0").strip()
     if not (found := re.fullmatch(r"0\.([0-6])(\.\d+)*", version)):
         raise ValueError(f"{path}: version {version} is none of 0.2 to 0.6.")
-    work = _Upgrade(path, lenient, Path(folder) if folder is not None else path.parent)
+    work = Work(path, lenient, Path(folder) if folder is not None else path.parent)
     for place, name in without:
         work.changes.append(Change(place, "dropped", f"the include {name}, which is missing"))
     scene = work.scene(root, int(found[1]))
@@ -144,8 +143,8 @@ def is_new(path: Path) -> bool:
     return tag != "scene" or attributes.get("version", "0").strip()[:1] not in "01"
 
 
-class _Upgrade:
-    """The way of one scene, from the parts to the whole."""
+class Work:
+    """The upgrade of one scene, from the parts to the whole."""
 
     def __init__(self, path: Path, lenient: bool, folder: Path) -> None:
         self.path, self.lenient, self.folder = path, lenient, folder
@@ -292,6 +291,10 @@ class _Upgrade:
         """Return what a plugin becomes, or None."""
         element.children = self._parts(element)
         kind, was = element.tag, element.type
+        for child in element.children:
+            if new := RENAMED.get((was, child.name)):
+                child.attributes["name"] = new
+                self.changed(child, f"a property of {was} is {new}")
         if kind == "subsurface":
             self.dropped(element, f"the subsurface {was} has no successor")
             return None
@@ -319,11 +322,13 @@ class _Upgrade:
                 self.approximated(element, f"the {kind} {was} is {new}")
             element.type = new
             return element
+        if kind == "texture":
+            self.approximated(element, f"the texture {was} has no successor; it is a constant colour")
+            given = next(iter(element.of("rgb")), colour("", 0.5))
+            return Element("rgb", {"name": element.name, "value": given.value})
         if kind not in NEAREST:
             self.dropped(element, f"the {kind} {was} has no successor")
             return None
-        if kind == "texture":
-            return colour(element.name, 0.5)
         nearest = "volpath" if kind == "integrator" and self.has_media else NEAREST[kind]
         self.approximated(element, f"the {kind} {was} is {nearest}")
         element.type = nearest
@@ -410,29 +415,10 @@ def _normalize(transform: Element) -> None:
     """Take the scale out of the transform of a sensor, in place, which Mitsuba 3 refuses."""
     if not any(step.tag in ("scale", "matrix") for step in transform.children):
         return
-    t = importlib.import_module("mitsuba.scalar_rgb").ScalarTransform4f
-    total = np.eye(4)
-    for step in transform.children:
-        total = np.array(_matrix(t, step)) @ total
-    u, _, v = np.linalg.svd(total[:3, :3])
-    total[:3, :3] = u @ v
-    transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in total.ravel())})]
-
-
-def _matrix(t: Any, step: Element) -> Any:
-    def triple(default: float) -> list[float]:
-        given = [float(v) for v in step.value.replace(",", " ").split()] or [default]
-        return [float(step.attributes.get(axis, given[k % len(given)])) for k, axis in enumerate("xyz")]
-
-    def point(name: str) -> list[float]:
-        return [float(v) for v in step.attributes.get(name, "0, 1, 0").replace(",", " ").split()]
-
-    if step.tag == "translate":
-        return t().translate(triple(0)).matrix
-    if step.tag == "scale":
-        return t().scale(triple(1)).matrix
-    if step.tag == "rotate":
-        return t().rotate(triple(0), float(step.attributes.get("angle", 0))).matrix
-    if step.tag == "lookat":
-        return t().look_at(point("origin"), point("target"), point("up")).matrix
-    return np.array([float(v) for v in step.value.replace(",", " ").split()]).reshape(4, 4)
+    shape = Element("shape", {"type": "sphere"}, [Element("transform", {"name": "to_world"}, transform.children)])
+    scene = Element("scene", {"version": "3.0.0"}, [shape])
+    state = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), scene.to_xml())
+    matrix = next(np.array(it.props["to_world"].matrix) for it in state.nodes if "to_world" in it.props)
+    u, _, v = np.linalg.svd(matrix[:3, :3])
+    matrix[:3, :3] = u @ v
+    transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in matrix.ravel())})]
