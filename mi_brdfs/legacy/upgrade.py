@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import warnings
@@ -16,11 +17,12 @@ import numpy as np
 
 from ..names import check_name
 from .document import OBJECTS, Element, read_document, root_of
-from .rules import KNOWN, NEAREST, RENAMED, RULES, SUCCESSORS, colour, number
+from .rules import KNOWN, NEAREST, RENAMED, RULES, SUCCESSORS, channels, colour, number
 from .sheets import modernize
 from .spectra import rgb_of
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
+LOOK_AT = ("origin", "target", "up")
 COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
 Kind = Literal["changed", "approximated", "dropped", "replaced"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -176,7 +178,7 @@ class Work:
         self.has_media = any(it.tag == "medium" for it in root.walk())
         parts = self._parts(root)
         for extra in (it for it in parts if it.tag in PROPERTIES):
-            self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 has not")
+            self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 does not have")
         scene = Element("scene", {"version": "3.0.0"}, [it for it in parts if it.tag not in PROPERTIES])
         self._complete(root, scene)
         if self.missing:
@@ -237,7 +239,7 @@ class Work:
                 _normalize(element)
             return element
         if element.tag not in OBJECTS:
-            self.dropped(element, f"<{element.tag}>, which Mitsuba has not")
+            self.dropped(element, f"<{element.tag}>, which Mitsuba does not have")
             return None
         name = element.name
         try:
@@ -300,6 +302,14 @@ class Work:
             return None
         if (stand_in := self._without_files(element)) is not element:
             return stand_in
+        media = [it for it in element.children if it.name in ("interior", "exterior")]
+        if (
+            kind == "shape"
+            and media
+            and not element.of("bsdf", "emitter")
+            and len(element.of("ref", "medium")) == len(media)
+        ):
+            element.children.append(Element("bsdf", {"type": "null"}))
         if rule := RULES.get((kind, was)):
             result = rule(self, element)
             if result is None or result.tag != kind:
@@ -354,7 +364,7 @@ class Work:
                     child.scale = None
                 kept.append(child)
             elif child.name != "ensure_energy_conservation":
-                self.dropped(child, f"{child.name or child.tag} of {element.type}, which Mitsuba 3 has not")
+                self.dropped(child, f"{child.name or child.tag} of {element.type}, which Mitsuba 3 does not have")
         element.children = [self._cleaned(child) for child in kept]
         return element
 
@@ -395,7 +405,7 @@ class Work:
             return [default]
         texture = self.resolved(texture)
         if texture.tag in ("rgb", "float"):
-            return [float(v) for v in texture.value.replace(",", " ").split()]
+            return channels(texture)
         if texture.type == "bitmap" and (name := texture["filename"]):
             bitmap = mi.Bitmap(str(self.folder / name.value))
             raw = texture.text("raw") == "true"
@@ -415,10 +425,25 @@ def _normalize(transform: Element) -> None:
     """Take the scale out of the transform of a sensor, in place, which Mitsuba 3 refuses."""
     if not any(step.tag in ("scale", "matrix") for step in transform.children):
         return
-    shape = Element("shape", {"type": "sphere"}, [Element("transform", {"name": "to_world"}, transform.children)])
-    scene = Element("scene", {"version": "3.0.0"}, [shape])
-    state = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), scene.to_xml())
-    matrix = next(np.array(it.props["to_world"].matrix) for it in state.nodes if "to_world" in it.props)
+    transforms = importlib.import_module("mitsuba.scalar_rgb").ScalarTransform4f  # which needs no variant
+    matrix = np.eye(4)
+    for step in transform.children:
+        matrix = np.array(_matrix(transforms(), step)) @ matrix
     u, _, v = np.linalg.svd(matrix[:3, :3])
     matrix[:3, :3] = u @ v
     transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in matrix.ravel())})]
+
+
+def _matrix(identity: Any, step: Element) -> Any:
+    """Return the matrix of one step of a transform."""
+    given = step.attributes
+    if step.tag == "matrix":
+        return np.reshape(channels(step), (4, 4))
+    if step.tag == "lookat":
+        points = {name: channels(Element("", {"value": given.get(name, "0, 1, 0")})) for name in LOOK_AT}
+        return identity.look_at(**points).matrix
+    default = (channels(step) or [1.0 if step.tag == "scale" else 0.0]) * 3
+    triple = [float(given.get(axis, default[k])) for k, axis in enumerate("xyz")]
+    if step.tag == "rotate":
+        return identity.rotate(triple, float(given.get("angle", 0))).matrix
+    return (identity.scale if step.tag == "scale" else identity.translate)(triple).matrix
