@@ -3,7 +3,8 @@
 ``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
 dict scenes. :func:`list_models` names them, :func:`info` returns a manual page, :func:`preview_scene` a scene that
 shows a material. :func:`presets` names published materials, :func:`preset` returns one. :func:`ranges` and
-:func:`project` keep optimised parameters valid. ``explore`` opens a page with sliders, lobes and pictures.
+:func:`project` keep optimised parameters valid. ``explore`` opens a page with sliders, lobes and pictures;
+``load_legacy`` loads a scene of Mitsuba 0.2 to 0.6.
 """
 
 from .starting import end_on_ctrl_c
@@ -41,20 +42,22 @@ from .ranges import project, ranges  # noqa: E402
 
 install()
 
-_LAZY = ("bench", "cluster", "fit", "gallery", "plot", "sweep", "testing", "validation")
+_LAZY = ("bench", "cluster", "fit", "gallery", "legacy", "plot", "sweep", "testing", "validation")
 """Modules that are imported when they are used: some need extras, and all take time."""
+_ELSEWHERE = {"explore": "explorer", "load_legacy": "legacy"}
+"""Functions of such modules."""
 
 
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
         return importlib.import_module(f"{__name__}.{name}")
-    if name == "explore":
-        return importlib.import_module(f"{__name__}.explorer").explore
+    if name in _ELSEWHERE:
+        return getattr(importlib.import_module(f"{__name__}.{_ELSEWHERE[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY, "explore"})
+    return sorted({*globals(), *_LAZY, *_ELSEWHERE})
 
 
 __all__ = [

@@ -54,17 +54,3 @@ def test_parameters_of_06():
         np.testing.assert_array_equal(values(bsdf), values({"type": plugin, new: other}), err_msg=old)
         np.testing.assert_array_equal(values({"type": plugin}), values({"type": plugin, new: default}), err_msg=old)
         assert not np.allclose(values(bsdf), values({"type": plugin}), rtol=1e-3), old
-
-
-def refused():
-    """The fragments of scenes that the notebook has Mitsuba refuse."""
-    listing = next(text for text in TEXTS if text.startswith("refused = "))
-    return ast.literal_eval(ast.parse(listing).body[0].value)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_refused():
-    """What to write instead is tested with README.md."""
-    for text in refused():
-        with pytest.raises(RuntimeError):
-            in_06(text)

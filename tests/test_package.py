@@ -70,7 +70,7 @@ def test_style_and_types(tool):
 # fmt: off
 TRUNK = {
     "math", "srgb", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba", "ranges",
-    "names", "variants", "writing", "starting", "given", "preview", "probe", "rendering", "__version__", "info",
+    "names", "legacy", "variants", "writing", "starting", "given", "preview", "probe", "rendering", "__version__", "info",
     "doctor",
 }
 # fmt: on

@@ -61,7 +61,7 @@ KNOWN: dict[str, dict[str, str]] = {
         "shapegroup": "", "instance": "to_world",
     },
     "medium": {"homogeneous": "sigma_t albedo scale", "heterogeneous": "sigma_t albedo scale"},
-    "volume": {"constvolume": "value", "gridvolume": "filename to_world"},
+    "volume": {"constvolume": "value", "gridvolume": "filename to_world use_grid_bbox"},
     "phase": {"isotropic": "", "hg": "g", "rayleigh": "", "blendphase": "weight"},
     "sensor": {
         "perspective": f"{CAMERA} fov fov_axis focal_length", "orthographic": CAMERA, "irradiancemeter": "",
@@ -504,6 +504,12 @@ def _hg(work: Work, element: Element) -> Element:
     if (g := element["g"]) and g.tag != "float":
         work.approximated(element, "g of hg cannot vary; it is 0.8")
         element.pop("g")
+    return element
+
+
+@rule("volume", "gridvolume")
+def _grid_volume(work: Work, element: Element) -> Element:
+    element.set("boolean", "use_grid_bbox", True)  # as 0.6 always does
     return element
 
 
