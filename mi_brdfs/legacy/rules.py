@@ -168,21 +168,34 @@ DEFAULTS = {
 """The default reflectances that are not 1."""
 
 
-@rule("bsdf", "phong")
-def _phong(work: Work, element: Element) -> Element:
-    return scaled_down(work, element, "diffuse_reflectance", "specular_reflectance")
+LIMITS = {
+    ("phong", "exponent"): (0.0, 1e6), ("roughdiffuse", "alpha"): (0.0, 2.2),
+    **{("ward", name): (1e-4, 2.0) for name in ("alpha", "alpha_u", "alpha_v")},
+}  # fmt: skip
+"""The ranges of numbers here; 0.6 had none."""
 
 
-@rule("bsdf", "ward")
-def _ward(work: Work, element: Element) -> Element:
-    variant = element.pop("variant")
-    element.set("string", "variant", variant.value.strip().lower() if variant else "balanced")
+def limited(work: Work, element: Element) -> None:
+    """Bring the numbers of a BSDF into their ranges."""
+    for child in element.of("float"):
+        low, high = LIMITS.get((element.type, child.name), (-math.inf, math.inf))
+        if not low <= float(child.value) <= high:
+            work.approximated(child, f"{child.name} of {element.type} is limited to {low:g} … {high:g}")
+            child.attributes["value"] = f"{min(max(float(child.value), low), high):g}"
+
+
+@rule("bsdf", "phong", "ward")
+def _phong_or_ward(work: Work, element: Element) -> Element:
+    if variant := element["variant"]:
+        variant.attributes["value"] = variant.value.strip().lower()
     pair_of_alpha(work, element)
+    limited(work, element)
     return scaled_down(work, element, "diffuse_reflectance", "specular_reflectance")
 
 
 @rule("bsdf", "roughdiffuse", "diffuse")
 def _diffuse(work: Work, element: Element) -> Element:
+    limited(work, element)
     other = element.pop("diffuse_reflectance")
     if other and "reflectance" not in element:
         other.attributes["name"] = "reflectance"

@@ -58,7 +58,7 @@ class Ward(Model):
 
     diffuse_reflectance = Reflectance(0.5, "albedo ρd of the diffuse lobe", role="diffuse")
     specular_reflectance = Reflectance(0.2, "scale ρs of the specular lobe", role="specular")
-    alpha = Number(0.1, (1e-4, 1), "roughness α, the root mean square slope of the facets",
+    alpha = Number(0.1, (1e-4, 2), "roughness α, the root mean square slope of the facets",
                    anisotropic=True, lone_default=True)  # fmt: skip
     variant = Choice(("balanced", "ward", "ward-duer", "approximate"), "scale of the specular lobe")
     rotation = Rotation()
