@@ -14,7 +14,7 @@ SPECTRUM = {"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}
 # plugin, parameters → what the message must contain
 # ruff: noqa: E501
 REJECTED = [
-    ("ward", {"alpha": 1.7}, "ward: alpha = 1.7 is not allowed; it must be a number in [0.0001, 1] or a texture."),
+    ("ward", {"alpha": 2.7}, "ward: alpha = 2.7 is not allowed; it must be a number in [0.0001, 2] or a texture."),
     ("ward", {"alpha": NAN}, "ward: alpha = nan is not allowed; it must be"),
     ("ward", {"alpha_v": -INF, "alpha_u": 0.1}, "ward: alpha_v = -inf is not allowed; it must be"),
     ("ward", {"alpha": True}, "ward: alpha = True is a boolean; it must be a number in"),
