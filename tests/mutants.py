@@ -10,6 +10,7 @@ import importlib
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import ClassVar
 
 import drjit as dr
 import mitsuba as mi
@@ -254,6 +255,24 @@ def in_spectra(change, **members):
     return colour(evaluate, **members)
 
 
+def beside(texture, si, active):
+    """Its colours are looked up next to the wavelengths of the light, each nearer to the other three."""
+    moved = mi.SurfaceInteraction3f(si)
+    if mi.is_spectral:
+        moved.wavelengths = 0.7 * si.wavelengths + 0.3 * dr.mean(si.wavelengths)
+    return texture.eval(moved, active)
+
+
+class SharedByAll(Lambert):
+    """All BSDFs have the textures of the first."""
+
+    first: ClassVar = []
+
+    def evaluate(self, si, active):
+        self.first.append(self.textures)
+        return SimpleNamespace(reflectance=self.first[0]["reflectance"].eval(si, active))
+
+
 def elsewhere(moved):
     """A Lambertian that looks its texture up at another point."""
 
@@ -337,6 +356,12 @@ def as_bright_as_others(texture, si, active):
 
 def ignored_masks(own, self, ctx, si, active):
     return own(self, mi.BSDFContext(), si, active)
+
+
+def one_bit_of_the_mask(own, self, ctx, si, active):
+    """A type mask of several bits enables nothing."""
+    kinds = [int(mi.BSDFFlags.All), *self.kinds]
+    return own(self, ctx, si, active) if ctx.type_mask in map(int, kinds) else None
 
 
 def cosine_twice(own, self, ctx, si, wo, active):
@@ -589,6 +614,9 @@ MUTANTS = [
     mutant("lobe probability omitted", "pdf components", phong(PowerLobe), SumOfDensities),
     mutant("weight not divided", "weight", Phong, sampled(weight=lambda bs, w, si, u: w * bs.pdf)),
     mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
+    mutant("mask of one bit only", "components", Ward, adapted(_mixture=one_bit_of_the_mask)),
+    mutant("shared by all", "updates", SharedByAll),
+    mutant("colours of wavelengths beside", "spectral", colour(beside)),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
     mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),
     mutant("wrong component", "components", Ward, sampled(sampled_component=lambda bs, w, si, u: mi.UInt32(0))),
