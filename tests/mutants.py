@@ -364,6 +364,23 @@ def one_bit_of_the_mask(own, self, ctx, si, active):
     return own(self, ctx, si, active) if ctx.type_mask in map(int, kinds) else None
 
 
+def brighter_every_other_time(own, self, *given):
+    value, pdf = own(self, *given)
+    self.called = not getattr(self, "called", False)
+    return (1.1 * value if self.called else value), pdf
+
+
+def in_the_world(own, self, ctx, si, *given):
+    """A direction of the world is taken for a local one."""
+    value, pdf = own(self, ctx, si, *given)
+    return value * (0.75 + 0.25 * abs(si.n.z)), pdf
+
+
+def tiled_in_place(own, self, ctx, si, *given):
+    si.uv *= 2
+    return own(self, ctx, si, *given)
+
+
 def cosine_twice(own, self, ctx, si, wo, active):
     """eval has another cosine, sample's weight has not."""
     value, pdf = own(self, ctx, si, wo, active)
@@ -616,6 +633,10 @@ MUTANTS = [
     mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
     mutant("mask of one bit only", "components", Ward, adapted(_mixture=one_bit_of_the_mask)),
     mutant("shared by all", "updates", SharedByAll),
+    mutant("brighter every other time", "calls", Lambert, adapted(eval_pdf=brighter_every_other_time)),
+    mutant("darker where the world is turned", "calls", Lambert, adapted(eval_pdf=in_the_world)),
+    mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
+    mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
     mutant("colours of wavelengths beside", "spectral", colour(beside)),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
     mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),

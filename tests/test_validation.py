@@ -332,6 +332,16 @@ def test_bitmaps_are_not_used_up():
     assert not report.failures and (np.array(bitmap) == before).all()
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_plugin_of_one_variant():
+    """What cannot be loaded elsewhere cannot be judged there. Nor does it have a ``to_string``."""
+    report = check(of_others("in_rgb_alone"), only=["spectral", "polarization", "calls"])
+    assert [finding.verdict for finding in report.findings] == ["skip", "skip", "pass"], report
+    for finding, variant in zip(report.findings, ("spectral", "spectral_polarized"), strict=False):
+        assert finding.message.startswith(f"It does not work in llvm_ad_{variant}: ")
+        assert 'unknown plugin of type "in_rgb_alone"' in finding.message
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_parameters_that_are_no_numbers():

@@ -56,7 +56,7 @@ def polarization(run: Run) -> Findings:
                 matrices, turned = _of_f(matrix, wo), _of_f(_turned(bsdf, wi, wo), wo)
                 back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
                 others = _others(run, bsdf, wi, wo, matrices)
-        except (RuntimeError, TypeError) as error:
+        except Exception as error:
             yield Finding("polarization", part.name, "skip", f"It does not work in {name}: {told(error)}.")
             return
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)

@@ -100,7 +100,7 @@ def spectral(run: Run) -> Findings:
                 }
                 if greys:
                     _check_channels(run, outcome, greys)
-        except (RuntimeError, TypeError) as failure:
+        except Exception as failure:
             yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
             return
     for check, findings in failed.items():
