@@ -121,8 +121,9 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
 def mode(run: Run) -> Findings:
     """Check the mode ``TransportMode.Importance``, in which light is traced from the emitters: light reflected, or
     transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
-    cosine of ``wo``. That is the same unless the component is flagged NonSymmetric. And the weight of ``sample`` is
-    ``eval``/``pdf`` in this mode, too."""
+    cosine of ``wo``: Mitsuba's ``eval`` and ``sample`` are those of the adjoint then, without which ``ptracer`` and
+    ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
+    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
     for part in run.probe.parts:
         ways = [1] * part.has(mi.BSDFFlags.Reflection)
         ways += [-1] * (part.has(mi.BSDFFlags.Transmission) and len(part.sides) > 1)
@@ -147,7 +148,7 @@ def mode(run: Run) -> Findings:
             error = relative(got, expected, 1e-6, unknown=0)
             off = (error.max(axis=1) > tolerance).mean()
             if off > 1e-3:
-                why = "it is not flagged NonSymmetric" if symmetric else "that is f with its directions exchanged"
+                why = "it is not flagged NonSymmetric" if symmetric else "that is its adjoint, f from wo to wi"
                 why = f"is needed, as {why}; {off:.1%} of the pairs are wrong"
                 outcome.wrong(error, "in the mode Importance eval", got, why, wi, wo, expected=expected)
             if samples.lit.any():
