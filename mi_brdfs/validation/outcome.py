@@ -94,13 +94,14 @@ Findings = Iterator[Finding]
 
 
 def told(error: Exception) -> str:
-    """Return an exception in a few words: its kind, and the first line of what it says, without where in Mitsuba it was
-    raised. Mitsuba and Dr.Jit hide the cause of an error in a plugin's Python code behind one of their own."""
+    """Return an exception in a few words: its kind, and the first line of what it says, or that a plugin is unknown.
+    Mitsuba and Dr.Jit hide the cause of an error in a plugin's Python code behind one of their own."""
     cause: BaseException = error
     while cause.__cause__ is not None:
         cause = cause.__cause__
     line = next((line.strip() for line in str(cause).splitlines() if line.strip()), "")
-    line = re.sub(r'^\[\w+\.cpp:\d+\] (At dictionary node ".*?": )?', "", line)
+    if unknown := re.search(r'Plugin "(.+)" not found', line):
+        line = f'there is no plugin "{unknown[1]}"'
     return type(cause).__name__ + (f": {brief(line.rstrip('.'))}" if line else "")
 
 
