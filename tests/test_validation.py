@@ -228,6 +228,14 @@ FALSE_ALARMS = {
         {"type": "phong", "specular_reflectance": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True}},
         ["gradients"],
     ),
+    "gradients of textures": (
+        {
+            "type": "bumpmap",
+            "arbitrary": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True},
+            "a": {"type": "diffuse"},
+        },
+        ["textures"],
+    ),
     "index above one as a colour": (
         {"type": "low", "variant": "microfacet", "int_ior": 1.006},
         ["colours", "spectral"],
