@@ -37,6 +37,7 @@ from mi_brdfs.validation import check
 BRIGHT = "albedo", "reciprocity", "gradients", "updates", "polarization"
 """What fails where a setting is too bright."""
 VARIANTS = "llvm_ad_rgb", "llvm_ad_rgb", "llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_spectral_polarized"
+BUMPS = str(Path(__file__).parents[1] / "scenes" / "textures" / "brushed_lathe.png")
 BUILT_INS = [
     {"type": "diffuse"},
     {"type": "roughconductor"},
@@ -53,7 +54,7 @@ BUILT_INS = [
     {"type": "blendbsdf", "weight": 0.3, "a": {"type": "diffuse"}, "b": {"type": "roughconductor"}},
     {"type": "mask", "opacity": 0.5, "a": {"type": "diffuse"}},
     {"type": "twosided", "a": {"type": "roughconductor", "distribution": "ggx"}},
-    {"type": "bumpmap", "arbitrary": {"type": "checkerboard"}, "a": {"type": "diffuse"}},
+    {"type": "bumpmap", "arbitrary": {"type": "bitmap", "filename": BUMPS, "raw": True}, "a": {"type": "diffuse"}},
     {"type": "normalmap", "normalmap": {"type": "rgb", "value": (0.5, 0.5, 1)}, "a": {"type": "diffuse"}},
     {"type": "hair"},
 ]

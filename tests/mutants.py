@@ -10,6 +10,7 @@ import importlib
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import ClassVar
 
 import drjit as dr
 import mitsuba as mi
@@ -254,6 +255,24 @@ def in_spectra(change, **members):
     return colour(evaluate, **members)
 
 
+def beside(texture, si, active):
+    """Its colours are looked up next to the wavelengths of the light, each nearer to the other three."""
+    moved = mi.SurfaceInteraction3f(si)
+    if mi.is_spectral:
+        moved.wavelengths = 0.7 * si.wavelengths + 0.3 * dr.mean(si.wavelengths)
+    return texture.eval(moved, active)
+
+
+class SharedByAll(Lambert):
+    """All BSDFs have the textures of the first."""
+
+    first: ClassVar = []
+
+    def evaluate(self, si, active):
+        self.first.append(self.textures)
+        return SimpleNamespace(reflectance=self.first[0]["reflectance"].eval(si, active))
+
+
 def elsewhere(moved):
     """A Lambertian that looks its texture up at another point."""
 
@@ -337,6 +356,29 @@ def as_bright_as_others(texture, si, active):
 
 def ignored_masks(own, self, ctx, si, active):
     return own(self, mi.BSDFContext(), si, active)
+
+
+def one_bit_of_the_mask(own, self, ctx, si, active):
+    """A type mask of several bits enables nothing."""
+    kinds = [int(mi.BSDFFlags.All), *self.kinds]
+    return own(self, ctx, si, active) if ctx.type_mask in map(int, kinds) else None
+
+
+def brighter_every_other_time(own, self, *given):
+    value, pdf = own(self, *given)
+    self.called = not getattr(self, "called", False)
+    return (1.1 * value if self.called else value), pdf
+
+
+def in_the_world(own, self, ctx, si, *given):
+    """A direction of the world is taken for a local one."""
+    value, pdf = own(self, ctx, si, *given)
+    return value * (0.75 + 0.25 * abs(si.n.z)), pdf
+
+
+def tiled_in_place(own, self, ctx, si, *given):
+    si.uv *= 2
+    return own(self, ctx, si, *given)
 
 
 def cosine_twice(own, self, ctx, si, wo, active):
@@ -589,6 +631,13 @@ MUTANTS = [
     mutant("lobe probability omitted", "pdf components", phong(PowerLobe), SumOfDensities),
     mutant("weight not divided", "weight", Phong, sampled(weight=lambda bs, w, si, u: w * bs.pdf)),
     mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
+    mutant("mask of one bit only", "components", Ward, adapted(_mixture=one_bit_of_the_mask)),
+    mutant("shared by all", "updates", SharedByAll),
+    mutant("brighter every other time", "calls", Lambert, adapted(eval_pdf=brighter_every_other_time)),
+    mutant("darker where the world is turned", "calls", Lambert, adapted(eval_pdf=in_the_world)),
+    mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
+    mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
+    mutant("colours of wavelengths beside", "spectral", colour(beside)),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
     mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),
     mutant("wrong component", "components", Ward, sampled(sampled_component=lambda bs, w, si, u: mi.UInt32(0))),

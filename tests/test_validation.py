@@ -68,9 +68,12 @@ def in_frames_of_the_facet(matrix, light, viewer):
     return mi.mueller.rotate_mueller_basis(matrix, light, frames[0], axes[0], viewer, frames[1], axes[1])
 
 
-@pytest.mark.parametrize("fault", [None, turned, beyond_its_intensity, in_frames_of_the_facet])
-def test_mueller_matrices(fault):
-    """Of a rough conductor, with and without faults."""
+FAULTY = [("eval", each) for each in (None, turned, beyond_its_intensity, in_frames_of_the_facet)]
+
+
+@pytest.mark.parametrize(("method", "fault"), [*FAULTY, ("eval_pdf", turned), ("sample", turned)])
+def test_mueller_matrices(method, fault):
+    """Of a rough conductor, with and without faults of a method."""
     for variant in ("llvm_ad_spectral_polarized", "llvm_ad_rgb"):
         mi.set_variant(variant)
         given = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.3, "material": "Au"}
@@ -81,12 +84,22 @@ def test_mueller_matrices(fault):
                 self.metal = mi.load_dict(given)
                 self.m_components, self.m_flags = [int(self.metal.flags())], int(self.metal.flags())
 
+            def altered(self, name, value, si, wo):
+                return fault(value, -wo, si.wi) if fault and name == method and mi.is_polarized else value
+
             def eval(self, ctx, si, wo, active=True):
-                value = self.metal.eval(ctx, si, wo, active)
-                return fault(value, -wo, si.wi) if fault and mi.is_polarized else value
+                return self.altered("eval", self.metal.eval(ctx, si, wo, active), si, wo)
 
             def pdf(self, *arguments):
                 return self.metal.pdf(*arguments)
+
+            def eval_pdf(self, ctx, si, wo, active=True):
+                value, density = self.metal.eval_pdf(ctx, si, wo, active)
+                return self.altered("eval_pdf", value, si, wo), density
+
+            def sample(self, ctx, si, u, v, active=True):
+                bs, weight = self.metal.sample(ctx, si, u, v, active)
+                return bs, self.altered("sample", weight, si, bs.wo)
 
         mi.register_bsdf("wrapped_metal", Metal)
     report = check({"type": "wrapped_metal"}, only="polarization")
@@ -215,6 +228,14 @@ FALSE_ALARMS = {
         {"type": "phong", "specular_reflectance": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True}},
         ["gradients"],
     ),
+    "gradients of textures": (
+        {
+            "type": "bumpmap",
+            "arbitrary": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True},
+            "a": {"type": "diffuse"},
+        },
+        ["textures"],
+    ),
     "index above one as a colour": (
         {"type": "low", "variant": "microfacet", "int_ior": 1.006},
         ["colours", "spectral"],
@@ -319,6 +340,16 @@ def test_bitmaps_are_not_used_up():
     assert not report.failures and (np.array(bitmap) == before).all()
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_plugin_of_one_variant():
+    """What cannot be loaded elsewhere cannot be judged there. Nor does it have a ``to_string``."""
+    report = check(of_others("in_rgb_alone"), only=["spectral", "polarization", "calls"])
+    assert [finding.verdict for finding in report.findings] == ["skip", "skip", "pass"], report
+    for finding, variant in zip(report.findings, ("spectral", "spectral_polarized"), strict=False):
+        words = f'It does not work in llvm_ad_{variant}: RuntimeError: there is no plugin "in_rgb_alone".'
+        assert finding.message == words
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_parameters_that_are_no_numbers():
@@ -350,6 +381,21 @@ def test_one_fault_is_one_sentence():
     report = check(Mutant("low", (), lambert(low), given=(("reflectance", 0.95),)).register(), only=["pdf", "albedo"])
     assert {finding.check for finding in report.failures} == {"pdf"}
     assert report.verdict("albedo") == "skip"
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    ("name", "only"),
+    [
+        ("weight at most one", "textures"),
+        ("not a number at grazing", "components"),
+        ("negative at grazing", "weight mode components"),
+    ],
+)
+def test_other_checks_leave_a_fault_to_its_own(name, only):
+    (mutant,) = (it for it in MUTANTS if it.name == name)
+    report = check(mutant.register(), only=only.split(), angles=(60,))
+    assert report.passed and "could not be checked" not in str(report), report
 
 
 def test_arguments_that_are_wrong_or_short(llvm_rgb):

@@ -104,6 +104,9 @@ def pinned(texture: mi.Texture, si: mi.SurfaceInteraction3f, channel: int | None
         def eval_1(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
             return texture.eval_1(si, active)
 
+        def eval_1_grad(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            return texture.eval_1_grad(si, active)
+
         def eval_3(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
             value = texture.eval_3(si, active)
             return value if channel is None else type(value)(value[channel])

@@ -85,6 +85,8 @@ class BSDFProbe:
     bsdf: mi.BSDF
     every_wavelength: bool = field(default=False, kw_only=True)
     """Whether lanes have wavelengths of their own in spectral variants, from the whole visible range."""
+    turned: bool = field(default=False, kw_only=True)
+    """Whether the surface is turned in the world; directions are local, and stay."""
 
     @cached_property
     def components(self) -> list[Part]:
@@ -147,7 +149,11 @@ class BSDFProbe:
     # --- Calls ------------------------------------------------------------------------------------------------------
 
     def _at(self, wi: Array, uv: ArrayLike, count: int) -> mi.SurfaceInteraction3f:
-        return interaction(wi, uv, hero_wavelengths(count) if self.every_wavelength else WAVELENGTHS)
+        si = interaction(wi, uv, hero_wavelengths(count) if self.every_wavelength else WAVELENGTHS)
+        if self.turned:
+            s, t, n = mi.Vector3f(0.6, 0, -0.8), mi.Vector3f(-0.64, 0.6, -0.48), mi.Vector3f(0.48, 0.8, 0.36)
+            si.n, si.sh_frame, si.dp_du, si.dp_dv = mi.Normal3f(n), mi.Frame3f(s, t, n), s, t
+        return si
 
     def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return f |cosθ_o|."""

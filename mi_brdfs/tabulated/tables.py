@@ -12,7 +12,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import clamp
 from ..measured.arrays import DRJIT
 from ..measured.coordinates import PolarAngle
 from ..measured.files import checked, content_hash
@@ -163,10 +162,10 @@ class TableAxis(Axis):
     def _position(self, x: Any) -> Any:
         first, end, last = float(self.looped[0]), float(self.looped[-1]), len(self.looped) - 1
         if self.uneven is None:
-            return clamp((x - first) * (last / (end - first) if last else 1), 0, last)
+            return dr.clip((x - first) * (last / (end - first) if last else 1), 0, last)
         k = dr.binary_search(1, last, lambda k: fetch(self.uneven, k) <= x)
         below, above = fetch(self.uneven, k - 1), fetch(self.uneven, k)
-        return mi.Float(k - 1) + clamp((x - below) / (above - below), 0, 1)
+        return mi.Float(k - 1) + dr.clip((x - below) / (above - below), 0, 1)
 
 
 def array(values: np.ndarray) -> Any:

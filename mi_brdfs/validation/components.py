@@ -18,8 +18,8 @@ COUNT = 4000
 
 def components(run: Run) -> Findings:
     """Check that the components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
-    ``sampled_type`` lie within what was asked for and drawn, ``eta`` is 1 for light that stays on its side, and what a
-    context excludes is black."""
+    ``sampled_type`` lie within what was asked for and drawn, ``eta`` is 1 for light that stays on its side, what a
+    context excludes is black, and a type mask of one bit or several lets through the components of these types."""
     probe = run.probe
     for part in probe.parts:
         outcome = Outcome("components", part.name)
@@ -149,12 +149,17 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         outcome.wrong(value != 0, "eval", value, why, wi, wo)
         outcome.wrong(density != 0, "pdf", density, why, wi, wo)
         outcome.wrong(samples.weight != 0, "a sample's weight", samples.weight, why, wi, samples.wo, seed=3)
-    alone = [each for each in probe.components if each.flags & kind]
-    selected = part._replace(context=context(mask=kind))
-    value, expected = probe.eval(selected, wi, wo), np.sum([probe.eval(each, wi, wo) for each in alone], axis=0)
-    error = abs(value - expected) / max(expected.max(), 1e-12)
-    name, why = f"with the type mask {kind:#x} eval", "is what the components of this type make"
-    outcome.wrong(error * (error > 10 * run.rounding(probe.whole)), name, value, why, wi, wo, expected=expected)
+    kinds = [int(probe.bsdf.flags(k)) & every for k in range(probe.bsdf.component_count())]
+    absent = every & ~np.bitwise_or.reduce(kinds)
+    alone = [(each.flags & every, probe.eval(each, wi, wo)) for each in probe.components]
+    for mask in (kind, kind | int(absent), every & ~kind):
+        if any(it & mask not in (0, it) for it in kinds):
+            continue  # of a component in part
+        value = probe.eval(part._replace(context=context(mask=mask)), wi, wo)
+        expected = sum((of for it, of in alone if it & mask), np.zeros(value.shape))
+        error = relative(value, expected, 1)
+        name, why = f"with the type mask {mask:#x} eval", "is what the components of these types make"
+        outcome.wrong(error * (error > 10 * run.rounding(probe.whole)), name, value, why, wi, wo, expected=expected)
 
 
 def flags(run: Run) -> Findings:

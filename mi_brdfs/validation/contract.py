@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import drjit as dr
@@ -11,6 +13,7 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
+from ..probe.bsdf import BSDFProbe
 from ..probe.directions import angles_of, hemisphere, on_side, scattered
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative, told
@@ -19,6 +22,8 @@ from .run import Run
 from .updates import attach, traced_floats, value_of
 
 COUNT = 2000
+AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
+"""Methods in an order in which each follows each."""
 
 
 def active(run: Run) -> Findings:
@@ -116,8 +121,9 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
 def mode(run: Run) -> Findings:
     """Check the mode ``TransportMode.Importance``, in which light is traced from the emitters: light reflected, or
     transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
-    cosine of ``wo``. That is the same unless the component is flagged NonSymmetric. And the weight of ``sample`` is
-    ``eval``/``pdf`` in this mode, too."""
+    cosine of ``wo``: Mitsuba's ``eval`` and ``sample`` are those of the adjoint then, without which ``ptracer`` and
+    ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
+    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
     for part in run.probe.parts:
         ways = [1] * part.has(mi.BSDFFlags.Reflection)
         ways += [-1] * (part.has(mi.BSDFFlags.Transmission) and len(part.sides) > 1)
@@ -142,12 +148,12 @@ def mode(run: Run) -> Findings:
             error = relative(got, expected, 1e-6, unknown=0)
             off = (error.max(axis=1) > tolerance).mean()
             if off > 1e-3:
-                why = "it is not flagged NonSymmetric" if symmetric else "that is f with its directions exchanged"
+                why = "it is not flagged NonSymmetric" if symmetric else "that is its adjoint, f from wo to wi"
                 why = f"is needed, as {why}; {off:.1%} of the pairs are wrong"
                 outcome.wrong(error, "in the mode Importance eval", got, why, wi, wo, expected=expected)
             if samples.lit.any():
                 reflected, value = samples.weight * samples.pdf[:, None], samples.value
-                error = abs(reflected - value).max(axis=1) / np.maximum(value.max(axis=1), 1e-9) * samples.lit
+                error = abs(reflected - value).max(axis=1) / np.maximum(abs(value).max(axis=1), 1e-9) * samples.lit
                 if np.quantile(error[samples.lit], 0.99) > tolerance:
                     name = "in the mode Importance a weight times pdf"
                     outcome.wrong(error, name, reflected, "is eval", wi, samples.wo, expected=value, seed=67)
@@ -177,6 +183,89 @@ def recorded(run: Run) -> Findings:
             if dr.kernel_history([dr.KernelType.JIT, dr.KernelType.BlockReduce]):
                 outcome.fault(f"{name} asks for the values of an array, so that no renderer can record it in a loop")
     yield outcome.finding("It asks for no values of arrays.")
+
+
+def calls(run: Run) -> Findings:
+    """Check that calls depend on what they are given alone: ``eval``, ``pdf`` and ``sample`` return the same for the
+    same arguments whatever was called before, in whatever lane, and where the surface is turned in the world, as their
+    directions are local: to float32's rounding, for 99 in a hundred. And they leave the surface point, directions and
+    context as they are, and where Python defines ``to_string``, ``str`` of the BSDF does not raise."""
+    probe, part = run.probe, run.probe.whole
+    outcome, elsewhere = Outcome("calls", part.name), replace(probe, turned=True)
+    wi, wo, u = scattered(COUNT, 76, part.sides), scattered(COUNT, 77, part.sides), random(COUNT, 78)
+    wo[::2] = probe.sample(part, wi, u).wo[::2]
+
+    def called(method: str, probe: BSDFProbe = probe, order: slice = slice(None)) -> tuple[dict[str, Array], Array]:
+        """Return what a method returns, by name, and the directions that it goes to, in the usual order."""
+        i, o, variates = (np.ascontiguousarray(it[order]) for it in (wi, wo, u))
+        if method == "sample":
+            it = probe.sample(part, i, variates)
+            wanted = {"a sample's weight": it.weight, "a sample's density": it.density[:, None]}
+            lit = it.lit[order, None]
+            return {name: value[order] * lit for name, value in wanted.items()}, it.wo[order] * lit
+        return {method: getattr(probe, method)(part, i, o).reshape(COUNT, -1)[order]}, wo
+
+    first = {method: called(method) for method in ("sample", "eval", "pdf")}
+
+    def compare(when: str, method: str, got: dict[str, Array], towards: Array) -> None:
+        usual, usually_towards = first[method]
+        for name, value in got.items():
+            error = relative(value, usual[name])
+            if np.quantile(error.max(axis=1), 0.99) > 10 * run.rounding(part):
+                outcome.wrong(error, f"{when} {name}", value, "else", wi, towards, expected=usual[name], seed=78)
+        turned = np.linalg.norm(towards - usually_towards, axis=1) * (towards.any(axis=1) & usually_towards.any(axis=1))
+        if np.quantile(turned, 0.99) > 1e-3:
+            k = int(np.argmax(turned))
+            outcome.fault(
+                f"{when} sample draws {angles_of(towards[k])} for light from {angles_of(wi[k])}, but "
+                f"{angles_of(usually_towards[k])} by the same variates else",
+                np.inf,
+                wi=wi[k],
+                seed=78,
+            )
+
+    for k, (before, method) in enumerate(pairwise(AFTER_EACH_OTHER)):
+        order = slice(None, None, 1 if k % 2 else -1)
+        before = "sample and eval" if before == "sample" else before  # as the probe calls them
+        compare(f"after a call of {before} for other directions", method, *called(method, order=order))
+    for method in first:
+        compare("where the surface is turned in the world", method, *called(method, elsewhere))
+    _check_arguments(run, outcome, wi, wo, u)
+    try:
+        with unwrapped_ctrl_c():
+            if hasattr(probe.bsdf, "to_string"):  # a plugin in Python need not have one
+                str(probe.bsdf)
+    except Exception as error:
+        outcome.fault(f"str of it raises {told(error)}", np.inf)
+    yield outcome.finding("Calls depend on what they are given alone, and change nothing.")
+
+
+def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array) -> None:
+    """Check that methods leave their arguments as they are."""
+    bsdf, ctx, si, towards, variates = run.probe.bsdf, context(), interaction(wi), vectors(wo), sample_arguments(u)
+
+    def given() -> dict[str, Array]:
+        fields = {f"si.{name}": getattr(si, name) for name in ("wi", "uv", "n", "p")}
+        fields |= {"si.sh_frame.n": si.sh_frame.n, "wo": towards, "sample1": variates[0], "sample2": variates[1]}
+        numbered = {name: numbers(value, COUNT) for name, value in fields.items()}
+        return numbered | {"the context": np.array([[ctx.mode.value, ctx.type_mask, ctx.component]])}
+
+    methods: dict[str, Callable[[], Any]] = {
+        "eval": lambda: bsdf.eval(ctx, si, towards, True),
+        "pdf": lambda: bsdf.pdf(ctx, si, towards, True),
+        "eval_pdf": lambda: bsdf.eval_pdf(ctx, si, towards, True),
+        "sample": lambda: bsdf.sample(ctx, si, *variates, True),
+    }
+    for method, call in methods.items():
+        before = given()
+        call()
+        for name, after in given().items():
+            lanes = (after != before[name]).any(axis=1)
+            if lanes.any():
+                k = int(np.argmax(lanes))
+                was, now = (", ".join(f"{x:.4g}" for x in each[name][k]) for each in (before, {name: after}))
+                words = f"{method} changes {name} of its caller, from ({was}) to ({now})"
+                outcome.fault(words, np.inf, wi=wi[k], wo=wo[k])
 
 
 def null(run: Run) -> Findings:

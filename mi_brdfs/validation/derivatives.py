@@ -24,6 +24,8 @@ TOLERANCE = 0.02
 LOST = 3
 """How many times its last digit a value may be off, as of formulas whose terms cancel."""
 COUNT = 2000
+TURN = 0.01
+"""The step by which directions are turned, in parts of the width of a lobe."""
 
 
 def gradients(run: Run) -> Findings:
@@ -41,7 +43,8 @@ def gradients(run: Run) -> Findings:
     where a derivative inside the limit is not zero, the reverse derivative of the sum of the values or that of its
     negative is not, and a step against it leads to the limit.
 
-    And the derivatives of ``eval`` and ``pdf`` for the directions are finite.
+    And the derivatives of ``eval`` and ``pdf`` for the directions are finite, and where ``eval`` has any, they are
+    those of finite differences, to 2 % on average, too.
     """
     probe, part = run.probe, run.probe.whole
     yield _directional(run)
@@ -60,9 +63,6 @@ def gradients(run: Run) -> Findings:
     if probe.is_ours:
         limits, declared = ranges(probe.bsdf), nested(probe.bsdf.model.declared())
         turning = {it.name for parameter in declared for way in parameter.spellings for it in way if it.turns}
-
-    def values() -> Array:
-        return probe.eval(part, wi, wo)
 
     for key in keys:
         with restored(params, key) as original:
@@ -102,7 +102,9 @@ def gradients(run: Run) -> Findings:
                 if shift:
                     # At an index of refraction of 1, no reflection turns into total reflection: look beside it.
                     derivative, _ = _derivatives(run, params, key, wi, wo)
-                tried = _differences(params, key, values, part_of * step)
+                # Float32 must know the values to far less than a step.
+                known = np.spacing(np.abs(np.array(original + shift, np.float32)).max()) < 0.01 * part_of * step
+                tried = _differences(_shifted(run, params, key, wi, wo), part_of * step, known)
                 if tried.trusted.mean() > trusted.mean():
                     low, high, trusted, noise = tried
                     compared = derivative
@@ -112,28 +114,40 @@ def gradients(run: Run) -> Findings:
             words = "Finite differences of two steps disagree: no derivative to tell."
             yield outcome.finding("") if outcome.faults else Finding("gradients", key, "skip", words)
             continue
-        scales = np.broadcast_to(scale, trusted.shape)[trusted]
-        ad, low, high, noise = (x[trusted] * scales for x in (np.nan_to_num(compared), low, high, noise))
-        fd = np.clip(ad, low, high)
-        error, size = abs(ad - fd).sum(), max(abs(fd).sum(), abs(ad).sum())
-        outcome.data = {"error": float(error), "size": float(size)}
-        if error > TOLERANCE * size + LOST * noise.sum():
-            k = np.nonzero(trusted)[0][int(np.argmax(abs(ad - fd)))]
-            outcome.fault(
-                f"its derivatives are off by {error / size:.0%}: those of eval average {abs(ad).mean():.3g} in size, "
-                f"finite differences {abs(fd).mean():.3g}",
-                error / size,
-                wi=wi[k],
-                wo=wo[k],
-            )
+        error, size = _judge(
+            outcome, "its derivatives", compared, Differences(low, high, trusted, noise), scale, wi, wo
+        )
+        outcome.data = {"error": error, "size": size}
         agreement = "it has no influence" if size == 0 else f"they agree to {error / size:.1g}"
         yield outcome.finding(f"Finite and equal to finite differences: {agreement}.")
     if not keys and not findings:
         yield Finding("gradients", "whole", "skip", "It has no parameters.")
 
 
+def _judge(
+    outcome: Outcome, name: str, compared: Array, differences: Differences, scale: Array, wi: Array, wo: Array
+) -> tuple[float, float]:
+    """Add a fault if derivatives are off on average; return their error and their size."""
+    low, high, trusted, noise = differences
+    scales = np.broadcast_to(scale, trusted.shape)[trusted]
+    ad, low, high, noise = (x[trusted] * scales for x in (np.nan_to_num(compared), low, high, noise))
+    fd = np.clip(ad, low, high)
+    error, size = float(abs(ad - fd).sum()), float(max(abs(fd).sum(), abs(ad).sum()))
+    if error > TOLERANCE * size + LOST * noise.sum():
+        k = np.nonzero(trusted)[0][int(np.argmax(abs(ad - fd)))]
+        outcome.fault(
+            f"{name} are off by {error / size:.0%}: those of eval average {abs(ad).mean():.3g} in size, finite "
+            f"differences {abs(fd).mean():.3g}",
+            error / size,
+            wi=wi[k],
+            wo=wo[k],
+        )
+    return error, size
+
+
 def _directional(run: Run) -> Finding:
-    """Check that derivatives of ``eval`` and ``pdf`` for the directions are finite, also where formulas break."""
+    """Check the derivatives of ``eval`` and ``pdf`` for the directions: they are finite, also where formulas break, and
+    those of ``eval`` are those of finite differences."""
     outcome, probe, part = Outcome("gradients", "wi and wo"), run.probe, run.probe.whole
     wi, wo = _edges(part)
     mirrored = np.array([-1, -1, 1], np.float32)
@@ -151,7 +165,45 @@ def _directional(run: Run) -> Finding:
             bad = np.logical_not(np.isfinite(found).all(axis=1))
             why = f"as of {bad.mean():.1%} of the pairs tried"
             outcome.wrong(bad, f"the derivative of {name} for {word}", found, why, wi, wo)
-    return outcome.finding("The derivatives of eval and pdf for the directions are finite.")
+    agreement = _compare_directional(run, outcome)
+    return outcome.finding(f"The derivatives of eval and pdf for the directions are finite{agreement}.")
+
+
+def _compare_directional(run: Run, outcome: Outcome) -> str:
+    """Compare derivatives of ``eval``, as both directions turn, to finite differences; return what to say of them."""
+    probe, part = run.probe, run.probe.whole
+    wi = on_side(hemisphere(COUNT, 17, 0.1), part.sides[0])
+    samples = probe.sample(part, wi, random(COUNT, 18))
+    kept = samples.drawn & (samples.pdf > 0) & (abs(samples.wo[:, 2]) > 0.1)
+    step = TURN * min(run.spread(part), 1)
+    if not kept.any() or step < 1e-5:
+        return ""
+    directions = np.stack([wi[kept], samples.wo[kept]]).astype(np.float64)
+    axes = np.cross(directions, np.random.default_rng(19).normal(size=directions.shape))
+    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
+
+    def at(angle: float) -> Array:
+        turned = np.cos(angle) * directions + np.sin(angle) * axes
+        return probe.eval(part, *np.ascontiguousarray(turned.astype(np.float32)))
+
+    angle = mi.Float(0)
+    dr.enable_grad(angle)
+    wi, wo = np.ascontiguousarray(directions.astype(np.float32))
+    si, towards = interaction(wi), vectors(wo)
+    si.wi, towards = (w + angle * vectors(axis) for w, axis in zip((si.wi, towards), axes, strict=True))
+    result = probe.bsdf.eval(part.context, si, towards, True)
+    if not dr.grad_enabled(result):
+        return ""
+    dr.forward(angle)
+    derivative = numbers(dr.grad(result), len(wi))
+    differences = _differences(at, step)
+    differences = differences._replace(noise=differences.noise + 1e-7 * abs(differences.low) / step)
+    if differences.trusted.mean() < 0.5:
+        return ""
+    scale = 1 / samples.pdf[kept, None]
+    error, size = _judge(outcome, "the derivatives for wi and wo", derivative, differences, scale, wi, wo)
+    outcome.data = {"error": error, "size": size}
+    return f", and eval's agree with finite differences to {error / max(size, 1e-12):.1g}"
 
 
 def _check_weight(
@@ -278,18 +330,26 @@ class Differences(NamedTuple):
     """The error of each."""
 
 
-def _differences(params: mi.SceneParameters, key: str, values: Callable[[], Array], step: float) -> Differences:
-    """Return the derivatives of some values for a parameter, by differences of two steps, extrapolated.
+def _shifted(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: Array) -> Callable[[float], Array]:
+    """Return a function that returns values for a shift of a parameter from what it is now."""
+    original = value_of(params, key)
+
+    def at(shift: float) -> Array:
+        set_value(params, key, original + shift)
+        return run.probe.eval(run.probe.whole, wi, wo)
+
+    return at
+
+
+def _differences(at: Callable[[float], Array], step: float, known: bool = True) -> Differences:
+    """Return the derivatives of some values for a parameter, by differences of two steps, extrapolated, where ``at``
+    returns the values for a shift of the parameter; none are trusted unless it is ``known`` well enough for that.
 
     The bounds are the same, except where the differences to the two sides do not approach each other: at a kink any
     derivative between them will do. Where one side changes nothing, the other counts, if that is so of most, as at the
     end of a range: where it is so of some, they may be reflected totally.
     """
-    original, centre = value_of(params, key), values()
-
-    def at(shift: float) -> Array:
-        set_value(params, key, original + shift)
-        return values()
+    centre = at(0)
 
     def quotients(h: float) -> tuple[Array, Array]:
         return (at(h) - centre) / h, (centre - at(-h)) / h
@@ -320,6 +380,4 @@ def _differences(params: mi.SceneParameters, key: str, values: Callable[[], Arra
     trusted = (kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)) & (lone | ~grows)
     noise = noise + np.where(kink, 0, 0.5 * abs(change))
     low, high = (np.where(kink, choose(up, down), smooth) for choose in (np.minimum, np.maximum))
-    # Float32 must know the values to far less than a step.
-    fine = np.spacing(np.abs(np.array(original, np.float32)).max()) < 0.01 * step
-    return Differences(low, high, fine & trusted & np.isfinite(low) & np.isfinite(high), noise)
+    return Differences(low, high, known & trusted & np.isfinite(low) & np.isfinite(high), noise)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -93,12 +94,14 @@ Findings = Iterator[Finding]
 
 
 def told(error: Exception) -> str:
-    """Return an exception in a few words: its kind, and the first line of what it says. Mitsuba and Dr.Jit hide the
-    cause of an error in a plugin's Python code behind one of their own."""
+    """Return an exception in a few words: its kind, and the first line of what it says, or that a plugin is unknown.
+    Mitsuba and Dr.Jit hide the cause of an error in a plugin's Python code behind one of their own."""
     cause: BaseException = error
     while cause.__cause__ is not None:
         cause = cause.__cause__
     line = next((line.strip() for line in str(cause).splitlines() if line.strip()), "")
+    if unknown := re.search(r'Plugin "(.+)" not found', line):
+        line = f'there is no plugin "{unknown[1]}"'
     return type(cause).__name__ + (f": {brief(line.rstrip('.'))}" if line else "")
 
 

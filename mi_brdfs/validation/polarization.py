@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.arrays import Array, interaction, numbers, vectors
+from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import load
 from ..probe.directions import hemisphere, on_side
+from ..probe.variates import random
 from .outcome import Findings, Outcome, told
 from .report import Finding
 from .run import Run
@@ -19,6 +21,8 @@ COUNT = 2000
 TOLERANCE = 1e-3
 """Of elements, in parts of the intensity: they come of differences in float32."""
 STATES = 64
+SEED = 105
+"""Of samples."""
 BACK = np.array([1, 1, -1, 1])
 """The signs of the Stokes parameters for light that goes back along its way."""
 
@@ -27,7 +31,8 @@ def polarization(run: Run) -> Findings:
     """Check Mueller matrices: light of any polarization becomes light that is at most fully polarized; if directions
     are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
     NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
-    frames that turn, too. For this the BSDF must be given as a dict."""
+    frames that turn, too. And values of ``eval_pdf`` and ``eval_pdf_sample`` and weights of samples polarize light as
+    ``eval`` does. For this the BSDF must be given as a dict."""
     part, name = run.probe.whole, "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if run.given is None:
         yield Finding("polarization", part.name, "skip", "To load it in a polarized variant, its dict is needed.")
@@ -50,7 +55,8 @@ def polarization(run: Run) -> Findings:
                     return
                 matrices, turned = _of_f(matrix, wo), _of_f(_turned(bsdf, wi, wo), wo)
                 back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
-        except (RuntimeError, TypeError) as error:
+                others = _others(run, bsdf, wi, wo, matrices)
+        except Exception as error:
             yield Finding("polarization", part.name, "skip", f"It does not work in {name}: {told(error)}.")
             return
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)
@@ -59,18 +65,49 @@ def polarization(run: Run) -> Findings:
     made = matrices @ states.T
     degree = ((np.linalg.norm(made[..., 1:, :], axis=-2) - made[..., 0, :]) / intensity[..., None]).max(axis=-1)
     why = "some light would be polarized more than fully"
-    outcome.wrong(degree * (degree > TOLERANCE), "the excess of eval's Mueller matrix", degree, why, wi, wo)
+    degree *= (degree > TOLERANCE) & (matrices[..., 0, 0] > 0)
+    outcome.wrong(degree, "the excess of eval's Mueller matrix", degree, why, wi, wo)
     same = np.quantile(abs(turned - matrices)[..., 0, 0] / intensity, 0.99) < TOLERANCE
     for law, other, words in (
         (not part.has(mi.BSDFFlags.NonSymmetric), back, "if its directions are exchanged"),
         (same, turned, "if its directions are turned about the normal"),
     ):
-        difference = abs(other - matrices).max(axis=(-2, -1)) / intensity
+        difference = abs(other - matrices).max(axis=(-2, -1)) / np.maximum(intensity, other[..., 0, 0])
         # Those of grazing facets and of narrow lobes have few digits.
         wrong = difference * (law and np.quantile(difference, 0.99) > TOLERANCE)
         name = f"the change of eval's Mueller matrix {words}"
         outcome.wrong(wrong, name, difference, "in parts of the intensity", wi, wo)
+    for name, towards, other, own in others:
+        lit = other[:, 0, 0, 0] != 0
+        difference = abs(_normalized(other) - _normalized(own)).max(axis=(-2, -1)) * lit[:, None]
+        if lit.any() and np.quantile(difference[lit], 0.99) > TOLERANCE:
+            name = f"the difference of the Mueller matrices of {name} and of eval"
+            outcome.wrong(difference, name, difference, "in parts of their intensities", wi, towards, seed=SEED)
     yield outcome.finding("Mueller matrices are physical.")
+
+
+def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[tuple[str, Array, Array, Array]]:
+    """Return ``(name, wo, elements, those of eval)`` of other methods than ``eval``, of which ``matrices`` are those
+    for ``wo``, and where weights are those of delta functions, none."""
+    context, si, variates = mi.BSDFContext(), interaction(wi), sample_arguments(random(len(wi), SEED))
+    pair = bsdf.eval_pdf(context, si, vectors(wo), True)
+    triple = bsdf.eval_pdf_sample(context, si, vectors(wo), *variates, True)
+    bs, weight = bsdf.sample(context, si, *variates, True)
+    weights = [dr.select(run.probe.is_smooth(each), it, 0) for each, it in ((bs, weight), triple[2:])]
+    dr.eval(bs, pair, triple, weights)
+    drawn = numbers(dr.select(bs.pdf > 0, bs.wo, mi.Vector3f(0, 0, 1)), len(wi)).astype(np.float32)
+    of_drawn = _of_f(_mueller(bsdf, wi, drawn), drawn)
+    return [
+        ("eval_pdf", wo, _of_f(pair[0], wo), matrices),
+        ("eval_pdf_sample", wo, _of_f(triple[0], wo), matrices),
+        ("a sample's weight", drawn, _of_f(weights[0], drawn), of_drawn),
+        ("the weight of eval_pdf_sample", drawn, _of_f(weights[1], drawn), of_drawn),
+    ]
+
+
+def _normalized(matrices: Array) -> Array:
+    intensity = matrices[..., :1, :1]
+    return matrices / np.where(intensity == 0, 1, intensity)
 
 
 def _mueller(bsdf: Any, wi: Array, wo: Array) -> Any:
@@ -89,5 +126,6 @@ def _turned(bsdf: Any, wi: Array, wo: Array) -> Any:
 
 def _of_f(matrix: Any, wo: Array) -> Array:
     """Return elements, shape (N, channels, 4, 4), without the cosine."""
+    dr.eval(matrix)
     rows = [[numbers(mi.UnpolarizedSpectrum(matrix[i, j]), len(wo)) for j in range(4)] for i in range(4)]
     return np.moveaxis(np.array(rows, np.float64), (0, 1), (-2, -1)) / abs(wo[:, 2, None, None, None])

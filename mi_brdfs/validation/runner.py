@@ -47,6 +47,7 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         contract.active,
         contract.mode,
         contract.recorded,
+        contract.calls,
         contract.null,
         contract.reflectance,
         spectral.colours,

@@ -77,7 +77,7 @@ def weight(run: Run) -> Findings:
             with np.errstate(invalid="ignore", divide="ignore"):
                 quotient = value / pdf[:, None]
                 reflected = weight * pdf[:, None]
-                scale = np.maximum(np.maximum(value, reflected).max(axis=1), 1e-6 * np.maximum(pdf, 1e-6))
+                scale = np.maximum(np.maximum(abs(value), abs(reflected)).max(axis=1), 1e-6 * np.maximum(pdf, 1e-6))
                 off = abs(reflected - value).max(axis=1) / scale
                 wide = abs(density - pdf) / np.maximum(np.maximum(density, pdf), 1e-9)
             for name, got, expected, why, error in (

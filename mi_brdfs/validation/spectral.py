@@ -54,7 +54,8 @@ def spectral(run: Run) -> Findings:
 
     And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
     and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
-    colours have there, and not that of another wavelength. For this the BSDF must be given as a dict."""
+    colours have there, and not that of another wavelength, be it one beside it. For this the BSDF must be given as a
+    dict."""
     part = run.probe.whole
     if run.given is None:
         yield Finding("spectral", part.name, "skip", "To load it in two variants, its dict is needed.")
@@ -99,7 +100,7 @@ def spectral(run: Run) -> Findings:
                 }
                 if greys:
                     _check_channels(run, outcome, greys)
-        except (RuntimeError, TypeError) as failure:
+        except Exception as failure:
             yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
             return
     for check, findings in failed.items():
@@ -137,6 +138,13 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
         for k in range(count)
     ]
     errors = np.array([[_error(got[:, k], grey[other][:, k])[1] for other in range(count)] for k in range(count)])
+    if mi.is_spectral:
+        # Asked at any wavelengths, these textures have the values of the light's, also to make a tint of.
+        bound = evaluated(load(given | {name: pinned(texture, si) for name, texture in textures.items()}), wavelengths)
+        error, typical = _error(got, bound)
+        if typical > TOLERANCE:
+            name, why = _at(wavelengths, error), "if all colours have their values of the light's wavelengths"
+            outcome.wrong(error, name, got, f"{why}: they are looked up at others", wi, wo, expected=bound)
     for k in range(count):
         channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
         difference, why = abs(got[:, k] - grey[k][:, k]), "where all colours are grey of their value there"
@@ -148,8 +156,11 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
             alone = evaluated(coloured, alike[k])[:, k]
             error, typical = _error(alone, grey[k][:, k])
             if typical > TOLERANCE:
-                name = f"eval at {wavelengths[np.argmax(error), k]:.0f} nm"
-                outcome.wrong(error, name, alone, why, wi, wo, expected=grey[k][:, k])
+                outcome.wrong(error, _at(wavelengths[:, k], error), alone, why, wi, wo, expected=grey[k][:, k])
+
+
+def _at(wavelengths: Array, error: Array) -> str:
+    return f"eval at {wavelengths.flat[np.argmax(error)]:.0f} nm"
 
 
 def _error(got: Array, expected: Array) -> tuple[Array, float]:

@@ -24,8 +24,8 @@ COUNT = 1000
 
 def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
-    value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. For this
-    the BSDF must be given as a dict."""
+    value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. And what
+    is set of one changes no other BSDF of the plugin. For this the BSDF must be given as a dict."""
     probe, part = run.probe, run.probe.whole
     if run.given is None:
         yield Finding("updates", "whole", "skip", "To load it with another value, its dict is needed.")
@@ -45,30 +45,40 @@ def updates(run: Run) -> Findings:
             given = float(number[0]) if len(number) == 1 else {"type": "rgb", "value": number.tolist()}
             if len(number) != 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
                 continue
+            before = probe.eval(part, wi, wo)
             try:
                 with unwrapped_ctrl_c():
                     fresh = BSDFProbe(load(run.given | {name: given}))
             except (RuntimeError, TypeError):  # it is given otherwise
                 continue
+            told = ", ".join(f"{each:.4g}" for each in number)
+            after, first = (each.eval(part, wi, wo) for each in (probe, fresh))
             set_value(params, key, value)
             tried += 1
-            for word, got, expected in (
-                ("eval", probe.eval(part, wi, wo), fresh.eval(part, wi, wo)),
-                ("pdf", probe.pdf(part, wi, wo)[:, None], fresh.pdf(part, wi, wo)[:, None]),
+            once, why, shared = (
+                f"once it is set to {told}, ",
+                "if it is loaded with that",
+                "before: they share something",
+            )
+            mine, last = (each.eval(part, wi, wo) for each in (probe, fresh))
+            pdf, expected_pdf = (each.pdf(part, wi, wo)[:, None] for each in (probe, fresh))
+            for name, got, expected, but in (
+                (f"{once}eval", mine, last, why),
+                (f"{once}pdf", pdf, expected_pdf, why),
+                (f"{once}eval of another that was loaded with that", last, first, shared),
+                (f"once another is loaded with {told}, eval", after, before, shared),
             ):
                 error = relative(got, expected)
-                name = f"once it is set to {', '.join(f'{each:.4g}' for each in number)}, {word}"
-                why, over = "if it is loaded with that", error * (error > 10 * run.rounding(part))
-                outcome.wrong(over, name, got, why, wi, wo, expected=expected)
-            mine, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
-            turned = np.linalg.norm(mine.wo - loaded.wo, axis=1) * (mine.lit & loaded.lit)
+                over = error * (error > 10 * run.rounding(part))
+                outcome.wrong(over, name, got, but, wi, wo, expected=expected)
+            ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
+            turned = np.linalg.norm(ours.wo - loaded.wo, axis=1) * (ours.lit & loaded.lit)
             # A choice among lobes may fall otherwise where a rounding error decides it.
             if np.quantile(turned, 0.9) > 1e-3:
                 k = int(np.argmax(turned))
                 outcome.fault(
-                    f"once it is set to {', '.join(f'{each:.4g}' for each in number)}, sample draws "
-                    f"{angles_of(mine.wo[k])} for light from {angles_of(wi[k])}, but {angles_of(loaded.wo[k])} by the "
-                    "same variates if it is loaded with that",
+                    f"once it is set to {told}, sample draws {angles_of(ours.wo[k])} for light from "
+                    f"{angles_of(wi[k])}, but {angles_of(loaded.wo[k])} by the same variates if it is loaded with that",
                     turned.sum(),
                     wi=wi[k],
                     seed=92,
