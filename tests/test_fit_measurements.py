@@ -17,8 +17,8 @@ from mi_brdfs.fit.observations import solid_angles
 from mi_brdfs.fit.unknowns import configurations, unknown_of
 from mi_brdfs.measured import Axis, Grid, Measurement, Samples
 from mi_brdfs.measured.coordinates import HalfDifference, Spherical
-from mi_brdfs.measured.observer import to_srgb
 from mi_brdfs.mitsuba.registry import find_model
+from mi_brdfs.observer import to_srgb
 from mi_brdfs.parameters import Quantity
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")

@@ -15,10 +15,10 @@ from mi_brdfs.cli import app, measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
-from mi_brdfs.measured.observer import to_srgb
 from mi_brdfs.measured.report.albedo import albedos, coverage, hemisphere
 from mi_brdfs.measured.report.reciprocity import reciprocity_error
 from mi_brdfs.measured.scattered import as_grid
+from mi_brdfs.observer import to_srgb
 from mi_brdfs.parameters.messages import listed
 from mi_brdfs.plot.measured import LitTable
 

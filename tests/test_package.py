@@ -69,8 +69,9 @@ def test_style_and_types(tool):
 
 # fmt: off
 TRUNK = {
-    "math", "srgb", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba", "ranges",
-    "names", "variants", "legacy", "writing", "starting", "given", "preview", "probe", "rendering", "__version__",
+    "math", "srgb", "observer", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba",
+    "ranges", "names", "variants", "legacy", "writing", "starting", "given", "preview", "probe", "rendering",
+    "__version__",
     "info", "doctor",
 }
 # fmt: on

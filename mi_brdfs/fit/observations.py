@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from ..measured import Axis, Grid, Measurement, read
 from ..measured.arrays import stacked
 from ..measured.measurement import Quantity
-from ..measured.observer import to_srgb
 from ..measured.report.albedo import albedos
+from ..observer import to_srgb
 
 Arrays: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike]
 Source: TypeAlias = str | Path | Measurement | Arrays

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .observer import to_srgb
+from ..observer import to_srgb
 
 AT_ONCE = 1 << 22
 """The most values that are evaluated together."""

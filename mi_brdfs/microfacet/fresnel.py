@@ -69,21 +69,31 @@ class Schlick(Fresnel):
         return Schlick(luminance(self.f0), None, f90, self.exponent)(cos)
 
 
-def _mueller(f: Spectrum, a: Spectrum, b: Spectrum, cos: mi.Float) -> tuple[Spectrum, ...]:
-    """Return F, B, C and S (:meth:`Fresnel.mueller`) from F and a - ib = √(n² - sin²θ), where n is the index η - ik.
+class Interface(Fresnel):
+    """The smooth surface of a medium of the index ``eta`` - i ``k`` relative to the ``exterior``, which has an index,
+    too."""
 
-    By Fresnel's equations, for fields ∝ exp(iωt) and p on the side of the facet's normal, r_p/r_s = (sin²θ - (a - ib)
-    cosθ)/(sin²θ + (a - ib) cosθ) (D. Clarke, Stellar polarimetry, 2010, appendix A), so that B = (|r_s|² - |r_p|²)/2
-    and C + iS = r_p r_s* are to F as 2 a sin²θ cosθ, sin⁴θ - (a² + b²) cos²θ and 2 b sin²θ cosθ to sin⁴θ + (a² + b²)
-    cos²θ.
-    """
-    sin2, a, b = 1 - cos * cos, a * cos, b * cos
-    sin4, q2 = sin2 * sin2, a * a + b * b
-    scale = f / (sin4 + q2)
-    return f, 2 * sin2 * a * scale, (sin4 - q2) * scale, 2 * sin2 * b * scale
+    eta: Spectrum
+    k: Spectrum = 0.0
+    exterior: mi.Float = 1.0
+
+    def refracted(self, cos: mi.Float) -> tuple[Spectrum, Spectrum]:
+        """Return a and b of a - ib = √(n² - sin²θ), where n is the index η - ik."""
+        raise NotImplementedError(f"{type(self).__name__} does not define refracted.")
+
+    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+        """By Fresnel's equations, for fields ∝ exp(iωt) and p on the side of the facet's normal, r_p/r_s = (sin²θ -
+        (a - ib) cosθ)/(sin²θ + (a - ib) cosθ) (D. Clarke, Stellar polarimetry, 2010, appendix A), so that B = (|r_s|² -
+        |r_p|²)/2 and C + iS = r_p r_s* are to F as 2 a sin²θ cosθ, sin⁴θ - (a² + b²) cos²θ and 2 b sin²θ cosθ to
+        sin⁴θ + (a² + b²) cos²θ."""
+        f, (a, b) = self(cos), self.refracted(cos)
+        sin2, a, b = 1 - cos * cos, a * cos, b * cos
+        sin4, q2 = sin2 * sin2, a * a + b * b
+        scale = f / (sin4 + q2)
+        return f, 2 * sin2 * a * scale, (sin4 - q2) * scale, 2 * sin2 * b * scale
 
 
-class Dielectric(Fresnel):
+class Dielectric(Interface):
     """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
     Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
@@ -95,19 +105,19 @@ class Dielectric(Fresnel):
     LEAST, INSIDE = 0.01, 0.9
     """The least index, which reflects all light, and one that has a derivative."""
 
-    def __init__(self, eta: mi.Float) -> None:
-        self.eta = eta
+    def __init__(self, eta: mi.Float, exterior: mi.Float = 1) -> None:
+        self.eta, self.exterior = eta, exterior
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any]) -> Dielectric:
-        return cls(values["int_ior"] / values["ext_ior"])
+        return cls(values["int_ior"] / values["ext_ior"], values["ext_ior"])
 
     def __call__(self, cos: mi.Float) -> mi.Float:
         return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
 
-    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+    def refracted(self, cos: mi.Float) -> tuple[mi.Float, mi.Float]:
         g2 = self.eta * self.eta - 1 + cos * cos
-        return _mueller(self(cos), safe_sqrt(g2), safe_sqrt(-g2), cos)
+        return safe_sqrt(g2), safe_sqrt(-g2)
 
     @staticmethod
     def _reflectance(eta: mi.Float, cos: mi.Float) -> mi.Float:
@@ -128,7 +138,7 @@ class Dielectric(Fresnel):
         return ForwardDirections.of_facets(self, distribution, wi)
 
 
-class Conductor(Fresnel):
+class Conductor(Interface):
     """The exact unpolarized reflectance of a conductor of relative complex index ``eta`` - i ``k``."""
 
     RANGES = {"eta": (0.01, 100), "k": (0, 100)}
@@ -158,12 +168,12 @@ class Conductor(Fresnel):
         p = (even_p - odd_p) / dr.maximum(even_p + odd_p, EPSILON)
         return 0.5 * s * (1 + p)
 
-    def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
+    def refracted(self, cos: mi.Float) -> tuple[Spectrum, Spectrum]:
         real, ab = self.eta * self.eta - self.k * self.k - (1 - cos * cos), self.eta * self.k
         # The smaller one of a and b as their product over the larger one, which keeps its digits.
         larger = dr.sqrt(dr.maximum(0.5 * (safe_sqrt(real * real + 4 * ab * ab) + dr.abs(real)), TINY))
         smaller, steep = ab / larger, real > 0
-        return _mueller(self(cos), dr.select(steep, larger, smaller), dr.select(steep, smaller, larger), cos)
+        return dr.select(steep, larger, smaller), dr.select(steep, smaller, larger)
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         # Of channels that differ much the mean index may reflect next to nothing where they do.

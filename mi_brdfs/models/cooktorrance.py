@@ -6,6 +6,7 @@ import mitsuba as mi
 from ..lobes import Lobe, facet_lobes, over_diffuse
 from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 from ..microfacet.distributions import GGX, Beckmann, Blinn, Distribution
+from ..microfacet.film import FILM_IOR, FILM_THICKNESS, filmed
 from ..microfacet.shadowing import VCavity
 from ..model import Model, Values
 from ..parameters import Choice, FresnelSet, Number, Preset, Reflectance
@@ -62,6 +63,7 @@ class CookTorrance(Model):
     fresnel = FresnelSet()
     distribution = Choice(("beckmann", "ggx", "blinn"), "distribution of the facets; blinn limits α to 1")
     normalization = Choice(("modern", "tog82"), "scale of the specular lobe")
+    film_thickness, film_ior = FILM_THICKNESS, FILM_IOR
     haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
     preset = Preset()
 
@@ -76,6 +78,6 @@ class CookTorrance(Model):
             distribution: Distribution = Blinn(2 / dr.square(α) - 2)
         else:
             distribution = {"beckmann": Beckmann, "ggx": GGX}[self.distribution](α, α)
-        scale = 4 if self.normalization == "tog82" else 1
-        specular = facet_lobes(self, p, p.specular_reflectance, distribution, lambda _: VCavity(), p.fresnel, scale)
+        scale, fresnel = 4 if self.normalization == "tog82" else 1, filmed(self, p)
+        specular = facet_lobes(self, p, p.specular_reflectance, distribution, lambda _: VCavity(), fresnel, scale)
         return over_diffuse(p.diffuse_reflectance, *specular)

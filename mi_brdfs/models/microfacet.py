@@ -6,6 +6,7 @@ from ..lobes import Lobe, facet_lobes, over_diffuse
 from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 from ..microfacet import shadowing
 from ..microfacet.distributions import ABC, EPD, GGX, GTR, Beckmann, Blinn, Distribution, HemiEPD
+from ..microfacet.film import FILM_IOR, FILM_THICKNESS, filmed
 from ..model import Model, Values
 from ..parameters import FresnelSet, OneTerm, ParameterError, Preset, Reflectance, Rotation
 from ..parameters.messages import listed
@@ -132,6 +133,7 @@ class Microfacet(Model):
         "shadowing term G",
     )
     fresnel = FresnelSet()
+    film_thickness, film_ior = FILM_THICKNESS, FILM_IOR
     haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
     rotation = Rotation()
     preset = Preset()
@@ -153,5 +155,5 @@ class Microfacet(Model):
             )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
-        specular = facet_lobes(self, p, p.specular_reflectance, p.distribution(), p.shadowing, p.fresnel)
+        specular = facet_lobes(self, p, p.specular_reflectance, p.distribution(), p.shadowing, filmed(self, p))
         return over_diffuse(p.diffuse_reflectance, *specular)

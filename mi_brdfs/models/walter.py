@@ -3,6 +3,7 @@ from __future__ import annotations
 from ..lobes import Lobe, facet_lobes, over_diffuse
 from ..lobes.facets import HAZE, HAZE_SPREAD, RETROREFLECTIVITY
 from ..microfacet.distributions import GGX
+from ..microfacet.film import FILM_IOR, FILM_THICKNESS, filmed
 from ..microfacet.shadowing import MULTISCATTER
 from ..model import Model, Values
 from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
@@ -54,12 +55,13 @@ class Walter(Model):
     fresnel = FresnelSet()
     shadowing = Choice(("separable", "correlated"), "Smith's shadowing term")
     multiscatter = MULTISCATTER
+    film_thickness, film_ior = FILM_THICKNESS, FILM_IOR
     haze, haze_spread, retroreflectivity = HAZE, HAZE_SPREAD, RETROREFLECTIVITY
     rotation = Rotation()
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         correlated = self.shadowing == "correlated"
         specular = facet_lobes(
-            self, p, p.specular_reflectance, GGX(*p.alpha), lambda facets: facets.smith(correlated), p.fresnel
+            self, p, p.specular_reflectance, GGX(*p.alpha), lambda facets: facets.smith(correlated), filmed(self, p)
         )
         return over_diffuse(p.diffuse_reflectance, *specular)

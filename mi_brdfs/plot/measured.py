@@ -19,10 +19,10 @@ from ..measured import Measurement, Samples, read
 from ..measured.arrays import components, stacked
 from ..measured.coordinates import HalfDifference, polar_angle, spherical
 from ..measured.measurement import usable
-from ..measured.observer import to_srgb
 from ..measured.report.albedo import albedos
 from ..measured.report.counts import batches, census
 from ..measured.report.summary import azimuths, ends, table
+from ..observer import to_srgb
 from ..parameters.messages import brief, printable
 from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined

@@ -17,8 +17,8 @@ from ..measured.coordinates import PolarAngle
 from ..measured.files import checked, content_hash
 from ..measured.formats import read
 from ..measured.measurement import Axis, Extrapolation, Grid, Interpolation, Measurement, Quantity, corners
-from ..measured.observer import to_srgb
 from ..measured.scattered import as_grid
+from ..observer import to_srgb
 from ..probe.arrays import luminance
 from ..variants import is_scalar
 from .basis import BASIS, WAVELENGTHS

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import nnls
 
-from mi_brdfs.measured.observer import to_srgb
+from mi_brdfs.observer import to_srgb
 
 FILE = Path(__file__).parents[2] / "mi_brdfs" / "tabulated" / "basis.py"
 WAVELENGTHS = np.arange(360, 831, 10)
