@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -16,9 +16,6 @@ from ..parameters import Number, ParameterError
 from ..parameters.parameter import Quantity
 from .fresnel import Interface, Unit
 from .terms import Fresnel
-
-Complex = tuple[Any, Any]
-"""Real and imaginary part."""
 
 
 class Thickness(Number):
@@ -55,20 +52,22 @@ def filmed(model: Any, p: Any) -> Fresnel:
 
 
 class Film(Fresnel):
-    r"""The exact unpolarized reflectance of a film of index n and thickness d between the exterior and a dielectric or
-    conductor, after L. Belcour and P. Barla, A practical extension to microfacet theory for the modeling of varying
-    iridescence, ACM Transactions on Graphics 36(4), 2017, doi:10.1145/3072959.3073620: for s and p, with the amplitudes
-    a and b that its upper and its lower face reflect, the sum over all paths in the film (G. B. Airy 1833),
+    r"""The exact unpolarized reflectance of a film of index n and thickness d on a dielectric or conductor, after
+    L. Belcour and P. Barla, A practical extension to microfacet theory for the modeling of varying iridescence, ACM
+    Transactions on Graphics 36(4), 2017, doi:10.1145/3072959.3073620. For s and p each, where the upper face of the
+    film reflects the amplitude a and the lower one b, the sum over all paths in the film (G. B. Airy 1833) is
 
-        r = (a + b e)/(1 + a b e) = a + (1 - a²) b h,  h = e/(1 + a b e),  e = exp(-4πi n d cosθ_t/λ)
+        r = (a + b e)/(1 + a b e),    e = exp(-4πi n d cosθ_t/λ)
 
-    It is a series in e. So is |r|² with its conjugate, and that depends on h alone,
+    In spectral variants λ are the wavelengths of the ray. In rgb variants each channel is the mean of |r|² over them,
+    as seen by the CIE 1931 observer under D65, with the conductor's η and k of that channel, and limited to [0, 1]; in
+    mono variants, that for the luminance. Of all that depends on e, |r|² has only h in it, and linearly:
 
+        r = a + (1 - a²) b h,    h = e/(1 + a b e)
         |r|² = 1 - (1 - a²)(1 - |b|²)/(1 - a²|b|²) (1 - 2 a Re(b h))
 
-    In spectral variants λ are the wavelengths of the ray. In rgb variants each channel is the integral over them, under
-    D65, with the conductor's η and k of that channel, within [0, 1]: that is ⟨h⟩ in the place of h, a sum over
-    :func:`waves`. In mono variants it is that of the luminance. An index lower than the exterior's is taken for it.
+    So its mean takes that of h, which :func:`waves` make a short sum. A film's index below the exterior's, from which
+    light would be totally reflected, is taken for that.
     """
 
     def __init__(self, base: Interface, index: Any, thickness: Any) -> None:
@@ -76,8 +75,7 @@ class Film(Fresnel):
         self.thickness = thickness * base.exterior
 
     def __call__(self, cos: mi.Float) -> Spectrum:
-        s, p = self._faces(cos)
-        return dr.clip(0.5 * (s.reflectance() + p.reflectance()), 0, 1)
+        return self._unpolarized(*self._polarized(cos))
 
     def estimate(self, cos: mi.Float) -> Spectrum:
         # Interference may leave nothing at one angle.
@@ -85,107 +83,121 @@ class Film(Fresnel):
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         """The mean over all phases."""
-        s, p = self._faces(cos, interfering=False)
-        return luminance(0.5 * (s.reflectance() + p.reflectance()))
+        return luminance(self._unpolarized(*self._polarized(cos, interfering=False)))
+
+    def mean(self, schlick: Any, dip: Any) -> Spectrum:
+        return dr.minimum(super().mean(schlick, dip), 1)
 
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
-        s, p = self._faces(cos)
-        b, product = 0.5 * (s.reflectance() - p.reflectance()), p.times_conjugate(s)
-        f = self(cos)
+        s, p = self._polarized(cos)
+        f, b, product = self._unpolarized(s, p), 0.5 * (s.reflectance() - p.reflectance()), p.times_conjugate(s)
         # Colours outside sRGB are limited, and so is their polarization.
-        scale = dr.minimum(f * dr.rsqrt(dr.maximum(b * b + _square(product), EPSILON)), 1)
-        return f, b * scale, product[0] * scale, product[1] * scale
+        scale = dr.minimum(f * dr.rsqrt(dr.maximum(b * b + product.square(), EPSILON)), 1)
+        return f, b * scale, product.real * scale, product.imag * scale
 
-    def _faces(self, cos: mi.Float, interfering: bool = True) -> tuple[Faces, Faces]:
-        """Return the film's faces as s and p meet them."""
+    @staticmethod
+    def _unpolarized(s: Airy, p: Airy) -> Spectrum:
+        return dr.clip(0.5 * (s.reflectance() + p.reflectance()), 0, 1)
+
+    def _polarized(self, cos: mi.Float, interfering: bool = True) -> tuple[Airy, Airy]:
+        """Return how s and p are reflected: the amplitude at a face is (u - v)/(u + v), where u and v are n cosθ above
+        and below for s, and the same over n² for p."""
         n2, (a, b) = self.index * self.index, self.base.refracted(cos)
-        normal = dr.sqrt(dr.maximum(n2 - 1 + cos * cos, EPSILON))  # n cosθ_t
-        waves = list(self._waves(normal)) if interfering else []
-        eta2, k2 = self.base.eta * self.base.eta, self.base.k * self.base.k
-        steep = normal / n2
-        s = Faces((cos, 0), (normal, 0), (normal, 0), (a, -b), waves)
-        lower = (eta2 - k2) * steep, -2 * self.base.eta * self.base.k * steep
-        return s, Faces((cos * n2, 0), (normal, 0), lower, (a, -b), waves)
+        film, below = dr.sqrt(dr.maximum(n2 - 1 + cos * cos, EPSILON)), Complex(a, -b)
+        eta, k = self.base.eta, self.base.k
+        ratio = Complex(eta * eta - k * k, -2 * eta * k) * (film / n2)
+        waves = list(self._waves(film)) if interfering else []
+        return Airy((cos, film), (Complex(film), below), waves), Airy((cos * n2, film), (ratio, below), waves)
 
-    def _waves(self, normal: mi.Float) -> Iterator[tuple[Complex, Complex]]:
-        """Yield weights and e, whose weighted mean is that of a function of e."""
-        path = 2 * normal * self.thickness
+    def _waves(self, film: mi.Float) -> Any:
+        """Yield weights and e, whose weighted sum is the mean of what is a power series in e."""
+        path = 2 * film * self.thickness
         if mi.is_spectral:
             sin, cos = dr.sincos(dr.two_pi * path)
-            yield (1, 0), (cos, -sin)
+            yield 1, Complex(cos, -sin)
             return
         for rate, colour in waves():
             sin, cos = dr.sincos(rate.imag * path)
-            decay = dr.exp(rate.real * path)
-            weights = (mi.Color3f(*part.tolist()) for part in (colour.real, colour.imag))
-            real, imaginary = (it if mi.is_rgb else mi.luminance(it) for it in weights)
-            yield (real, imaginary), (decay * cos, decay * sin)
+            parts = (mi.Color3f(*part.tolist()) for part in (colour.real, colour.imag))
+            weight = Complex(*(part if mi.is_rgb else mi.luminance(part) for part in parts))
+            yield weight, Complex(cos, sin) * dr.exp(rate.real * path)
 
 
-class Faces:
-    """The two faces of a film: their amplitudes a and b, of the form (u - v)/(u + v), and b ⟨h⟩ over some waves."""
+@dataclass
+class Complex:
+    """A complex number of floats or colours."""
 
-    def __init__(self, u: Complex, v: Complex, u_below: Complex, v_below: Complex, waves: list[Any]) -> None:
-        (self.a, _), self.through = _amplitude(u, v)
-        self.b, below = _amplitude(u_below, v_below)
+    real: Any
+    imag: Any = 0
+
+    def __add__(self, other: Complex) -> Complex:
+        return Complex(self.real + other.real, self.imag + other.imag)
+
+    def __sub__(self, other: Complex) -> Complex:
+        return Complex(self.real - other.real, self.imag - other.imag)
+
+    def __mul__(self, other: Any) -> Complex:
+        if not isinstance(other, Complex):
+            return Complex(self.real * other, self.imag * other)
+        real = self.real * other.real - self.imag * other.imag
+        return Complex(real, self.real * other.imag + self.imag * other.real)
+
+    def __truediv__(self, other: Complex) -> Complex:
+        return self * other.conjugate() * dr.rcp(dr.maximum(other.square(), EPSILON))
+
+    def conjugate(self) -> Complex:
+        return Complex(self.real, -self.imag)
+
+    def square(self) -> Any:
+        """|z|²."""
+        return self.real * self.real + self.imag * self.imag
+
+
+ONE = Complex(1)
+
+
+class Airy:
+    """The amplitude r = a + (1 - a²) b h that one polarization reflects, from the u and v of both faces, of which the
+    upper one's are real, and a mean over waves."""
+
+    def __init__(self, upper: tuple[Any, Any], lower: tuple[Complex, Complex], waves: list[Any]) -> None:
+        upper_amplitude, self.through = _amplitude(*(Complex(it) for it in upper))
+        self.a, (self.b, below) = upper_amplitude.real, _amplitude(*lower)
+        self.ab = self.b * self.a
+        h = (e / (ONE + self.ab * e) * weight for weight, e in waves)
+        self.bh = self.b * sum(h, Complex(0))
         self.kept = self.through * below / dr.maximum(self.through + below - self.through * below, EPSILON)
-        around, imaginary = self.a * self.b[0], self.a * self.b[1]
-        square = around * around + imaginary * imaginary
-        total: Complex = (0, 0)
-        for weight, e in waves:
-            # h = (e + |e|² (a b)*)/|1 + a b e|²
-            e2 = _square(e)
-            real = 1 + 2 * (around * e[0] - imaginary * e[1]) + square * e2
-            scale = dr.rcp(dr.maximum(real, EPSILON))
-            term = _times(weight, ((e[0] + e2 * around) * scale, (e[1] - e2 * imaginary) * scale))
-            total = total[0] + term[0], total[1] + term[1]
-        self.bh = _times(self.b, total)
 
     def reflectance(self) -> Spectrum:
-        return 1 - self.kept * (1 - 2 * self.a * self.bh[0])
+        """Return the mean of |r|²."""
+        return 1 - self.kept * (1 - 2 * self.a * self.bh.real)
 
-    def times_conjugate(self, s: Faces) -> Complex:
-        """Return ⟨r_p r_s*⟩, for p these: the product of both series."""
-        g, conjugate = self.bh, (s.bh[0], -s.bh[1])
-        both = _times(self.b, (s.b[0], -s.b[1]))
-        rest = 1 - self.a * g[0] - s.a * conjugate[0], -self.a * g[1] - s.a * conjugate[1]
-        divisor = 1 - self.a * s.a * both[0], self.a * s.a * both[1]  # of which this is the conjugate
-        product = _times(_times(both, rest), divisor)
-        through = self.through * s.through / dr.maximum(_square(divisor), EPSILON)
-        once = self.a * s.through, s.a * self.through
-        return (
-            self.a * s.a + once[0] * conjugate[0] + once[1] * g[0] + through * product[0],
-            once[0] * conjugate[1] + once[1] * g[1] + through * product[1],
-        )
+    def times_conjugate(self, s: Airy) -> Complex:
+        """Return the mean of r_p r_s*, for p this. In it h_p h_s* = (1 - a_p b_p h_p - (a_s b_s h_s)*)/(1 - a_p b_p
+        (a_s b_s)*), which is linear, too."""
+        p, p_bh, s_bh = self, self.bh, s.bh.conjugate()
+        both = (ONE - p_bh * p.a - s_bh * s.a) / (ONE - p.ab * s.ab.conjugate())
+        once = p_bh * (p.through * s.a) + s_bh * (p.a * s.through)
+        return Complex(p.a * s.a) + once + p.b * s.b.conjugate() * both * (p.through * s.through)
 
 
 def _amplitude(u: Complex, v: Complex) -> tuple[Complex, Any]:
-    """Return r = (u - v)/(u + v), and 1 - |r|²."""
-    sum2 = dr.maximum(_square((u[0] + v[0], u[1] + v[1])), EPSILON)
-    across = u[1] * v[0] - u[0] * v[1]  # Im(u v*)
-    return ((_square(u) - _square(v)) / sum2, 2 * across / sum2), 4 * (u[0] * v[0] + u[1] * v[1]) / sum2
+    """Return r = (u - v)/(u + v), and 1 - |r|² = 4 Re(u v*)/|u + v|²."""
+    return (u - v) / (u + v), 4 * (u * v.conjugate()).real / dr.maximum((u + v).square(), EPSILON)
 
 
-def _square(z: Complex) -> Any:
-    return z[0] * z[0] + z[1] * z[1]
-
-
-def _times(z: Complex, w: Complex) -> Complex:
-    return z[0] * w[0] - z[1] * w[1], z[0] * w[1] + z[1] * w[0]
-
-
-COUNT, STEP, FARTHEST = 7, 100, 9000
-"""How many waves there are, and at which path differences in nm they are fitted: beyond, channels have no contrast."""
+COUNT, STEP, FARTHEST = 11, 100, 6000
+"""How many waves there are, and at which path differences in nm they are fitted: beyond, colours have no contrast."""
 
 
 @functools.cache
 def waves() -> list[tuple[complex, np.ndarray]]:
     """Return rates p and colours A whose sum Σ A exp(p L) is the colour that the path difference L, in nm, makes of
-    white light: the mean of exp(-2πi L/λ) over the sRGB channels under D65, to .01, and 1 for L = 0.
+    white light: the mean of exp(-2πi L/λ) over the sRGB channels under D65, to .005, and 1 for L = 0.
 
-    By the rotations between neighbours among the leading singular vectors of the Hankel matrix (R. Roy and T. Kailath,
-    ESPRIT, 1989, doi:10.1109/29.32276). A mean over e that ends with such waves needs no more of them for a high
-    finesse, as one over wavelengths does.
+    The rates are those of the rotations between neighbours among the leading singular vectors of the Hankel matrix (R.
+    Roy and T. Kailath, ESPRIT, 1989, doi:10.1109/29.32276). They decay, and power series in exp(-2πi L/λ) have the same
+    sum, so that films of a high finesse need no more of them, as they would need wavelengths.
     """
     wavelengths, weights = observer()
     paths = np.arange(0, FARTHEST + 1, STEP)
