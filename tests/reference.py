@@ -132,6 +132,29 @@ def fresnel_dielectric(cos, eta):
     return fresnel_conductor(cos, eta, 0.0)
 
 
+def film_amplitudes(cos, exterior, film, base, thickness, wavelength):
+    """The amplitudes that s and p reflect of fields ~ exp(iwt), p on the side of the normal: by the characteristic
+    matrix of the film and the tilted admittances N cos (s) and N / cos (p) of all three media (F. Abeles 1950, as in
+    H. A. Macleod, Thin-film optical filters, 2010, chapter 2). `base` is the index eta - i k; lengths in nm."""
+    cos, exterior, film = map(_double, (cos, exterior, film))
+    base = np.asarray(base, complex)
+    sine2 = exterior**2 * (1 - cos) * (1 + cos)
+    normal = [np.sqrt(index.astype(complex) ** 2 - sine2) for index in (exterior, film, base)]  # N cos
+    normal = [np.where(it.imag > 0, -it, it) for it in normal]  # what is evanescent decays
+    phase = 2 * np.pi / wavelength * normal[1] * thickness
+    found = []
+    for y0, y1, y2 in (normal, [index**2 / it for index, it in zip((exterior, film, base), normal, strict=True)]):
+        b = np.cos(phase) + 1j * np.sin(phase) * y2 / y1
+        c = 1j * y1 * np.sin(phase) + np.cos(phase) * y2
+        found.append((y0 * b - c) / (y0 * b + c))
+    return found[0], -found[1]
+
+
+def fresnel_film(cos, exterior, film, base, thickness, wavelength):
+    """The unpolarized reflectance of a film: see `film_amplitudes`."""
+    return sum(np.abs(r) ** 2 for r in film_amplitudes(cos, exterior, film, base, thickness, wavelength)) / 2
+
+
 def fresnel_schlick(cos, f0):
     """Schlick 1994: F = f0 + (1 - f0) (1 - cos)^5."""
     cos, f0 = _double(cos), _double(f0)

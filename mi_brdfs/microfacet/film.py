@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, Spectrum, clamp, leaving, luminance
+from ..math import EPSILON, Spectrum, clamp, gauss_legendre, leaving, luminance
 from ..observer import observer
 from ..parameters import Number, ParameterError
 from ..parameters.parameter import Quantity
@@ -89,7 +89,10 @@ class Film(Fresnel):
         return luminance(self._unpolarized(*self._polarized(cos, None)))
 
     def mean(self, schlick: Any, dip: Any) -> Spectrum:
-        return dr.minimum(super().mean(schlick, dip), 1)
+        """That of the combination which is nearest to the reflectance at some angles: those of 0, 82 and 90° alone have
+        other hues."""
+        fitted = (self(mi.Float(cos)) * (constant + a * schlick + b * dip) for cos, (constant, a, b) in _combination())
+        return dr.clip(sum(fitted), 0, 1)
 
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
         s, p = self._polarized(cos, self.thickness)
@@ -124,6 +127,16 @@ class Film(Fresnel):
             parts = (mi.Color3f(*part.tolist()) for part in (colour.real, colour.imag))
             weight = Complex(*(part if mi.is_rgb else mi.luminance(part) for part in parts))
             yield weight, Complex(cos, sin) * dr.exp(rate.real * path)
+
+
+@functools.cache
+def _combination() -> list[tuple[float, list[float]]]:
+    """Return cosines, each with the share of the reflectance there in 1, (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶ of the
+    combination that fits those best, in the mean over a hemisphere."""
+    cos, weight = np.array(gauss_legendre(4)).T
+    root = np.sqrt(cos * weight)
+    basis = np.stack([np.ones_like(cos), (1 - cos) ** 5, cos * (1 - cos) ** 6])
+    return list(zip(cos.tolist(), (np.linalg.pinv((basis * root).T) * root).T.tolist(), strict=True))
 
 
 @dataclass
