@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
 
@@ -36,6 +37,21 @@ def shared(*parts: str) -> Path:
 def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     """Uniform directions with cosines of at least ``lowest``, shape (count, 3), float32."""
     return directions.hemisphere(count, seed, lowest)
+
+
+def observed() -> tuple[np.ndarray, np.ndarray]:
+    """``(wavelengths, weights)``: each quarter of a nm, and the linear sRGB that a reflectance there has under D65 for
+    the CIE 1931 observer, of white 1 in each channel."""
+    scalar = importlib.import_module("mitsuba.scalar_rgb")
+    wavelengths = np.arange(360, 830.1, 0.25)
+    xyz = np.array([np.array(scalar.cie1931_xyz(w)).ravel() * float(scalar.cie_d65(w)) for w in wavelengths])
+    to_srgb = [
+        [3.2404542, -1.5371385, -0.4985314],
+        [-0.969266, 1.8760108, 0.041556],
+        [0.0556434, -0.2040259, 1.0572252],
+    ]
+    weights = xyz @ np.transpose(to_srgb)
+    return wavelengths, weights / weights.sum(axis=0)
 
 
 def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:

@@ -93,14 +93,14 @@ class Unknown:
 
 
 def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
-    """Return an unknown on the scale that suits a declared range: shares up to 1 on a logit scale, positive numbers on
-    a logarithmic one."""
+    """Return an unknown on the scale that suits a declared range: shares up to 1, and of a range of which a part is
+    usual, on a logit scale, positive numbers on a logarithmic one."""
     low, high = quantity.limits
     if quantity.turns:
         low, high, scale = -math.inf, math.inf, "turns"
     elif low < 0:
         low, high, scale = max(low, -LARGEST), min(high, LARGEST), "asinh"
-    elif low == 0 and high <= 1:
+    elif low == 0 and (high <= 1 or quantity.usual):
         low, high, scale = EDGE * high, (1 - EDGE) * high, "logit"
     elif math.isinf(high):
         low, high, scale = max(low, 1 / LARGEST), LARGEST, "log"

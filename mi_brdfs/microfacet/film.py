@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, Spectrum, clamp, gauss_legendre, leaving, luminance
+from ..math import EPSILON, Spectrum, gauss_legendre, leaving, luminance
 from ..observer import observer
 from ..parameters import Number, ParameterError
 from ..parameters.parameter import Quantity
@@ -72,7 +72,7 @@ class Film(Fresnel):
     """
 
     def __init__(self, base: Interface, index: Any, thickness: Any) -> None:
-        self.base, self.index = base, clamp(index / base.exterior, 1, dr.inf)
+        self.base, self.index = base, dr.select(index < base.exterior, 1, index / base.exterior)
         self.thickness = thickness * base.exterior
 
     def __call__(self, cos: mi.Float) -> Spectrum:
