@@ -211,14 +211,14 @@ PLANTED = [
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(("base", "film"), PLANTED)
 def test_fits_recover_a_thickness(base, film):
-    """From several starts, as each fringe is a valley of its own."""
+    """From many starts, as each order of interference is a valley of its own."""
     wi, wo = hemisphere(1500, 3, 0.2), hemisphere(1500, 4, 0.2)
     wo = wi * np.float32([-1, -1, 1]) + 0.15 * wo
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
     truth = {"type": "walter", "alpha": 0.2, **base, **film}
     f = call(mi.load_dict(truth).eval, mi.BSDFContext(), wi, wo)[0] / wo[:, 2:]
     given = {"specular_reflectance": 1.0, "diffuse_reflectance": None, **base, **film, "film_thickness": "free"}
-    best, *_ = fit((wi, wo, f), "walter", given=given, starts=8)
+    best, *_ = fit((wi, wo, f), "walter", given=given, starts=64)
     np.testing.assert_allclose(best.bsdf["film_thickness"], film["film_thickness"], rtol=2e-3)
     np.testing.assert_allclose(best.bsdf["alpha"], 0.2, rtol=2e-3)
 
@@ -240,8 +240,8 @@ def test_fits_seek_films_only_if_asked():
                   "film_thickness": 150.0, "film_ior": 2.5}, marks=pytest.mark.slow),
     pytest.param({"type": "cooktorrance", "int_ior": 1.0, "ext_ior": 1.5, "film_thickness": 2000.0, "film_ior": 4.0},
                  marks=pytest.mark.slow),
-    pytest.param({"type": "walter", "alpha": 0.7, "material": "Cr", "film_thickness": 300.0, "multiscatter": "walk",
-                  "haze": 0.3, "retroreflectivity": 0.3}, marks=pytest.mark.slow),
+    pytest.param({"type": "walter", "alpha": 0.7, "material": "Cr", "film_thickness": 300.0,
+                  "multiscatter": "walk"}, marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_a_checker_finds_nothing(given):
     assert_bsdf(given)

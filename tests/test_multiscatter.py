@@ -1,11 +1,13 @@
 """Light that facets reflect more than once: what it adds up to, and what colour it has."""
 
+import functools
+
 import mitsuba as mi
 import numpy as np
 import pytest
 import reference as ref
 from random_walk import walk
-from support import direction, efficiencies, lattice
+from support import direction, efficiencies, lattice, observed
 
 from mi_brdfs.probe.bsdf import BSDFProbe
 from mi_brdfs.testing import assert_bsdf
@@ -23,8 +25,22 @@ FRESNEL = {
     "f0 .5": ({"f0": 0.5}, lambda c: ref.fresnel_schlick(c, 0.5)[:, None]),
     "f0 .9": ({"f0": 0.9}, lambda c: ref.fresnel_schlick(c, 0.9)[:, None]),
     "F82": ({"f0": 0.8, "f82": 0.6}, lambda c: ref.fresnel_generalized_schlick(c, 0.8, 0.6)[:, None]),
+    "film": ({"eta": 2.9, "k": 3.0, "film_thickness": 500.0}, lambda c: film(c)),
     "gold": (GOLD, lambda c: ref.fresnel_conductor(c[:, None], *(np.array(GOLD[n]["value"]) for n in ("eta", "k")))),
 }
+
+
+@functools.cache
+def colours_of_a_film():
+    cosines, (wavelengths, weights) = np.linspace(1e-3, 1, 500), observed()
+    spectra = ref.fresnel_film(cosines[:, None], 1.0, 1.5, 2.9 - 3j, 500.0, wavelengths)
+    return cosines, np.clip(spectra @ weights, 0, 1)
+
+
+def film(cos):
+    """The colours of a film on chrome, between those of 500 angles."""
+    cosines, colours = colours_of_a_film()
+    return np.stack([np.interp(cos, cosines, colour) for colour in colours.T], axis=-1)
 
 
 def facets(way, alpha, distribution="ggx", shadowing="smith-correlated", **given):
@@ -67,8 +83,8 @@ def test_nor_by_the_published_ways(way):
 @pytest.mark.parametrize("fresnel", FRESNEL)
 @pytest.mark.parametrize("name", ["satin", "rough", "roughest", "brushed, rough"])
 def test_the_colour_is_that_of_a_walk(name, fresnel):
-    """The albedo is that of simulated walks, to .005 up to 60° and .02 at 80°, besides three standard errors; where
-    facets are far rougher one way than the other, and tinted at grazing, to .012."""
+    """The albedo is that of simulated walks, to .005 up to 60° and .02 at 80°, besides three standard errors; under a
+    film, or where facets are far rougher one way than the other, and tinted at grazing, to .012."""
     given, function = FRESNEL[fresnel]
     alpha, angles = ROUGHNESS[name], (5, 60, 80)
     ours = albedos(facets("walk", alpha, **given), angles, 40)
@@ -76,7 +92,7 @@ def test_the_colour_is_that_of_a_walk(name, fresnel):
     for albedo, theta in zip(ours, angles, strict=True):
         energy, error = walk("ggx", *alpha, direction(theta, 40), function, 100_000, rng)
         noise = 3 * np.sqrt((error**2).sum(axis=0))
-        near = 0.012 if fresnel == "F82" and alpha[0] != alpha[1] else 0.005
+        near = 0.012 if fresnel == "film" or (fresnel == "F82" and alpha[0] != alpha[1]) else 0.005
         assert (abs(albedo - energy.sum(axis=0)) < (near if theta <= 60 else 0.02) + noise).all()
 
 

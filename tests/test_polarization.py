@@ -1,14 +1,18 @@
 """Mueller matrices: those of Mitsuba's conductors, those of Fresnel's equations, and of what depolarises."""
 
+import itertools
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+import reference as ref
 import scipy.stats
 from generate import polarization
-from support import call, direction, hemisphere, interaction, is_scalar, numbers
+from support import call, direction, hemisphere, interaction, is_scalar, numbers, observed
 
 from mi_brdfs.lobes import WeightedLobe
+from mi_brdfs.probe.arrays import WAVELENGTHS
 from mi_brdfs.testing import assert_bsdf
 
 IN_LLVM = "llvm_ad_spectral_polarized"
@@ -102,15 +106,23 @@ def first_axes(forward):
     return np.stack([1 + sign * x * x * a, sign * x * y * a, -sign * x], axis=-1)
 
 
-def of_facets(wi, wo, index):
-    """The Mueller matrices of facets with F = 1 for their own light, from what they make of electric fields."""
+def surface(index):
+    """The amplitudes of s and p that a smooth surface reflects, as a function of the cosine."""
+
+    def amplitudes(cos):
+        refracted = np.sqrt(1 - (1 - cos**2) / complex(index) ** 2)
+        refracted = np.where(refracted.imag > 0, -refracted, refracted)  # it decays inside
+        s_wave = (cos - index * refracted) / (cos + index * refracted)
+        return s_wave, (index * cos - refracted) / (index * cos + refracted)
+
+    return amplitudes
+
+
+def of_facets(wi, wo, amplitudes):
+    """The Mueller matrices of facets, from what they make of electric fields."""
     wi, wo = (w.astype(np.float64) / np.linalg.norm(w.astype(np.float64), axis=1, keepdims=True) for w in (wi, wo))
     towards, away, h = -wo, wi, (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
     cos = (h * away).sum(axis=1)
-    refracted = np.sqrt(1 - (1 - cos**2) / complex(index) ** 2)
-    refracted = np.where(refracted.imag > 0, -refracted, refracted)  # it decays inside
-    s_wave = (cos - index * refracted) / (cos + index * refracted)
-    p_wave = (index * cos - refracted) / (index * cos + refracted)
     s = np.cross(h, away) / np.linalg.norm(np.cross(h, away), axis=1, keepdims=True)
 
     def axes(forward):
@@ -118,11 +130,16 @@ def of_facets(wi, wo, index):
         waves = np.stack([s, np.cross(forward, s)], axis=1)
         return waves @ np.stack([x, np.cross(forward, x)], axis=2)
 
-    scales = np.stack([s_wave, p_wave], axis=-1)[:, :, None]
+    scales = np.stack(amplitudes(cos), axis=-1)[:, :, None]
     jones = axes(away).swapaxes(-1, -2) @ (scales * axes(towards))
     traces = np.einsum("aij,njk,bkl,nil->nab", PAULI, jones, PAULI, jones.conj()) / 2
     assert abs(traces.imag).max() < 1e-12
-    return traces.real / traces.real[:, :1, :1]
+    return traces.real
+
+
+def for_their_own_light(matrix):
+    """That of facets with F = 1."""
+    return matrix / matrix[..., :1, :1]
 
 
 @pytest.mark.usefixtures("polarized")
@@ -135,8 +152,8 @@ def test_dielectrics_obey_fresnel(eta):
     sin2 = 1 - (1 + (wi * wo).sum(axis=1)) / 2
     checked = abs(eta**2 - sin2) > 2e-3
     assert checked.mean() > 0.95
-    found = found / found[:, :1, :1]
-    assert in_parts_of_the_intensity(found, of_facets(wi, wo, eta))[checked].max() < 1e-4
+    found, expected = for_their_own_light(found), for_their_own_light(of_facets(wi, wo, surface(eta)))
+    assert in_parts_of_the_intensity(found, expected)[checked].max() < 1e-4
     total = (sin2 > eta**2) & checked
     if eta in (0.66, 0.3, 0.03):
         assert total.mean() > 0.1
@@ -149,7 +166,44 @@ def test_conductors_obey_fresnel(index):
     wi, wo = directions(4000)
     given = {"type": "microfacet", "eta": index.real, "k": -index.imag, "alpha": 0.5}
     found = matrices(given | {"shadowing": "vcavity", "distribution": "ggx"}, wi, wo)[:, 0]
-    assert in_parts_of_the_intensity(found / found[:, :1, :1], of_facets(wi, wo, index)).max() < 1e-4
+    expected = for_their_own_light(of_facets(wi, wo, surface(index)))
+    assert in_parts_of_the_intensity(for_their_own_light(found), expected).max() < 1e-4
+
+
+FILMS = {
+    "soap": ({"int_ior": 1.0, "ext_ior": 1.0}, 1.0, 1.33, 400.0),
+    "coated glass": ({"int_ior": 1.5, "ext_ior": 1.0}, 1.5, 2.3, 700.0),
+    "from inside": ({"int_ior": 1.0, "ext_ior": 1.5}, 1.0, 1.8, 300.0),
+    "silver": ({"eta": 0.05, "k": 4.0}, 0.05 - 4j, 1.5, 250.0),
+    "chrome": ({"eta": 3.2, "k": 3.3}, 3.2 - 3.3j, 1.4, 1500.0),
+}
+"""Dicts, the index of what is below, and that of the film with its thickness."""
+
+
+@pytest.mark.parametrize("name", FILMS)
+def test_films_do_to_fields_what_characteristic_matrices_say(name):
+    """All elements, to 2e-4 of the intensity that F = 1 reflects, at each wavelength; and in variants without, in the
+    mean over all of them, to .003."""
+    given, base, index, thickness = FILMS[name]
+    wi, wo = directions(400)
+    wavelengths, weights = observed()
+    luminance = weights @ [0.212671, 0.715160, 0.072169]
+    film = {"type": "walter", "alpha": 0.5, "film_thickness": thickness, "film_ior": index, **given}
+
+    def expected(wavelength):
+        media = given.get("ext_ior", 1.0), index, base, thickness, wavelength
+        return of_facets(wi, wo, lambda cos: ref.film_amplitudes(cos, *media))
+
+    found = {}
+    for variant in IN_LLVM, "llvm_ad_mono_polarized":
+        with mi.variant_context(variant):
+            unit = matrices({"type": "walter", "alpha": 0.5}, wi, wo)[..., :1, :1]
+            found[variant] = matrices(film, wi, wo) / unit
+    for channel, wavelength in enumerate(WAVELENGTHS):
+        assert abs(found[IN_LLVM][:, channel] - expected(wavelength)).max() < 2e-4
+    mean = sum(w * expected(wavelength) for w, wavelength in zip(luminance[::8], wavelengths[::8], strict=True))
+    assert abs(found["llvm_ad_mono_polarized"][:, 0] - mean / luminance[::8].sum()).max() < 3e-3
+    assert abs(mean[:, 1:, 1:]).max(axis=0).min() > 0.02
 
 
 SAME = {
@@ -159,6 +213,7 @@ SAME = {
     "next to nothing": {"type": "walter", "int_ior": 1.0001, "ext_ior": 1.0, "alpha": 0.5},
     "from inside": {"type": "cooktorrance", "int_ior": 1.0, "ext_ior": 2.0, "alpha": 0.5},
     "turquin": {"type": "walter", "eta": 1.2, "k": 3.0, "alpha": 0.9, "multiscatter": "turquin"},
+    "film": {"type": "walter", "eta": 3.0, "k": 3.0, "alpha": 0.3, "film_thickness": 300.0},
 }
 
 
@@ -307,6 +362,7 @@ def test_a_weight_scales_the_whole_matrix():
     {"type": "cooktorrance", "material": "Cu", "diffuse_reflectance": 0.1}, {"type": "nishino", "material": "Al"},
     METAL | {"alpha": 0.9, "multiscatter": "walk"}, METAL | {"alpha": 0.9, "multiscatter": "turquin"},
     {"type": "microfacet", "eta": 0.01, "k": 0.0, "alpha": 0.3}, {"type": "burley"}, {"type": "wrap"},
+    {"type": "walter", "eta": 3.0, "k": 3.0, "alpha": 0.3, "film_thickness": 500.0},
 ], ids=str)  # fmt: skip
 def test_matrices_are_physical(given):
     assert_bsdf(given, only="polarization")
@@ -315,6 +371,7 @@ def test_matrices_are_physical(given):
 EXTREMES = {
     "conductor": {"eta": [0.01, 0.3, 1.0, 3.0, 100.0], "k": [0.0, 1e-3, 1.0, 100.0]},
     "dielectric": {"int_ior": [0.01, 0.5, 1.0, 1.5, 100.0], "ext_ior": [1.0]},
+    "film": {"film_thickness": [0.0, 300.0, 2000.0], "film_ior": [1.0, 1.5, 4.0], "int_ior": [1.0, 1.5]},
 }
 
 
@@ -327,8 +384,8 @@ def test_derivatives_are_finite(kind):
     angles = [(0, 0), (0, 90), (30, 0), (45, 180), (60, 45), (89.9, 0), (89.9, 180)]
     some = np.float32([direction(*angle) for angle in angles])
     wi, wo = (np.repeat(some, len(some), axis=0), np.tile(some, (len(some), 1)))
-    for values in np.stack(np.meshgrid(*EXTREMES[kind].values()), axis=-1).reshape(-1, 2):
-        bsdf = mi.load_dict({"type": "walter", **dict(zip(names, map(float, values), strict=True)), "rotation": 0.1})
+    for values in itertools.product(*EXTREMES[kind].values()):
+        bsdf = mi.load_dict({"type": "walter", **dict(zip(names, values, strict=True)), "rotation": 0.1})
         params = mi.traverse(bsdf)
         keys = [key for key in params.keys() if key.endswith(".value")]
         for key in keys:

@@ -60,8 +60,9 @@ def fit(
     the diffuse ones, get none. Anisotropic data have the values for both tangent directions and the rotation; numbers
     that would make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the parameters of
     ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none". Words that later papers added to
-    the models of facets (f82, f90, schlick_exponent, haze, haze_spread, retroreflectivity) and the index outside stay
-    as they are, unless they are given as "free".
+    the models of facets (f82, f90, schlick_exponent, film_thickness, film_ior, haze, haze_spread, retroreflectivity)
+    and the index outside stay as they are, unless they are given as "free". A thickness takes 64 starts or more, as
+    each order of interference is a valley of its own.
 
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are

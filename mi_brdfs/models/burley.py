@@ -46,7 +46,8 @@ class Burley(Model):
     F(f0). Its clear coat is 4 cosθ_i cosθ_o times this one.
 
     ``multiscatter`` says what becomes of light that the facets of D reflect more than once, as in ``microfacet``, and
-    ``haze`` and ``retroreflectivity`` are those of ``microfacet``, for the same facets.
+    ``haze`` and ``retroreflectivity`` are those of ``microfacet``, for the same facets. There is no film, as F has no
+    index of refraction.
 
     Reciprocal, except for ``multiscatter`` = turquin. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the
     defaults, 1.60 for roughness = 1 and, with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv

@@ -29,8 +29,8 @@ class CookTorrance(Model):
     * blinn: D = (n+2)/(2π) cosθ_h^n with n = 2/α² - 2; α is limited to 1
 
     F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics (``int_ior`` over ``ext_ior``, in the
-    paper's form), Schlick's approximation for ``f0``, and 1 if none of them is given. For f82, f90, ``haze`` and
-    ``retroreflectivity`` see ``microfacet``. ``normalization`` is
+    paper's form), Schlick's approximation for ``f0``, and 1 if none of them is given. For f82, f90, a film, ``haze``
+    and ``retroreflectivity`` see ``microfacet``. ``normalization`` is
 
     * modern: as above, where D is an NDF (∫ D cosθ_h = 1) and 4 comes from the Jacobian of the half vector. This agrees
       with the conference version of 1981, which has D/4 and 1/π.
@@ -39,8 +39,8 @@ class CookTorrance(Model):
     Reciprocal. Energy-conserving for ``modern`` with ρd + ρs <= 1. For the paper's sum of several D of different
     roughness, use ``blendbsdf``. One-sided.
 
-    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does; ``f0``,
-    F = 1 and the diffuse lobe depolarise it.
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface or film does;
+    ``f0``, F = 1 and the diffuse lobe depolarise it.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
     (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.

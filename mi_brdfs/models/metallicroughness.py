@@ -30,7 +30,7 @@ class MetallicRoughness(Model):
     * smith: Smith's term for GGX, separable, as in ``walter``; with it, ``multiscatter`` says what becomes of light
       that facets reflect more than once, as in ``microfacet``.
 
-    ``haze`` and ``retroreflectivity`` are those of ``microfacet``.
+    ``haze`` and ``retroreflectivity`` are those of ``microfacet``. There is no film, as F has no index of refraction.
 
     The factor 1-F of the diffuse lobe is common practice, as in the glTF 2.0 specification; Karis's notes have
     Lambert's lobe without it. It removes the light reflected by the facets between wi and wo, not all the light

@@ -57,14 +57,26 @@ class Microfacet(Model):
     that F at c = 1/7, 82°, is f82 times what it was (P. Kutz, M. Hašan and D. Edmondson, Novel aspects of the Adobe
     Standard Material, 2021; generalized_schlick_bsdf of MaterialX).
 
+    ``film_thickness`` = d covers a conductor or dielectric with a film of so many nm and the index n = ``film_ior``,
+    whose reflections interfere. F is then the mean of |r|² for s and p,
+
+        r = (a + b e)/(1 + a b e),    e = exp(-4πi n d cosθ_t/λ)
+
+    with the amplitudes a and b that the film's upper and lower face reflect, and the angle θ_t inside (L. Belcour and
+    P. Barla, A practical extension to microfacet theory for the modeling of varying iridescence, ACM Transactions on
+    Graphics 36(4), 2017, doi:10.1145/3072959.3073620). In spectral variants λ are the wavelengths of the ray. In rgb F
+    is the integral over them under D65, with the η and k of each channel, to 1 %, and limited to [0, 1]; in mono
+    variants it is that of the luminance. A film of a lower index than ``ext_ior`` does nothing, nor does any with
+    F = 1. Schlick's approximation has no index, and takes no film.
+
     Two words change the lobe of the facets. With ``haze`` = h and ``haze_spread`` = s it is (1-h) times this one and h
     times one of rougher facets, √α' = √α + s (1-√α), where α < 1 (P. Barla, R. Pacanowski and P. Vangorp, A composite
     BRDF model for hazy gloss, Computer Graphics Forum 37(4), 2018, doi:10.1111/cgf.13475, as OpenPBR 1.2 words it); not
     for abc and hepd. With ``retroreflectivity`` = r it is (1-r) f(wi, wo) + r f(wi', wo), where wi' = (-x, -y, z) is
     the mirror direction of wi: that share of the light goes back where it came from (M. Raab, L. Belcour, F. Liu and
     J. Portsmouth, The minimal retroreflective microfacet model, Journal of Computer Graphics Techniques 15(1), 2026).
-    The albedo stays; what goes back is unpolarized. Fits leave these, f82, f90 and the exponent as they are, unless
-    given as "free".
+    The albedo stays; what goes back is unpolarized. Fits leave these, the film, f82, f90 and the exponent as they
+    are, unless given as "free".
 
     With smith and smith-correlated, ``multiscatter`` says what becomes of light that facets reflect more than once. The
     larger α, the more: for GGX with α = 1 and F = 1 the facets' lobe reflects 0.31 at normal incidence.
@@ -80,7 +92,7 @@ class Microfacet(Model):
 
     For F = 1 all of them conserve energy within 0.005 up to 85° and αu : αv = 8 : 1, which is the error of the tables.
     The albedo of walk is that of the simulated walk within 0.005 up to 60°, and 0.02 at 80°, for Schlick's reflectance
-    and metals, and within 0.012 for f82 = 0.6 on facets with αu : αv = 8 : 1.
+    and metals, and within 0.012 for f82 = 0.6 on facets with αu : αv = 8 : 1 and, in rgb, for films.
 
     Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
     with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``
@@ -92,8 +104,8 @@ class Microfacet(Model):
     schlick shadows. For Ashikhmin and Premoze's term, Neumann's and the EPD, only the formulas were at hand, in later
     papers and public code. One-sided.
 
-    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does. All else
-    depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface or film does. All
+    else depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
     Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
     so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and

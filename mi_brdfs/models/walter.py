@@ -24,15 +24,15 @@ class Walter(Model):
     with h = (wi+wo)/|wi+wo| and, by ``shadowing``, G = 1/((1+Λ(wi))(1+Λ(wo))) (separable, as published) or
     1/(1+Λ(wi)+Λ(wo)) (correlated). F is exact for conductors (``eta`` and ``k``, or ``material``) and dielectrics
     (``int_ior`` over ``ext_ior``), Schlick's approximation for ``f0``, and 1 if none of them is given. For f82, f90,
-    ``haze`` and ``retroreflectivity`` see ``microfacet``.
+    ``film_thickness``, ``haze`` and ``retroreflectivity`` see ``microfacet``.
 
     Reciprocal, except for ``multiscatter`` = turquin. Energy-conserving with ρd + ρs <= 1: the lobe's albedo stays
     below ρs, and far below for rough surfaces, as light is reflected only once (α = 1, F = 1: 0.31 ρs at normal
     incidence), unless ``multiscatter`` says what becomes of the rest, as in ``microfacet``. Same as Mitsuba's
     ``roughconductor`` with ``distribution="ggx"`` (separable), in polarized variants, too. One-sided.
 
-    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does. All else
-    depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
+    In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface or film does. All
+    else depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
     Sampling: an antithetic pair of visible normals, bounded and tilted towards the normal, one chosen by how much each
     reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
