@@ -201,9 +201,10 @@ def test_films_do_to_fields_what_characteristic_matrices_say(name):
             found[variant] = matrices(film, wi, wo) / unit
     for channel, wavelength in enumerate(WAVELENGTHS):
         assert abs(found[IN_LLVM][:, channel] - expected(wavelength)).max() < 2e-4
-    mean = sum(w * expected(wavelength) for w, wavelength in zip(luminance[::8], wavelengths[::8], strict=True))
-    assert abs(found["llvm_ad_mono_polarized"][:, 0] - mean / luminance[::8].sum()).max() < 3e-3
-    assert abs(mean[:, 1:, 1:]).max(axis=0).min() > 0.02
+        assert abs(found[IN_LLVM][:, channel, 1:, 1:]).max(axis=0).min() > 0.02
+    some = slice(None, None, 8)
+    mean = sum(w * expected(wavelength) for w, wavelength in zip(luminance[some], wavelengths[some], strict=True))
+    assert abs(found["llvm_ad_mono_polarized"][:, 0] - mean / luminance[some].sum()).max() < 3e-3
 
 
 SAME = {
@@ -371,7 +372,7 @@ def test_matrices_are_physical(given):
 EXTREMES = {
     "conductor": {"eta": [0.01, 0.3, 1.0, 3.0, 100.0], "k": [0.0, 1e-3, 1.0, 100.0]},
     "dielectric": {"int_ior": [0.01, 0.5, 1.0, 1.5, 100.0], "ext_ior": [1.0]},
-    "film": {"film_thickness": [0.0, 300.0, 2000.0], "film_ior": [1.0, 1.5, 4.0], "int_ior": [1.0, 1.5]},
+    "film": {"film_thickness": [0.0, 300.0, 2000.0], "film_ior": [1.0, 4.0], "int_ior": [1.5]},
 }
 
 
