@@ -32,13 +32,21 @@ class Options(NamedTuple):
     def __or__(self, other: Options) -> Options:
         return Options(self.words | other.words, self.quantities + other.quantities)
 
+    def without(self, *names: str) -> Options:
+        return self._replace(quantities=tuple(it for it in self.quantities if it.name not in names))
+
     def __str__(self):
         words = [f"{name}={word}" for name, word in self.words.items()]
         return " ".join([*words, *(quantity.name for quantity in self.quantities)])
 
 
+FILM = {"film_thickness": 300.0, "film_ior": 1.8}
+
+
 def typical(quantity) -> float:
     """The default of a quantity, or else a value at which it does something."""
+    if quantity.name in FILM:
+        return FILM[quantity.name]
     if quantity.default is not None:
         return float(quantity.default)
     if quantity.turns:
@@ -64,10 +72,10 @@ def ways(parameters) -> list[Options]:
                 waiting.append((it, way))
                 options = way | options
                 if term and it.terms[way.words["distribution"]].widened is Distribution.widened:
-                    kept = tuple(it for it in options.quantities if not it.name.startswith("haze"))
-                    options = options._replace(quantities=kept)
+                    options = options.without("haze", "haze_spread")
                 break
-        found.append(options)
+        schlick = any(it.name == "f0" for it in options.quantities)
+        found.append(options.without(*FILM) if schlick else options)
     return found
 
 
