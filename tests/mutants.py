@@ -18,6 +18,7 @@ import mitsuba as mi
 from mi_brdfs.lobes import LambertLobe, MicrofacetLobe, Mixture, PowerLobe, over_diffuse
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
 from mi_brdfs.microfacet.facet import Facet
+from mi_brdfs.microfacet.film import filmed
 from mi_brdfs.microfacet.fresnel import Unit
 from mi_brdfs.microfacet.shadowing import Kelemen, Shadowing, SmithGGX
 from mi_brdfs.mitsuba import bsdf as adapter
@@ -145,6 +146,14 @@ def shifted_between_quadrants(wi, wo):
     return dr.select(third_quadrant(wo), 1.04, mi.Float(1)) - dr.select(first_quadrant(wo), 0.04, mi.Float(0))
 
 
+class FilmCutOff(MicrofacetLobe):
+    """A film without derivatives for its thickness."""
+
+    def __init__(self, colour, distribution, shadowing, film):
+        film.thickness = dr.detach(film.thickness)
+        super().__init__(colour, distribution, shadowing, film)
+
+
 UniformDensity = altered(LambertLobe, lambda self, wi, wo, f, pdf: (f, mi.Float(dr.inv_two_pi)))
 UniformSampler = drawn(LambertLobe, lambda wi, wo, u, v: mi.warp.square_to_uniform_hemisphere(v))
 
@@ -211,7 +220,7 @@ def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None):
     class Mutant(Walter):
         def lobes(self, p):
             smith = shadowing or SmithGGX(*p.alpha, correlated=False)
-            specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, p.fresnel)
+            specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, filmed(self, p))
             return over_diffuse(p.diffuse_reflectance, specular)
 
     return Mutant
@@ -673,6 +682,7 @@ MUTANTS = [
     mutant(
         "gradient not a number", "gradients", diffuse_value(lambda f, r: f * (1 + 0.01 * dr.sqrt(dr.square(r - 0.5))))
     ),
+    mutant("gradient of a film cut", "gradients", walter(FilmCutOff), int_ior=1.5, film_thickness=500.0),
     mutant("parameter baked in", "recompiles", BakedIn),
     mutant("density off for a quarter of the azimuths", "pdf", diffuse(density=lit(third_quadrant))),
     mutant("density off towards a quarter of the azimuths", "chi2", diffuse(density=shifted_between_quadrants)),

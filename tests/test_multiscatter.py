@@ -25,7 +25,7 @@ FRESNEL = {
     "f0 .5": ({"f0": 0.5}, lambda c: ref.fresnel_schlick(c, 0.5)[:, None]),
     "f0 .9": ({"f0": 0.9}, lambda c: ref.fresnel_schlick(c, 0.9)[:, None]),
     "F82": ({"f0": 0.8, "f82": 0.6}, lambda c: ref.fresnel_generalized_schlick(c, 0.8, 0.6)[:, None]),
-    "film": ({"eta": 2.9, "k": 3.0, "film_thickness": 500.0}, lambda c: film(c)),
+    "film": ({"eta": 2.9, "k": 3.0, "film_thickness": 500.0, "film_ior": 1.5}, lambda c: film(c)),
     "gold": (GOLD, lambda c: ref.fresnel_conductor(c[:, None], *(np.array(GOLD[n]["value"]) for n in ("eta", "k")))),
 }
 

@@ -144,6 +144,10 @@ SWEEPS: dict[str, list[Sweep]] = {
         sweep("material", "Ag", "Al", "Au", "Cu", "W", alpha=0.2),
         sweep("int_ior", 1.1, 1.33, 1.5, 2.0, 3.0, diffuse_reflectance=GREEN, alpha=0.15),
         sweep("multiscatter", "none", "walk", "kulla-conty", "turquin", material="Au", alpha=0.8),
+        sweep("film_thickness", 0, 150, 300, 450, 800, material="Cr", alpha=0.15),
+        sweep("f82", 1.0, 0.75, 0.5, 0.25, 0.0, f0=0.8, alpha=0.15),
+        sweep("haze", 0.0, 0.25, 0.5, 0.75, 1.0, material="Au", alpha=0.05),
+        sweep("retroreflectivity", 0.0, 0.25, 0.5, 0.75, 1.0, material="Au", alpha=0.3),
     ],
     "ward": [
         sweep("alpha", 0.02, 0.05, 0.1, 0.2, 0.4, diffuse_reflectance=RED),

@@ -33,7 +33,8 @@ class Thickness(Number):
         return thickness / dr.maximum(si.wavelengths, 1)  # which inactive lanes lack
 
 
-INDEX = 1.5
+INDEX = 1.4
+"""That of OpenPBR's films."""
 FILM_THICKNESS = Thickness(
     None, (0, 2000), "thickness in nm of a film on the conductor or dielectric; omitted by default", sought=False
 )
