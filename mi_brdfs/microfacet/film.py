@@ -90,8 +90,8 @@ class Film(Fresnel):
         return luminance(self._unpolarized(*self._polarized(cos, None)))
 
     def mean(self, schlick: Any, dip: Any) -> Spectrum:
-        """That of the combination which is nearest to the reflectance at some angles: those of 0, 82 and 90° alone have
-        other hues."""
+        """That of the combination nearest to the reflectance at four angles: at 0, 82 and 90° alone it has other
+        hues."""
         fitted = (self(mi.Float(cos)) * (constant + a * schlick + b * dip) for cos, (constant, a, b) in _combination())
         return dr.clip(sum(fitted), 0, 1)
 
@@ -132,8 +132,8 @@ class Film(Fresnel):
 
 @functools.cache
 def _combination() -> list[tuple[float, list[float]]]:
-    """Return cosines, each with the share of the reflectance there in 1, (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶ of the
-    combination that fits those best, in the mean over a hemisphere."""
+    """Return cosines, each with how much the reflectance there counts in the coefficients of 1, (1 - cosθ)⁵ and cosθ
+    (1 - cosθ)⁶: those of least squares over a hemisphere."""
     cos, weight = np.array(gauss_legendre(4)).T
     root = np.sqrt(cos * weight)
     basis = np.stack([np.ones_like(cos), (1 - cos) ** 5, cos * (1 - cos) ** 6])
