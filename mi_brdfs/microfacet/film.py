@@ -86,8 +86,8 @@ class Film(Fresnel):
         return dr.maximum(self(cos), 0.1 * self.brightness(cos))
 
     def brightness(self, cos: mi.Float) -> mi.Float:
-        """The mean over all phases."""
-        return luminance(self._unpolarized(*self._polarized(cos, None)))
+        """The mean over all phases, or at least the rounding error of the reflectance."""
+        return dr.maximum(luminance(self._unpolarized(*self._polarized(cos, None))), 1e-7)
 
     def mean(self, schlick: Any, dip: Any) -> Spectrum:
         """That of the combination nearest to the reflectance at four angles: at 0, 82 and 90° alone it has other
