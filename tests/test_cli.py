@@ -146,7 +146,7 @@ ERRORS = {
     "not a scene": (["scenes/bsdf.xml"], 1, "does not hold a <scene>"),
     "no sensor": (["scenes/bare.xml"], 1, "no <sensor>"),
     "unknown plugin": (["scenes/box.xml", "-Dmaterial=wrad"], 1, 'scenes/box.xml: line 11: .*"wrad"'),
-    "our parameter": (["scenes/ward.xml", "-Dalpha=1.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 1.7 .*allowed"),
+    "our parameter": (["scenes/ward.xml", "-Dalpha=2.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 2.7 .*allowed"),
     "misspelt parameter": (["scenes/misspelt.xml"], 1, "scenes/misspelt.xml: line 2: .*reflectanse"),
     "bad value": (["scenes/box.xml", "-Dres=many"], 1, 'scenes/box.xml: line 8: .*"many"'),
     "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
