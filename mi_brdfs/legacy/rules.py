@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from .document import Element
@@ -132,25 +133,34 @@ def channels(element: Element) -> list[float]:
 def scaled_down(work: Work, element: Element, *names: str) -> Element:
     """Return a BSDF whose reflectances of these names, which have maxima in each channel, add up to at most 1: where
     they do not, 0.6 scales all by .99 over the largest sum."""
-    if not names:
-        return element
-    if (given := element.pop("ensure_energy_conservation")) and given.value.strip().lower() == "false":
-        return element
+    kept = (given := element.pop("ensure_energy_conservation")) and given.value.strip().lower() == "false"
     each = [work.maxima(element[name], DEFAULTS.get((element.type, name), 1.0)) for name in names]
-    most = max(sum(one[k % len(one)] for one in each) for k in range(3))
-    if most <= 1 + 1e-6:  # as in single precision, where .7 + .3 is 1
-        return element
-    factor = 0.99 / most
-    work.changed(element, f"{' + '.join(names)} of {element.type} is above 1, which 0.6 scales down to .99")
-    textures = [name for name in names if (it := element[name]) and it.tag not in ("rgb", "float")]
-    for name in names:
-        if name not in textures:
-            value = element.pop(name)
-            rgb = channels(value) if value else [DEFAULTS.get((element.type, name), 1.0)]
-            # Beside a texture, which cannot be scaled, the BSDF is.
-            rgb = [v if textures else v * factor for v in rgb]
-            element.children.append(colour(name, *rgb))
-    return dimmed(element, factor) if textures else element
+    most = max((sum(one[k % len(one)] for one in each) for k in range(3)), default=0)
+    factor = 1.0
+    if most > 1 + 1e-6 and not kept:  # as in single precision, where .7 + .3 is 1
+        factor = 0.99 / most
+        work.changed(element, f"{' + '.join(names)} of {element.type} is above 1, which 0.6 scales down to .99")
+    textures = [it for name in names if (it := element[name]) and it.tag not in ("rgb", "float")]
+    constants = {
+        name: channels(it) if (it := element[name]) else [DEFAULTS.get((element.type, name), 1.0)]
+        for name in names
+        if element[name] not in textures
+    }
+    # Textures cannot be scaled, but the BSDF can, if its constants make up for what is not to be.
+    share = factor if textures else 1.0
+    scales = {tuple(it.scale or [1.0]) for it in textures}
+    if len(scales) == 1 and len(set(scale := scales.pop())) == 1 and not element.type.endswith(("plastic", "electric")):
+        most = max([factor * scale[0], *(v / scale[0] if scale[0] > 0 else 2 for it in constants.values() for v in it)])
+        if most <= 1:
+            share = factor * scale[0]
+            element.children = [replace(it, scale=None) if it in textures else it for it in element.children]
+    for name, rgb in constants.items():
+        if factor != share:
+            element.set("rgb", name, [v * factor / share for v in rgb])
+        if max(rgb) * factor / share > 1 or min(rgb) < 0:
+            work.approximated(element, f"{name} of {element.type} is limited to 0 … 1")
+            element.set("rgb", name, [min(max(v * factor / share, 0.0), 1.0) for v in rgb])
+    return dimmed(element, share) if share < 1 else element
 
 
 def dimmed(element: Element, factor: float) -> Element:
@@ -197,13 +207,11 @@ def _phong_or_ward(work: Work, element: Element) -> Element:
 def _diffuse(work: Work, element: Element) -> Element:
     limited(work, element)
     other = element.pop("diffuse_reflectance")
-    if other and "reflectance" not in element:
+    if other and ("reflectance" not in element or other.tag in ("texture", "ref")):
+        element.pop("reflectance")
         other.attributes["name"] = "reflectance"
         element.children.append(other)
         work.changed(element, f"diffuseReflectance of {element.type} is reflectance")
-    if (texture := element["reflectance"]) and texture.scale and max(texture.scale) <= 1:
-        factor, texture.scale = sum(texture.scale) / len(texture.scale), None
-        return dimmed(scaled_down(work, element, "reflectance"), factor)
     return scaled_down(work, element, "reflectance")
 
 
@@ -391,9 +399,17 @@ def _bitmap(work: Work, element: Element) -> Element:
     return element
 
 
+CHECKS = {"color0": 0.4, "color1": 0.2}
+
+
 @rule("texture", "checkerboard")
 def _checkerboard(work: Work, element: Element) -> Element:
     _to_uv(element)
+    if element.name in ("alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight"):
+        # Mitsuba 3 swaps the two where it reads a checkerboard as a number, up to 3.9 at least.
+        values = [channels(it) if (it := element.pop(name)) else [grey] for name, grey in CHECKS.items()]
+        for name, rgb in zip(CHECKS, reversed(values), strict=True):
+            element.set("float", name, sum(rgb) / len(rgb))
     return element
 
 

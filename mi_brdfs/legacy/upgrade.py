@@ -17,7 +17,7 @@ import numpy as np
 
 from ..names import check_name
 from .document import OBJECTS, Element, read_document, root_of
-from .rules import KNOWN, NEAREST, RENAMED, RULES, SUCCESSORS, channels, colour, number
+from .rules import CHECKS, KNOWN, NEAREST, RENAMED, RULES, SUCCESSORS, channels, colour, number
 from .sheets import modernize
 from .spectra import rgb_of
 
@@ -292,6 +292,7 @@ class Work:
     def _object(self, element: Element) -> Element | None:
         """Return what a plugin becomes, or None."""
         element.children = self._parts(element)
+        self._last_of_each_name(element)
         kind, was = element.tag, element.type
         for child in element.children:
             if new := RENAMED.get((was, child.name)):
@@ -319,6 +320,14 @@ class Work:
         else:
             result = self._succeeded(element)
         return result and self._cleaned(result)
+
+    def _last_of_each_name(self, element: Element) -> None:
+        """Leave out the properties that a later one of the same name replaces, or a texture at any place."""
+        named = [it for it in element.children if it.name and self.resolved(it).tag in (*PROPERTIES, "rgb", "texture")]
+        last = {it.name: it for it in sorted(named, key=lambda it: it.tag in ("texture", "ref"))}
+        for extra in (it for it in named if it is not last[it.name]):
+            element.children.remove(extra)
+            self.dropped(extra, f"{extra.name} of {element.type}, which is given twice")
 
     def _succeeded(self, element: Element) -> Element | None:
         """Return a plugin under its name in Mitsuba 3, or what is nearest to it."""
@@ -413,7 +422,7 @@ class Work:
             pixels = np.array(linear)[..., :3]
             most = np.maximum(pixels.reshape(-1, pixels.shape[-1]).max(axis=0), 0).tolist()
         elif texture.type == "checkerboard":
-            both = [self.maxima(texture[name], given) for name, given in (("color0", 0.4), ("color1", 0.2))]
+            both = [self.maxima(texture[name], given) for name, given in CHECKS.items()]
             most = [max(one[k % len(one)] for one in both) for k in range(3)]
         else:
             most = [1.0]
