@@ -2,18 +2,26 @@
 
 0.6 cannot be installed beside Mitsuba 3, so the rules are restated here: defaults, notations of colours, the scaling of
 BSDFs that gain energy, and the formulas in float64 (``reference.py``). Elements of public scenes are retyped as rows of
-``ELEMENTS``, with the repository that has them; those with ``-`` show rules that no public scene was found for.
+``rows/legacy.txt``, with the repository that has them; those with ``-`` show rules that no public scene was found for.
 """
 
 from __future__ import annotations
+
+import itertools
+import os
+import random
+import re
+import sys
+import warnings
+from xml.etree import ElementTree
 
 import mitsuba as mi
 import numpy as np
 import pytest
 import reference
-from support import context, direction, hemisphere, interaction, numbers
+from support import ROOT, context, direction, hemisphere, interaction, numbers
 
-from mi_brdfs.legacy import load_legacy
+from mi_brdfs.legacy import Upgraded, load_legacy, upgrade
 
 UV = 0.375, 0.375
 """The centre of a texel of the pictures, in the second column of four."""
@@ -45,84 +53,7 @@ TEXTURES = {
 }
 """Textures, the values at ``UV``, and the largest of each channel."""
 
-ELEMENTS = """
-0.6.0 ward; string variant=ward; float alphaU=.4; float alphaV=.9; spectrum specularReflectance=3; spectrum diffuseReflectance=4 | jfischoff/hs-mitsuba
-0.6.0 ward; string variant=ward; float alphaU=1; float alphaV=2; spectrum specularReflectance=3; spectrum diffuseReflectance=4 | jfischoff/hs-mitsuba
-0.6.0 ward; float alphaU=.1; float alphaV=.3 | mitsuba-renderer/mitsuba
-0.5.0 ward; float alphaU=.1; float alphaV=.3; spectrum diffuseReflectance=0.2; spectrum specularReflectance=0.4 | Ashitaka98/mitsuba
-0.5.0 ward; spectrum diffuseReflectance=0; rgb specularReflectance=0.61600 0.47520 0.35200; float alpha=0.4 | BlurryLight/Mitsuba0.6_CMakeVcpkg
-0.2.0 ward; float diffuseAmount=0; float specularAmount=1; float alphaX=0.1; float alphaY=0.3; spectrum diffuseReflectance=1; spectrum specularReflectance=1 | mitsuba-renderer/mitsuba
-0.2.0 ward; float diffuseAmount=0.5; float specularAmount=0.5; float alphaX=0.1; float alphaY=0.3; spectrum diffuseReflectance=1; spectrum specularReflectance=1 | tomka/mitsuba-renderer
-0.2.0 ward; string variant=ward; float diffuseAmount=0.8; float specularAmount=0.2; float alphaX=0.1; float alphaY=0.1; rgb diffuseReflectance=0.5, 0.5, 0.5; rgb specularReflectance=0.2, 0.2, 0.2 | the add-on of 0.2 for Blender
-0.6.0 phong | mitsuba-renderer/mitsuba
-0.6.0 phong; spectrum diffuseReflectance=0.2; spectrum specularReflectance=0.4 | Ashitaka98/mitsuba
-0.6.0 phong; float exponent=1; spectrum specularReflectance=2; spectrum diffuseReflectance=3 | jfischoff/hs-mitsuba
-0.2.0 phong; float diffuseAmount=0.5; float specularAmount=0.5; spectrum diffuseReflectance=1; spectrum specularReflectance=1 | mitsuba-renderer/mitsuba
-0.2.0 phong; float diffuseAmount=.5; float specularAmount=.5; float exponent=20; spectrum diffuseReflectance=1; spectrum specularReflectance=1 | tomka/mitsuba-renderer
-0.5.0 phong; string sdmmFilename=phong_4c.sdmm; rgb diffuseReflectance=0.015686 0.015686 0.015686; rgb specularReflectance=9.216 9.216 9.216; float exponent=6000 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=0.023529 0.023529 0.023529; rgb specularReflectance=0.5832 0.5832 0.5832; float exponent=2000 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=0.094118 0.301961 0.431373; rgb specularReflectance=0.5832 0.5832 0.5832; float exponent=1 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=1 0.858824 0.129412; rgb specularReflectance=0.5832 0.5832 0.5832; float exponent=1 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=0 0 0; rgb specularReflectance=1 1 1; float exponent=98 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=0.24 0.24 0.24; rgb specularReflectance=0.59 0.59 0.59; float exponent=54 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=0.7 0.439632 0.1; rgb specularReflectance=0.1 0.1 0.1; float exponent=400.07177 | anadodik/sdmm-mitsuba
-0.5.0 phong; rgb diffuseReflectance=0.25 0.3 0.1; rgb specularReflectance=0.025 0.03 0.01; float exponent=20.07177 | anadodik/sdmm-mitsuba
-0.5.0 phong; float exponent=256; spectrum specularReflectance=0.1; rgb diffuseReflectance=#ffff6a | anadodik/sdmm-mitsuba
-0.5.0 phong; string sdmmFilename=phong_4c.sdmm; ref diffuseReflectance=picture; ref specularReflectance=picture; float exponent=1 | anadodik/sdmm-mitsuba
-0.5.0 phong; ref diffuseReflectance=bytes; ref specularReflectance=checks; float exponent=104.601 | anadodik/sdmm-mitsuba
-0.5.0 phong; float exponent=256; ref diffuseReflectance=bytes; spectrum specularReflectance=0.1 | hchoi405/dppm-scenes
-0.5.0 phong; float exponent=5000; ref diffuseReflectance=picture; spectrum specularReflectance=0.1 | hchoi405/dppm-scenes
-0.5.0 phong; float exponent=256; spectrum specularReflectance=0.1; spectrum diffuseReflectance=0.5, 0, 0 | hchoi405/dppm-scenes
-0.5.0 phong; float exponent=5000; spectrum specularReflectance=0.2; spectrum diffuseReflectance=0.8 | hchoi405/dppm-scenes
-0.5.0 phong; texture diffuseReflectance=dim; rgb specularReflectance=0.027451, 0.027451, 0.027451; float exponent=5.68976 | yysun997/improved-path-guiding
-0.5.0 phong; rgb diffuseReflectance=0.992157, 0.992157, 0.992157; rgb specularReflectance=0.0980392, 0.0980392, 0.0980392; float exponent=42.6828 | yysun997/improved-path-guiding
-0.5.0 phong; rgb diffuseReflectance=0.01, 0.01, 0.01; rgb specularReflectance=0.603922, 0.639216, 0.372549; float exponent=10.8702 | yysun997/improved-path-guiding
-0.5.0 phong; rgb diffuseReflectance=0.941177 0.866667 0.737255; rgb specularReflectance=0.034039 0.032314 0.029333; float exponent=1.07177 | BlurryLight/Mitsuba0.6_CMakeVcpkg
-0.5.0 phong; ref diffuseReflectance=checks; rgb specularReflectance=.8,.8,.8; float exponent=100 | luanfujun/Langevin-MCMC
-0.5.0 phong; rgb diffuseReflectance=0,0,0; rgb specularReflectance=.8,.8,.8; float exponent=100 | BachiLi/dpt
-0.6.0 phong; rgb reflectance=1.0, 1.0, 1.0; float exponent=50 | BachiLi/torrey_public
-0.5.0 phong; rgb diffuseReflectance=0.27843 0.27843 0.27843; rgb specularReflectance=1.00000 1.00000 1.00000; float alpha=300.00000 | lzqsd/OptixRenderer
-0.5.0 phong; texture diffuseReflectance=bytes; rgb specularReflectance=0.43922 0.43922 0.43922; float alpha=40.00000 | lzqsd/OptixRenderer
-0.5.0 phong; float exponent=30.0; srgb specularReflectance=0.2 0.2 0.2; srgb diffuseReflectance=0.5 0.5 0.5 | an exporter of Maya's materials
-0.5.0 phong; texture specularReflectance=raw; texture diffuseReflectance=bytes; float exponent=3 | a generator of scenes of cars
-0.6.0 roughdiffuse | Ashitaka98/mitsuba
-0.6.0 roughdiffuse; float alpha=1 | mitsuba-renderer/mitsuba
-0.6.0 roughdiffuse; rgb reflectance=0.5, 0.25, 0.12; float alpha=1.0 | eugenedeon/mitsuba
-0.6.0 roughdiffuse; rgb reflectance=1.000, 0.500, 0.000; float alpha=1.0; boolean useFastApprox=true | jfischoff/hs-mitsuba
-0.5.0 roughdiffuse; rgb reflectance=0.04 0.04 0.05; float alpha=0.2 | a generator of scenes of cars
-0.5.0 roughdiffuse; spectrum reflectance=0.1; float alpha=0.7 | a generator of scenes of cars
-0.6.0 Phong | -
-0.6.0 WARD; string variant=Ward-Duer | -
-0.6.0 ward; float alpha=0.3; float alphaU=0.1 | -
-0.6.0 ward; float alphaV=0.4 | -
-0.6.0 ward; texture alphaU=checks; float alphaV=0.2 | -
-0.6.0 ward; float alpha=0.3; texture alphaV=checks | -
-0.6.0 ward; float alpha=1.5 | -
-0.6.0 phong; spectrum diffuseReflectance=0.8; spectrum specularReflectance=0.8 | -
-0.6.0 phong; spectrum diffuseReflectance=0.8; spectrum specularReflectance=0.8; boolean ensureEnergyConservation=false | -
-0.6.0 phong; rgb diffuseReflectance=0.9, 0.1, 0.1; rgb specularReflectance=0.1, 0.9, 0.1 | -
-0.6.0 phong; rgb diffuseReflectance=0.9, 0.1, 0.1; rgb specularReflectance=0.3, 0.9, 0.1 | -
-0.6.0 phong; spectrum specularReflectance=400:0.1, 700:0.5 | -
-0.6.0 phong; srgb diffuseReflectance=#804020 | -
-0.6.0 phong; rgb diffuseReflectance=#804020 | -
-0.6.0 phong; rgb diffuseReflectance=0.25 | -
-0.6.0 phong; spectrum diffuseReflectance=0.1, 0.2, 0.3 | -
-0.6.0 phong; texture exponent=ten | -
-0.6.0 phong; texture diffuseReflectance=bright | -
-0.6.0 phong; texture diffuseReflectance=bright; boolean ensureEnergyConservation=false | -
-0.6.0 phong; texture diffuseReflectance=half | -
-0.6.0 phong; texture specularReflectance=dark; texture diffuseReflectance=checks | -
-0.6.0 phong; spectrum diffuseReflectance=0.9; texture diffuseReflectance=checks | -
-0.6.0 phong; float specularSamplingWeight=0.5; float exponent=10; float exponent=20 | -
-0.6.0 ward; texture diffuseReflectance=picture; spectrum specularReflectance=0.5; float alpha=0.2 | -
-0.6.0 roughdiffuse; rgb diffuseReflectance=0.6, 0.4, 0.2 | -
-0.6.0 roughdiffuse; spectrum reflectance=0.2; spectrum diffuseReflectance=0.9 | -
-0.6.0 roughdiffuse; spectrum reflectance=0.2; texture diffuseReflectance=checks | -
-0.6.0 roughdiffuse; spectrum reflectance=1.5 | -
-0.6.0 roughdiffuse; spectrum reflectance=1.5; boolean ensureEnergyConservation=false | -
-0.6.0 roughdiffuse; texture alpha=checks; boolean useFastApprox=true | -
-0.6.0 roughdiffuse; float alpha=3 | -
-"""
+ROWS = [row.split("|")[0].strip() for row in (ROOT / "tests/rows/legacy.txt").read_text().splitlines()]
 APPROXIMATED = {
     "0.6.0 roughdiffuse; float alpha=3": "0.6.0 roughdiffuse; float alpha=2.2",
     "0.6.0 roughdiffuse; spectrum reflectance=1.5; boolean ensureEnergyConservation=false":
@@ -200,12 +131,15 @@ def old(version, kind, properties, wi, wo):
         return np.stack([np.maximum(reference.orennayar(wi, wo, v, sigma, model), 0) for v in rgb], axis=-1)
     diffuse, specular = scaled(reflectance("diffuseReflectance", 0.5), reflectance("specularReflectance", 0.2))
     if kind == "phong":
-        values = [reference.phong(wi, wo, *pair, number("exponent", 30), "energy") for pair in zip(diffuse, specular)]
+        values = [
+            reference.phong(wi, wo, *pair, number("exponent", 30), "energy")
+            for pair in zip(diffuse, specular, strict=True)
+        ]
     else:
         alpha, axes = number("alpha", 0.1), ("X", "Y") if version == "0.2.0" else ("U", "V")
         alphas = [number(f"alpha{axis}", alpha) for axis in axes]
         variant = constants.get("variant", ("string", "balanced"))[1].lower()
-        values = [reference.ward(wi, wo, *pair, *alphas, variant) for pair in zip(diffuse, specular)]
+        values = [reference.ward(wi, wo, *pair, *alphas, variant) for pair in zip(diffuse, specular, strict=True)]
     return np.stack(values, axis=-1)
 
 
@@ -253,7 +187,7 @@ def evaluated(bsdf, wi=WI, wo=WO):
     return np.array([numbers(bsdf.eval(context(), interaction(i, UV), mi.Vector3f(o))).ravel() for i, o in pairs])
 
 
-@pytest.mark.parametrize("row", [row.split("|")[0].strip() for row in ELEMENTS.strip().splitlines()])
+@pytest.mark.parametrize("row", ROWS, ids=str)
 def test_values_of_elements(load, row):
     version, kind, properties = split(row)
     referred = dict.fromkeys(value for tag, _, value in properties if tag == "ref")
@@ -262,3 +196,285 @@ def test_values_of_elements(load, row):
     expected = old(*split(APPROXIMATED.get(row, row)), WI.astype(np.float32), WO.astype(np.float32))
     rtol = 1e-3 if any(value in PAIRS for _, _, value in properties) else 1e-4
     np.testing.assert_allclose(evaluated(scene.shapes()[0].bsdf()), expected, rtol, 1e-6)
+
+
+def shape(inner):
+    return f'<shape type="sphere">{inner}</shape>'
+
+
+def bsdf(type, inner=""):
+    return shape(f'<bsdf type="{type}">{inner}</bsdf>')
+
+
+def colour_of(inner):
+    return bsdf("diffuse", inner)
+
+
+UPGRADES = {
+    # What 0.6 supplies by itself, and its order.
+    "nothing": ("<scene/>", ['<integrator type="direct"/>', '<emitter type="sunsky">', "-120"], ["without a sensor"]),
+    "last sensor": (
+        '<sensor type="orthographic"/><sensor type="thinlens"/>',
+        [r'<sensor type="thinlens">.*<sensor type="orthographic"/>'],
+        ["changed: of several sensors the last"],
+    ),
+    "film": (
+        '<sensor type="perspective"><film type="ldrfilm"><integer name="width" value="64"/><float name="gamma" '
+        'value="2.2"/><float name="exposure" value="1"/><boolean name="highQualityEdges" value="true"/></film></sensor>',
+        ['<film type="hdrfilm">.*"width" value="64".*"sample_border" value="true"'],
+        ["changed: ldrfilm is hdrfilm", "dropped: gamma of hdrfilm", "dropped: exposure of hdrfilm"],
+    ),
+    "mfilm": ('<sensor type="perspective"><film type="mfilm"/></sensor>', ['"width" value="1".*"height" value="1"'], []),
+    "pixels": (
+        '<sensor type="perspective"><film type="hdrfilm"><string name="pixelFormat" value="RGB, xyz"/></film></sensor>',
+        ['name="pixel_format" value="rgb"'], ["approximated: pixelFormat RGB, xyz is rgb"],
+    ),
+    "alpha": (
+        '<sensor type="perspective"><film type="hdrfilm"><string name="pixelFormat" value="luminanceAlpha"/></film>'
+        "</sensor>", ['name="pixel_format" value="luminance_alpha"'], [],
+    ),
+    "focal length": ('<sensor type="perspective"/>', ['name="focal_length" value="50mm"'], []),
+    "fov": (
+        '<sensor type="perspective_rdist"><float name="fov" value="35"/><string name="kc" value="1, 2"/></sensor>',
+        ['<sensor type="perspective"><float name="fov" value="35"/></sensor>'],
+        ["approximated: perspective_rdist", "dropped: kc of perspective"],
+    ),
+    "spherical": ('<sensor type="spherical"/>', ['type="perspective"'], ["approximated: the sensor spherical is persp"]),
+    "camera of 0.3": (
+        '0.3.0 <camera type="perspective"><boolean name="mapSmallerSide" value="false"/><float name="fov" value="35"/>'
+        '<float name="focusDepth" value="3"/></camera>',
+        ['<sensor type="perspective">.*"focus_distance" value="3".*"fov_axis" value="larger".*<matrix value="-1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/>'],
+        ["changed: camera perspective of 0.3"],
+    ),
+    "look of 0.2": (
+        '0.2.0 <camera type="perspective"><transform name="toWorld"><lookAt ox="1" oy="2" oz="3" tx="4" uy="1"/>'
+        "</transform></camera>",
+        ['<matrix value="-0.7071[0-9]* 0.3015[0-9]* 0.6396[0-9]* 1 0 0.9045[0-9]* -0.4264[0-9]* 2 -0.7071[0-9]* -0.3015'], [],
+    ),
+    "sampler": (
+        '<sensor type="perspective"><sampler type="sobol"><integer name="sampleCount" value="16"/><integer '
+        'name="scramble" value="7"/></sampler></sensor>',
+        ['<sampler type="multijitter"><integer name="sample_count" value="16"/></sampler>'],
+        ["approximated: the sampler sobol is multijitter", "dropped: scramble"],
+    ),
+    "dimension": (
+        '<sensor type="perspective"><sampler type="ldsampler"><integer name="dimension" value="4"/></sampler></sensor>',
+        ['<sampler type="ldsampler"/>'], ["dropped: dimension of ldsampler"],
+    ),
+    # Integrators.
+    "path": (
+        '<integrator type="path"><integer name="maxDepth" value="8"/><boolean name="strictNormals" value="true"/>'
+        "</integrator>",
+        ['<integrator type="path"><integer name="max_depth" value="8"/></integrator>'], ["dropped: strict_normals"],
+    ),
+    "mlt": ('<integrator type="mlt"/>', ['<integrator type="path"/>'], ["approximated: the integrator mlt is path"]),
+    "bdpt in fog": (
+        '<integrator type="bdpt"/>' + shape('<medium name="interior" type="homogeneous"/>'),
+        ['<integrator type="volpath"/>', '<bsdf type="null"/>'], ["approximated: the integrator bdpt is volpath"],
+    ),
+    "irrcache": (
+        '<integrator type="irrcache"><integrator type="direct"/></integrator>', ['<integrator type="direct"/>'], [],
+    ),
+    "two integrators": (
+        '<integrator type="ptracer"/><integrator type="path"/>', ['<integrator type="path"/>'], ["before another one"],
+    ),
+    # Colours: Planck's law and the observer of 1931 give those of E in float64.
+    "grey light": ('<emitter type="point"><spectrum name="intensity" value="3"/></emitter>', ['<rgb name="intensity" v'
+                   'alue="3"/>'], []),
+    "hexadecimal": (colour_of('<rgb name="reflectance" value="#804020"/>'), [("reflectance", (128 / 255, 64 / 255, 32 /
+                    255))], []),
+    "srgb": (colour_of('<srgb name="reflectance" value="#804020"/>'), [("reflectance", (0.215861, 0.051269, 0.014444))], []),
+    "intent": (colour_of('<rgb name="reflectance" intent="reflectance" value="0.5"/>'), [("reflectance", (0.5,))], []),
+    "three": (colour_of('<spectrum name="reflectance" value="0.1 0.2, .3"/>'), [("reflectance", (0.1, 0.2, 0.3))], []),
+    "pairs": (colour_of('<spectrum name="reflectance" value="400:0.1, 700:0.9"/>'), [("reflectance", (0.8723, 0.4587,
+              0.1813))], []),
+    "file of pairs": (colour_of('<spectrum name="reflectance" filename="rising.spd"/>'), [("reflectance", (0.8723,
+                      0.4587, 0.1813))], []),
+    "blackbody": ('<emitter type="constant"><blackbody name="radiance" temperature="5000K" scale="2"/></emitter>',
+                  [("radiance", (2 * 15263, 2 * 12082.6, 2 * 9592.6))], ["changed: <blackbody> is written as linear"]),
+    "cold": ('<emitter type="constant"><blackbody name="radiance" temperature="3000"/></emitter>',
+             [("radiance", (733.1, 349.6, 112.7))], []),
+    # BSDFs.
+    "copper": (bsdf("conductor"), ['name="material" value="Cu"'], ["changed: conductor without a material is copper"]),
+    "extEta": (
+        bsdf("conductor", '<rgb name="eta" value="1.5, 2, 3"/><rgb name="k" value="3"/><float name="extEta" value="1.5"/>'),
+        [("eta", (1, 4 / 3, 2)), ("k", (2,))], ["changed: eta of conductor is divided by extEta"],
+    ),
+    "extEta of copper": (
+        bsdf("conductor", '<string name="material" value="Cu"/><string name="extEta" value="water"/>'),
+        ['value="Cu"'], ["approximated: conductor is as in air"],
+    ),
+    "indices": (
+        bsdf("dielectric", '<string name="intIOR" value="bk7"/><float name="extIOR" value="1"/>'),
+        ['"int_ior" value="bk7".*"ext_ior" value="1"'], [],
+    ),
+    "phong facets": (
+        bsdf("roughconductor", '<string name="distribution" value="phong"/><float name="alpha" value="0.2"/>'),
+        ['<bsdf type="microfacet">.*"distribution" value="blinn".*"exponent" value="48"'],
+        ["changed: distribution phong of roughconductor is blinn"],
+    ),
+    "as facets": (
+        bsdf("roughconductor", '<string name="distribution" value="as"/><float name="alphaU" value="0.1"/><float '
+             'name="alphaV" value="0.4"/>'),
+        ['"exponent" value="48"'], ["approximated: anisotropic roughness"],
+    ),
+    "phong in plastic": (
+        bsdf("roughplastic", '<string name="distribution" value="phong"/>'),
+        ['"distribution" value="beckmann"'], ["approximated: distribution phong of roughplastic is beckmann"],
+    ),
+    "textured plastic": (
+        bsdf("roughplastic", '<texture name="alpha" type="checkerboard"/>'),
+        ['"alpha" value="0.1"'], ["approximated: alpha of roughplastic cannot be a texture"],
+    ),
+    "mixture": (
+        bsdf("mixturebsdf", '<string name="weights" value="0.2, 0.3"/><bsdf type="diffuse"/><bsdf type="dielectric"/>'),
+        ['<bsdf type="blendbsdf"><float name="weight" value="0.8"/><bsdf type="diffuse"/><bsdf type="blendbsdf"><float '
+         'name="weight" value="0.625"/><bsdf type="dielectric"/><bsdf type="diffuse"><rgb name="reflectance" value="0"'],
+        ["changed: mixturebsdf is blendbsdf"],
+    ),
+    "mixture above 1": (
+        bsdf("mixturebsdf", '<string name="weights" value="1 3"/><bsdf type="diffuse"/><bsdf type="dielectric"/>'),
+        ['<bsdf type="blendbsdf"><float name="weight" value="0.75"/><bsdf type="diffuse"/><bsdf type="dielectric"/>'], [],
+    ),
+    "half a blend": (bsdf("blendbsdf", '<bsdf type="diffuse"/><bsdf type="null"/>'), ['"weight" value="0.5"'], []),
+    "bump": (
+        bsdf("bumpmap", f'{SCALE.format(0.1, BITMAP.format("picture.exr", ""))}<bsdf type="diffuse"/>'),
+        ['<bsdf type="bumpmap">.*"raw" value="true".*"scale" value="0.1"'], ["changed: the texture scale in bumpmap"],
+    ),
+    "bump of 0.4": (
+        "0.4.0 " + bsdf("bump", BITMAP.format("picture.exr", "") + '<bsdf type="diffuse"/>'),
+        ['<bsdf type="bumpmap">'], [],
+    ),
+    "coat of paint": (
+        bsdf("coating", '<float name="intIOR" value="1.6"/><float name="thickness" value="2"/><bsdf type="diffuse"><rgb '
+             'name="reflectance" value="0.2, 0.3, 0.4"/></bsdf>'),
+        ['<bsdf type="plastic">.*"int_ior" value="1.6".*<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.4"/>'],
+        ["approximated: coating over diffuse is plastic", "thickness"],
+    ),
+    "coat of metal": (
+        bsdf("roughcoating", '<float name="alpha" value="0.2"/><bsdf type="conductor"/>'),
+        ['<bsdf type="blendbsdf">.*value="Cu".*<bsdf type="roughconductor">.*"alpha" value="0.2"'],
+        ["approximated: roughcoating is a mixture with a mirror"],
+    ),
+    "hk": (bsdf("hk", '<float name="thickness" value="2"/>'), ['<bsdf type="diffuse"/>'],
+           ["approximated: the bsdf hk is diffuse", "thickness"]),
+    "irawan": (bsdf("irawan", '<string name="filename" value="silk.wv"/>'), ['<bsdf type="diffuse"/>'],
+               ["approximated: the bsdf irawan is diffuse", "filename"]),
+    "difftrans": (
+        bsdf("difftrans", '<rgb name="transmittance" value="0.7"/>'),
+        ['<bsdf type="principledthin"><float name="diff_trans" value="2"/><rgb name="base_color" value="0.7"/>'],
+        ["approximated: difftrans is principledthin"],
+    ),
+    "normals": (
+        bsdf("normalmap", f'{BITMAP.format("picture.exr", "")}<bsdf type="diffuse"/>'),
+        ['<texture type="bitmap" name="normalmap">.*"raw" value="true"'], [],
+    ),
+    "case": (bsdf("Dielectric"), ['<bsdf type="dielectric"/>'], []),
+    "lambertian of 0.3": (f"0.3.0 {bsdf('lambertian')}", ['<bsdf type="diffuse"/>'], ["lambertian of 0.3 is bsdf diff"]),
+    # Textures.
+    "bitmap": (
+        colour_of(BITMAP.format("picture.exr", '<float name="gamma" value="1"/><string name="filterType" value="ewa"/>'
+                  '<string name="wrapMode" value="zero"/><float name="maxAnisotropy" value="8"/><float name="uvscale" '
+                  'value="4"/><float name="uoffset" value="0.5"/>').replace(">", ' name="reflectance">', 1)),
+        ['"raw" value="true"', '"filter_type" value="bilinear"', '"wrap_mode" value="clamp"',
+         '<transform name="to_uv"><scale x="4" y="4"/><translate x="0.5" y="0"/></transform>'],
+        ["changed: gamma 1 of bitmap is raw", "approximated: wrapMode zero", "dropped: max_anisotropy of bitmap"],
+    ),
+    "gamma": (
+        colour_of(BITMAP.format("bytes.png", '<float name="gamma" value="1.8"/>').replace(">", ' name="reflectance">', 1)),
+        [], ["approximated: gamma 1.8 of bitmap"],
+    ),
+    "shared picture, dimmed": (
+        TEXTURES["picture"][0].replace(" ", ' id="p" ', 1)
+        + colour_of(SCALE.format(0.5, '<ref id="p"/>').replace(">", ' name="reflectance">', 1))
+        + colour_of('<ref name="reflectance" id="p"/>'),
+        ['"weight" value="0.5"', '<ref id="p" name="reflectance"/>'], [],
+    ),
+    "grid": (
+        colour_of('<texture type="gridtexture" name="reflectance"><rgb name="color0" value="0.3"/></texture>'),
+        ['<rgb name="reflectance" value="0.3"/>'], ["approximated: the texture gridtexture has no successor"],
+    ),
+    "vertex colours": (
+        colour_of('<texture type="vertexcolors" name="reflectance"/>'),
+        ['<texture type="mesh_attribute" name="reflectance"><string name="name" value="vertex_color"/>'], [],
+    ),
+    # Light.
+    "luminaire": (
+        '0.3.0 <luminaire type="constant"><spectrum name="intensity" value="2"/></luminaire>',
+        ['<emitter type="constant"><rgb name="radiance" value="2"/></emitter>'], ["luminaire constant of 0.3 is emitter"],
+    ),
+    "sky": (
+        '<emitter type="sky"><float name="scale" value="3"/><float name="stretch" value="2"/></emitter>',
+        ['<emitter type="sunsky">.*"sun_scale" value="0"', '"sky_scale" value="3"', '<rotate x="1" angle="-90"/>',
+         'name="albedo" value="0.2"'],
+        ["approximated: sky is sunsky", "dropped: stretch of sunsky"],
+    ),
+    "collimated": (
+        '<emitter type="collimated"><spectrum name="power" value="2"/></emitter>',
+        ['<shape type="disk">.*<emitter type="directionalarea"><rgb name="radiance" value="636619'],
+        ["approximated: collimated is a disk"],
+    ),
+    "unknown light": ('<emitter type="laser"/><emitter type="point"/>', [], ["dropped: the emitter laser has no success"]),
+    # Media and shapes.
+    "medium": (
+        shape('<medium name="interior" type="homogeneous"><rgb name="sigmaS" value="1, 2, 3"/><rgb name="sigmaA" '
+              'value="1"/></medium>'),
+        [("sigma_t", (0.5, 0.75, 1)), ("albedo", (0.5, 2 / 3, 0.75)), ("scale", (4,))], ["changed: sigmaS and sigmaA"],
+    ),
+    "subsurface": (shape('<subsurface type="dipole"/>'), [], ["dropped: the subsurface dipole has no successor"]),
+    "hair": ('<shape type="hair"><string name="filename" value="bytes.png"/></shape>', [], ["dropped: the shape hair"]),
+    "smooth": (shape('<float name="maxSmoothAngle" value="30"/>'), [], ["dropped: max_smooth_angle of sphere"]),
+    "animation": (
+        shape('<animation name="toWorld"><transform time="0"><translate x="1"/></transform><transform time="1"/>'
+              "</animation>"),
+        ['<transform name="to_world"><translate x="1"/></transform>'], ["approximated: an animated transform"],
+    ),
+    # The document.
+    "include": ('<include filename="lamp.xml"/>', ['<emitter type="point"/>'], []),
+    "parameters": (
+        '<default name="a" value="0.25"/><default name="ab" value="0.5"/><default name="ab" value="0.75"/>'
+        + colour_of('<rgb name="reflectance" value="$a, $ab, 0"/>'),
+        [("reflectance", (0.25, 0.5, 0))], [],
+    ),
+    "null": ('<null id="none"/>' + shape('<ref id="none"/>'), ['<shape type="sphere"/>'], ["dropped: references to what"]),
+    "alias": (
+        '<bsdf type="diffuse" id="grey"/><alias id="grey" as="paint"/>' + shape('<ref id="paint"/>'),
+        ['<shape type="sphere"><ref id="grey"/></shape>'], [],
+    ),
+    "matrix": (
+        shape('<transform name="toWorld"><scale value="2"/><matrix value="1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/></transform>'),
+        ['<scale value="2"/><matrix value="1 0 0 0'], [],
+    ),
+}  # fmt: skip
+"""Elements of 0.6, or of the version before them; patterns, or the numbers of a property, in the new XML; and parts of
+the report."""
+
+
+@pytest.fixture
+def upgraded(folder):
+    """Upgrade a scene from the text in it, and return it with XML on one line."""
+    (folder / "rising.spd").write_text("# nm value\n400 0.1\n700 0.9\n")
+    (folder / "lamp.xml").write_text('<scene version="0.6.0"><emitter type="point"/></scene>')
+
+    def upgraded(text, **options):
+        version, text = text.split(" ", 1) if text.startswith("0.") else ("0.6.0", text)
+        path = folder / "scene.xml"
+        path.write_text(f'<scene version="{version}">{text.replace("<scene/>", "")}</scene>')
+        new = upgrade(path, **options)
+        return Upgraded(new.version, re.sub(r"\s+(?=<|/>)", "", new.xml), new.changes)
+
+    return upgraded
+
+
+@pytest.mark.parametrize("name", UPGRADES)
+def test_what_becomes_of_elements(upgraded, name):
+    old, expected, said = UPGRADES[name]
+    new = upgraded(old)
+    for it in expected:
+        if isinstance(it, str):
+            assert re.search(it, new.xml), new.xml
+        else:
+            value = re.search(f'name="{it[0]}" value="([^"]*)"', new.xml)[1]
+            np.testing.assert_allclose([float(v) for v in value.split(",")], it[1], 2e-3)
+    for words in said:
+        assert words in new.report()

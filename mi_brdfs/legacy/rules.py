@@ -85,7 +85,6 @@ SUCCESSORS = {
 RENAMED = {
     ("heterogeneous", "density"): "sigma_t", ("mitchell", "b"): "B", ("mitchell", "c"): "C",
     ("hdrfilm", "high_quality_edges"): "sample_border", ("ldrfilm", "high_quality_edges"): "sample_border",
-    ("independent", "scramble"): "seed", ("multijitter", "scramble"): "seed",
     ("difftrans", "transmittance"): "base_color", ("difftrans", "diffuse_transmittance"): "base_color",
     ("normalmap", ""): "normalmap",
 }  # fmt: skip
@@ -332,6 +331,13 @@ def _mixture(work: Work, element: Element) -> Element:
         share = 1 - weight / total if total > 0 else 0.5
         result = Element(element.tag, {"type": blend}, [number("float", "weight", f"{share:.9g}"), part, result])
     return result
+
+
+@rule("bsdf", "blendbsdf")
+def _blend(_: Work, element: Element) -> Element:
+    if "weight" not in element:  # which Mitsuba 3 asks for
+        element.set("float", "weight", 0.5)
+    return element
 
 
 @rule("bsdf", "coating", "roughcoating")

@@ -319,7 +319,17 @@ class Work:
                 result.place = element.place
         else:
             result = self._succeeded(element)
+        if result and was != "scale":
+            self._left_out(element, result)
         return result and self._cleaned(result)
+
+    def _left_out(self, element: Element, result: Element) -> None:
+        """Say which properties of a plugin are not in what it has become."""
+        there = list(result.walk())
+        used = {it.name for it in there} | {it.value for it in there}
+        for child in element.children:
+            if child.tag not in ("bsdf", "ref") and child not in there and not {child.name, child.value} & used:
+                self.dropped(child, f"{child.name or child.tag} of {element.type}")
 
     def _last_of_each_name(self, element: Element) -> None:
         """Leave out the properties that a later one of the same name replaces, or a texture at any place."""
@@ -350,9 +360,9 @@ class Work:
             return None
         nearest = "volpath" if kind == "integrator" and self.has_media else NEAREST[kind]
         self.approximated(element, f"the {kind} {was} is {nearest}")
-        element.type = nearest
         if kind == "bsdf":
-            element.children = [it for it in element.children if it.name == "reflectance"]
+            return Element(kind, {"type": nearest}, [it for it in element.children if it.name == "reflectance"])
+        element.type = nearest
         return element
 
     def _cleaned(self, element: Element) -> Element:
