@@ -478,3 +478,85 @@ def test_what_becomes_of_elements(upgraded, name):
             np.testing.assert_allclose([float(v) for v in value.split(",")], it[1], 2e-3)
     for words in said:
         assert words in new.report()
+
+
+def given(**properties):
+    """Properties, of the type that their values have."""
+    tags = {float: "float", int: "integer", bool: "boolean", str: "string", tuple: "spectrum"}
+    return "".join(
+        f'<{tags[type(it)]} name="{name}" value="{re.sub("[()]|,(?=[)])", "", str(it)) if it is not True else "true"}"/>'
+        for name, it in properties.items()
+    )
+
+
+SYNTHETIC = [
+    f'<integrator type="bdpt">{given(maxDepth=7, rayLength=2.5)}</integrator>',
+    f'<sensor type="thinlens">{given(apertureRadius=0.123, kc=0.4)}<sampler type="halton">'
+    f'{given(sampleCount=33, scramble=5)}</sampler><film type="ldrfilm">'
+    f'{given(tonemapMethod="reinhard", key=0.19, attachLog=True)}<rfilter type="box">{given(radius=0.6)}</rfilter>'
+    "</film></sensor>",
+    f'<bsdf type="coating" id="a">{given(thickness=1.25, sigmaA=(0.31,))}<bsdf type="diffuse"/></bsdf>',
+    f'<bsdf type="coating" id="b">{given(specularReflectance=(0.32,))}<bsdf type="conductor">{given(x=8.5)}</bsdf></bsdf>',
+    f'<bsdf type="hk" id="c">{given(thickness=1.33, sigmaS=(0.34,))}<phase type="hg">{given(g=0.21)}</phase></bsdf>',
+    f'<bsdf type="difftrans" id="d">{given(transmittance=(0.35,), y=9.5)}</bsdf>',
+    f'<bsdf type="phong" id="e">{given(eta=1.36, exponent=37.5)}{given(exponent=38.5)}</bsdf>',
+    f'<bsdf type="roughplastic" id="f">{given(alphaU=0.39)}<texture name="diffuseReflectance" type="gridtexture">'
+    f"{given(lineWidth=0.41, color1=(0.42,))}</texture></bsdf>",
+    f'<bsdf type="mask" id="g"><texture name="opacity" type="bitmap">{given(filename="bytes.png", channel="r")}</texture>'
+    '<bsdf type="roughdiffuse"/></bsdf>',
+    f'<emitter type="sunsky">{given(extend=43, sunRadiusScale=15.5)}</emitter>',
+    f'<emitter type="collimated">{given(power=(0.44,), samplingWeight=0.45)}</emitter>',
+    f'<emitter type="photons">{given(z=46)}</emitter>',
+    f'<shape type="sphere">{given(radius=2.25, q=47)}<subsurface type="dipole"/><medium name="interior" '
+    f'type="homogeneous">{given(material="Milk", strategy=48)}</medium></shape>',
+    f'<shape type="hair">{given(filename="bytes.png", reduction=49)}</shape>',
+]
+CONVERTED = {"material", "sun_radius_scale", "power", "z", "reduction", "filename", "g"}
+"""Names of what is in other units, and of what is in a plugin, here photons, hair, and phase in hk, that is dropped."""
+
+
+@pytest.mark.parametrize("element", SYNTHETIC)
+def test_every_property_is_in_the_new_scene_or_named(upgraded, element):
+    new = upgraded(element)
+    for tree in ElementTree.fromstring(f"<scene>{element}</scene>").iter():
+        name = re.sub("(?<=[a-z])(?=[A-Z])", "_", tree.get("name", "")).lower()
+        kept = (f'value="{tree.get("value")}"' if "value" in tree.attrib else f'name="{name}"') in new.xml
+        assert not name or name in CONVERTED or kept or re.search(rf"(?<!\w){name}(?!\w)", new.report()), tree.attrib
+        assert re.search(rf"\b{tree.get('type', '')}\b", new.xml + new.report()), tree.attrib
+
+
+@pytest.mark.parametrize("version", ["0.2.0", "0.3.0", "0.5.0", "0.6.0"])
+def test_an_upgraded_scene_stays_as_it_is(upgraded, folder, version):
+    new = upgraded(f"{version} {''.join(SYNTHETIC)}")
+    (folder / "new.xml").write_text(new.xml)
+    assert upgrade(folder / "new.xml") == Upgraded("3", new.xml)
+    mi.load_string(new.xml.replace("bytes.png", str(folder / "bytes.png")))  # all that is written is known there
+
+
+@pytest.mark.parametrize("version", ["2.0.0", "2.1.0", "3.0.0", "3.9.1"])
+def test_scenes_of_mitsuba_3_are_left_as_they_are(folder, version):
+    text = f'<!-- é -->\n<scene version="{version}"><bsdf type="Odd"><float name="alphaU" value="x"/></bsdf></scene>\n\n'
+    (folder / "new.xml").write_text(text, encoding="utf-8")
+    assert upgrade(folder / "new.xml") == Upgraded("3", text)
+
+
+MISSING = [
+    ('<shape type="obj"><string name="filename" value="a.obj"/>{}</shape>', '<shape type="cube">'),
+    ('<shape type="obj"><string name="filename" value="C:\\a.obj"/>{}</shape>', '<shape type="cube">'),
+    (colour_of(BITMAP.format("a.png", "").replace(">", ' name="reflectance">', 1)), '<rgb name="reflectance" value="0.5"'),
+    ('<emitter type="envmap"><string name="filename" value="a.exr"/></emitter>', '<emitter type="constant"/>'),
+    ('<volume type="gridvolume"><string name="filename" value="a.vol"/></volume>', '<volume type="constvolume">'),
+    ('<include filename="a.xml"/>', '<scene version="3.0.0">'),
+]
+
+
+@pytest.mark.parametrize("old, stand_in", MISSING)
+def test_missing_files(upgraded, old, stand_in):
+    old = old.format('<transform name="toWorld"><scale value="2"/></transform><bsdf type="conductor"/>')
+    with pytest.raises(ValueError, match=r"^scene.xml:3: there is no (file )?(C:\\)?a\.\w+"):
+        upgraded(f"\n\n{old}")
+    new = upgraded(old, lenient=True)
+    assert stand_in in new.xml
+    assert re.search(r"(replaced|dropped): .*a\.\w+", new.report())
+    if "cube" in stand_in:
+        assert '<scale value="2"/></transform><bsdf type="conductor">' in new.xml

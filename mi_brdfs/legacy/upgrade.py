@@ -311,25 +311,25 @@ class Work:
             and len(element.of("ref", "medium")) == len(media)
         ):
             element.children.append(Element("bsdf", {"type": "null"}))
-        if rule := RULES.get((kind, was)):
-            result = rule(self, element)
-            if result is None or result.tag != kind:
-                return result
-            if result is not element:
-                result.place = element.place
-        else:
-            result = self._succeeded(element)
-        if result and was != "scale":
+        rule = RULES.get((kind, was))
+        result = rule(self, element) if rule else self._succeeded(element)
+        if result is None:
+            return None
+        if was != "scale":
             self._left_out(element, result)
-        return result and self._cleaned(result)
+        if result.tag != kind:
+            return result
+        if result is not element:
+            result.place = element.place
+        return self._cleaned(result)
 
     def _left_out(self, element: Element, result: Element) -> None:
         """Say which properties of a plugin are not in what it has become."""
         there = list(result.walk())
-        used = {it.name for it in there} | {it.value for it in there}
+        used = {text for it in there for text in (it.name, it.value) if text}
         for child in element.children:
             if child.tag not in ("bsdf", "ref") and child not in there and not {child.name, child.value} & used:
-                self.dropped(child, f"{child.name or child.tag} of {element.type}")
+                self.dropped(child, f"{child.name or child.type} of {element.type}")
 
     def _last_of_each_name(self, element: Element) -> None:
         """Leave out the properties that a later one of the same name replaces, or a texture at any place."""
