@@ -7,12 +7,10 @@ BSDFs that gain energy, and the formulas in float64 (``reference.py``). Elements
 
 from __future__ import annotations
 
-import itertools
 import os
 import random
 import re
 import sys
-import warnings
 from xml.etree import ElementTree
 
 import mitsuba as mi
@@ -245,12 +243,10 @@ def test_what_becomes_of_elements(upgraded, row):
 
 
 def given(**properties):
-    """Properties, of the type that their values have."""
-    tags = {float: "float", int: "integer", bool: "boolean", str: "string", tuple: "spectrum"}
-    return "".join(
-        f'<{tags[type(it)]} name="{name}" value="{re.sub("[()]|,(?=[)])", "", str(it)) if it is not True else "true"}"/>'
-        for name, it in properties.items()
-    )
+    """Properties, of the type that their values have; a list is a spectrum."""
+    tags = {float: "float", int: "integer", bool: "boolean", str: "string", list: "spectrum"}
+    values = {name: it[0] if isinstance(it, list) else str(it).lower() for name, it in properties.items()}
+    return "".join(f'<{tags[type(it)]} name="{name}" value="{values[name]}"/>' for name, it in properties.items())
 
 
 SYNTHETIC = [
@@ -259,20 +255,21 @@ SYNTHETIC = [
     f'{given(sampleCount=33, scramble=5)}</sampler><film type="ldrfilm">'
     f'{given(tonemapMethod="reinhard", key=0.19, attachLog=True)}<rfilter type="box">{given(radius=0.6)}</rfilter>'
     "</film></sensor>",
-    f'<bsdf type="coating" id="a">{given(thickness=1.25, sigmaA=(0.31,))}<bsdf type="diffuse"/></bsdf>',
-    f'<bsdf type="coating" id="b">{given(specularReflectance=(0.32,))}<bsdf type="conductor">{given(x=8.5)}</bsdf></bsdf>',
-    f'<bsdf type="hk" id="c">{given(thickness=1.33, sigmaS=(0.34,))}<phase type="hg">{given(g=0.21)}</phase></bsdf>',
-    f'<bsdf type="difftrans" id="d">{given(transmittance=(0.35,), y=9.5)}</bsdf>',
+    f'<bsdf type="coating" id="a">{given(thickness=1.25, sigmaA=[0.31])}<bsdf type="diffuse"/></bsdf>',
+    f'<bsdf type="coating" id="b">{given(specularReflectance=[0.32])}<bsdf type="conductor">{given(x=8.5)}</bsdf>'
+    "</bsdf>",
+    f'<bsdf type="hk" id="c">{given(thickness=1.33, sigmaS=[0.34])}<phase type="hg">{given(g=0.21)}</phase></bsdf>',
+    f'<bsdf type="difftrans" id="d">{given(transmittance=[0.35], y=9.5)}</bsdf>',
     f'<bsdf type="phong" id="e">{given(eta=1.36, exponent=37.5)}{given(exponent=38.5)}</bsdf>',
     f'<bsdf type="roughplastic" id="f">{given(alphaU=0.39)}<texture name="diffuseReflectance" type="gridtexture">'
-    f"{given(lineWidth=0.41, color1=(0.42,))}</texture></bsdf>",
-    f'<bsdf type="mask" id="g"><texture name="opacity" type="bitmap">{given(filename="bytes.png", channel="r")}</texture>'
-    '<bsdf type="roughdiffuse"/></bsdf>',
+    f"{given(lineWidth=0.41, color1=[0.42])}</texture></bsdf>",
+    f'<bsdf type="mask" id="g"><texture name="opacity" type="bitmap">{given(filename="bytes.png", channel="r")}'
+    '</texture><bsdf type="roughdiffuse"/></bsdf>',
     f'<emitter type="sunsky">{given(extend=43, sunRadiusScale=15.5)}</emitter>',
-    f'<emitter type="collimated">{given(power=(0.44,), samplingWeight=0.45)}</emitter>',
+    f'<emitter type="collimated">{given(power=[0.44], samplingWeight=0.45)}</emitter>',
     f'<emitter type="photons">{given(z=46)}</emitter>',
     f'<shape type="sphere">{given(radius=2.25, q=47)}<subsurface type="dipole"/><medium name="interior" '
-    f'type="homogeneous">{given(material="Milk", strategy=48)}</medium></shape>',
+    f'type="homogeneous">{given(material="milk", strategy=48)}</medium></shape>',
     f'<shape type="hair">{given(filename="bytes.png", reduction=49)}</shape>',
 ]
 CONVERTED = {"material", "sun_radius_scale", "power", "z", "reduction", "filename", "g"}
@@ -299,9 +296,7 @@ def test_an_upgraded_scene_stays_as_it_is(upgraded, folder, version):
 
 @pytest.mark.parametrize("version", ["2.0.0", "2.1.0", "3.0.0", "3.9.1"])
 def test_scenes_of_mitsuba_3_are_left_as_they_are(folder, version):
-    text = (
-        f'<!-- é -->\n<scene version="{version}"><bsdf type="Odd"><float name="alphaU" value="x"/></bsdf></scene>\n\n'
-    )
+    text = f'<!-- é -->\n<scene version="{version}"><bsdf type="Odd"><float name="alphaU" value="x"/></bsdf></scene>\n'
     (folder / "new.xml").write_text(text, encoding="utf-8")
     assert upgrade(folder / "new.xml") == Upgraded("3", text)
 
@@ -309,15 +304,12 @@ def test_scenes_of_mitsuba_3_are_left_as_they_are(folder, version):
 MISSING = [
     ('<shape type="obj"><string name="filename" value="a.obj"/>{}</shape>', '<shape type="cube">'),
     ('<shape type="obj"><string name="filename" value="C:\\a.obj"/>{}</shape>', '<shape type="cube">'),
-    (
-        '<bsdf type="diffuse"><texture name="reflectance" type="bitmap"><string name="filename" value="a.png"/></texture>'
-        "</bsdf>",
-        '<rgb name="reflectance" value="0.5"',
-    ),
+    ('<bsdf type="mask"><texture name="opacity" type="bitmap"><string name="filename" value="a.png"/></texture></bsdf>',
+     '<rgb name="opacity" value="0.5"'),
     ('<emitter type="envmap"><string name="filename" value="a.exr"/></emitter>', '<emitter type="constant"/>'),
     ('<volume type="gridvolume"><string name="filename" value="a.vol"/></volume>', '<volume type="constvolume">'),
     ('<include filename="a.xml"/>', '<scene version="3.0.0">'),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("old, stand_in", MISSING)
@@ -330,3 +322,94 @@ def test_missing_files(upgraded, old, stand_in):
     assert re.search(r"(replaced|dropped): .*a\.\w+", new.report())
     if "cube" in stand_in:
         assert '<scale value="2"/></transform><bsdf type="conductor">' in new.xml
+
+
+@pytest.fixture(scope="module")
+def opened():
+    """What is opened, run and connected to, by Python."""
+    seen: list[str] = []
+    watching = [True]
+
+    def hook(event, args):
+        if watching and event in ("open", "subprocess.Popen", "socket.connect"):
+            seen.append(os.path.basename(str(args[0])))
+
+    sys.addaudithook(hook)  # which nothing takes out again
+    yield seen
+    watching.clear()
+
+
+HOSTILE = {
+    "empty": "",
+    "no XML": "<scene",
+    "two roots": '<scene version="0.6.0"/><scene version="0.6.0"/>',
+    "another root": '<bsdf version="0.6.0"/>',
+    "version": '<scene version="0.7.0"/>',
+    "no number": '<scene version="0.x"/>',
+    "includes itself": '<scene version="0.6.0"><include filename="scene.xml"/></scene>',
+    "cycle": '<scene version="0.6.0"><include filename="cycle.xml"/></scene>',
+    "includes a folder": '<scene version="0.6.0"><include filename="."/></scene>',
+    "includes a picture": '<scene version="0.6.0"><include filename="bytes.png"/></scene>',
+    "bomb": '<!DOCTYPE scene [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><scene version="0.6.0">&b;</scene>',
+    "no picture": f'<scene version="0.6.0"><bsdf type="phong">{BITMAP.format("lamp.xml", "")}</bsdf></scene>'.replace(
+        "<texture", '<texture name="diffuseReflectance"'
+    ),
+    "external": '<!DOCTYPE scene [<!ENTITY a SYSTEM "SECRET">]><scene version="0.6.0">&a;</scene>',
+    "parameter entity": '<!DOCTYPE scene [<!ENTITY % a SYSTEM "SECRET"> %a;]><scene version="0.6.0"/>',
+    "external type": '<!DOCTYPE scene SYSTEM "SECRET"><scene version="0.6.0"/>',
+    "XInclude": '<scene version="0.6.0" xmlns:i="http://www.w3.org/2001/XInclude"><i:include href="SECRET"/></scene>',
+    "undefined entity": '<scene version="0.6.0">&nothing;</scene>',
+    "parameters that multiply": '<scene version="0.6.0"><default name="a0" value="hahahahaha"/>'
+    + "".join(f'<default name="a{k + 1}" value="{f"$a{k}" * 10}"/>' for k in range(9)) + "</scene>",
+    "parameter in itself": '<scene version="0.6.0"><default name="a" value="$a"/></scene>',
+    "deep": '<scene version="0.6.0">' + "<bsdf type='twosided'>" * 5000 + "</bsdf>" * 5000 + "</scene>",
+    "long": f'<scene version="0.6.0"><string name="a" value="{"a" * 200_000}"/></scene>',
+    "reference to itself": '<scene version="0.6.0"><bsdf type="mask" id="a"><ref id="a"/></bsdf></scene>',
+    "alias of itself": '<scene version="0.6.0"><alias id="a" as="a"/><shape type="cube"><ref id="a"/></shape></scene>',
+    "encoding": '<?xml version="1.0" encoding="utf-8"?><scene version="0.6.0" author="\xe9"/>'.encode("latin-1"),
+    "unknown encoding": '<?xml version="1.0" encoding="klingon"?><scene version="0.6.0"/>',
+    "UTF-16": '<?xml version="1.0" encoding="utf-16"?><scene version="0.6.0"/>'.encode("utf-16"),
+    "zeros": b'<scene version="0.6.0">\0</scene>',
+}  # fmt: skip
+VALUES = ["", "nan", "inf", "-inf", "1e999", "-1", "9" * 400, "1 2 3 4", "word", "0x10", "é", "$missing", "#12345",
+          "1:2,", "true", "../../secret", "/", "\u2028", "%s%n", "400:1 300:1", "0"]  # fmt: skip
+TYPES = ["diffuse", "phong", "mixturebsdf", "coating", "scale", "bitmap", "sunsky", "homogeneous", "hdrfilm", "odd"]
+TAGS = ["bsdf", "texture", "shape", "emitter", "film", "ref", "float", "rgb", "spectrum", "blackbody", "transform",
+        "default", "include", "alias", "null", "camera", "odd"]  # fmt: skip
+
+
+def mutated(seed):
+    """A scene with some of its letters, values, types, tags, names and elements changed."""
+    some = random.Random(seed)
+    old = [re.sub(r"^0\S+ ", "", row.split(" =>")[0]) for row in rows("legacy_upgrades.txt")]
+    text = "".join(some.sample(old + SYNTHETIC, 6)).replace("<scene/>", "")
+    for _ in range(some.randint(1, 8)):
+        kind, new = some.choice([
+            (r'(?<= value=")[^"]*', VALUES), (r'(?<= type=")[^"]*', TYPES), (r" \w+=\"[^\"]*\"", ["", ' id="a"']),
+            (r'(?<= name=")[^"]*', ["", "alpha", "weights", "filename", "to world", "scale", "reflectance"]),
+            (r"(?=<\w)", ["text", "<ref id='a'/>", "<null id='a'/>", "<bsdf/>", "&amp;", "]]>", "<bsdf type='phong'>"]),
+            (r"<\w+[^<]*/>", ["", "<spectrum name='reflectance'/>", "<blackbody temperature='-3'/>", "<float/>"]),
+        ])  # fmt: skip
+        at = some.choice(list(re.finditer(kind, text)) or [re.search("", text)])
+        text = text[: at.start()] + some.choice(new) + text[at.end() :]
+    text = re.sub(rf"(?<=[</]){some.choice(TAGS)}\b", some.choice(TAGS), text)
+    return f'<scene version="{some.choice(["0.2.0", "0.3.0", "0.4.4", "0.6.0"])}">{text}</scene>'
+
+
+@pytest.mark.parametrize("name", [*HOSTILE, *range(100)])
+def test_hostile_scenes_are_upgraded_or_refused_in_a_sentence(folder, opened, name):
+    text = HOSTILE[name] if name in HOSTILE else mutated(name)
+    secret, path = folder.parent / "secret.txt", folder / "scene.xml"
+    secret.write_text("400 1")
+    (folder / "cycle.xml").write_text('<scene version="0.6.0"><include filename="scene.xml"/></scene>')
+    path.write_bytes(text if isinstance(text, bytes) else text.replace("SECRET", secret.as_uri()).encode())
+    opened.clear()
+    try:
+        new = upgrade(path, lenient=name not in HOSTILE and name % 2 == 0)
+    except ValueError as error:
+        assert type(error) is ValueError
+        assert re.fullmatch(r".*\.(xml|spd|png)\b.*[.)]", str(error)), error
+    else:
+        assert new.version == "3" or ElementTree.fromstring(new.xml).get("version") == "3.0.0"
+    named = {it for it in os.listdir(folder) if it in str(text)}
+    assert set(opened) <= named | {"scene.xml"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
@@ -213,7 +214,7 @@ class _Reader:
     def _found(self, include: Element, path: Path) -> Path | None:
         name = include.attributes.get("filename", "")
         for folder in (self.scene.parent, path.parent):
-            if name and (folder / name).is_file():
+            if name and os.path.isfile(folder / name):
                 return folder / name
         if self.lenient:
             self.missing.append((include.place, name))

@@ -4,6 +4,7 @@ those without a successor."""
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -123,7 +124,10 @@ def bsdf(type: str, *children: Element) -> Element:
 
 
 def channels(element: Element) -> list[float]:
-    return [float(v) for v in element.value.replace(",", " ").split()]
+    try:
+        return [float(v) for v in re.split(r"[,\s]+", element.value.strip())]
+    except ValueError:
+        raise ValueError(f"{element.name or element.tag} = {element.value!r} has something else than numbers") from None
 
 
 # --- BSDFs ------------------------------------------------------------------------------------------------------

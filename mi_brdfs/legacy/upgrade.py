@@ -80,7 +80,10 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     """
     path = Path(path)
     if is_new(path):
-        return Upgraded("3", path.read_text(encoding="utf-8"))
+        try:
+            return Upgraded("3", path.read_text(encoding="utf-8"))
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{path}: the file is no UTF-8: {error}.") from None
     root, without = read_document(path, {name: str(value) for name, value in parameters.items()}, lenient)
     is_old = any(it.tag in ("camera", "luminaire") for it in root.walk())
     version = root.attributes.get("version", "0.2.0" if is_old else "0.6.0").strip()
@@ -235,10 +238,16 @@ class Work:
         if element.tag == "animation":
             return self._animation(element)
         if element.tag in PROPERTIES:
+            if element.tag in ("float", "integer"):
+                try:
+                    float(element.value)
+                except ValueError:
+                    said = f"{element.place}: <{element.tag}> {element.name} = {element.value!r} is no number."
+                    raise ValueError(said) from None
             if element.name == "to_world" and parent.tag == "sensor":
                 _normalize(element)
             return element
-        if element.tag not in OBJECTS:
+        if element.tag not in (*KNOWN, "subsurface"):
             self.dropped(element, f"<{element.tag}>, which Mitsuba does not have")
             return None
         name = element.name
@@ -247,7 +256,7 @@ class Work:
         except ValueError as error:
             said = str(error)
             raise ValueError(
-                said if ".xml:" in said else f"{element.place}: {element.tag} {element.type}: {said}"
+                said if ".xml:" in said else f"{element.place}: {element.tag} {element.type}: {said}."
             ) from None
         if result is not element:
             element.attributes.pop("id", None)
@@ -416,7 +425,9 @@ class Work:
 
     def _file(self, name: str) -> Path | None:
         """Return the file of a name, which may have been written on Windows."""
-        return next((it for text in (name, name.replace("\\", "/")) if (it := self.path.parent / text).is_file()), None)
+        return next(
+            (it for text in (name, name.replace("\\", "/")) if os.path.isfile(it := self.path.parent / text)), None
+        )
 
     def maxima(self, texture: Element | None, default: float) -> list[float]:
         """Return the largest value in each channel, as 0.6 knows it."""
@@ -426,7 +437,10 @@ class Work:
         if texture.tag in ("rgb", "float"):
             return channels(texture)
         if texture.type == "bitmap" and (name := texture["filename"]):
-            bitmap = mi.Bitmap(str(self.folder / name.value))
+            try:
+                bitmap = mi.Bitmap(str(self.folder / name.value))
+            except RuntimeError as error:
+                raise ValueError(f"{name.value} cannot be read: {error}") from None
             raw = texture.text("raw") == "true"
             linear = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=bitmap.srgb_gamma() and raw)
             pixels = np.array(linear)[..., :3]
@@ -448,6 +462,8 @@ def _normalize(transform: Element) -> None:
     matrix = np.eye(4)
     for step in transform.children:
         matrix = np.array(_matrix(transforms(), step)) @ matrix
+    if not np.isfinite(matrix).all():
+        raise ValueError("its transform is not finite, or looks nowhere")
     u, _, v = np.linalg.svd(matrix[:3, :3])
     matrix[:3, :3] = u @ v
     transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in matrix.ravel())})]
@@ -461,7 +477,7 @@ def _matrix(identity: Any, step: Element) -> Any:
     if step.tag == "lookat":
         points = {name: channels(Element("", {"value": given.get(name, "0, 1, 0")})) for name in LOOK_AT}
         return identity.look_at(**points).matrix
-    default = (channels(step) or [1.0 if step.tag == "scale" else 0.0]) * 3
+    default = (channels(step) if step.value else [1.0 if step.tag == "scale" else 0.0]) * 3
     triple = [float(given.get(axis, default[k])) for k, axis in enumerate("xyz")]
     if step.tag == "rotate":
         return identity.rotate(triple, float(given.get("angle", 0))).matrix
