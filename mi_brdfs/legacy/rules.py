@@ -4,7 +4,6 @@ those without a successor."""
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -125,9 +124,12 @@ def bsdf(type: str, *children: Element) -> Element:
 
 def channels(element: Element) -> list[float]:
     try:
-        return [float(v) for v in re.split(r"[,\s]+", element.value.strip())]
+        if values := [float(v) for v in element.value.replace(",", " ").split()]:
+            return values
     except ValueError:
-        raise ValueError(f"{element.name or element.tag} = {element.value!r} has something else than numbers") from None
+        pass
+    raise ValueError(f"{element.name or element.tag} = {element.value!r} has something else than numbers")
+
 
 
 # --- BSDFs ------------------------------------------------------------------------------------------------------
@@ -410,6 +412,7 @@ def _bitmap(work: Work, element: Element) -> Element:
 
 
 CHECKS = {"color0": 0.4, "color1": 0.2}
+"""The default colours of a checkerboard."""
 
 
 @rule("texture", "checkerboard")
@@ -495,7 +498,7 @@ def _sunsky(work: Work, element: Element) -> Element:
 def _collimated(work: Work, element: Element) -> Element:
     work.approximated(element, "collimated is a disk of radius .001 that shines straight on")
     radius = 1e-3
-    power = element["power"]
+    power = element.pop("power")
     light = [v / (math.pi * radius**2) for v in (channels(power) if power and power.tag == "rgb" else [1.0])]
     world = element["to_world"] or Element("transform", {"name": "to_world"})
     world.children.insert(0, Element("scale", {"value": f"{radius:g}"}))

@@ -32,7 +32,7 @@ def rgb_of(element: Element, folder: Path) -> list[float]:
 
 
 def _channels(element: Element, folder: Path) -> list[float]:
-    text = element.value.strip()
+    text = element.value.strip(", \t\n")
     if element.tag == "blackbody":
         kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
         return _of_light(*_blackbody(kelvin, float(element.attributes.get("scale", 1))))

@@ -335,7 +335,7 @@ class Work:
     def _left_out(self, element: Element, result: Element) -> None:
         """Say which properties of a plugin are not in what it has become."""
         there = list(result.walk())
-        used = {text for it in there for text in (it.name, it.value) if text}
+        used = {"ensure_energy_conservation", *(text for it in there for text in (it.name, it.value) if text)}
         for child in element.children:
             if child.tag not in ("bsdf", "ref") and child not in there and not {child.name, child.value} & used:
                 self.dropped(child, f"{child.name or child.type} of {element.type}")
