@@ -131,7 +131,6 @@ def channels(element: Element) -> list[float]:
     raise ValueError(f"{element.name or element.tag} = {element.value!r} has something else than numbers")
 
 
-
 # --- BSDFs ------------------------------------------------------------------------------------------------------
 
 
@@ -413,12 +412,14 @@ def _bitmap(work: Work, element: Element) -> Element:
 
 CHECKS = {"color0": 0.4, "color1": 0.2}
 """The default colours of a checkerboard."""
+NUMBERS = "alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight"
+"""Properties that Mitsuba 3 reads of a texture as numbers."""
 
 
 @rule("texture", "checkerboard")
 def _checkerboard(work: Work, element: Element) -> Element:
     _to_uv(element)
-    if element.name in ("alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight"):
+    if element.name in NUMBERS:
         # Mitsuba 3 swaps the two where it reads a checkerboard as a number, up to 3.9 at least.
         values = [channels(it) if (it := element.pop(name)) else [grey] for name, grey in CHECKS.items()]
         for name, rgb in zip(CHECKS, reversed(values), strict=True):

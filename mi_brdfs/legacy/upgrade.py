@@ -17,7 +17,7 @@ import numpy as np
 
 from ..names import check_name
 from .document import OBJECTS, Element, read_document, root_of
-from .rules import CHECKS, KNOWN, NEAREST, RENAMED, RULES, SUCCESSORS, channels, colour, number
+from .rules import CHECKS, KNOWN, NEAREST, NUMBERS, RENAMED, RULES, SUCCESSORS, channels, colour, number
 from .sheets import modernize
 from .spectra import rgb_of
 
@@ -277,10 +277,12 @@ class Work:
             self.dropped(element, "references to what has no successor")
             return None
         # What became a colour has no id, and what is scaled differs from what others refer to.
-        if target.tag not in OBJECTS or target.scale:
+        checks = target.type == "checkerboard" and element.name in NUMBERS
+        if target.tag not in OBJECTS or target.scale or checks:
             attributes = {name: value for name, value in target.attributes.items() if name != "id"}
             named = {"name": element.name} if element.name else {}
-            return Element(target.tag, attributes | named, target.children, element.place, target.scale)
+            copy = Element(target.tag, attributes | named, target.children, element.place, target.scale)
+            return RULES["texture", "checkerboard"](self, copy) if checks else copy
         return Element(
             "ref",
             {"id": target.attributes["id"]} | ({"name": element.name} if element.name else {}),
