@@ -25,15 +25,17 @@ FAINT = 0.03
 
 
 def drawn(options, rng):
-    """Values of the quantities by name: colours and other fractions are uniform, the rest of any magnitude."""
+    """Values of the quantities by name: colours and other fractions are uniform, the rest of any magnitude from a
+    thousandth of one, or of where they usually end: a film is thicker than an atom."""
     values = {}
     for quantity in options.quantities:
         low, high = quantity.limits[0], min(quantity.limits[1], 1e3 if quantity.colour else 1e6)
         shape = (3, SETTINGS) if quantity.colour else SETTINGS
+        usual = quantity.usual[1] if quantity.usual else 1
         if (low, high) == (0, 1) or low < 0:
             values[quantity.name] = rng.uniform(low, high, shape)
         else:
-            values[quantity.name] = magnitudes(low or 1e-3, high, rng, shape)
+            values[quantity.name] = magnitudes(low or 1e-3 * usual, high, rng, shape)
     return {name: np.float32(value) for name, value in values.items()}
 
 

@@ -11,12 +11,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, Spectrum, gauss_legendre, leaving, luminance
+from ..math import EPSILON, SMALL, Spectrum, gauss_legendre, leaving, luminance, safe_sqrt
 from ..observer import observer
 from ..parameters import Number, ParameterError
 from ..parameters.parameter import Quantity
-from .fresnel import Interface, Unit
-from .terms import Fresnel
+from .forward import ForwardDirections
+from .fresnel import Dielectric, Interface, Unit
+from .terms import Distribution, Fresnel
 
 
 class Thickness(Number):
@@ -88,6 +89,14 @@ class Film(Fresnel):
     def brightness(self, cos: mi.Float) -> mi.Float:
         """The mean over all phases, or at least the rounding error of the reflectance."""
         return dr.maximum(luminance(self._unpolarized(*self._polarized(cos, None))), 1e-7)
+
+    def forward(self, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections | None:
+        """Those of the dielectric that reflects as much at normal incidence: thin films between like media reflect most
+        at grazing, too."""
+        if not isinstance(self.base, Dielectric):
+            return None
+        amplitude = safe_sqrt(luminance(self(mi.Float(1))))
+        return Dielectric((1 + amplitude) / dr.maximum(1 - amplitude, SMALL)).forward(distribution, wi)
 
     def mean(self, schlick: Any, dip: Any) -> Spectrum:
         """That of the combination nearest to the reflectance at four angles: at 0, 82 and 90° alone it has other
