@@ -94,8 +94,16 @@ def textures(smith: Smith) -> list[Any]:
         towards = np.concatenate([data[name], data[f"{smith.facets}-walk"]], axis=-1)
         mean = data[f"{name}-mean"]
     return [
-        kind(mi.TensorXf(np.float32(it)), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))
+        kind(_aligned(it), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))
     ]
+
+
+def _aligned(values: np.ndarray) -> Any:
+    """Return a tensor in Dr.Jit's own memory: channels are looked up together only where arrays are aligned, as
+    NumPy's need not be."""
+    tensor = mi.TensorXf(np.float32(values)) * dr.opaque(mi.Float, 1)
+    dr.eval(tensor)
+    return tensor
 
 
 def _compressed(alpha: Any) -> Any:
