@@ -96,7 +96,7 @@ class Problem:
         dr.enqueue(dr.ADMode.Forward, self.params[key])
         dr.traverse(dr.ADMode.Forward)
         counted = [mi.luminance(mi.Color3f(*row.tolist())) for row in np.eye(3)]
-        gradient = np.stack([channel * dr.grad(value) for channel, value in zip(counted, values)], axis=-1)
+        gradient = np.stack([channel * dr.grad(value) for channel, value in zip(counted, values, strict=True)], axis=-1)
         dr.disable_grad(self.params[key])
         return gradient.reshape(STARTS, PAIRS, 3)
 

@@ -93,9 +93,7 @@ def textures(smith: Smith) -> list[Any]:
     with np.load(FILE) as data:
         towards = np.concatenate([data[name], data[f"{smith.facets}-walk"]], axis=-1)
         mean = data[f"{name}-mean"]
-    return [
-        kind(_aligned(it), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))
-    ]
+    return [kind(_aligned(it), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))]
 
 
 def _aligned(values: np.ndarray) -> Any:
