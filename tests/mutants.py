@@ -87,6 +87,17 @@ def between(low, high):
     return lambda w: (w.z < math.cos(math.radians(low))) & (w.z > math.cos(math.radians(high)))
 
 
+def azimuths(low, high):
+    """Whether the azimuth of a direction is within some angles, in degrees."""
+
+    def within(w):
+        phi = dr.atan2(w.y, w.x)
+        phi = dr.select(phi < 0, phi + 2 * dr.pi, phi)
+        return (phi > math.radians(low)) & (phi < math.radians(high))
+
+    return within
+
+
 def third_quadrant(w):
     return (w.x < 0) & (w.y < 0)
 
@@ -108,6 +119,11 @@ def turned(angle):
 def root_at_normal(w):
     """sinθ as √(1 - cos²θ), of which the derivative is infinite at normal incidence."""
     return dr.sqrt(dr.maximum(1 - w.z * w.z, 0))
+
+
+def sine_to_the_mirror(wi, wo):
+    """sin as √(1 - cos²) of a dot product that a rounding error may lift above 1."""
+    return 1 - 0.1 * dr.sqrt(1 - dr.square(dr.dot(mi.Vector3f(-wi.x, -wi.y, wi.z), wo)))
 
 
 def nothing_over_nothing(wi, wo):
@@ -282,6 +298,17 @@ class SharedByAll(Lambert):
         return SimpleNamespace(reflectance=self.first[0]["reflectance"].eval(si, active))
 
 
+class TextureKept(Lambert):
+    """Keeps the value of its texture for calls of as many lanes."""
+
+    width = 0
+
+    def evaluate(self, si, active):
+        if self.width != dr.width(si.uv):
+            self.width, self.kept = dr.width(si.uv), super().evaluate(si, active)
+        return self.kept
+
+
 def elsewhere(moved):
     """A Lambertian that looks its texture up at another point."""
 
@@ -383,6 +410,20 @@ def in_the_world(own, self, ctx, si, *given):
     """A direction of the world is taken for a local one."""
     value, pdf = own(self, ctx, si, *given)
     return value * (0.75 + 0.25 * abs(si.n.z)), pdf
+
+
+def brighter_afar(own, self, ctx, si, *given):
+    value, pdf = own(self, ctx, si, *given)
+    return value * (1 + dr.squared_norm(si.duv_dx)), pdf
+
+
+def suspended(own, self, *given):
+    with dr.suspend_grad():
+        return own(self, *given)
+
+
+def with_derivatives(own, self, *given):
+    return adapter.ModelBSDF.eval_pdf(self, *given)[0]
 
 
 def tiled_in_place(own, self, ctx, si, *given):
@@ -644,6 +685,12 @@ MUTANTS = [
     mutant("shared by all", "updates", SharedByAll),
     mutant("brighter every other time", "calls", Lambert, adapted(eval_pdf=brighter_every_other_time)),
     mutant("darker where the world is turned", "calls", Lambert, adapted(eval_pdf=in_the_world)),
+    mutant("attributes of any name", "calls", Lambert, adapted(has_attribute=lambda own, self, *given: mi.Bool(True))),
+    mutant("texture of the last call", "calls", TextureKept, reflectance={"type": "checkerboard"}),
+    mutant("differentials not asked for", "flags", Lambert, adapted(eval_pdf=brighter_afar)),
+    mutant("density off for ten degrees of azimuth", "flags", diffuse(density=lit(azimuths(200, 210), 0.92))),
+    mutant("not a number for exact mirror pairs", "finite", diffuse(sine_to_the_mirror)),
+    mutant("eval_pdf without derivatives", "gradients", Lambert, adapted(eval_pdf=suspended, eval=with_derivatives)),
     mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
     mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
     mutant("colours of wavelengths beside", "spectral", colour(beside)),

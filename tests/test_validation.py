@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 import psutil
 import pytest
-from mutants import MUTANTS, TWO, Mutant, changed, diffuse, lambert, of_others
+from mutants import MUTANTS, TWO, Mutant, changed, diffuse, in_spectra, lambert, of_others
 from support import shared
 from typer.testing import CliRunner
 
@@ -129,6 +129,61 @@ def test_what_goes_straight_through(says, bends):
 
     mi.register_bsdf("veil", Veil)
     assert check({"type": "veil"}, only="null").verdict("null") == ("pass" if says == 0.3 and not bends else "fail")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    ("density", "mirrors", "fails"), [(0.5, (-1, -1), ""), (1, (-1, -1), "components"), (0.5, (-1, 1), "flags")]
+)
+def test_mirrors_are_drawn_as_they_say_and_turn_with_the_light(density, mirrors, fails):
+    class Polish(mi.BSDF):
+        """Half of the samples are those of a mirror, the others of a diffuse surface."""
+
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            kinds = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection
+            self.m_components = [int(kind | mi.BSDFFlags.FrontSide) for kind in kinds]
+            self.m_flags = self.m_components[0] | self.m_components[1]
+
+        def sample(self, ctx, si, u, v, active=True):
+            bs, (drawn, mirrored) = dr.zeros(mi.BSDFSample3f), self.shares(ctx)
+            mirror = mi.Bool(u >= drawn)
+            reflected = mi.Vector3f(mirrors[0] * si.wi.x, mirrors[1] * si.wi.y, si.wi.z)
+            bs.wo = dr.select(mirror, reflected, mi.warp.square_to_cosine_hemisphere(v))
+            kinds = int(mi.BSDFFlags.DeltaReflection), int(mi.BSDFFlags.DiffuseReflection)
+            bs.sampled_type, bs.eta = dr.select(mirror, *map(mi.UInt32, kinds)), 1
+            bs.sampled_component = dr.select(mirror, mi.UInt32(1), 0)
+            stated = density if drawn else 1
+            bs.pdf = dr.select(mirror, stated, self.pdf(ctx, si, bs.wo))
+            active &= (si.wi.z > 0) & (drawn + mirrored > 0)
+            bs.pdf &= active
+            return bs, dr.select(active, mi.Color3f(0.5 / max(drawn, mirrored, 0.1)), 0)
+
+        def shares(self, ctx):
+            own = [
+                ctx.is_enabled(kind, k)
+                for k, kind in enumerate((mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection))
+            ]
+            return [own[k] / max(sum(own), 1) for k in range(2)]
+
+        def eval(self, ctx, si, wo, active=True):
+            f = 0.5 * dr.inv_pi * (self.shares(ctx)[0] > 0)
+            return mi.Color3f(dr.select(active & (si.wi.z > 0) & (wo.z > 0), f * wo.z, 0))
+
+        def pdf(self, ctx, si, wo, active=True):
+            share = self.shares(ctx)[0] * dr.inv_pi
+            return dr.select(active & (si.wi.z > 0) & (wo.z > 0), share * wo.z, 0)
+
+    mi.register_bsdf("polish", Polish)
+    report = check({"type": "polish"}, only=["components", "flags", "weight", "pdf"])
+    assert {finding.check for finding in report.failures} == set(fails.split()), report
+
+
+def test_wavelengths_in_another_order():
+    mi.set_variant("llvm_ad_spectral")
+    first = in_spectra(lambda value, wavelengths: value * wavelengths[0] / 830)
+    report = check(Mutant("of the first wavelength", ("spectral",), first).register(), only="spectral")
+    assert "in another order of the wavelengths" in str(report.failures[0].data["faults"]), report
 
 
 @pytest.mark.usefixtures("llvm_rgb")

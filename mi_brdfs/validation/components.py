@@ -5,9 +5,9 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from ..probe.arrays import context
+from ..probe.arrays import Array, context, interaction, numbers, vectors
 from ..probe.bsdf import Part, Samples
-from ..probe.directions import direction, hemisphere, on_side
+from ..probe.directions import angles_of, direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
 from .outcome import Findings, Outcome, relative
@@ -18,14 +18,16 @@ COUNT = 4000
 
 def components(run: Run) -> Findings:
     """Check that the components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
-    ``sampled_type`` lie within what was asked for and drawn, ``eta`` is 1 for light that stays on its side, what a
-    context excludes is black, and a type mask of one bit or several lets through the components of these types."""
+    ``sampled_type`` lie within what was asked for and drawn, the density of a delta function's sample is how often it
+    is drawn, ``eta`` is 1 for light that stays on its side, what a context excludes is black, and a type mask of one
+    bit or several lets through the components of these types."""
     probe = run.probe
     for part in probe.parts:
         outcome = Outcome("components", part.name)
         for incident in run.views(part):
             _check_sampled(run, outcome, part, incident)
         if part.component is None:
+            _check_deltas(run, outcome, part)
             _check_sum(run, outcome)
             _check_there_and_back(run, outcome, part)
         yield outcome.finding("Sums, sampled components and types are as asked for.")
@@ -85,6 +87,24 @@ def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Sample
             share = said[alone].mean()
             told = f"{start} only {share:.1%} of the samples where nothing but {part.name} draws any are said to be its"
             outcome.fault(f"{told} own", 1 - share, wi=incident.vector(int(lit[alone][0])), seed=SEED)
+
+
+def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that the density that samples of delta functions state is how often they are drawn."""
+    for incident in run.incidents(part) if run.probe.deltas else ():
+        samples = run.samples(part, incident)
+        for k in run.probe.deltas:
+            own = (samples.component == k) & samples.weight.any(axis=1)
+            share, density = own.mean(), samples.density[own].mean() if own.any() else 0
+            # Six standard errors: a false alarm once in 1e8.
+            if abs(share - density) > 6 * np.sqrt(share * (1 - share) / len(own)) + 1e-3:
+                outcome.fault(
+                    f"for light from {incident.name} samples of {run.probe.name_of(k)} state the density "
+                    f"{density:.4g}, but are {share:.2%} of the samples",
+                    abs(share - density),
+                    wi=incident.wi,
+                    seed=SEED,
+                )
 
 
 def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
@@ -164,8 +184,9 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
 
 def flags(run: Run) -> Findings:
     """Check that a component's flags fit its behaviour. One that gathers half of its light within 10° of the mirror
-    direction is not diffuse, one that changes as the frame turns about the normal is anisotropic, and one that is for
-    reflection and transmission does both."""
+    direction is not diffuse, one whose f or density changes as the frame turns about the normal is anisotropic, so is a
+    delta function that does not turn with the light, one that is for reflection and transmission does both, and one
+    that the differentials of uv change needs them."""
     probe, kinds = run.probe, mi.BSDFFlags
     for part in probe.components:
         outcome = Outcome("flags", part.name)
@@ -188,18 +209,17 @@ def flags(run: Run) -> Findings:
                     )
         if part.has(kinds.Reflection) and part.has(kinds.Transmission):
             _check_both_ways(run, outcome, part)
-        varies = part.has(kinds.SpatiallyVarying)
-        if not part.has(kinds.Anisotropic) and not varies:
-            difference = _turned(run, part)
-            if difference > 100 * run.rounding(part):
-                outcome.fault(
-                    f"f changes by up to {difference:.1%} as both directions turn about the normal, but it is not "
-                    "flagged anisotropic",
-                    difference,
-                    wi=on_side(direction(40), part.sides[0]),
-                    seed=5,
-                )
+        if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
+            _check_turned(run, outcome, part)
+        if not probe.bsdf.needs_differentials():
+            _check_differentials(run, outcome, part)
         yield outcome.finding("They fit what it does.")
+    for k in probe.deltas:
+        part = Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
+        outcome = Outcome("flags", part.name)
+        if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
+            _check_delta_turned(run, outcome, part)
+        yield outcome.finding("It turns with the light, or is flagged anisotropic.")
 
 
 def _check_both_ways(run: Run, outcome: Outcome, part: Part) -> None:
@@ -211,18 +231,61 @@ def _check_both_ways(run: Run, outcome: Outcome, part: Part) -> None:
         outcome.fault(f"it is flagged for reflection and transmission, but {does} and never {lacks}")
 
 
-def _turned(run: Run, part: Part) -> float:
-    """Return the typical relative change of f as the frame turns: nine tenths of the pairs change less."""
-    wi = np.tile(on_side(direction(40), part.sides[0]), (COUNT, 1))
+def _check_turned(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that f and the density are the same, but for one pair in a hundred, where both directions turn about the
+    normal by any angle."""
+    wi = on_side(hemisphere(COUNT, 8, 0.2), part.sides[0])
     wo = run.probe.sample(part, wi, random(COUNT, 5)).wo
-    before = run.probe.eval(part, wi, wo).max(axis=1)
-    largest = 0.0
-    for angle in (35, 90):
-        cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        matrix = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        after = run.probe.eval(part, (wi @ matrix).astype(np.float32), (wo @ matrix).astype(np.float32)).max(axis=1)
+    turned = _turned(wi), _turned(wo)
+    for name, method in (("f", run.probe.eval), ("pdf", run.probe.pdf)):
+        before, after = (method(part, *pair).reshape(COUNT, -1).max(axis=1) for pair in ((wi, wo), turned))
         lit = np.maximum(before, after) > 0
-        if lit.any():
-            change = abs(after - before)[lit] / np.maximum(before, after)[lit]
-            largest = max(largest, float(np.quantile(np.nan_to_num(change), 0.9)))
-    return largest
+        change = relative(after, before, 1e-6, unknown=0) * lit
+        difference = float(np.quantile(change[lit], 0.99)) if lit.any() else 0.0
+        if difference > 100 * run.rounding(part):
+            k = int(np.argmax(change))
+            outcome.fault(
+                f"{name} changes by up to {difference:.1%} as both directions turn about the normal, but it is not "
+                "flagged anisotropic",
+                difference,
+                wi=wi[k],
+                wo=wo[k],
+            )
+
+
+def _check_delta_turned(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that the direction of a delta function turns with the light."""
+    wi, u = on_side(hemisphere(COUNT, 8, 0.2), part.sides[0]), random(COUNT, 5)
+    before, after = run.probe.sample(part, wi, u), run.probe.sample(part, _turned(wi), u)
+    lit = before.weight.any(axis=1) & after.weight.any(axis=1)
+    apart = np.linalg.norm(after.wo - _turned(before.wo), axis=1) * lit
+    if np.quantile(apart, 0.99) > 1e-3:
+        k = int(np.argmax(apart))
+        outcome.fault(
+            f"light from {angles_of(wi[k])} goes to {angles_of(before.wo[k])}, but light from "
+            f"{angles_of(_turned(wi)[k])} to {angles_of(after.wo[k])}: it does not turn with the light about the "
+            "normal, and is not flagged anisotropic",
+            apart.max(),
+            wi=wi[k],
+            seed=5,
+        )
+
+
+def _turned(w: Array) -> Array:
+    """Return directions, each turned about the normal by an angle of its own."""
+    angle = 2 * np.pi * np.random.default_rng(9).random(len(w))
+    (x, y, z), cos, sin = w.T.astype(np.float64), np.cos(angle), np.sin(angle)
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1).astype(np.float32)
+
+
+def _check_differentials(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that f does not change with the differentials of uv, which nobody computes unless flags ask for them."""
+    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (10, 11))
+    wo[::2] = run.probe.sample(part, wi, random(COUNT, 12)).wo[::2]
+    si = interaction(wi)
+    si.duv_dx, si.duv_dy = mi.Vector2f(0.3, 0.1), mi.Vector2f(-0.1, 0.2)
+    value = numbers(run.probe.bsdf.eval(part.context, si, vectors(wo), True), COUNT)
+    without = run.probe.eval(part, wi, wo)
+    error = relative(value, without)
+    name, why = "with differentials of uv eval", "without them, but it is not flagged NeedsDifferentials"
+    outcome.wrong(error * (error > 10 * run.rounding(part)), name, value, why, wi, wo, expected=without)

@@ -24,6 +24,7 @@ from .updates import attach, traced_floats, value_of
 COUNT = 2000
 AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
 """Methods in an order in which each follows each."""
+UNKNOWN = "no_such_attribute"
 
 
 def active(run: Run) -> Findings:
@@ -189,21 +190,23 @@ def calls(run: Run) -> Findings:
     """Check that calls depend on what they are given alone: ``eval``, ``pdf`` and ``sample`` return the same for the
     same arguments whatever was called before, in whatever lane, and where the surface is turned in the world, as their
     directions are local: to float32's rounding, for 99 in a hundred. And they leave the surface point, directions and
-    context as they are, and where Python defines ``to_string``, ``str`` of the BSDF does not raise."""
+    context as they are; where Python defines ``to_string``, ``str`` of the BSDF does not raise; and ``has_attribute``
+    does not say yes to any name."""
     probe, part = run.probe, run.probe.whole
     outcome, elsewhere = Outcome("calls", part.name), replace(probe, turned=True)
     wi, wo, u = scattered(COUNT, 76, part.sides), scattered(COUNT, 77, part.sides), random(COUNT, 78)
-    wo[::2] = probe.sample(part, wi, u).wo[::2]
+    uv = random(COUNT, 79)[:, :2]
+    wo[::2] = probe.sample(part, wi, u, uv).wo[::2]
 
     def called(method: str, probe: BSDFProbe = probe, order: slice = slice(None)) -> tuple[dict[str, Array], Array]:
         """Return what a method returns, by name, and the directions that it goes to, in the usual order."""
-        i, o, variates = (np.ascontiguousarray(it[order]) for it in (wi, wo, u))
+        i, o, variates, at = (np.ascontiguousarray(it[order]) for it in (wi, wo, u, uv))
         if method == "sample":
-            it = probe.sample(part, i, variates)
+            it = probe.sample(part, i, variates, at)
             wanted = {"a sample's weight": it.weight, "a sample's density": it.density[:, None]}
             lit = it.lit[order, None]
             return {name: value[order] * lit for name, value in wanted.items()}, it.wo[order] * lit
-        return {method: getattr(probe, method)(part, i, o).reshape(COUNT, -1)[order]}, wo
+        return {method: getattr(probe, method)(part, i, o, at).reshape(COUNT, -1)[order]}, wo
 
     first = {method: called(method) for method in ("sample", "eval", "pdf")}
 
@@ -227,7 +230,7 @@ def calls(run: Run) -> Findings:
     for k, (before, method) in enumerate(pairwise(AFTER_EACH_OTHER)):
         order = slice(None, None, 1 if k % 2 else -1)
         before = "sample and eval" if before == "sample" else before  # as the probe calls them
-        compare(f"after a call of {before} for other directions", method, *called(method, order=order))
+        compare(f"after a call of {before} for other directions and points", method, *called(method, order=order))
     for method in first:
         compare("where the surface is turned in the world", method, *called(method, elsewhere))
     _check_arguments(run, outcome, wi, wo, u)
@@ -237,6 +240,8 @@ def calls(run: Run) -> Findings:
                 str(probe.bsdf)
     except Exception as error:
         outcome.fault(f"str of it raises {told(error)}", np.inf)
+    if np.any(probe.bsdf.has_attribute(UNKNOWN, True)):
+        outcome.fault(f'has_attribute says that it has "{UNKNOWN}", as it may of any name', np.inf)
     yield outcome.finding("Calls depend on what they are given alone, and change nothing.")
 
 

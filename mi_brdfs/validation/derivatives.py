@@ -35,9 +35,10 @@ def gradients(run: Run) -> Findings:
     at a jump, they prove nothing and do not count, and where that is so of most, a value beside the one given is looked
     at.
 
-    Where ``eval`` has a derivative, so has what ``sample`` returns, which integrators that are differentiated step by
-    step use (``prb`` calls ``eval`` again): the direction, or else the weight, whose derivative is that of eval over
-    pdf. Plugins of ours detach the direction and its density; others may differentiate the density.
+    ``eval_pdf`` has the derivatives of ``eval``. Where that has one, so has what ``sample`` returns, which integrators
+    that are differentiated step by step use (``prb`` calls ``eval`` again): the direction, or else the weight, whose
+    derivative is that of eval over pdf. Plugins of ours detach the direction and its density; others may differentiate
+    the density.
 
     A parameter of a plugin of ours that an optimiser took beyond its range is evaluated at the limit, and led back:
     where a derivative inside the limit is not zero, the reverse derivative of the sum of the values or that of its
@@ -209,24 +210,35 @@ def _compare_directional(run: Run, outcome: Outcome) -> str:
 def _check_weight(
     run: Run, outcome: Outcome, params: mi.SceneParameters, key: str, wi: Array, u: Array, expected: Array
 ) -> None:
-    """Check the derivative of ``sample``'s weight, where that of value over pdf is ``expected``."""
+    """Check the derivatives of ``eval_pdf``'s value and of ``sample``'s weight, where that of ``eval`` over pdf is
+    ``expected``."""
     bsdf, whole = run.probe.bsdf, run.probe.whole
     attach(params, key)
     bs, weight = bsdf.sample(whole.context, interaction(wi), *sample_arguments(u), True)
     value, density = bsdf.eval_pdf(whole.context, interaction(wi), dr.detach(bs.wo), True)
     quotient = value / density
-    twice = bs.wo * 2  # only ends of the graph keep a derivative, and the weight may depend on the direction
-    moved, found, attached = (np.zeros((len(wi), 1)) for _ in range(3))
-    if dr.grad_enabled(weight, twice, quotient):
+    # Only ends of the graph keep a derivative, and the weight may depend on the direction.
+    twice, pair = bs.wo * 2, value / dr.detach(density)
+    moved, found, attached, of_pair = (np.zeros((len(wi), 1)) for _ in range(4))
+    if dr.grad_enabled(weight, twice, quotient, pair):
         dr.forward(params[key])
-        moved, found, attached = (numbers(dr.grad(it), len(wi)) for it in (twice, weight, quotient))
+        moved, found, attached, of_pair = (numbers(dr.grad(it), len(wi)) for it in (twice, weight, quotient, pair))
     dr.disable_grad(params[key])
     if not np.isfinite(found).all():
         outcome.fault(
             f"{1 - np.isfinite(found).mean():.1%} of the derivatives of sample's weight are not finite", np.inf
         )
     size = abs(expected).mean()
-    if moved.any() or not size > 1e-5:  # less is rounding, as where an index of refraction of 1 reflects nothing
+    if not size > 1e-5:  # less is rounding, as where an index of refraction of 1 reflects nothing
+        return
+    error = abs(np.nan_to_num(of_pair) - expected).mean()
+    if error > TOLERANCE * size:
+        outcome.fault(
+            f"the derivatives of eval_pdf's value over pdf average {abs(of_pair).mean():.3g} in size, but those of "
+            f"eval over pdf {size:.3g}, and differ by {error / size:.0%}",
+            error / size,
+        )
+    if moved.any():
         return
     # Plugins other than ours may differentiate their density, too.
     accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(attached)]

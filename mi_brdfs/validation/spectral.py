@@ -54,8 +54,8 @@ def spectral(run: Run) -> Findings:
 
     And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
     and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
-    colours have there, and not that of another wavelength, be it one beside it. For this the BSDF must be given as a
-    dict."""
+    colours have there, and not that of another wavelength, be it one beside it; their order does not matter. For this
+    the BSDF must be given as a dict."""
     part = run.probe.whole
     if run.given is None:
         yield Finding("spectral", part.name, "skip", "To load it in two variants, its dict is needed.")
@@ -98,8 +98,7 @@ def spectral(run: Run) -> Findings:
                     for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
                     for check in checks
                 }
-                if greys:
-                    _check_channels(run, outcome, greys)
+                _check_channels(run, outcome, greys)
         except Exception as failure:
             yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
             return
@@ -139,6 +138,11 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     ]
     errors = np.array([[_error(got[:, k], grey[other][:, k])[1] for other in range(count)] for k in range(count)])
     if mi.is_spectral:
+        rolled = np.roll(evaluated(coloured, np.roll(wavelengths, 1, axis=1)), -1, axis=1)
+        error, typical = _error(rolled, got)
+        if typical > TOLERANCE:
+            name = f"in another order of the wavelengths {_at(wavelengths, error)}"
+            outcome.wrong(error, name, rolled, "in the first: it takes another's value", wi, wo, expected=got)
         # Asked at any wavelengths, these textures have the values of the light's, also to make a tint of.
         bound = evaluated(load(given | {name: pinned(texture, si) for name, texture in textures.items()}), wavelengths)
         error, typical = _error(got, bound)

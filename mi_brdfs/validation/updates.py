@@ -25,7 +25,8 @@ COUNT = 1000
 def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
     value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. And what
-    is set of one changes no other BSDF of the plugin. For this the BSDF must be given as a dict."""
+    is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change. For
+    this the BSDF must be given as a dict."""
     probe, part = run.probe, run.probe.whole
     if run.given is None:
         yield Finding("updates", "whole", "skip", "To load it with another value, its dict is needed.")
@@ -71,6 +72,13 @@ def updates(run: Run) -> Findings:
                 error = relative(got, expected)
                 over = error * (error > 10 * run.rounding(part))
                 outcome.wrong(over, name, got, but, wi, wo, expected=expected)
+            params[key] = original
+            probe.bsdf.parameters_changed()
+            back, why = probe.eval(part, wi, wo), "before: parameters_changed without names must take up any change"
+            error = relative(back, before)
+            over = error * (error > 10 * run.rounding(part))
+            outcome.wrong(over, "once it is set back, eval", back, why, wi, wo, expected=before)
+            set_value(params, key, value)
             ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
             turned = np.linalg.norm(ours.wo - loaded.wo, axis=1) * (ours.lit & loaded.lit)
             # A choice among lobes may fall otherwise where a rounding error decides it.

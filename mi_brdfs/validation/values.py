@@ -23,8 +23,10 @@ def _pairs(part: Part) -> tuple[Array, Array]:
     edge = np.array([direction(theta, phi) for theta in thetas for phi in (0, 30, 90, 180, 210)])
     wi, wo = (w.reshape(-1, 3) for w in np.broadcast_arrays(edge[:, None], edge[None]))
     generic = hemisphere(4000, 1), hemisphere(4000, 2)
-    mirrored = edge * np.array([-1, -1, 1], np.float32)
-    wi, wo = np.concatenate([wi, edge, generic[0]]), np.concatenate([wo, mirrored, generic[1]])
+    # A dot product of unit vectors may exceed 1 by a rounding error: of one exact mirror pair in four.
+    exact = np.concatenate([edge, generic[0][:1000]])
+    mirrored = exact * np.array([-1, -1, 1], np.float32)
+    wi, wo = np.concatenate([wi, exact, generic[0]]), np.concatenate([wo, mirrored, generic[1]])
     sides = [(i, o) for i in part.sides for o in (1, -1)]
     wi, wo = (np.concatenate([on_side(w, side[which]) for side in sides]) for which, w in enumerate((wi, wo)))
     return np.ascontiguousarray(wi), np.ascontiguousarray(wo)
