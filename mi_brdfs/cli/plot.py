@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
+from .options import MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
 from .terminal import Exit, fail, failing, out, stdout_to_stderr
 
 
@@ -16,16 +16,13 @@ from .terminal import Exit, fail, failing, out, stdout_to_stderr
 def plot(
     targets: Annotated[
         list[str],
-        typer.Argument(
-            metavar="TYPE|FILE|XML…",
-            help="Plugins of the pack or others; files with a scene, a BSDF or measured values.",
-        ),
+        typer.Argument(metavar="MATERIAL…", help=MATERIAL),
     ],
     parameters: Annotated[
         list[str] | None,
         parameters_option(
-            "Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws each "
-            "value."
+            "Set a parameter of each material that has it to a number, a word, true, false, #rrggbb or 'r;g;b'; "
+            "name=a,b,c draws each value."
         ),
     ] = None,
     kind: Annotated[
@@ -57,7 +54,6 @@ def plot(
     if kind not in asked.KINDS:
         fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
     with failing(Exit.USAGE):
-        bsdfs = asked.asked_for(targets, parameters or [])
         options = asked.options_of(
             kind, angles, azimuth=azimuth, scale=scale, normalize=normalize or None, rgb=rgb or None
         )
@@ -65,6 +61,7 @@ def plot(
     set_tracing_variant(variant)
     with stdout_to_stderr():
         with failing(Exit.USAGE):
+            bsdfs = asked.asked_for(targets, parameters or [])
             figure = asked.KINDS[kind](*bsdfs, **options)
         with writing_to(file):
             asked.write(figure, file)

@@ -11,7 +11,7 @@ import typer
 
 from ..preview import STAGES, preview_scene
 from .app import command
-from .options import MOST_PIXELS, AnyVariant, Parameters, parameters_of, set_variant, source_of
+from .options import MATERIAL, MOST_PIXELS, AnyVariant, Parameters, parameters_of, set_variant, source_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing
 
@@ -20,10 +20,7 @@ from .terminal import Exit, fail, failing
 def show(
     material: Annotated[
         str,
-        typer.Argument(
-            metavar="TYPE|FILE|FILE.xml:ID|XML",
-            help="A plugin of the pack or another; a file with a BSDF or measured values; one BSDF of a scene.",
-        ),
+        typer.Argument(metavar="MATERIAL", help=MATERIAL),
     ],
     parameters: Parameters = None,
     stage: Annotated[str, typer.Option(metavar="STAGE", help=f"The light: {', '.join(STAGES)}.")] = "studio",
