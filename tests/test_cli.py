@@ -32,7 +32,7 @@ SCENE = """<scene version="3.0.0">
     <film type="hdrfilm"><integer name="width" value="$res"/><integer name="height" value="$res"/></film>
     <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
   </sensor>
-  <shape type="obj"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
+  <shape type="obj" id="sheet"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
   <emitter type="constant"/>
 </scene>
 """
@@ -132,6 +132,35 @@ def test_the_output_option_names_either_file_and_the_seed_the_noise(folder):
     assert not np.allclose(pixels[0], pixels[2], rtol=1e-3)
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("processes", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_materials_of_a_scene_are_replaced(folder, processes):
+    """By the id of a BSDF, wherever it is referred to, or of a shape; also where it had none."""
+    (folder / "balls.xml").write_text(
+        '<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/><sensor type="orthographic">'
+        '<transform name="to_world"><scale x="3" y="3"/><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>'
+        '<film type="hdrfilm"><integer name="width" value="3"/><integer name="height" value="3"/>'
+        '<rfilter type="box"/></film></sensor><bsdf type="diffuse" id="paint"/>'
+        + "".join(
+            f'<shape type="rectangle" id="{id}">{inner}<transform name="to_world"><translate x="{x}"/></transform>'
+            "</shape>"
+            for id, x, inner in (("a", -2, '<ref id="paint"/>'), ("b", 0, '<ref id="paint"/>'), ("c", 2, ""))
+        )
+        + "</scene>"
+    )
+    words = ["--workers", processes] * bool(processes)
+    black, white = "lambert:reflectance=0", "lambert:reflectance=1"
+    for replaced, expected in [
+        ((f"paint={black}", f"c={white}"), [0, 0, 1]),
+        ((f"a={white}", f"b={black}"), [1, 0, 0.5]),
+    ]:
+        options = [word for it in replaced for word in ("--replace", it)]
+        done = invoke("render", "balls.xml", "--spp", 256, "-o", "it.exr", *options, *words, cwd=folder)
+        assert done.exit_code == 0, done.stderr
+        row = np.array(mi.Bitmap(str(folder / "it.exr")))[1, :, 0]
+        np.testing.assert_allclose(row, expected, atol=0.02)
+
+
 @pytest.mark.slow
 def test_mitsubas_warnings_go_to_stderr(folder):
     done = run("render", "scenes/box.xml", "--variant", "llvm_ad_mono", cwd=folder)
@@ -149,6 +178,10 @@ ERRORS = {
     "our parameter": (["scenes/ward.xml", "-Dalpha=2.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 2.7 .*allowed"),
     "misspelt parameter": (["scenes/misspelt.xml"], 1, "scenes/misspelt.xml: line 2: .*reflectanse"),
     "bad value": (["scenes/box.xml", "-Dres=many"], 1, 'scenes/box.xml: line 8: .*"many"'),
+    "no pixels": (["scenes/box.xml", "-Dres=0"], 1, "the film's width is 0; give it at least 1 pixel"),
+    "no such id": (["scenes/box.xml", "--replace", "roof=ward"], 1, "has the id roof; there are sheet"),
+    "no material": (["scenes/box.xml", "--replace", "sheet=wrad"], 2, 'no plugin "wrad"; did you mean "ward"'),
+    "malformed --replace": (["scenes/box.xml", "--replace", "sheet"], 2, "--replace sheet: write ID=MATERIAL"),
     "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
     "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
     "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),
