@@ -19,6 +19,7 @@ import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.mitsuba import llvm
 from mi_brdfs.mitsuba.errors import one_line
+from mi_brdfs.probe.sources import value_of
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
@@ -75,6 +76,40 @@ def test_types_are_listed_and_have_pages():
     page = invoke("info", "ward").stdout
     assert page.startswith(mi_brdfs.info("ward").splitlines()[0])
     assert "alpha_u" in page and "``" not in page
+
+
+WORDS = {
+    "ggx": ("walter", ""), "trowbridge-reitz": ("microfacet", "distribution=ggx"),
+    "beckmann": ("microfacet", "distribution=beckmann"), "oren-nayar": ("orennayar", ""), "pbr": ("burley", ""),
+    "gltf": ("metallicroughness", ""), "principled": ("burley", ""), "roughconductor": ("walter", "material=Au"),
+    "Gold": ("walter", "material=Au"), "roughness": ("ward", "alpha"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_words_of_other_programs_lead_to_models(word):
+    """With the option that they need; what is hinted at exists."""
+    plugin, option = WORDS[word]
+    found = invoke("list", "--search", word).stdout.splitlines()
+    (row,) = (line for line in found if line.startswith(f"{plugin} "))
+    assert option in row and len(found) < 13
+    told = re.search("did you mean '(\\w+)'(?: with (\\w+)=([\\w.]+))?", invoke("info", word).stderr)
+    with mi.variant_context("scalar_rgb"):
+        mi.load_dict({"type": told[1]} | ({told[2]: value_of(told[3])} if told[2] else {}))
+
+
+def test_nothing_goes_by_a_word():
+    done = invoke("list", "--search", "zzz")
+    assert done.exit_code == 2 and "no model goes by the word zzz" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("plugin", "wrong", "hint"),
+    [("ward", {"roughness": 0.1}, "did you mean alpha?"), ("walter", {"material": "Gold"}, 'did you mean "Au"?')],
+)
+def test_parameters_by_other_names(plugin, wrong, hint):
+    with mi.variant_context("scalar_rgb"), pytest.raises(RuntimeError, match=re.escape(hint)):
+        mi.load_dict({"type": plugin, **wrong})
 
 
 def states(text):

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from ..model import Model
 from ..parameters import Parameter, PerLobe, Quantity, nested
-from ..parameters.messages import listed, meant
+from ..parameters.messages import listed
+from ..parameters.vocabulary import hint
 from ..probe.arrays import Array
 from ..probe.parameter_space import choices
 from .observations import FitError
@@ -246,8 +247,8 @@ def check_names(models: Iterable[type[Model]], names: Iterable[str]) -> None:
     known = {name for model in models for name in known_names(model)}
     for wrong in names:
         if wrong not in known:
-            near, plugins = meant(wrong, known), ", ".join(model.plugins[0] for model in models)
-            raise FitError(f"{plugins}: there is no parameter {wrong}" + (f"; did you mean {near}?" if near else "."))
+            question, plugins = hint(wrong, known, ""), ", ".join(model.plugins[0] for model in models)
+            raise FitError(f"{plugins}: there is no parameter {wrong}" + (f"; {question}" if question else "."))
 
 
 def _combinations(
