@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from support import ROOT
+from typer.main import get_command
 from typer.testing import CliRunner
 
 import mi_brdfs
@@ -76,6 +77,21 @@ def test_types_are_listed_and_have_pages():
     page = invoke("info", "ward").stdout
     assert page.startswith(mi_brdfs.info("ward").splitlines()[0])
     assert "alpha_u" in page and "``" not in page
+
+
+def test_help_is_in_panels_with_examples_that_can_be_typed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    commands = get_command(app).commands
+    panels = [it.rich_help_panel for it in commands.values()]
+    assert list(dict.fromkeys(panels)) == ["Look", "Measure", "Validate", "Develop"] and panels == sorted(
+        panels, key=["Look", "Measure", "Validate", "Develop"].index
+    )
+    for name, it in commands.items():
+        heading, *examples = it.epilog.split("\n\n")
+        assert heading == "Examples:" and examples
+        for program, command, *words in map(str.split, examples):
+            assert (program, command) == ("mi-brdfs", name)
+            it.make_context(name, words)  # refuses what is no option
 
 
 WORDS = {

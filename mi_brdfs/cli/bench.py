@@ -22,7 +22,7 @@ from .options import (
 from .terminal import Exit, err, failing, print_table, progress, stdout_to_stderr
 
 
-@command()
+@command("Validate", "bench ward phong:exponent=30", "bench walter roughconductor -D alpha=.3")
 def bench(
     targets: Annotated[
         list[str],

@@ -51,7 +51,12 @@ class Settings(NamedTuple):
     """What it is compared with, in place of the checks."""
 
 
-@command()
+@command(
+    "Validate",
+    "check ward:alpha=.05 scene.xml:paint",
+    "check --import my_brdf.py lommel --html check.html",
+    "check walter:alpha=.3,f0=.9 --against mine.xml",
+)
 def check(
     targets: Annotated[
         list[str] | None,

@@ -22,7 +22,7 @@ from .options import (
 from .terminal import Exit, err, failing, print_paragraph, stdout_to_stderr
 
 
-@command()
+@command("Measure", "convert paint.bsdf paint.binary", "convert fit.json:walter paint.csv")
 def convert(
     given: Annotated[
         str,

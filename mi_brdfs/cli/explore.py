@@ -28,7 +28,7 @@ from .options import (
 from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 
-@command()
+@command("Look", "explore walter burley:roughness=.3", "explore paint.binary fit.json:walter --scene room.xml:wall")
 def explore(
     targets: Annotated[
         list[str] | None,

@@ -41,7 +41,12 @@ Starts = Annotated[int, typer.Option(min=1, help="From how many settings each fi
 Cut = Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")]
 
 
-@command("fit")
+@command(
+    "Measure",
+    "fit paint.binary --model ward,walter -o report.html",
+    "fit paint.binary -o best.xml --json fit.json --save fits",
+    name="fit",
+)
 def fit_(
     files: Files,
     model: Models = "all",

@@ -12,8 +12,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from .. import info as manual
-from ..mitsuba.registry import DATA, all_models
+from ..mitsuba.registry import DATA, all_models, find_plugin
 from ..model import Plugin
 from ..parameters import nested
 from ..parameters.vocabulary import OTHERS, key
@@ -21,7 +20,7 @@ from .app import command
 from .terminal import Exit, fail, failing, out, print_table
 
 
-@command("list")
+@command("Look", "list", "list --search gold", name="list")
 def list_(
     search: Annotated[
         str | None, typer.Option(metavar="WORD", help="Only those that a word leads to, also one of other programs.")
@@ -54,11 +53,11 @@ def _options(model: type[Plugin], word: str) -> list[str] | None:
     return sorted(named.values()) if found or is_named else None
 
 
-@command()
+@command("Look", "info walter", "info tabulated")
 def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or alias, as `list` shows it.")]) -> None:
     """Show the manual page of a BRDF."""
     with failing(Exit.ERROR):
-        page = manual(type)
+        page = find_plugin(type).manual()
     page = re.sub(r":\w+:`([^`]+)`", r"\1", page)
     out.print(_styled(folded(page, out.width) if out.is_terminal else page))
 

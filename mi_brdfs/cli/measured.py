@@ -20,7 +20,7 @@ FORMATS = "MERL, RGL, MBSDF, Zemax, LightTools, ALTA, Cornell, CSV or UTIA"
 """Those that can be read, as the help says, which does not wait for the readers."""
 
 
-@command()
+@command("Measure", "measured paint.binary --plot paint.png")
 def measured(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help=f"Measured BRDFs: {FORMATS}.")],
     plot_file: Annotated[

@@ -54,7 +54,7 @@ Parameters = Annotated[
     list[str] | None,
     parameters_option(
         "Set a parameter of each material that has it to a number, a word, true, false, #rrggbb or 'r;g;b', or a "
-        "<default> of its XML; may be repeated. MATERIAL:name=value,name=value sets those of one."
+        "<default> of its XML; may be repeated."
     ),
 ]
 MATERIAL = (

@@ -12,7 +12,9 @@ from .options import MATERIAL, TracingVariant, file_option, parameters_option, s
 from .terminal import Exit, fail, failing, out, stdout_to_stderr
 
 
-@command()
+@command(
+    "Look", "plot ward:alpha=.1,.2,.4 --kind cartesian", "plot paint.binary fit.json:walter --angles 30,60 -o fit.pdf"
+)
 def plot(
     targets: Annotated[
         list[str],
@@ -45,6 +47,13 @@ def plot(
     rgb: Annotated[
         bool, typer.Option("--rgb", help="Draw red, green and blue, not the luminance, for polar, cartesian, albedo.")
     ] = False,
+    title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure; not for sphere.")] = None,
+    labels: Annotated[
+        str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels; not for sphere. Default: as needed.")
+    ] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
@@ -55,7 +64,15 @@ def plot(
         fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
     with failing(Exit.USAGE):
         options = asked.options_of(
-            kind, angles, azimuth=azimuth, scale=scale, normalize=normalize or None, rgb=rgb or None
+            kind,
+            angles,
+            azimuth=azimuth,
+            scale=scale,
+            normalize=normalize or None,
+            rgb=rgb or None,
+            title=title,
+            labels=labels and labels.split(","),
+            size=asked.size_of(size),
         )
         file = asked.output_file(output, kind, targets)
     set_tracing_variant(variant)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..probe.sources import BSDFSource
 
 
-@command()
+@command("Look", "render room.xml --spp 64 --denoise", "render room.xml --replace wall=fit.json:walter -o wall.png")
 def render(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.xml", help="The scene file.")],
     output: Output = None,

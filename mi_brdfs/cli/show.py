@@ -16,7 +16,7 @@ from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing
 
 
-@command()
+@command("Look", "show walter:material=Au,alpha=.2 --denoise", "show best.xml --stage lamp -o best.png")
 def show(
     material: Annotated[
         str,

@@ -220,12 +220,22 @@ def find_model(name: str) -> type[Model]:
 
 
 def info(name: str) -> str:
-    """Return the manual page of a plugin: formula and source, conventions, properties, and the table of its parameters.
+    """Return the manual page of a plugin: formula and source, conventions, properties, and the table of its parameters;
+    plain text, without the marks of reStructuredText about names.
 
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
     """
-    return _find(name, _own_plugins()).manual()
+    return re.sub(r":\w+:`([^`]+)`", r"\1", find_plugin(name).manual()).replace("``", "")
+
+
+def find_plugin(name: str) -> type[Plugin]:
+    """Return the class of a plugin name, of a model or of another plugin.
+
+    Raises:
+        ValueError: as :func:`info`.
+    """
+    return _find(name, _own_plugins())
 
 
 def presets(model: str | None = None) -> list[str]:

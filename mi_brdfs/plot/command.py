@@ -86,6 +86,23 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
     return options
 
 
+def size_of(text: str | None) -> tuple[float, float] | None:
+    """Return the width and the height that are given as 6x4, in inches.
+
+    Raises:
+        ValueError: if they are no such numbers.
+    """
+    if text is None:
+        return None
+    try:
+        width, height = map(float, text.split("x"))
+    except ValueError:
+        width = height = 0
+    if not (1 <= width <= 50 and 1 <= height <= 50):
+        raise ValueError(f"--size {text}: write WIDTHxHEIGHT, in inches from 1 to 50, as in 6x4")
+    return width, height
+
+
 def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
     """Return the file to write, by default one in the working directory, named after its content.
 
