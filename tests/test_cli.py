@@ -13,12 +13,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from support import ROOT
+from typer.main import get_command
 from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.mitsuba import llvm
 from mi_brdfs.mitsuba.errors import one_line
+from mi_brdfs.probe.sources import value_of
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
@@ -32,7 +34,7 @@ SCENE = """<scene version="3.0.0">
     <film type="hdrfilm"><integer name="width" value="$res"/><integer name="height" value="$res"/></film>
     <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
   </sensor>
-  <shape type="obj"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
+  <shape type="obj" id="sheet"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
   <emitter type="constant"/>
 </scene>
 """
@@ -75,6 +77,55 @@ def test_types_are_listed_and_have_pages():
     page = invoke("info", "ward").stdout
     assert page.startswith(mi_brdfs.info("ward").splitlines()[0])
     assert "alpha_u" in page and "``" not in page
+
+
+def test_help_is_in_panels_with_examples_that_can_be_typed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    commands = get_command(app).commands
+    panels = [it.rich_help_panel for it in commands.values()]
+    assert list(dict.fromkeys(panels)) == ["Look", "Measure", "Validate", "Develop"] and panels == sorted(
+        panels, key=["Look", "Measure", "Validate", "Develop"].index
+    )
+    for name, it in commands.items():
+        heading, *examples = it.epilog.split("\n\n")
+        assert heading == "Examples:" and examples
+        for program, command, *words in map(str.split, examples):
+            assert (program, command) == ("mi-brdfs", name)
+            it.make_context(name, words)  # refuses what is no option
+
+
+WORDS = {
+    "ggx": ("walter", ""), "trowbridge-reitz": ("microfacet", "distribution=ggx"),
+    "beckmann": ("microfacet", "distribution=beckmann"), "oren-nayar": ("orennayar", ""), "pbr": ("burley", ""),
+    "gltf": ("metallicroughness", ""), "principled": ("burley", ""), "roughconductor": ("walter", "material=Au"),
+    "Gold": ("walter", "material=Au"), "roughness": ("ward", "alpha"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_words_of_other_programs_lead_to_models(word):
+    """With the option that they need; what is hinted at exists."""
+    plugin, option = WORDS[word]
+    found = invoke("list", "--search", word).stdout.splitlines()
+    (row,) = (line for line in found if line.startswith(f"{plugin} "))
+    assert option in row and len(found) < 13
+    told = re.search("did you mean '(\\w+)'(?: with (\\w+)=([\\w.]+))?", invoke("info", word).stderr)
+    with mi.variant_context("scalar_rgb"):
+        mi.load_dict({"type": told[1]} | ({told[2]: value_of(told[3])} if told[2] else {}))
+
+
+def test_nothing_goes_by_a_word():
+    done = invoke("list", "--search", "zzz")
+    assert done.exit_code == 2 and "no model goes by the word zzz" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("plugin", "wrong", "hint"),
+    [("ward", {"roughness": 0.1}, "did you mean alpha?"), ("walter", {"material": "Gold"}, 'did you mean "Au"?')],
+)
+def test_parameters_by_other_names(plugin, wrong, hint):
+    with mi.variant_context("scalar_rgb"), pytest.raises(RuntimeError, match=re.escape(hint)):
+        mi.load_dict({"type": plugin, **wrong})
 
 
 def states(text):
@@ -132,6 +183,35 @@ def test_the_output_option_names_either_file_and_the_seed_the_noise(folder):
     assert not np.allclose(pixels[0], pixels[2], rtol=1e-3)
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("processes", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_materials_of_a_scene_are_replaced(folder, processes):
+    """By the id of a BSDF, wherever it is referred to, or of a shape; also where it had none."""
+    (folder / "balls.xml").write_text(
+        '<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/><sensor type="orthographic">'
+        '<transform name="to_world"><scale x="3" y="3"/><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>'
+        '<film type="hdrfilm"><integer name="width" value="3"/><integer name="height" value="3"/>'
+        '<rfilter type="box"/></film></sensor><bsdf type="diffuse" id="paint"/>'
+        + "".join(
+            f'<shape type="rectangle" id="{id}">{inner}<transform name="to_world"><translate x="{x}"/></transform>'
+            "</shape>"
+            for id, x, inner in (("a", -2, '<ref id="paint"/>'), ("b", 0, '<ref id="paint"/>'), ("c", 2, ""))
+        )
+        + "</scene>"
+    )
+    words = ["--workers", processes] * bool(processes)
+    black, white = "lambert:reflectance=0", "lambert:reflectance=1"
+    for replaced, expected in [
+        ((f"paint={black}", f"c={white}"), [0, 0, 1]),
+        ((f"a={white}", f"b={black}"), [1, 0, 0.5]),
+    ]:
+        options = [word for it in replaced for word in ("--replace", it)]
+        done = invoke("render", "balls.xml", "--spp", 256, "-o", "it.exr", *options, *words, cwd=folder)
+        assert done.exit_code == 0, done.stderr
+        row = np.array(mi.Bitmap(str(folder / "it.exr")))[1, :, 0]
+        np.testing.assert_allclose(row, expected, atol=0.02)
+
+
 @pytest.mark.slow
 def test_mitsubas_warnings_go_to_stderr(folder):
     done = run("render", "scenes/box.xml", "--variant", "llvm_ad_mono", cwd=folder)
@@ -149,6 +229,10 @@ ERRORS = {
     "our parameter": (["scenes/ward.xml", "-Dalpha=2.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 2.7 .*allowed"),
     "misspelt parameter": (["scenes/misspelt.xml"], 1, "scenes/misspelt.xml: line 2: .*reflectanse"),
     "bad value": (["scenes/box.xml", "-Dres=many"], 1, 'scenes/box.xml: line 8: .*"many"'),
+    "no pixels": (["scenes/box.xml", "-Dres=0"], 1, "the film's width is 0; give it at least 1 pixel"),
+    "no such id": (["scenes/box.xml", "--replace", "roof=ward"], 1, "has the id roof; there are sheet"),
+    "no material": (["scenes/box.xml", "--replace", "sheet=wrad"], 2, 'no plugin "wrad"; did you mean "ward"'),
+    "malformed --replace": (["scenes/box.xml", "--replace", "sheet"], 2, "--replace sheet: write ID=MATERIAL"),
     "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
     "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
     "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),

@@ -44,7 +44,10 @@ def test_ranks_models_and_writes_rows(tmp_path):
         (("--variant", "scalar_rgb"), "this needs a vectorized and unpolarized variant, not scalar_rgb"),
         (("--json", "nowhere/x.json"), "--json nowhere/x.json: there is no folder nowhere"),
         (("-o", "nowhere/r.html"), "-o nowhere/r.html: there is no folder nowhere"),
-        (("-o", "r.pdf"), "-o r.pdf: the report is a page; give it a name that ends in .html"),
+        (("-o", "r.pdf"), "-o r.pdf: give the report a name that ends in .html, or the best fit one in .xml"),
+        ((LOFT, "-o", "r.xml"), "-o r.xml: it holds one fit, and there are 2 files; give --save FOLDER"),
+        ((LOFT, "--save", "all"), "--save all: two files are called AnoBlackEC1onAlum; fit them"),
+        (("--save", "r.xml"), "--save r.xml: name a folder for all fits, or write the best one with -o r.xml"),
         (("--model", "ward,phong", "-D", "alpah=0.2"), "ward, phong: there is no parameter alpah; did you mean alpha?"),
         (("-D", "alpha=0.2,0.3"), "-D alpha=0.2,0.3: only a choice can have several values"),
         (("-D", "alpha"), "-D alpha: write -D name=value"),
@@ -54,6 +57,26 @@ def test_wrong_usage_gets_a_sentence(arguments, sentence, tmp_path):
     done = invoke("fit", LOFT, *arguments, cwd=tmp_path)
     assert done.exit_code == 2 and done.stdout == ""
     assert sentence in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_fits_are_files_that_scenes_include(tmp_path):
+    """The best, and each in a folder; values at a limit are the limit itself."""
+    options = "--model", "walter,lambert", "--starts", 2, "-o", "best.xml", "--save", "all", "--json", "fit.json"
+    done = invoke("fit", LOFT, *options, cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    assert sorted(it.name for it in (tmp_path / "all").iterdir()) == [
+        f"{LOFT.stem}-{it}.xml" for it in ("lambert", "walter")
+    ]
+    best, *_ = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
+    assert best["bounds"] == ["specular_reflectance"] and best["bsdf"]["specular_reflectance"] == 1
+    (tmp_path / "scene.xml").write_text(
+        '<scene version="3.0.0"><include filename="best.xml"/>'
+        f'<shape type="sphere"><ref id="{LOFT.stem}"/></shape></scene>'
+    )
+    included = mi.load_file(str(tmp_path / "scene.xml")).shapes()[0].bsdf()
+    for it in included, mi.load_file(str(tmp_path / "all" / f"{LOFT.stem}-walter.xml")):
+        assert str(it) == str(mi.load_dict(best["bsdf"]))
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -71,6 +71,9 @@ def test_scales(limits):
     slope = (unknown.from_scale(inner + 1e-6) - unknown.from_scale(inner - 1e-6)) / 2e-6
     np.testing.assert_allclose(unknown.slope(x[1:-1]), slope, rtol=1e-5)
     assert unknown.at_end(x[0]) and unknown.at_end(x[-1]) and not unknown.at_end(x[4])
+    near = np.array([x[0], x[-1]]) * [1 + 1e-9, 1 - 1e-9]  # is written as the end, of the range itself if it is sought
+    ends = limits if unknown.scale == "logit" else (unknown.low, unknown.high)
+    assert [unknown.shown(float(it)) for it in near] == list(ends) and unknown.shown(x[4]) == x[4]
 
 
 def test_a_choice_that_means_nothing_is_fitted_once():

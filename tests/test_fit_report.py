@@ -16,6 +16,7 @@ from test_cli import invoke, run
 from test_validation_html import Page
 
 from mi_brdfs.fit import FitError, appearance, fit, report
+from mi_brdfs.fit.html import Card, Section
 
 MEASURED = ROOT / "scenes" / "measured"
 LOFT = MEASURED / "AnoBlackEC1onAlum.bsdf"
@@ -126,6 +127,30 @@ def small(monkeypatch):
 def fits():
     """Of two materials, two each."""
     return fit([str(LOFT), str(MEASURED / "aeroglaze_z307.bsdf")], ["ward", "lambert"], starts=1)
+
+
+@pytest.mark.parametrize(
+    ("error", "bic", "told"),
+    [
+        (1.03, 9, "second is as good: its held-out error is only 3.0 % larger."),
+        (1.03, 12, "second is close, its held-out error is only 3.0 % larger, but its BIC is worse by 12."),
+        (1.03, -12, "second is close, its held-out error is only 3.0 % larger, and its BIC is better by 12."),
+        (2, -12, "The held-out error of the next, second, is 2 times as large. By the BIC it would be second."),
+    ],
+)
+def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
+    """None is as good that has very strong evidence against it."""
+    first = replace(fits[0], model="first", bic=0, errors={"log": {"held_out": 1.0}})
+    second = replace(fits[1], model="second", bic=bic, errors={"log": {"held_out": error}})
+    verdict = Section("m", "f", [Card(first, 1), Card(second, 2)]).verdict
+    assert verdict.startswith(f"first comes nearest to the data. {told}")
+
+
+def test_it_prints_in_full(written):
+    """What is folded opens, and nothing is cut off at the edge of the paper."""
+    assert "addEventListener('beforeprint'" in written[2] and "held out.Δ" not in written[2]
+    paper = re.search(r"@media print \{(.*?)\n\}", written[2], re.DOTALL)[1]
+    assert ".wide, pre { overflow: visible }" in paper and 'loading="lazy"' not in written[2]
 
 
 @pytest.mark.slow

@@ -494,6 +494,9 @@ def test_each_kind_has_its_file(folder):
     done = run("ward", "--param", "alpha=0.1,0.4", "--param", "variant=ward-duer", "--scale", "log")
     assert (done.exit_code, done.stdout, done.stderr) == (0, "ward-polar.png\n", "")
     assert min(mi.Bitmap(str(folder / "ward-polar.png")).size()) > 800
+    assert run("ward", "--kind", "albedo", "--size", "3x2", "--title", "A", "-o", "s.png").stdout == "s.png\n"
+    assert list(mi.Bitmap(str(folder / "s.png")).size()) == [600, 400]
+    (folder / "s.png").unlink()
     assert run("lambert", "toon", "--kind", "sphere", "--angles", "20").stdout == "lambert-toon-sphere.html\n"
     assert run('<bsdf type="lambert"/>', "--kind", "cartesian", "-o", "b.pdf").stdout == "b.pdf\n"
     names = {file.name for file in folder.iterdir()}
@@ -511,7 +514,8 @@ WRONG = {
     "empty": (["ward", "--param", "alpha=0.1,,"], 2, "write name=value"),
     "twice": (["ward", "--param", "alpha=0.1", "--param", "alpha=0.2"], 2, "alpha is given twice"),
     "two sweeps": (["ward", "--param", "a=1,2", "--param", "b=1,2"], 2, "a and b have several values each"),
-    "of XML": (['<bsdf type="ward"/>', "--param", "alpha=0.1"], 2, "in its XML"),
+    "of XML": (['<bsdf type="ward"/>', "--param", "alpha=0.1"], 2, "no <default> parameter of this name"),
+    "of none": (["ward", "phong", "-D", "alhpa=0.1"], 2, "ward: unknown parameter alhpa; did you mean alpha?"),
     "no file": (["gone.xml"], 2, "gone.xml: no such file"),
     "bad XML": (["<bsdf"], 2, "parsing failed"),
     "angle": (["ward", "--angles", "95"], 2, "degrees, not 95"),
@@ -521,6 +525,9 @@ WRONG = {
     "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale does not apply to albedo"),
     "no azimuth": (["ward", "--azimuth", "nan"], 2, "--azimuth nan: give degrees"),
     "no maximum": (["ward", "--kind", "hemisphere", "--normalize"], 2, "--normalize does not apply to hemisphere"),
+    "size": (["ward", "--size", "5"], 2, "--size 5: write WIDTHxHEIGHT, in inches"),
+    "no size": (["ward", "--kind", "sphere", "--size", "3x3"], 2, "--size does not apply to sphere"),
+    "label": (["ward", "phong", "--labels", "a"], 2, "there are 2 BSDFs, but 1 labels"),
     "no channels": (["ward", "--kind", "sphere", "--rgb"], 2, "--rgb does not apply to sphere"),
     "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),
     "page": (["ward", "--kind", "sphere", "-o", "ward.png"], 2, "ward.png: sphere is written as .html"),

@@ -86,6 +86,7 @@ def test_no_builtin_is_shadowed():
 def test_list_and_info():
     assert {"lambert", "phong", "ward", "walter"} <= set(mi_brdfs.list_models())
     page = mi_brdfs.info("ward")
+    assert not any("``" in mi_brdfs.info(name) or ":func:" in mi_brdfs.info(name) for name in mi_brdfs.list_models())
     for part in ("doi:10.1145/133994.134078", "alpha_u, alpha_v", "balanced | ward | ward-duer", "Reciprocal"):
         assert part in page
     with pytest.raises(ValueError, match="There is no model 'phnog'; did you mean 'phong'"):

@@ -20,7 +20,7 @@ from mi_brdfs.cli.app import imported
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import warn_once
 from mi_brdfs.probe.arrays import interaction, vectors
-from mi_brdfs.probe.sources import find_sources
+from mi_brdfs.probe.sources import find_sources, shared, split
 from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
 from mi_brdfs.validation.formats import block, junit
@@ -289,6 +289,45 @@ def test_materials_of_a_scene(tmp_path):
     assert sorted(alphas) == pytest.approx([0.1, 0.3])
     with pytest.raises(ValueError, match="no such material; there are TwoSidedBRDF of Ward, Ward 1"):
         list(find_sources(f"{path}:gold"))
+    (path := tmp_path / "a:b=c.xml").write_text('<!-- >< -->\n<bsdf type="ward"/>')  # no version, a trap of a name
+    assert [source.name for source in find_sources(str(path))] == ["a:b=c.xml"]
+
+
+FITS = """[{"model": "ward", "file": "a.bsdf", "bsdf": {"type": "ward", "alpha": 0.2}},
+{"model": "phong", "file": "a.bsdf", "bsdf": {"type": "phong", "exponent": 9}}]"""
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_materials_have_parameters_of_their_own(tmp_path):
+    """They go before those for all, of which each has what it declares."""
+    (tmp_path / "fit.json").write_text(FITS)
+    (tmp_path / "scene.xml").write_text(SCENE)
+    fits, scene = str(tmp_path / "fit.json"), str(tmp_path / "scene.xml")
+
+    def loaded(word, **parameters):
+        sources = list(find_sources(word, parameters))
+        return [it if isinstance(it, dict) else mi.traverse(it) for it in (source.load() for source in sources)]
+
+    colour = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
+    assert loaded("ward:alpha=0.3,diffuse_reflectance=.1;.2;.3", alpha="0.1", rotation="9") == [
+        {"type": "ward", "alpha": 0.3, "diffuse_reflectance": colour, "rotation": 9}
+    ]
+    assert loaded(f"{fits}:ward:alpha=.3") == [{"type": "ward", "alpha": 0.3}]
+    assert loaded(fits, alpha="0.4") == [{"type": "ward", "alpha": 0.4}, {"type": "phong", "exponent": 9}]
+    assert loaded(f"{scene}:plastic:n=33", n="12")[0]["exponent.value"] == 33
+    words = ["ward", "phong", f"{fits}:phong", scene, '<bsdf type="ward"/>', "roughconductor", "scan.binary"]
+    given = shared(words, {"alpha": "1", "exponent": "2", "n": "3", "quantity": "f", "nope": "4"})
+    assert [" ".join(own) for own in given] == [
+        "alpha nope", "exponent nope", "exponent nope", "n nope", "nope", "alpha nope", "quantity nope",
+    ]  # fmt: skip
+    assert split("plot:alpha=.1,.2,variant=a") == ("plot", {"alpha": ".1,.2", "variant": "a"})
+    assert split(r"C:\x\scene.xml:gold") == (r"C:\x\scene.xml:gold", {})
+    for word, text in ("ward:alpha=", "write alpha=value"), (f"{fits}:gold", "there are ward, phong"):
+        with pytest.raises(ValueError, match=text):
+            list(find_sources(word))
+    (tmp_path / "fit.json").write_text('[{"model": "ward"}]')
+    with pytest.raises(ValueError, match="it holds no fits, as mi-brdfs fit --json writes them"):
+        list(find_sources(fits))
 
 
 # --- The command ----------------------------------------------------------------------------------------------------

@@ -23,7 +23,9 @@ def main(
     try:
         from website.build import build
     except ImportError as error:
-        print(f"the site needs {error.name}: pip install 'mi_brdfs[site]'", file=sys.stderr)
+        # What another extra brings is told in a sentence, without a name.
+        told = f"the site needs {error.name}: pip install 'mi_brdfs[site]'" if error.name else str(error)
+        print(told, file=sys.stderr)
         raise typer.Exit(2) from None
     status = build(folder)
     print(folder / "index.html")

@@ -14,6 +14,7 @@ from typing import Annotated, Any, cast
 
 import mitsuba as mi
 import typer
+from rich.markup import escape
 
 from .. import __version__
 from ..mitsuba import guests
@@ -80,8 +81,10 @@ Imports = Annotated[
 ]
 
 
-def command(name: str | None = None) -> Callable:
-    """Register a function as a command, with the option --import, which Ctrl-C and missing extras end in a sentence."""
+def command(panel: str, *examples: str, name: str | None = None) -> Callable:
+    """Register a function as a command in a panel of the help, which ends with examples, with the option --import;
+    Ctrl-C and missing extras end it in a sentence."""
+    lines = [f"mi-brdfs {escape(example)}" for example in examples]
 
     def add(function: Callable) -> Callable:
         @functools.wraps(function)
@@ -105,6 +108,6 @@ def command(name: str | None = None) -> Callable:
         parameters = [*signature.parameters.values(), option]
         importing.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         importing.__annotations__ = {**inspect.get_annotations(function, eval_str=True), "imports": Imports}
-        return app.command(name)(importing)
+        return app.command(name, rich_help_panel=panel, epilog="\n\n".join(["Examples:", *lines]))(importing)
 
     return add

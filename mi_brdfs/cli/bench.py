@@ -9,18 +9,24 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import Parameters, TracingVariant, file_option, parameters_of, set_tracing_variant, sources_of, write_json
+from .options import (
+    MATERIAL,
+    Parameters,
+    TracingVariant,
+    file_option,
+    parameters_of,
+    set_tracing_variant,
+    sources_of,
+    write_json,
+)
 from .terminal import Exit, err, failing, print_table, progress, stdout_to_stderr
 
 
-@command()
+@command("Validate", "bench ward phong:exponent=30", "bench walter roughconductor -D alpha=.3")
 def bench(
     targets: Annotated[
         list[str],
-        typer.Argument(
-            metavar="TYPE|FILE|FILE.xml:ID|XML…",
-            help="One BSDF or two: plugins; files with a scene, a BSDF or measured values; one BSDF of a scene.",
-        ),
+        typer.Argument(metavar="MATERIAL…", help=f"One or two. {MATERIAL}"),
     ],
     parameters: Parameters = None,
     json_file: Annotated[Path | None, file_option("--json", "Also write all figures to this file.")] = None,
@@ -35,7 +41,7 @@ def bench(
         from ..bench.comparison import STAGES, compare
 
         task = bar.add_task("", total=len(STAGES))
-        sources = [source for word in targets for source in sources_of(word, given)]
+        sources = sources_of(targets, given)
         with failing(Exit.USAGE):
             result = compare(*sources, on_progress=lambda stage: bar.update(
                 task, description=stage, completed=STAGES.index(stage)))  # fmt: skip

@@ -24,6 +24,7 @@ from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
 from .options import (
+    MATERIAL,
     Parameters,
     TracingVariant,
     file_option,
@@ -50,14 +51,16 @@ class Settings(NamedTuple):
     """What it is compared with, in place of the checks."""
 
 
-@command()
+@command(
+    "Validate",
+    "check ward:alpha=.05 scene.xml:paint",
+    "check --import my_brdf.py lommel --html check.html",
+    "check walter:alpha=.3,f0=.9 --against mine.xml",
+)
 def check(
     targets: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="TYPE|FILE|FILE.xml:ID|XML…",
-            help="Plugins of the pack or others; files with a scene, a BSDF or measured values; one BSDF of a scene.",
-        ),
+        typer.Argument(metavar="MATERIAL…", help=MATERIAL),
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
     parameters: Parameters = None,
@@ -105,7 +108,7 @@ def check(
     warnings.simplefilter("ignore", EnergyWarning)  # the report says it
     with stdout_to_stderr():
         words = targets or [model.plugins[0] for model in all_models()]
-        sources = [source for word in words for source in sources_of(word, given)]
+        sources = sources_of(words, given)
         settings = Settings(options, None if against is None else source_of(against, {}))
         reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])

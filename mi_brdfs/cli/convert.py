@@ -9,6 +9,7 @@ import typer
 
 from .app import command
 from .options import (
+    MATERIAL,
     Parameters,
     TracingVariant,
     check_output,
@@ -21,13 +22,11 @@ from .options import (
 from .terminal import Exit, err, failing, print_paragraph, stdout_to_stderr
 
 
-@command()
+@command("Measure", "convert paint.bsdf paint.binary", "convert fit.json:walter paint.csv")
 def convert(
     given: Annotated[
         str,
-        typer.Argument(
-            metavar="IN", help="A measured file; or a BSDF: the type of a plugin, FILE.xml, FILE.xml:ID, or XML."
-        ),
+        typer.Argument(metavar="MATERIAL", help=MATERIAL),
     ],
     output: Annotated[
         Path, typer.Argument(metavar="OUT", help="The file to write: .binary (MERL), .bsdf (RGL or Zemax), .csv.")
@@ -43,15 +42,17 @@ def convert(
     check_output("OUT", output)
     from ..measured import convert as converted
     from ..measured import read
-    from ..probe.sources import is_measured  # imports numpy
+    from ..probe.sources import is_measured, split  # imports numpy
 
-    is_file = is_measured(given)
-    values = {} if is_file else parameters_of(parameters)
-    quantity: Any = quantity_of(parameters) if is_file else None
+    with failing(Exit.USAGE):
+        word, own = split(given)
+    is_file = is_measured(word)
+    values = parameters_of(parameters) | own
+    quantity: Any = quantity_of(values) if is_file else None
     if not is_file:
         set_tracing_variant(variant)
     with stdout_to_stderr(), err.status(f"Writing {output.name}"), writing_to(output), failing(Exit.USAGE):
-        taken = read(given, quantity) if is_file else source_of(given, values, "convert").load()
+        taken = read(word, quantity) if is_file else source_of(word, values, "convert").load()
         result = converted(taken, output, format)
     for line in str(result).splitlines():
         print_paragraph(line)

@@ -11,7 +11,7 @@ from .app import command
 from .terminal import Exit, out, print_table
 
 
-@command()
+@command("Develop", "doctor")
 def doctor() -> None:
     """Show which variants work on this machine, which LLVM is used, and how to enable the others."""
     findings = doctor_module.examine()

@@ -32,7 +32,7 @@ class Measured(NamedTuple):
     found: list[tuple[dict[str, Any], Maximum]]
 
 
-@command()
+@command("Develop", "energy walter --check", "energy --import my_brdf.py lommel")
 def energy(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="TYPE…", help="Types, as `list` shows them. Default: all.")

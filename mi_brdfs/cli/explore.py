@@ -15,18 +15,24 @@ import typer
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from .app import command
-from .options import Parameters, TracingVariant, file_option, parameters_of, set_tracing_variant, source_of, write_text
+from .options import (
+    MATERIAL,
+    Parameters,
+    TracingVariant,
+    file_option,
+    parameters_of,
+    set_tracing_variant,
+    source_of,
+    write_text,
+)
 from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 
-@command()
+@command("Look", "explore walter burley:roughness=.3", "explore paint.binary fit.json:walter --scene room.xml:wall")
 def explore(
     targets: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="TYPE|FILE|PRESET…",
-            help="Up to four: plugins of the pack or Mitsuba's, measured files, published materials, FILE.xml:ID.",
-        ),
+        typer.Argument(metavar="MATERIAL…", help=f"Up to four. {MATERIAL}"),
     ] = None,
     parameters: Parameters = None,
     scene: Annotated[
@@ -99,25 +105,31 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     from ..explorer.materials import Materials, plain
     from ..explorer.state import GIVEN, MEASURED, PRESET, SUBJECTS, checked
     from ..mitsuba.registry import presets
-    from ..probe.sources import is_measured, value_of
+    from ..probe.sources import is_measured, shared, split, value_of
 
     if len(targets) > SUBJECTS:
         fail(f"a page shows {SUBJECTS} BSDFs at most, these are {len(targets)}", Exit.USAGE)
-    values = plain({name: value_of(text) for name, text in given.items()})
     sources, subjects = [], []
     known = set(presets())
-    for target in targets:
+    with failing(Exit.USAGE):
+        each = shared(targets, given)
+    for target, options in zip(targets, each, strict=True):
         with failing(Exit.USAGE):
-            if target in known:
-                subject = {**Materials().expanded({"type": PRESET, "name": target}), **values}
-            elif is_measured(target) and os.path.exists(target):
-                sources.append(source_of(target, {}))
+            word, own = split(target)
+            texts = options | own
+            values = plain({name: value_of(text) for name, text in texts.items()})
+            if word in known:
+                subject = {**Materials().expanded({"type": PRESET, "name": word}), **values}
+            elif is_measured(word) and os.path.exists(word):
+                sources.append(source_of(word, {}))
                 subject = {"type": MEASURED, "file": sources[-1].word, **values}
-            elif ".xml" in target or target.startswith("<"):
-                sources.append(source_of(target, given))
-                subject = {"type": GIVEN, "file": sources[-1].word}
+            elif not (word.startswith("<") or ".xml" in word or ".json" in word):
+                subject = {"type": word, **values}
+            elif isinstance(fitted := (source := source_of(word, texts)).load(), dict):
+                subject = plain(fitted)
             else:
-                subject = {"type": target, **values}
+                sources.append(source._replace(word=target))
+                subject = {"type": GIVEN, "file": target}
             materials = Materials({it.word: it for it in sources})
             with materials.loaded(materials.expanded(checked(subject))):
                 pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,6 +24,7 @@ from .options import (
     set_tracing_variant,
     write_json,
     write_text,
+    writing_to,
 )
 from .terminal import Exit, err, fail, failing, out, print_table, progress, stdout_to_stderr
 
@@ -39,7 +41,12 @@ Starts = Annotated[int, typer.Option(min=1, help="From how many settings each fi
 Cut = Annotated[float, typer.Option(min=1, max=90, help="The largest angle to the normal, in degrees.")]
 
 
-@command("fit")
+@command(
+    "Measure",
+    "fit paint.binary --model ward,walter -o report.html",
+    "fit paint.binary -o best.xml --json fit.json --save fits",
+    name="fit",
+)
 def fit_(
     files: Files,
     model: Models = "all",
@@ -62,7 +69,12 @@ def fit_(
     image: Annotated[
         bool, typer.Option("--image", help="Rank by FLIP, the error of a rendered picture as an eye sees it.")
     ] = False,
-    output: Annotated[Path | None, file_option("-o", "Also write a page with pictures.", "FILE.html")] = None,
+    output: Annotated[
+        Path | None, file_option("-o", "Also write a page with pictures, or the best fit.", "FILE.html|FILE.xml")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Also write each fit there: FILE-MODEL.xml.")
+    ] = None,
     json_file: Annotated[Path | None, file_option("--json", "Also write all fits to this file.")] = None,
     variant: TracingVariant = None,
 ) -> None:
@@ -70,8 +82,17 @@ def fit_(
     is finished."""
     from ..fit import find_metric
 
-    if output and output.suffix.lower() not in (".html", ".htm"):
-        fail(f"-o {output}: the report is a page; give it a name that ends in .html", Exit.USAGE)
+    best = output if output and output.suffix.lower() == ".xml" else None
+    report = None if best else output
+    if report and report.suffix.lower() not in (".html", ".htm"):
+        fail(f"-o {output}: give the report a name that ends in .html, or the best fit one in .xml", Exit.USAGE)
+    if best and len(files) > 1:
+        fail(f"-o {output}: it holds one fit, and there are {len(files)} files; give --save FOLDER", Exit.USAGE)
+    if save and save.suffix.lower() == ".xml":
+        fail(f"--save {save}: name a folder for all fits, or write the best one with -o {save}", Exit.USAGE)
+    names_of_files = [_id(file) for file in files]
+    if save and (twice := next((name for name in names_of_files if names_of_files.count(name) > 1), None)):
+        fail(f"--save {save}: two files are called {twice}; fit them into different folders", Exit.USAGE)
     with failing(Exit.USAGE):
         find_metric(metric)
         models = all_models() if model == "all" else find_models(model.split(","))
@@ -83,11 +104,14 @@ def fit_(
         from ..fit.appearance import evaluator
 
         evaluator()  # is there, or the error says what brings it
-    if output:
+    if report:
         from ..fit.html import Page
 
         page = Page()
     set_tracing_variant(variant, "_ad_rgb")
+    if save:
+        with writing_to(save):
+            save.mkdir(parents=True, exist_ok=True)
     names = [it.plugins[0] for it in models]
     fits: list[Fit] = []
     complete, seen, failed = True, True, 0
@@ -111,13 +135,24 @@ def fit_(
     interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(names)} fits were finished."
     if complete and not seen:
         interrupted = "Interrupted; not all pictures were made."
-    if page and output and ranked:
-        write_text(output, page.text(interrupted))
+    if page and report and ranked:
+        write_text(report, page.text(interrupted))
+    if best and ranked:
+        write_text(best, ranked[0][0].to_xml(_id(files[0])) + "\n")
+    if save:
+        for it in fits:
+            name = _id(Path(it.file), it.model)
+            write_text(save / f"{name}.xml", it.to_xml(name) + "\n")
     if interrupted:
         err.print(interrupted)
         raise typer.Exit(Exit.INTERRUPTED)
     if failed:
         raise typer.Exit(Exit.ERROR)
+
+
+def _id(file: Path, *words: str) -> str:
+    """Return an id, which is also the name of a file, for what is fitted to a file."""
+    return re.sub(r"[^\w-]+", "_", "-".join([file.stem, *words]))
 
 
 def _given(parameters: dict[str, str], models: list[type[Model]]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from .options import MOST_PIXELS, AnyVariant, set_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
-@command()
+@command("Look", "gallery ward walter --presets -o pictures")
 def gallery(
     types: Annotated[
         list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases, as `list` shows them. Default: all.")

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ..mitsuba.errors import one_line
 from .app import command
-from .options import check_output, file_option, parameters_option, quantity_of, write_json, writing_to
+from .options import check_output, file_option, parameters_of, parameters_option, quantity_of, write_json, writing_to
 from .terminal import Exit, err, fail, out, print_table
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ FORMATS = "MERL, RGL, MBSDF, Zemax, LightTools, ALTA, Cornell, CSV or UTIA"
 """Those that can be read, as the help says, which does not wait for the readers."""
 
 
-@command()
+@command("Measure", "measured paint.binary --plot paint.png")
 def measured(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help=f"Measured BRDFs: {FORMATS}.")],
     plot_file: Annotated[
@@ -39,7 +39,7 @@ def measured(
 
     if plot_file is not None:
         _check_picture(plot_file)
-    held = quantity_of(parameters)
+    held = quantity_of(parameters_of(parameters))
     drawn, findings, failed = [], [], 0
     for file in files:
         try:

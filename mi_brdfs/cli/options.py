@@ -53,10 +53,15 @@ def scheduler_option(doing: str) -> Any:
 Parameters = Annotated[
     list[str] | None,
     parameters_option(
-        "Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b', or a <default> of the XML; "
-        "may be repeated."
+        "Set a parameter of each material that has it to a number, a word, true, false, #rrggbb or 'r;g;b', or a "
+        "<default> of its XML; may be repeated."
     ),
 ]
+MATERIAL = (
+    "A plugin, a preset, a measured file, XML, FILE.xml:ID, fit.json:MODEL; each with its own parameters, as in "
+    "ward:alpha=.2,rotation=30."
+)
+"""What a material may be, as the help of each command says."""
 
 AnyVariant = Annotated[
     str | None,
@@ -89,25 +94,30 @@ def parameters_of(definitions: list[str] | None) -> dict[str, str]:
     return parameters
 
 
-def quantity_of(definitions: list[str] | None) -> Any:
-    """Return what ``-D quantity=…`` says that a measured file holds, which has no other parameters."""
-    parameters = {"quantity": "stated"} | parameters_of(definitions)
+def quantity_of(parameters: dict[str, str]) -> Any:
+    """Return what the parameter ``quantity`` says that a measured file holds, which is read and has no others."""
+    parameters = {"quantity": "stated"} | parameters
     for name in parameters.keys() - {"quantity"}:
         fail(f"-D {name}: a measured file has no parameter but quantity", Exit.USAGE)
     return parameters["quantity"]
 
 
-def sources_of(word: str, parameters: dict[str, str]) -> list[BSDFSource]:
-    """Return the BSDFs that a word stands for, or fail with a sentence."""
-    from ..probe.sources import find_sources  # imports numpy
+def sources_of(words: list[str], parameters: dict[str, str]) -> list[BSDFSource]:
+    """Return the BSDFs that words stand for, each with those of the parameters that it has, or fail with a sentence."""
+    from ..probe.sources import find_sources, shared  # imports numpy
 
-    with failing(Exit.USAGE, Exception, about=word):
-        return list(find_sources(word, parameters))
+    found: list[BSDFSource] = []
+    with failing(Exit.USAGE, Exception):
+        given = shared(words, parameters)
+    for word, own in zip(words, given, strict=True):
+        with failing(Exit.USAGE, Exception, about=word):
+            found += find_sources(word, own)
+    return found
 
 
 def source_of(word: str, parameters: dict[str, str], verb: str = "name") -> BSDFSource:
     """Return the one BSDF that a word stands for."""
-    source, *others = sources_of(word, parameters)
+    source, *others = sources_of([word], parameters)
     if others:
         words = ", ".join(it.word for it in (source, *others))
         fail(f"{word} has several materials; {verb} one of {words}", Exit.USAGE)

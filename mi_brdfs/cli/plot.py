@@ -8,24 +8,23 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
+from .options import MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
 from .terminal import Exit, fail, failing, out, stdout_to_stderr
 
 
-@command()
+@command(
+    "Look", "plot ward:alpha=.1,.2,.4 --kind cartesian", "plot paint.binary fit.json:walter --angles 30,60 -o fit.pdf"
+)
 def plot(
     targets: Annotated[
         list[str],
-        typer.Argument(
-            metavar="TYPE|FILE|XML…",
-            help="Plugins of the pack or others; files with a scene, a BSDF or measured values.",
-        ),
+        typer.Argument(metavar="MATERIAL…", help=MATERIAL),
     ],
     parameters: Annotated[
         list[str] | None,
         parameters_option(
-            "Set a parameter of each TYPE to a number, a word, true, false, #rrggbb or 'r;g;b'; name=a,b,c draws each "
-            "value."
+            "Set a parameter of each material that has it to a number, a word, true, false, #rrggbb or 'r;g;b'; "
+            "name=a,b,c draws each value."
         ),
     ] = None,
     kind: Annotated[
@@ -48,6 +47,13 @@ def plot(
     rgb: Annotated[
         bool, typer.Option("--rgb", help="Draw red, green and blue, not the luminance, for polar, cartesian, albedo.")
     ] = False,
+    title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure; not for sphere.")] = None,
+    labels: Annotated[
+        str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels; not for sphere. Default: as needed.")
+    ] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
@@ -57,14 +63,22 @@ def plot(
     if kind not in asked.KINDS:
         fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
     with failing(Exit.USAGE):
-        bsdfs = asked.asked_for(targets, parameters or [])
         options = asked.options_of(
-            kind, angles, azimuth=azimuth, scale=scale, normalize=normalize or None, rgb=rgb or None
+            kind,
+            angles,
+            azimuth=azimuth,
+            scale=scale,
+            normalize=normalize or None,
+            rgb=rgb or None,
+            title=title,
+            labels=labels and labels.split(","),
+            size=asked.size_of(size),
         )
         file = asked.output_file(output, kind, targets)
     set_tracing_variant(variant)
     with stdout_to_stderr():
         with failing(Exit.USAGE):
+            bsdfs = asked.asked_for(targets, parameters or [])
             figure = asked.KINDS[kind](*bsdfs, **options)
         with writing_to(file):
             asked.write(figure, file)

@@ -17,7 +17,7 @@ LETTERS = {"alpha": "α", "exponent": "n", "b": "B"}
 """The parameters that are shown in the table, the width of the lobe."""
 
 
-@command("presets")
+@command("Look", "presets --like gold", "presets ngan/ward/blue-acrylic", name="presets")
 def presets_(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="Show this one, with its source.")] = None,
     model: Annotated[str | None, typer.Option(metavar="TYPE", help="Only those of this plugin.")] = None,

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import mitsuba as mi
 import typer
 
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
-from .options import AnyVariant, parameters_of, parameters_option, scheduler_option, set_variant
+from .options import AnyVariant, parameters_of, parameters_option, scheduler_option, set_variant, source_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
-from .terminal import Exit, fail, failing
+from .terminal import Exit, fail, failing, stdout_to_stderr
+
+if TYPE_CHECKING:
+    from ..probe.sources import BSDFSource
 
 
-@command()
+@command("Look", "render room.xml --spp 64 --denoise", "render room.xml --replace wall=fit.json:walter -o wall.png")
 def render(
     scene: Annotated[Path, typer.Argument(metavar="SCENE.xml", help="The scene file.")],
     output: Output = None,
@@ -23,6 +26,14 @@ def render(
     spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: the scene's.")] = None,
     seconds: Seconds = None,
     define: Annotated[list[str] | None, parameters_option("Set a <default> parameter of the scene.")] = None,
+    replacements: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--replace",
+            metavar="ID=MATERIAL",
+            help="Put a material in the place of the BSDF, or of that of the shape, with this id; may be repeated.",
+        ),
+    ] = None,
     sensor: Annotated[
         str, typer.Option(metavar="NUMBER|ID", help="Which of the scene's sensors, counted from 0, or its id.")
     ] = "0",
@@ -49,7 +60,11 @@ def render(
     files = output_files(output or Path(scene.stem + ".exr"))
     set_variant(variant)
 
-    file = SceneFile(str(scene), parameters, box_filter=denoise)
+    with stdout_to_stderr():
+        replaced = _replaced(replacements or [])
+    if scheduler and (file_of := next((it.word for it in replaced.values() if Path(it.source).exists()), None)):
+        fail(f"--replace: the workers of a scheduler do not have {file_of}; give a plugin or a preset", Exit.USAGE)
+    file = SceneFile(str(scene), parameters, box_filter=denoise, replaced=replaced)
 
     def load() -> tuple[mi.Scene, int]:
         loaded = _load(file)
@@ -77,6 +92,17 @@ def _window(text: str | None) -> list[int] | None:
     except ValueError:
         fail(f"--crop {text}: write four whole numbers, X,Y,WIDTH,HEIGHT", Exit.USAGE)
     return [x, y, width, height]
+
+
+def _replaced(options: list[str]) -> dict[str, BSDFSource]:
+    """Return the materials by the ids that they are given to."""
+    found = {}
+    for option in options:
+        id, equals, word = option.partition("=")
+        if not (id and equals and word):
+            fail(f"--replace {option}: write ID=MATERIAL, as in floor=burley:roughness=.2", Exit.USAGE)
+        found[id] = source_of(word, {})
+    return found
 
 
 def _index(scene: mi.Scene, sensor: str) -> int:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TABLES = "md", "csv"
 
 
-@command()
+@command("Measure", "sweep paints/*.binary --metric log,cube-root -o results")
 def sweep(
     files: Files,
     model: Models = "all",

@@ -12,7 +12,7 @@ from .options import file_option, parameters_of, parameters_option, write_text
 from .terminal import Exit, err, failing, out
 
 
-@command()
+@command("Look", "upgrade old.xml -o new.xml")
 def upgrade(
     old: Annotated[Path, typer.Argument(metavar="OLD.xml", help="A scene of Mitsuba 0.2 to 0.6.")],
     output: Annotated[

@@ -21,7 +21,13 @@ from .result import Fit, Median, medians, notes, values
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
 ALIKE = 1.05
-"""The ratio of errors up to which two models fit alike."""
+"""The ratio of errors up to which two models fit alike, unless BIC decides between them."""
+DECISIVE = 10
+"""The difference in BIC from which the evidence is called very strong.
+
+R. E. Kass, A. E. Raftery, Bayes factors, Journal of the American Statistical Association 90(430), 1995,
+doi:10.1080/01621459.1995.10476572.
+"""
 SCALES = 1, 2, 5, 10, 20, 50, 100
 """The ends of the scale of differences of lightness."""
 
@@ -68,12 +74,17 @@ class Section:
         if len(fits) == 1:
             return f"Only {best.model} was fitted. {agreement}"
         told = [f"{best.model} comes nearest to the data."]
-        ratio, name = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model
+        ratio, name, against = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model, fits[1].bic - best.bic
         kind = "held-out error" if best.flip is None else "FLIP error"
-        if ratio <= ALIKE:
-            told.append(f"{name} is as good: its {kind} is only {100 * (ratio - 1):.1f} % larger.")
-        else:
+        larger = f"its {kind} is only {100 * (ratio - 1):.1f} % larger"
+        if ratio > ALIKE:
             told.append(f"The {kind} of the next, {name}, is {ratio:.3g} times as large.")
+        elif abs(against) < DECISIVE:
+            told.append(f"{name} is as good: {larger}.")
+        elif against > 0:
+            told.append(f"{name} is close, {larger}, but its BIC is worse by {against:.0f}.")
+        else:
+            told.append(f"{name} is close, {larger}, and its BIC is better by {-against:.0f}.")
         winners = {"held-out error": min(fits, key=lambda it: it.held_out), "BIC": min(fits, key=lambda it: it.bic)}
         told += [f"By the {kind} it would be {it.model}." for kind, it in winners.items() if it is not best]
         return " ".join([*told, agreement])

@@ -157,9 +157,9 @@ class Fit:
         ]
         return row | {"remarks": self.remarks()}
 
-    def to_xml(self) -> str:
-        """Return the BSDF as XML, to paste into a scene."""
-        return to_xml(self.bsdf)
+    def to_xml(self, id: str = "") -> str:
+        """Return the BSDF as XML, to paste into a scene; with an id, to be a file of its own."""
+        return to_xml(self.bsdf, id)
 
 
 class Median(NamedTuple):

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from ..model import Model
 from ..parameters import Parameter, PerLobe, Quantity, nested
-from ..parameters.messages import listed, meant
+from ..parameters.messages import listed
+from ..parameters.vocabulary import hint
 from ..probe.arrays import Array
 from ..probe.parameter_space import choices
 from .observations import FitError
@@ -61,6 +62,8 @@ class Unknown:
     scale: str
     """One of ``SCALES``."""
     default: float | None = None
+    limits: tuple[float, float] = (-math.inf, math.inf)
+    """The ends of the parameter's own range, of which a share is sought up to ``EDGE``."""
 
     @property
     def label(self) -> str:
@@ -83,8 +86,14 @@ class Unknown:
         return SCALES[self.scale].slope(x, self.high + self.low)
 
     def shown(self, x: float) -> float:
-        """Return a value as a plugin dict has it: half turns change nothing."""
-        return x - round(2 * x) / 2 if self.scale == "turns" else x
+        """Return a value as a plugin dict has it: half turns change nothing, and what is at an end of the range is that
+        end itself."""
+        if self.scale == "turns":
+            return x - round(2 * x) / 2
+        if not self.at_end(x):
+            return x
+        k = int(abs(x - self.high) < abs(x - self.low))
+        return self.limits[k] if self.scale == "logit" else (self.low, self.high)[k]
 
     def at_end(self, x: float) -> bool:
         """Return whether a value is at an end of the range."""
@@ -107,7 +116,7 @@ def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
     else:
         low, scale = max(low, SMALLEST * min(high, 1)), "log"
     default = None if quantity.colour else quantity.default
-    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default)
+    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default, quantity.limits)
 
 
 @dataclass(frozen=True)
@@ -238,8 +247,8 @@ def check_names(models: Iterable[type[Model]], names: Iterable[str]) -> None:
     known = {name for model in models for name in known_names(model)}
     for wrong in names:
         if wrong not in known:
-            near, plugins = meant(wrong, known), ", ".join(model.plugins[0] for model in models)
-            raise FitError(f"{plugins}: there is no parameter {wrong}" + (f"; did you mean {near}?" if near else "."))
+            question, plugins = hint(wrong, known, ""), ", ".join(model.plugins[0] for model in models)
+            raise FitError(f"{plugins}: there is no parameter {wrong}" + (f"; {question}" if question else "."))
 
 
 def _combinations(

@@ -111,21 +111,38 @@ def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> An
     """Load a scene file, old or new."""
     with looking_in(path.parent):
         config = mi.parser.ParserConfig(mi.variant())
-        state, _ = parsed(config, path, lenient, parameters)
-        mi.parser.transform_all(config, state)
-        return mi.parser.instantiate(config, state)
+        state, upgraded = parsed(config, path, lenient, parameters)
+        try:
+            mi.parser.transform_all(config, state)
+            return mi.parser.instantiate(config, state)
+        except RuntimeError as error:  # of a file that was given a version
+            place = "string" if upgraded else str(path)
+            raise RuntimeError(
+                str(error).replace("loading string (line", f"loading {place} (line")
+            ) from error.__cause__
 
 
 def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
     """Return a scene file as Mitsuba's parser has it, and the text of an upgraded one."""
     check_name(str(path))
     if is_new(path):
-        return mi.parser.parse_file(config, str(path), **parameters), None
+        tag, attributes = root_of(path)
+        if not tag or "version" in attributes:
+            return mi.parser.parse_file(config, str(path), **parameters), None
+        return mi.parser.parse_string(config, versioned(path.read_text(encoding="utf-8-sig")), **parameters), None
     new = upgrade(path, lenient=lenient, **parameters)
     warnings.warn(
         f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade says what.", stacklevel=3
     )
     return mi.parser.parse_string(config, new.xml), new.xml
+
+
+def versioned(text: str) -> str:
+    """Return XML with a version in its root, as Mitsuba 3 demands; as it is if it has one."""
+    root = re.match(r"\s*(<[?!].*?>\s*)*<[\w:]+", text, re.DOTALL)
+    if not root or "version=" in text[root.end() :].partition(">")[0]:
+        return text
+    return f'{text[: root.end()]} version="3.0.0"{text[root.end() :]}'
 
 
 @contextmanager

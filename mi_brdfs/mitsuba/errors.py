@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..parameters.messages import brief, meant, printable
+from ..parameters.messages import brief, printable
+from ..parameters.vocabulary import hint
 from ..starting import Terminated
 from .registry import plugin_names
 
@@ -58,9 +59,8 @@ def _unknown_type(text: str) -> str | None:
     if not found:
         return None
     kind, name = found[1].replace("unknown", "").strip(), brief(found[2])
-    closest = meant(name, plugin_names())
-    hint = f'; did you mean "{closest}"?' if closest else ""
-    return f'there is no {f"{kind} " if kind else ""}plugin "{name}"{hint}'
+    question = hint(name, plugin_names())
+    return f'there is no {f"{kind} " if kind else ""}plugin "{name}"{question and f"; {question}"}'
 
 
 def _last_of_traceback(text: str) -> str:

@@ -24,7 +24,7 @@ from ..microfacet.terms import Term
 from ..model import Energy, Model, Plugin, full_name
 from ..models.microfacet import Microfacet
 from ..parameters import published
-from ..parameters.messages import meant
+from ..parameters.vocabulary import hint
 from ..starting import signals_held
 from ..tabulated.tabulated import Tabulated
 from . import llvm
@@ -220,12 +220,22 @@ def find_model(name: str) -> type[Model]:
 
 
 def info(name: str) -> str:
-    """Return the manual page of a plugin: formula and source, conventions, properties, and the table of its parameters.
+    """Return the manual page of a plugin: formula and source, conventions, properties, and the table of its parameters;
+    plain text, without the marks of reStructuredText about names.
 
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
     """
-    return _find(name, _own_plugins()).manual()
+    return re.sub(r":\w+:`([^`]+)`", r"\1", find_plugin(name).manual()).replace("``", "")
+
+
+def find_plugin(name: str) -> type[Plugin]:
+    """Return the class of a plugin name, of a model or of another plugin.
+
+    Raises:
+        ValueError: as :func:`info`.
+    """
+    return _find(name, _own_plugins())
 
 
 def presets(model: str | None = None) -> list[str]:
@@ -243,9 +253,8 @@ def presets(model: str | None = None) -> list[str]:
 
 def _find(name: str, plugins: dict) -> Any:
     if name not in plugins:
-        closest = meant(str(name), plugins)
-        hint = f"did you mean {closest!r}?" if closest else f"there are {', '.join(sorted(plugins))}."
-        raise ValueError(f"There is no model {name!r}; {hint}")
+        question = hint(str(name), plugins, "'") or f"there are {', '.join(sorted(plugins))}."
+        raise ValueError(f"There is no model {name!r}; {question}")
     return plugins[name]
 
 

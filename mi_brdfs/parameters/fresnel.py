@@ -12,9 +12,10 @@ import mitsuba as mi
 from ..math import clamp
 from .colours import rgb_texture
 from .groups import OneTerm
-from .messages import listed, meant, shown
+from .messages import listed, shown
 from .parameter import Parameter, ParameterRow
 from .reader import PropertyReader, Range
+from .vocabulary import hint
 
 
 class FresnelSet(OneTerm):
@@ -99,13 +100,13 @@ class ConductorName(Parameter):
             return self.replace()
         known = conductors()
         if material not in known:
-            closest = meant(material, known)
-            hint = f'; did you mean "{closest}"? It' if closest else "; it"
+            question = hint(material, known)
+            beginning = f"; {question} It" if question else "; it"
             # Of two measurements of a material, as Cu and Cu_palik, the first.
             first = [it for it in known if not (it.endswith("_palik") and it.removesuffix("_palik") in known)]
             raise reader.error(
                 self.name,
-                f'= {shown(material)} is unknown{hint} must be "none", for F = 1, or one of Mitsuba\'s conductors '
+                f'= {shown(material)} is unknown{beginning} must be "none", for F = 1, or one of Mitsuba\'s conductors '
                 + ", ".join(first),
             )
         textures = {name: _measured(_indices() / f"{material}.{name}.spd") for name in self.limits}

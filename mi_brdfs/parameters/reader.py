@@ -9,7 +9,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from .messages import brief, interval, kind_of, listed, meant, shown
+from .messages import brief, interval, kind_of, listed, shown
+from .vocabulary import hint
 
 Range = tuple[float, float]
 """The lowest and the highest value that a parameter may have; the latter may be infinite."""
@@ -56,9 +57,9 @@ class PropertyReader:
             )
         if not known:
             return f"{self.plugin}: unknown parameter {brief(name)}; it has no parameters."
-        closest = meant(name, known)
-        hint = f"; did you mean {closest}? Known are" if closest else "; known are"
-        return f"{self.plugin}: unknown parameter {brief(name)}{hint} {', '.join(shown)}."
+        question = hint(name, known, "")
+        beginning = f"; {question} Known are" if question else "; known are"
+        return f"{self.plugin}: unknown parameter {brief(name)}{beginning} {', '.join(shown)}."
 
     def number(self, name: str, default: float, limits: Range) -> mi.Texture:
         """Return the texture of a number."""

@@ -7,10 +7,12 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 
-def to_xml(bsdf: Mapping[str, Any]) -> str:
-    """Return a plugin dict of numbers, words and rgb colours as XML, to paste into a scene."""
+def to_xml(bsdf: Mapping[str, Any], id: str = "") -> str:
+    """Return a plugin dict of numbers, words and rgb colours as XML, to paste into a scene; with an id, to be a file of
+    its own, which a scene may ``<include>``."""
     lines = [f"    {_element(name, value)}" for name, value in bsdf.items() if name != "type"]
-    return "\n".join([f"<bsdf type={quoteattr(bsdf['type'])}>", *lines, "</bsdf>"])
+    alone = f' version="3.0.0" id={quoteattr(id)}' if id else ""
+    return "\n".join([f"<bsdf{alone} type={quoteattr(bsdf['type'])}>", *lines, "</bsdf>"])
 
 
 def _element(name: str, value: Any) -> str:

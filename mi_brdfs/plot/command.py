@@ -5,13 +5,15 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+from ..mitsuba.registry import plugin_names
 from ..parameters.messages import listed
-from ..probe.sources import degrees_of, value_of
+from ..probe.sources import degrees_of, shared, split, value_of
 from ..writing import replacing
 from . import albedo, cartesian, hemisphere, page, polar, sphere
 
@@ -22,33 +24,41 @@ DPI = 200
 
 
 def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | dict]:
-    """Return the BSDFs that words and ``--param`` options stand for: each word, as a plugin dict for each value of a
-    swept parameter.
+    """Return the BSDFs that words and ``--param`` options stand for: plugins with parameters as dicts, whose labels say
+    what differs, and other words with the parameters that they have; one for each value of a swept parameter.
 
     Raises:
         ValueError: if an option is malformed or fits no word.
     """
-    values: dict[str, list[Any]] = {}
+    given: dict[str, str] = {}
     for option in parameters:
-        name, _, given = option.partition("=")
-        if not name or not given or "" in given.split(","):
+        name, _, value = option.partition("=")
+        if not name or not value:
             raise ValueError(f"--param {option}: write name=value, or name=a,b,c to draw each value")
-        if name in values:
+        if name in given:
             raise ValueError(f"--param {name} is given twice; write {name}=a,b,c to draw each value")
-        values[name] = [value_of(text) for text in given.split(",")]
-    sweeps = [name for name, choices in values.items() if len(choices) > 1]
-    if len(sweeps) > 1:
-        raise ValueError(f"--param: {' and '.join(sweeps)} have several values each; only one parameter may")
-    if not values:
-        return list(targets)
-    for word in targets:
-        if word.startswith("<") or word.endswith(".xml"):
-            raise ValueError(f"--param sets parameters of plugins given by type; those of {word} are in its XML")
-    dicts: list[str | dict] = []
-    for word in targets:
-        fixed = {"type": word} | {name: choices[0] for name, choices in values.items()}
-        dicts += [fixed | {name: choice} for name in sweeps for choice in values[name]] or [fixed]
-    return dicts
+        given[name] = value
+    return [bsdf for word, own in zip(targets, shared(targets, given), strict=True) for bsdf in _swept(word, own)]
+
+
+def _swept(word: str, given: dict[str, str]) -> Iterator[str | dict]:
+    """Yield a word with its parameters, for each value of the one that has several."""
+    word, own = split(word)
+    values = {name: text.split(",") for name, text in (given | own).items()}
+    for name, choices in values.items():
+        if "" in choices:
+            raise ValueError(f"{name}={','.join(choices)}: write name=value, or name=a,b,c to draw each value")
+    if len(sweeps := [name for name, choices in values.items() if len(choices) > 1]) > 1:
+        raise ValueError(f"{' and '.join(sweeps)} have several values each; only one parameter may")
+    is_plugin = word in plugin_names()
+    for chosen in product(*values.values()):
+        pairs = dict(zip(values, chosen, strict=True))
+        if not pairs:
+            yield word
+        elif is_plugin:
+            yield {"type": word} | {name: value_of(text) for name, text in pairs.items()}
+        else:
+            yield f"{word}:{','.join(f'{name}={text}' for name, text in pairs.items())}"
 
 
 def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
@@ -76,6 +86,23 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
     return options
 
 
+def size_of(text: str | None) -> tuple[float, float] | None:
+    """Return the width and the height that are given as 6x4, in inches.
+
+    Raises:
+        ValueError: if they are no such numbers.
+    """
+    if text is None:
+        return None
+    try:
+        width, height = map(float, text.split("x"))
+    except ValueError:
+        width = height = 0
+    if not (1 <= width <= 50 and 1 <= height <= 50):
+        raise ValueError(f"--size {text}: write WIDTHxHEIGHT, in inches from 1 to 50, as in 6x4")
+    return width, height
+
+
 def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
     """Return the file to write, by default one in the working directory, named after its content.
 
@@ -84,7 +111,8 @@ def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
     """
     suffixes = PAGES if kind == "sphere" else PICTURES
     if path is None:
-        words = ["bsdf" if word.startswith("<") else Path(word).stem for word in dict.fromkeys(targets)]
+        words = ["bsdf" if word.startswith("<") else Path(split(word)[0]).stem for word in targets]
+        words = list(dict.fromkeys(words))
         return Path(re.sub(r"[^\w-]+", "_", "-".join([*words, kind]))[-100:] + suffixes[0])
     if path.suffix.lower() not in suffixes:
         raise ValueError(f"{path}: {kind} is written as {listed(suffixes)}")

@@ -36,6 +36,8 @@ def hemisphere(
     azimuth: float = 0,
     labels: Sequence[str] | None = None,
     resolution: int = 320,
+    title: str | None = None,
+    size: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw the luminance of f cosθ_o for all wo, in false colours on a logarithmic scale of at most five decades.
 
@@ -47,25 +49,25 @@ def hemisphere(
     """
     check_angles(angles)
     found = with_smooth_part(named(bsdfs, labels))
-    rows = [(it, side) for it in found for side in ((1, -1) if lobes.transmits(it.probe) else (1,))]
-    pictures = [[lobes.disc(it.probe, theta, azimuth, side, resolution) for theta in angles] for it, side in rows]
+    rows = [(it, half) for it in found for half in ((1, -1) if lobes.transmits(it.probe) else (1,))]
+    pictures = [[lobes.disc(it.probe, theta, azimuth, half, resolution) for theta in angles] for it, half in rows]
     top = largest(picture for row in pictures for picture in row)
     middles = [line for row in pictures for picture in row for line in (picture[resolution // 2],
                                                                         picture[:, resolution // 2])]  # fmt: skip
     norm = LogNorm(np.clip(lobes.dim(middles), 1e-5 * top, 1e-2 * top), top)
-    size = min((WIDTH - 0.8) / len(angles), 3)
-    figure = style.new_figure(size * len(angles) + 0.8, (size + 0.1) * len(rows) + 0.6)
+    side = min((WIDTH - 0.8) / len(angles), 3)
+    figure = style.new_figure(side * len(angles) + 0.8, (side + 0.1) * len(rows) + 0.6, size)
     axes = figure.subplots(len(rows), len(angles), squeeze=False)
-    for (it, side), line, row in zip(rows, axes, pictures, strict=True):
+    for (it, half), line, row in zip(rows, axes, pictures, strict=True):
         for ax, theta, picture in zip(line, angles, row, strict=True):
-            _draw_disc(ax, np.maximum(picture, norm.vmin), norm, theta, side > 0)
+            _draw_disc(ax, np.maximum(picture, norm.vmin), norm, theta, half > 0)
         if len(rows) > 1:
-            label = it.label if side > 0 else f"{it.label}, below"
-            line[0].set_ylabel(fill(label, int(LETTERS * size)), fontsize=TEXT, color=INK)
+            label = it.label if half > 0 else f"{it.label}, below"
+            line[0].set_ylabel(fill(label, int(LETTERS * side)), fontsize=TEXT, color=INK)
     for ax, theta in zip(axes[0], angles, strict=True):
         ax.set_title(incidence(theta), fontsize=TEXT, color=INK)
-    if len(rows) == 1:
-        style.set_title(figure, found[0].label)
+    if title or len(rows) == 1:
+        style.set_title(figure, title or found[0].label)
     style.add_bar(ScalarMappable(norm, "viridis"), axes, quantity(QUANTITY), shrink=0.8)
     marks = [Line2D([], [], linestyle="", color=INK, **mark) for mark in (WI, MIRROR)]
     style.add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
@@ -77,12 +79,16 @@ def albedo(
     azimuth: float = 0,
     labels: Sequence[str] | None = None,
     rgb: bool = False,
+    title: str | None = None,
+    size: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw the directional albedo over the angle of incidence: the luminance, or with ``rgb`` each channel, of all
     reflected and transmitted light, delta functions included. It is the mean weight of 8192 samples of the BSDF's own
     sampler, with the same variates at each angle. Everything else is as in :func:`polar`."""
     found = named(bsdfs, labels)
-    figure = style.new_figure(6, 3.8)
+    figure = style.new_figure(6, 3.8, size)
+    if title:
+        style.set_title(figure, title)
     ax = figure.subplots()
     handles = []
     for k, it in enumerate(found):

@@ -30,6 +30,8 @@ def polar(
     labels: Sequence[str] | None = None,
     normalize: bool = False,
     rgb: bool = False,
+    title: str | None = None,
+    size: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw the lobes in the plane of incidence, as the radius over the angle to the normal, which points up.
 
@@ -47,6 +49,8 @@ def polar(
             id or class of a loaded BSDF; what the others have in common is above the legend.
         normalize: divide each curve by its maximum, to compare shapes.
         rgb: draw red, green and blue in place of the luminance, in a row for each angle.
+        title: above the figure; by default the name of the only BSDF, or the only angle.
+        size: width and height in inches; by default what the panels need.
 
     Returns:
         A figure that notebooks show and pyplot does not manage: ``figure.savefig(path)`` writes it.
@@ -56,7 +60,7 @@ def polar(
             variant is scalar or polarized, or has no channels that ``rgb`` could draw.
         Exception: whatever Mitsuba raises if a BSDF cannot be loaded.
     """
-    return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, azimuth, scale, labels, normalize, rgb)
+    return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, azimuth, scale, labels, normalize, rgb, title, size)
 
 
 def cartesian(
@@ -67,11 +71,13 @@ def cartesian(
     labels: Sequence[str] | None = None,
     normalize: bool = False,
     rgb: bool = False,
+    title: str | None = None,
+    size: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw the luminance of f cosθ_o in the plane of incidence over the signed angle θ_o, negative on the side of wi;
     transmission lies beyond ±90°. Triangles at the top are the mirror directions. Everything else is as in
     :func:`polar`."""
-    return _planar(draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels, normalize, rgb)
+    return _planar(draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels, normalize, rgb, title, size)
 
 
 class LabelledCurve(NamedTuple):
@@ -93,6 +99,8 @@ def _planar(
     labels: Sequence[str] | None,
     normalize: bool,
     rgb: bool,
+    title: str | None,
+    size: tuple[float, float] | None,
 ) -> Figure:
     """Draw a row of panels for the BSDF or for each angle, and a column for each scale. ``heights`` are those of a
     panel of width 1, without and with transmission."""
@@ -122,19 +130,19 @@ def _planar(
         panels = {found[0].label: [only for (only,) in each]}
     width = WIDTH if len(scales) > 1 else 0.6 * WIDTH
     height = width / len(scales) * heights[whole]
-    figure = style.new_figure(width, height * len(panels) + 0.8)
+    figure = style.new_figure(width, height * len(panels) + 0.8, size)
     axes = figure.subplots(len(panels), len(scales), squeeze=False)
     text = quantity(QUANTITY, normalize=normalize, rgb=rgb)
-    for k, (title, curves) in enumerate(panels.items()):
+    for k, (heading, curves) in enumerate(panels.items()):
         for ax, name in zip(axes[k], scales, strict=True):
             style.calm(ax)
             draw(ax, curves, name == "log", whole, text)
             if len(panels) > 1:
-                ax.set_title(title, fontsize=TEXT, color=INK, pad=10)
+                ax.set_title(heading, fontsize=TEXT, color=INK, pad=10)
             if k < len(panels) - 1:
                 ax.set_xlabel("")
-    if len(panels) == 1:
-        style.set_title(figure, title)
+    if title or len(panels) == 1:
+        style.set_title(figure, title or heading)
     marks = {"mirror direction": Line2D([], [], linestyle="", **MIRROR, color=FAINT)}
     if draw is _draw_polar:
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}

@@ -35,7 +35,9 @@ class _Figure(Figure):
         return png.getvalue()
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float, size: tuple[float, float] | None = None) -> Figure:
+    """Return a figure of a width and a height in inches, or of the size that is asked for."""
+    width, height = size or (width, height)
     return _Figure(figsize=(width, height), dpi=144, layout="constrained", facecolor="white")
 
 

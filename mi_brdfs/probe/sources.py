@@ -1,11 +1,13 @@
-"""BSDFs by the words that name them on the command line: plugins, XML, the materials of scene files."""
+"""BSDFs by the words that name them on the command line: plugins, published materials, measured files, XML, the
+materials of scene files, fits; each with parameters of its own, as in ``ward:alpha=0.2,rotation=30``."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,8 +15,9 @@ import mitsuba as mi
 import numpy as np
 
 from .. import legacy
+from ..mitsuba.registry import DATA, MODELS
 from ..names import tabulated
-from ..parameters import published
+from ..parameters import nested, published
 from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load
 from .directions import direction, on_side
@@ -22,6 +25,8 @@ from .variates import random
 
 RESERVED = ("path", "string", "parallel", "optimize")
 """The arguments of Mitsuba's functions that load XML, which no parameter of it may be called."""
+OWN = re.compile(r":(?=[A-Za-z_]\w*=)")
+"""Where the parameters of a word begin."""
 
 
 class BSDFSource(NamedTuple):
@@ -31,9 +36,9 @@ class BSDFSource(NamedTuple):
     word: str
     """What a user may give for it."""
     source: str
-    """The type of a plugin, XML text, or the path of a scene or of a measured file."""
+    """The type of a plugin, XML text, or the path of a scene, of fits or of a measured file."""
     material: int | None = None
-    """Which of the scene's materials."""
+    """Which of the scene's materials, or of the fits."""
     parameters: Mapping[str, str] = {}
     """Those of the plugin, or of the XML, with their values as text."""
 
@@ -49,62 +54,128 @@ class BSDFSource(NamedTuple):
             return published.preset(self.source) | values
         if is_measured(self.source):
             return tabulated(self.path) | values
+        if self.material is not None and self.source.endswith(".json"):
+            return _fits(Path(self.source))[self.material]["bsdf"] | values
         if self.source.endswith(".xml"):
             loaded = legacy.load(Path(self.source), self.parameters)
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
-            return mi.load_string(_versioned(self.source), **self.parameters)
+            return mi.load_string(legacy.versioned(self.source), **self.parameters)
         return {"type": self.source} | values
 
 
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
     """Yield the BSDFs that a word stands for: the type of a plugin, the name of a published material, a ``<bsdf …>`` as
     text, the path of a measured file, which ``tabulated`` renders, the path of a scene, whose materials count once each
-    and those of lamps only if they reflect, or one of them as ``scene.xml:id``. Parameters are those of the plugin, or
-    the values of the ``<default>`` elements of XML.
+    and those of lamps only if they reflect, or one of them as ``scene.xml:id``, the path of the JSON of fits, or one of
+    them as ``fit.json:model``. Parameters are those of the plugin, or the values of the ``<default>`` elements of XML;
+    those of the word itself (:func:`split`) go before.
 
     Raises:
         ValueError: if it stands for none.
         Exception: what Mitsuba raises where it cannot be loaded.
     """
-    parameters = parameters or {}
+    word, own = split(word)
+    parameters = {**(parameters or {}), **own}
     is_data = is_measured(word)
-    file, _, wanted = ("", "", "") if is_data else word.partition(".xml:")
-    path = Path(f"{file}.xml" if wanted else word)
+    file, ending, wanted = ("", "", "") if is_data else _parted(word)
+    path = Path(f"{file}{ending}" if wanted else word)
     is_text = word.startswith("<") and not is_data and not os.path.isfile(path)
-    is_file = path.suffix == ".xml" and not is_text
+    is_file = path.suffix in (".xml", ".json") and not is_text
     wanted = wanted if is_file else ""
     if is_file and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
-    if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
-        raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
     name = path.name if is_file or is_data else word
     source = BSDFSource(name, word, str(path) if is_file or is_data else word, None, parameters)
-    suffix = "".join(f" {name}={value}" for name, value in parameters.items())
+    if is_file and path.suffix == ".json":
+        found = list(_chosen(source, _names_of(_fits(path)), wanted))
+        for each, given in zip(found, shared([it.word for it in found], parameters), strict=True):
+            fitted = each._replace(name=each.name + _suffix(given), parameters=given)
+            load(fitted.load())
+            yield fitted
+        return
+    if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
+        raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
     loaded = source.load()
     loaded = load(loaded) if isinstance(loaded, dict) else loaded
     if isinstance(loaded, mi.Scene) and is_file:
         names = _distinct([name_of(bsdf) for bsdf in _materials(loaded)])
         if not names:
             raise ValueError(f"{path}: the scene has no material")
-        if wanted and wanted not in names:
-            raise ValueError(f"{word}: there is no such material; there are {', '.join(names)}")
-        for k, name in enumerate(names):
-            if wanted in ("", name):
-                yield source._replace(name=f"{path.name}:{name}{suffix}", word=f"{path}:{name}", material=k)
+        for each in _chosen(source, names, wanted):
+            yield each._replace(name=each.name + _suffix(parameters))
     elif isinstance(loaded, mi.BSDF) and not wanted:
-        yield source._replace(name=(name_of(loaded) if is_text else source.name) + suffix)
+        yield source._replace(name=(name_of(loaded) if is_text else source.name) + _suffix(parameters))
     else:
         raise ValueError(f"{word if wanted else source.name} is not a {'scene' if wanted else 'BSDF'}")
 
 
+def split(word: str) -> tuple[str, dict[str, str]]:
+    """Return a word without its own parameters, ``:name=value,name=value`` at its end, and these as text. What is no
+    ``name=value`` after a comma belongs to the value before it, as in ``alpha=0.1,0.2``. The name of a file that exists
+    has none, nor has what is within XML.
+
+    Raises:
+        ValueError: if a parameter has no value.
+    """
+    start = word.rfind(">") + 1 if word.startswith("<") else 0
+    found = None if os.path.exists(word) else OWN.search(word, start)
+    if found is None:
+        return word, {}
+    values: dict[str, str] = {}
+    for name, value in re.findall(r"(\w+)=(.*?)(?=,\w+=|$)", word[found.end() :], re.DOTALL):
+        if not value:
+            raise ValueError(f"{word}: write {name}=value")
+        values[name] = value
+    return word[: found.start()], values
+
+
+def shared(words: Sequence[str], parameters: Mapping[str, str]) -> list[dict[str, str]]:
+    """Return which parameters each of some words gets: those that it declares, and, so that it says what is wrong, each
+    that none declares. XML declares its ``<default>`` elements."""
+    declared = [{name for name in parameters if len(words) == 1 or _declares(word, name)} for word in words]
+    known = set().union(*declared)
+    return [{name: parameters[name] for name in parameters if name in own or name not in known} for own in declared]
+
+
+def _declares(word: str, name: str) -> bool:
+    """Return whether a BSDF that a word stands for has a parameter; also if that is seen only where it is loaded."""
+    word, _ = split(word)
+    file, ending, wanted = _parted(word)
+    path = Path(file + ending)
+    if is_measured(word):
+        return _has("tabulated", name)
+    if word in published.names():
+        return _has(published.preset(word)["type"], name)
+    if ending == ".json" and path.is_file():
+        fits = _fits(path)
+        rows = zip(_names_of(fits), fits, strict=True)
+        return any(_has(row["bsdf"]["type"], name) for own, row in rows if wanted in ("", own))
+    if word.startswith("<") or ending:
+        text = path.read_text(encoding="utf-8", errors="replace") if ending and path.is_file() else word
+        return bool(re.search(rf"""\$\{{?{name}\b|<include|<default[^>]+["']{name}["']""", text))
+    return _has(word, name)
+
+
+def _has(kind: str, name: str) -> bool:
+    """Return whether a plugin has a parameter."""
+    if model := (MODELS | DATA).get(kind):
+        return any(name in parameter.names for parameter in nested(model.declared()))
+    try:
+        mi.load_dict({"type": kind, name: 0.5})
+    except (RuntimeError, TypeError) as error:
+        return "unreferenced" not in str(error)
+    return True
+
+
 def is_measured(word: str) -> bool:
-    """Return whether a word is the path of a measured file: no XML, and neither a plugin nor a published material."""
+    """Return whether a word without parameters of its own is the path of a measured file: neither XML nor fits, and
+    neither a plugin nor a published material."""
     path = Path(word)
     if word in published.names():
         return False
-    if word.startswith("<") or ".xml" in word:  # XML, unless it is the name of another file
-        return os.path.isfile(word) and path.suffix != ".xml"
+    if word.startswith("<") or _parted(word)[1]:  # unless it is the name of another file
+        return os.path.isfile(word) and path.suffix not in (".xml", ".json")
     return bool(path.suffix) or path.name != word
 
 
@@ -181,7 +252,42 @@ def _is_black(bsdf: mi.BSDF) -> bool:
     return not any(probe.weights(probe.whole, wi[None], variates).any() for wi in sides)
 
 
-def _versioned(text: str) -> str:
-    """Return XML whose first element has a version, as Mitsuba demands."""
-    head, _, rest = text.partition(">")
-    return text if "version=" in head else f'{head.rstrip("/")} version="3.0.0"{"/" * head.endswith("/")}>{rest}'
+def _parted(word: str) -> tuple[str, str, str]:
+    """Return a word before the ending of XML or of fits, that ending, and the material that is named after it."""
+    found = re.fullmatch(r"(.+?)(\.xml|\.json)(?::(.+))?", word, re.DOTALL)
+    return (found[1], found[2], found[3] or "") if found else (word, "", "")
+
+
+def _suffix(parameters: Mapping[str, str]) -> str:
+    return "".join(f" {name}={value}" for name, value in parameters.items())
+
+
+def _chosen(source: BSDFSource, names: list[str], wanted: str) -> Iterator[BSDFSource]:
+    """Yield the materials of a file, or the one that is wanted."""
+    path = Path(source.source)
+    if wanted and wanted not in names:
+        raise ValueError(f"{path}:{wanted}: there is no such material; there are {', '.join(names)}")
+    for k, name in enumerate(names):
+        if wanted in ("", name):
+            yield source._replace(name=f"{path.name}:{name}", word=f"{path}:{name}", material=k)
+
+
+def _fits(path: Path) -> list[dict[str, Any]]:
+    """Return the fits that ``mi-brdfs fit --json`` wrote.
+
+    Raises:
+        ValueError: if the file holds none.
+    """
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        if rows and all(isinstance(it["bsdf"]["type"], str) and it["model"] and it["file"] for it in rows):
+            return rows
+    except (ValueError, TypeError, KeyError):
+        pass
+    raise ValueError(f"{path}: it holds no fits, as mi-brdfs fit --json writes them")
+
+
+def _names_of(fits: list[dict[str, Any]]) -> list[str]:
+    """Return the names of fits: their models, after the names of the files if there are several."""
+    several = len({it["file"] for it in fits}) > 1
+    return _distinct([f"{Path(it['file']).stem}/{it['model']}" if several else it["model"] for it in fits])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import mitsuba as mi
 
 from ..legacy.upgrade import looking_in, parsed
+from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
 """Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""
@@ -27,6 +28,8 @@ class SceneFile:
     """Whether films get box filters: a denoiser expects pixels that share no samples."""
     lenient: bool = False
     """Whether stand-ins take the place of files that a scene of Mitsuba 0.6 lacks."""
+    replaced: dict[str, BSDFSource] = field(default_factory=dict)
+    """What takes the place of BSDFs, or of those of shapes, by their ids."""
     contents: dict[str, bytes] | None = None
     """In a copy, the files by their paths, without the root."""
     names: dict[str, str] = field(default_factory=dict)
@@ -60,7 +63,8 @@ class SceneFile:
         parameters = self.parameters
         if text is not None:
             contents[_rootless(self.path)], parameters = text.encode(), {}
-        return SceneFile(_rootless(self.path), parameters, self.box_filter, False, contents, names, _rootless("."))
+        return replace(self, path=_rootless(self.path), parameters=parameters, lenient=False, contents=contents,
+                       names=names, folder=_rootless("."))  # fmt: skip
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         config = mi.parser.ParserConfig(mi.variant())
@@ -69,6 +73,10 @@ class SceneFile:
             for props, key in _file_names(state):
                 props[key] = names.get(props[key], props[key])
             mi.parser.transform_all(config, state)
+            _check_films(state)
+            for id, source in self.replaced.items():
+                bsdf = source.load()
+                _replace(state, id, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
             if self.box_filter:
                 _set_box_filters(state)
             return mi.parser.instantiate(config, state)
@@ -78,6 +86,38 @@ def _file_names(state: Any) -> list[tuple[mi.Properties, str]]:
     """Return where a parsed scene names files: the strings of properties that are called so."""
     properties = [(node.props, key) for node in state.nodes for key in node.props.keys() if "file" in key]
     return [(props, key) for props, key in properties if isinstance(props[key], str)]
+
+
+def _check_films(state: Any) -> None:
+    """Raise a ValueError if a film has no pixels, where Mitsuba would complain about the sensor."""
+    for node in state.nodes:
+        for name in ("width", "height") if node.type == mi.ObjectType.Film else ():
+            if name in node.props and not node.props[name] > 0:
+                raise ValueError(f"the film's {name} is {node.props[name]}; give it at least 1 pixel")
+
+
+def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
+    """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it.
+
+    Raises:
+        ValueError: if there is none.
+    """
+    kinds = mi.ObjectType.BSDF, mi.ObjectType.Shape
+    ids = {node.props.id(): k for k, node in enumerate(state.nodes) if node.type in kinds and node.props.id()}
+    if id not in ids:
+        raise ValueError(f"no BSDF or shape has the id {id}; there are {', '.join(sorted(ids)) or 'none with one'}")
+    is_shape = state.nodes[ids[id]].type == mi.ObjectType.Shape
+    found = False
+    for node in [state.nodes[ids[id]]] if is_shape else state.nodes:
+        for name in node.props.keys():
+            value = node.props[name]
+            if isinstance(value, mi.Properties.ResolvedReference):
+                own = state.nodes[value.index()].type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]
+                if own:
+                    node.props[name] = bsdf
+                    found = True
+    if is_shape and not found:
+        state.nodes[ids[id]].props["bsdf"] = bsdf
 
 
 def _rootless(path: str) -> str:
