@@ -581,6 +581,22 @@ def test_a_tour_runs(tab, address):
     tab.locator("#tour").wait_for(state="hidden")
 
 
+SCENE = """<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="320"/><integer name="height" value="180"/>
+</film></sensor><bsdf type="diffuse" id="paint"/><shape type="sphere" id="ball"><point name="center" x="0" y="0" z="9"/>
+<ref id="paint"/></shape></scene>"""
+
+
+@pytest.mark.slow
+def test_pictures_keep_the_aspect_of_their_scene(tab, tmp_path):
+    (tmp_path / "wide.xml").write_text(SCENE)
+    process, address = serving("lambert", "--scene", str(tmp_path / "wide.xml"))
+    opened(tab, address)
+    box = tab.locator(".pictures canvas").bounding_box()
+    process.terminate()
+    assert box["width"] / box["height"] == pytest.approx(16 / 9, rel=0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1440, "dark")])
 def test_nothing_is_wider_than_the_screen(tab, address, width, scheme):
