@@ -355,6 +355,9 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
         (["ward", "--environment", "none.exr"], "no such file"),
         (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
+        (["ward", "--vary", "alpha=0.1"], "--vary is for pages of --export"),
+        (["ward", "--export", "x.html", "--vary", "alpha"], "give a name and numbers, such as alpha=0.05,0.1,0.2"),
+        (["ward", "--export", "x.html", "--vary", "theta=1,99"], "give finite numbers from 0 to 89 degrees"),
         (["lambert", "--host", "203.0.113.1"], "mi-brdfs: 203.0.113.1 port 0: "),
         (["lambert", "--export", "/dev/full"], "cannot write /dev/full: No space left on device"),
         ([str(ROOT / "scenes" / "catalogue.xml")], "has several materials; name one of"),
@@ -627,4 +630,10 @@ def test_the_exported_page_works_from_the_disk(tab, exported):
     lobe = "document.querySelector('#view-lobe canvas').toDataURL()"
     before = tab.evaluate(lobe)
     tab.locator("#view-lobe canvas").press("ArrowLeft")
+    tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    theta = tab.locator("#scrubbers input")
+    assert theta.get_attribute("aria-valuetext") == "45"
+    before = tab.evaluate(lobe)
+    theta.press("End")
+    tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)

@@ -166,6 +166,7 @@ function drawBars() {
   for (const button of byId("views").children) {
     const wanted = state.views.includes(button.dataset.view);
     button.setAttribute("aria-pressed", String(wanted));
+    button.hidden = session.exported && !session.baked.includes(button.dataset.view);
     const { node } = cards[button.dataset.view];
     node.hidden = !wanted;
     node.style.order = state.views.indexOf(button.dataset.view);
