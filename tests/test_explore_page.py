@@ -352,6 +352,10 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
         (["wrd"], "ward"),
         (["ward"] * 5, "4 BSDFs at most"),
         (["ward", "--scene", "none.xml"], "no such file"),
+        (
+            ["ward", "--scene", f"{ROOT / 'scenes' / 'cornell_box.xml'}:gold"],
+            "no material or shape gold; it has shapes",
+        ),
         (["ward", "--environment", "none.exr"], "no such file"),
         (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
@@ -367,6 +371,33 @@ def test_wrong_arguments_are_told_in_a_sentence(monkeypatch, arguments, sentence
     monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
     done = command("--port", "0", *arguments)
     assert done.exit_code != 0 and sentence in done.stderr and done.stderr.count("mi-brdfs:") == 1, done.stderr
+
+
+def test_a_saved_file_of_models_is_read_again(tmp_path):
+    """Within two seconds; what is wrong with it is told, and the former models stay."""
+    file = tmp_path / "chalk.py"
+    text = (
+        "import mi_brdfs\n\nclass Chalk(mi_brdfs.models.lambert.Lambert):\n"
+        '    """Chalk."""\n\n    plugins = ("chalk",)\n    title = "first"\n'
+    )
+    file.write_text(text)
+    process, address = serving("lambert", "--import", str(file))
+
+    async def conversation(page, hello, client):
+        await page.send({"type": "lambert"}, views=["polar"])
+        await page.until("polar")
+        for saved, kind in ((text.replace("first", "again"), "reloaded"), ("import\n", "error")):
+            file.write_text(saved)
+            start = time.perf_counter()
+            while (frame := await page.frame(5))["type"] != kind:
+                pass
+            assert time.perf_counter() - start < 2
+        assert "chalk.py: line 1" in frame["text"]
+
+    try:
+        connected(address, conversation)
+    finally:
+        process.terminate()
 
 
 @pytest.mark.slow

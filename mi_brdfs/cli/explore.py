@@ -14,8 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..mitsuba.errors import unwrapped_ctrl_c
-from .app import command
+from .app import command, imported
 from .options import Parameters, TracingVariant, file_option, parameters_of, set_tracing_variant, source_of, write_text
 from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
@@ -31,7 +30,8 @@ def explore(
     ] = None,
     parameters: Parameters = None,
     scene: Annotated[
-        str | None, typer.Option(metavar="FILE.xml[:ID]", help="Show the pictures in this scene, in place of its BSDF.")
+        str | None,
+        typer.Option(metavar="FILE.xml[:ID]", help="Show the pictures in this scene, in place of a BSDF or a shape's."),
     ] = None,
     environment: Annotated[
         Path | None, typer.Option(metavar="FILE.exr", help="An environment map to light the pictures with.")
@@ -91,8 +91,9 @@ def explore(
                 webbrowser.open(address)
 
     try:
-        with unwrapped_ctrl_c():
-            serve(on, host, chosen, user, sources, state, ready, notebook)
+        watched = [Path(it) for it in imported if it.endswith(".py")]
+        with failing(Exit.USAGE):
+            serve(on, host, chosen, user, watched, sources, state, ready, notebook)
         return
     except KeyboardInterrupt:
         err.print("Ended.")

@@ -110,14 +110,13 @@ class _Baked:
             numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
             self.known += [name for name in numbers if name not in self.known]
             varied = [numbers.get(name) for name in self.vary if name != "theta"]
-            for it in filter(None, varied):
-                self._begin(it["name"], it["value"])
+            for control in filter(None, varied):
+                self._begin(control["name"], control["value"])
             ways = [enumerate(self.vary[it["name"]]) if it else [(None, 0.0)] for it in varied]
             for values in product(*ways):
-                other = dict(bsdf)
-                for it, (_, value) in zip(varied, values, strict=True):
-                    if it:
-                        other = with_value(other, it, value)
+                other = bsdf
+                for control, (_, value) in zip(varied, values, strict=True):
+                    other = with_value(other, control, value) if control else other
                 yield from self._views(k, other, tuple(at for at, _ in values))
 
     def _begin(self, name: str, value: float | None) -> None:

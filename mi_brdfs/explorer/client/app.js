@@ -217,6 +217,7 @@ function say(text) {
 
 function startMessages() {
   on("busy", ({ text }) => say(text));
+  on("reloaded", () => (byId("alert").hidden = true));
   on("idle", () => say(""));
   on("error", (text) => {
     byId("alert-text").textContent = text;
