@@ -110,8 +110,8 @@ class _Baked:
             numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
             self.known += [name for name in numbers if name not in self.known]
             varied = [numbers.get(name) for name in self.vary if name != "theta"]
-            for control in filter(None, varied):
-                self._begin(control["name"], control["value"])
+            for each in filter(None, varied):
+                self._begin(each["name"], each["value"])
             ways = [enumerate(self.vary[it["name"]]) if it else [(None, 0.0)] for it in varied]
             for values in product(*ways):
                 other = bsdf
