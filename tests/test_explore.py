@@ -1,6 +1,8 @@
 """The explorer without a browser: what a page sends, and what it gets."""
 
+import base64
 import gc
+import gzip
 import json
 import os
 import re
@@ -14,7 +16,7 @@ import pytest
 from latency import edited
 from support import ROOT
 
-from mi_brdfs.explorer.export import index
+from mi_brdfs.explorer.export import index, page
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
 from mi_brdfs.explorer.stages import Progress, Stages, UserScene, rgba
@@ -436,11 +438,46 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
         client.show({"type": "lambert", "reflectance": 0.9}, views=["picture"], shape="scene", size=64), "picture"
     )
     assert first[0]["payload"] != second[0]["payload"]
-    client = Client(UserScene(scene, "nothing"))
-    client.send({"type": "lambert"}, views=["picture"], shape="scene")
-    client.waiting = 99
-    (error,) = of(client.work(), "error")
-    assert "has no material nothing; it has" in error["text"]
+    client = Client(UserScene(scene, "ward"))  # the id of a shape
+    client.show({"type": "lambert"}, views=["picture"], shape="scene", size=64)
+    assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]
+
+
+# --- Exported pages ---------------------------------------------------------------------------------------------------
+
+
+def exported(subjects, **vary):
+    data = {"subjects": [{"bsdf": it, "name": it["type"]} for it in subjects]}
+    stages = Stages(UserScene())
+    stages.denoise = None
+    return page(parse({**data, "size": 64}, STAGES), Materials(), stages, data, vary)
+
+
+def test_an_exported_page_holds_each_place_of_its_scrubbers(llvm_rgb, monkeypatch):
+    """For those who have the parameter."""
+    monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
+    monkeypatch.setattr("mi_brdfs.explorer.export.LARGEST", 8e5)
+    source = exported([{"type": "ward", "alpha": 0.19}, {"type": "lambert"}], theta=(0, 40, 80), alpha=(0.1, 0.2))
+    held = json.loads(re.search(r'id="exported">(.*?)</script>', source)[1])
+    assert [(it["name"], it["start"]) for it in held["scrubbers"]] == [("theta", 1), ("alpha", 1)]
+    data, places = gzip.decompress(base64.b64decode(held["data"])), {}
+    for at, length, is_text in held["frames"]:
+        told = opened(data[:length].decode() if is_text else data[:length])
+        places.setdefault((told.get("view", told["type"]), told["subject"]), []).append(tuple(at))
+        data = data[length:]
+    grid = [(theta, alpha) for alpha in (0, 1) for theta in (0, 1, 2)]
+    assert places["lobe", 0] == places["polar", 0] == grid and places["lobe", 1] == [(it, None) for it in range(3)]
+    assert places["albedo", 0] == places["picture", 0] == [(None, 0), (None, 1)]
+    assert "sampler" not in held["views"]
+
+
+def test_a_page_that_cannot_be_exported_is_refused(llvm_rgb, monkeypatch):
+    monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
+    with pytest.raises(StateError, match="gloss is no number of these BSDFs; these have alpha"):
+        exported([{"type": "ward", "alpha": 0.2}], gloss=(0.1, 0.2), theta=(0,))
+    monkeypatch.setattr("mi_brdfs.explorer.export.LARGEST", 1000)
+    with pytest.raises(StateError, match=r"The page would have .* fewer values of parameters"):
+        exported([{"type": "lambert"}], theta=(0,))
 
 
 # --- Tours ------------------------------------------------------------------------------------------------------------

@@ -352,9 +352,16 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
         (["wrd"], "ward"),
         (["ward"] * 5, "4 BSDFs at most"),
         (["ward", "--scene", "none.xml"], "no such file"),
+        (
+            ["ward", "--scene", f"{ROOT / 'scenes' / 'cornell_box.xml'}:gold"],
+            "no material or shape gold; it has shapes",
+        ),
         (["ward", "--environment", "none.exr"], "no such file"),
         (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
+        (["ward", "--vary", "alpha=0.1"], "--vary is for pages of --export"),
+        (["ward", "--export", "x.html", "--vary", "alpha"], "give a name and numbers, such as alpha=0.05,0.1,0.2"),
+        (["ward", "--export", "x.html", "--vary", "theta=1,99"], "give finite numbers from 0 to 89 degrees"),
         (["lambert", "--host", "203.0.113.1"], "mi-brdfs: 203.0.113.1 port 0: "),
         (["lambert", "--export", "/dev/full"], "cannot write /dev/full: No space left on device"),
         ([str(ROOT / "scenes" / "catalogue.xml")], "has several materials; name one of"),
@@ -364,6 +371,33 @@ def test_wrong_arguments_are_told_in_a_sentence(monkeypatch, arguments, sentence
     monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
     done = command("--port", "0", *arguments)
     assert done.exit_code != 0 and sentence in done.stderr and done.stderr.count("mi-brdfs:") == 1, done.stderr
+
+
+def test_a_saved_file_of_models_is_read_again(tmp_path):
+    """Within two seconds; what is wrong with it is told, and the former models stay."""
+    file = tmp_path / "chalk.py"
+    text = (
+        "import mi_brdfs\n\nclass Chalk(mi_brdfs.models.lambert.Lambert):\n"
+        '    """Chalk."""\n\n    plugins = ("chalk",)\n    title = "first"\n'
+    )
+    file.write_text(text)
+    process, address = serving("lambert", "--import", str(file))
+
+    async def conversation(page, hello, client):
+        await page.send({"type": "lambert"}, views=["polar"])
+        await page.until("polar")
+        for saved, kind in ((text.replace("first", "again"), "reloaded"), ("import\n", "error")):
+            file.write_text(saved)
+            start = time.perf_counter()
+            while (frame := await page.frame(5))["type"] != kind:
+                pass
+            assert time.perf_counter() - start < 2
+        assert "chalk.py: line 1" in frame["text"]
+
+    try:
+        connected(address, conversation)
+    finally:
+        process.terminate()
 
 
 @pytest.mark.slow
@@ -581,6 +615,22 @@ def test_a_tour_runs(tab, address):
     tab.locator("#tour").wait_for(state="hidden")
 
 
+SCENE = """<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="320"/><integer name="height" value="180"/>
+</film></sensor><bsdf type="diffuse" id="paint"/><shape type="sphere" id="ball"><point name="center" x="0" y="0" z="9"/>
+<ref id="paint"/></shape></scene>"""
+
+
+@pytest.mark.slow
+def test_pictures_keep_the_aspect_of_their_scene(tab, tmp_path):
+    (tmp_path / "wide.xml").write_text(SCENE)
+    process, address = serving("lambert", "--scene", str(tmp_path / "wide.xml"))
+    opened(tab, address)
+    box = tab.locator(".pictures canvas").bounding_box()
+    process.terminate()
+    assert box["width"] / box["height"] == pytest.approx(16 / 9, rel=0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1440, "dark")])
 def test_nothing_is_wider_than_the_screen(tab, address, width, scheme):
@@ -611,4 +661,10 @@ def test_the_exported_page_works_from_the_disk(tab, exported):
     lobe = "document.querySelector('#view-lobe canvas').toDataURL()"
     before = tab.evaluate(lobe)
     tab.locator("#view-lobe canvas").press("ArrowLeft")
+    tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    theta = tab.locator("#scrubbers input")
+    assert theta.get_attribute("aria-valuetext") == "45"
+    before = tab.evaluate(lobe)
+    theta.press("End")
+    tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import math
 import os
 import signal
 import sys
@@ -13,8 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..mitsuba.errors import unwrapped_ctrl_c
-from .app import command
+from .app import command, imported
 from .options import (
     MATERIAL,
     Parameters,
@@ -36,13 +36,21 @@ def explore(
     ] = None,
     parameters: Parameters = None,
     scene: Annotated[
-        str | None, typer.Option(metavar="FILE.xml[:ID]", help="Show the pictures in this scene, in place of its BSDF.")
+        str | None,
+        typer.Option(metavar="FILE.xml[:ID]", help="Show the pictures in this scene, in place of a BSDF or a shape's."),
     ] = None,
     environment: Annotated[
         Path | None, typer.Option(metavar="FILE.exr", help="An environment map to light the pictures with.")
     ] = None,
     export: Annotated[
         Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE,…",
+            help="With --export: a parameter to scrub through; twice at most, and theta, which is always there.",
+        ),
     ] = None,
     host: Annotated[str, typer.Option(help="Who may connect: by default only this machine.")] = "127.0.0.1",
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Default: 8490, or any free one.")] = None,
@@ -58,6 +66,9 @@ def explore(
     given = parameters_of(parameters)
     if environment and not environment.is_file():
         fail(f"--environment {environment}: no such file", Exit.USAGE)
+    if vary and not export:
+        fail("--vary is for pages of --export; in the live page move the sliders", Exit.USAGE)
+    varied = _varied(vary or [])
     chosen = set_tracing_variant(variant, "_rgb")
 
     from ..explorer.server import PortError, listening, serve
@@ -71,7 +82,7 @@ def explore(
     state: dict[str, Any] = {"subjects": subjects, "stage": "environment" if environment else "studio"}
     state["shape"] = "scene" if scene else "body"
     if export:
-        _export(export, user, sources, state)
+        _export(export, user, sources, state, varied)
         return
     with failing(Exit.USAGE, PortError):
         on = listening(host, port)
@@ -86,8 +97,9 @@ def explore(
                 webbrowser.open(address)
 
     try:
-        with unwrapped_ctrl_c():
-            serve(on, host, chosen, user, sources, state, ready, notebook)
+        watched = [Path(it) for it in imported if it.endswith(".py")]
+        with failing(Exit.USAGE):
+            serve(on, host, chosen, user, watched, sources, state, ready, notebook)
         return
     except KeyboardInterrupt:
         err.print("Ended.")
@@ -137,7 +149,29 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     return sources, subjects
 
 
-def _export(file: Path, user: Any, sources: list[Any], data: dict[str, Any]) -> None:
+def _varied(texts: list[str]) -> dict[str, tuple[float, ...]]:
+    """Return the values of --vary by name."""
+    from ..explorer.state import LIMITS
+
+    found = {}
+    for text in texts:
+        name, _, values = text.partition("=")
+        try:
+            found[name] = tuple(sorted({float(it) for it in values.split(",")}))
+        except ValueError:
+            fail(f"--vary {text}: give a name and numbers, such as alpha=0.05,0.1,0.2", Exit.USAGE)
+        low, high = LIMITS["theta"] if name == "theta" else (-math.inf, math.inf)
+        if not all(low <= it <= high and math.isfinite(it) for it in found[name]):
+            limits = f" from {low} to {high} degrees" if name == "theta" else ""
+            fail(f"--vary {text}: give finite numbers{limits}", Exit.USAGE)
+    if len(found.keys() - {"theta"}) > 2:
+        fail("--vary takes two parameters at most, besides theta", Exit.USAGE)
+    return found
+
+
+def _export(
+    file: Path, user: Any, sources: list[Any], data: dict[str, Any], varied: dict[str, tuple[float, ...]]
+) -> None:
     from ..explorer.export import page
     from ..explorer.materials import Materials
     from ..explorer.stages import Stages
@@ -146,6 +180,6 @@ def _export(file: Path, user: Any, sources: list[Any], data: dict[str, Any]) -> 
     with stdout_to_stderr(), failing(Exit.ERROR):
         scenes = Stages(user)
         state = parse(data, scenes.names)
-        text = page(state, Materials({it.word: it for it in sources}), scenes, data)
+        text = page(state, Materials({it.word: it for it in sources}), scenes, data, varied)
     write_text(file, text)
     out.print(str(file))

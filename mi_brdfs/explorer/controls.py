@@ -38,6 +38,12 @@ def with_defaults(model: type[Model], bsdf: Bsdf) -> Bsdf:
     return bsdf | {name: value for name, value in found.items() if value is not None}
 
 
+def with_value(bsdf: Bsdf, control: Control, value: Any) -> Bsdf:
+    """Return a plugin dict with a value of a control: those that it excludes go, and those that it needs come."""
+    kept = {name: it for name, it in bsdf.items() if name not in control["excludes"]}
+    return {**control["also"], **kept, control["name"]: value}
+
+
 def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator[Control]:
     for parameter in declared:
         if isinstance(parameter, PerLobe):

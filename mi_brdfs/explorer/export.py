@@ -3,21 +3,36 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 import re
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
+from itertools import product
 from typing import Any
 
+import mitsuba as mi
+import numpy as np
+
+from ..parameters.messages import listed
 from . import stages
+from .controls import LOBES, with_value
 from .materials import Materials
-from .state import State, declared
+from .state import Bsdf, State, StateError, declared
 from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
 
 SPP = 64
 """Samples per pixel of its pictures."""
 SIZE = 320
 """… and the most pixels of a side."""
+ANGLES = 0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0
+"""The angles of incidence that a page holds, besides its own, in degrees."""
+LARGEST = 3e6
+"""The most bytes of a page."""
+Varied = Mapping[str, Sequence[float]]
+"""The values of scrubbers, by the names of parameters; ``theta`` is the angle of incidence."""
+At = tuple[int | None, ...]
 CLIENT = files(__package__) / "client"
 
 
@@ -32,41 +47,129 @@ def index() -> str:
     return client_file("index.html").replace('id="declared">', f'id="declared">{data}')
 
 
-def page(state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any]) -> str:
-    """Return the page with all views of a state; ``page_state`` is what the page itself said of it.
+def page(
+    state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any], vary: Varied | None = None
+) -> str:
+    """Return the page with all views of a state, at several angles of incidence and values of parameters;
+    ``page_state`` is what the page itself said of it.
 
     Raises:
-        StateError: if a subject cannot be shown.
+        StateError: if a subject cannot be shown, none has such a parameter, or the page would be too large.
     """
-    state = replace(state, size=min(state.size, SIZE))
-    sent = [{"text": frame} if isinstance(frame, str) else _split(frame) for frame in _frames(state, materials, scenes)]
-    data = json.dumps({"state": page_state, "frames": sent}).replace("<", "\\u003c")
-    return _inlined(f'<script type="application/json" id="exported">{data}</script>')
-
-
-def _frames(state: State, materials: Materials, scenes: stages.Stages) -> list[Frame]:
-    found: list[Frame] = []
-    for k, given in enumerate(state.subjects):
-        bsdf = materials.expanded(given)
-        told = {"controls": materials.controls(bsdf), **materials.written(bsdf), **materials.described(bsdf)}
-        found.append(text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told))
-        with materials.loaded(bsdf) as loaded:
-            probe = ComponentProbe(loaded, state.component)
-            for view in VIEWS:
-                found += frames(view, probe, state, 0, k)
-        progress = stages.Progress(scenes.stage(stages.Setting.of(state)))
-        while progress.spp < SPP:
-            with materials.loaded(bsdf) as loaded:
-                progress.advance(loaded)
-        payload, header = stages.shown(progress, state.exposure, scenes.denoise)
-        found.append(packed(payload, type="picture", serial=0, subject=k, final=True, **header))
+    state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
+    vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
+    baked = _Baked(state, materials, scenes, vary)
+    frames = [(at, frame.encode() if isinstance(frame, str) else frame, isinstance(frame, str))
+              for at, frame in baked.frames()]  # fmt: skip
+    if missing := [name for name in vary if name not in ("theta", *baked.found)]:
+        raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(baked.known, 'and')}.")
+    told = page_state.get("subjects") or [{} for _ in state.subjects]
+    subjects = [{**it, "bsdf": bsdf} for it, bsdf in zip(told, baked.subjects, strict=True)]
+    content = {
+        "state": {**page_state, "subjects": subjects},
+        "scrubbers": [{"name": name, "values": values, "start": baked.start[name]} for name, values in vary.items()],
+        "views": ["picture", *baked.views, *(["cartesian"] if "polar" in baked.views else [])],
+        "frames": [(at, len(frame), is_text) for at, frame, is_text in frames],
+        "data": base64.b64encode(gzip.compress(b"".join(frame for _, frame, _ in frames), mtime=0)).decode(),
+    }
+    data = json.dumps(content).replace("<", "\\u003c")
+    found = _inlined(f'<script type="application/json" id="exported">{data}</script>')
+    if len(found) > LARGEST:
+        raise StateError(f"The page would have {len(found) / 1e6:.1f} MB and may have {LARGEST / 1e6:.0f}: "
+                         "export fewer materials, or fewer values of parameters.")  # fmt: skip
     return found
 
 
-def _split(frame: bytes) -> dict[str, Any]:
-    """Return the header of a binary frame, and its payload as text."""
+@dataclass
+class _Baked:
+    """The frames of a page, for each place of its scrubbers."""
+
+    state: State
+    materials: Materials
+    scenes: stages.Stages
+    vary: Varied
+    subjects: list[Bsdf] = field(default_factory=list)
+    """The plugin dicts with all their values."""
+    known: list[str] = field(default_factory=list)
+    """The numbers that may be varied, and those that are."""
+    found: set[str] = field(default_factory=set)
+    start: dict[str, int] = field(default_factory=dict)
+    """Where each scrubber stands at first: where it is nearest to the state."""
+
+    def frames(self) -> Iterator[tuple[At, Frame]]:
+        """Yield frames, each with the places of the scrubbers at which it is shown, None for any."""
+        nowhere: At = (None,) * len(self.vary)
+        self._begin("theta", self.state.theta)
+        for k, given in enumerate(self.state.subjects):
+            bsdf = self.materials.expanded(given)
+            controls = self.materials.controls(bsdf)
+            self.subjects.append({**bsdf, **{it["name"]: it["value"] for it in controls
+                                             if it["value"] is not None and it["name"] != LOBES}})  # fmt: skip
+            told = {"controls": controls, **self.materials.written(bsdf), **self.materials.described(bsdf)}
+            yield nowhere, text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told)
+            numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
+            self.known += [name for name in numbers if name not in self.known]
+            varied = [numbers.get(name) for name in self.vary if name != "theta"]
+            for each in filter(None, varied):
+                self._begin(each["name"], each["value"])
+            ways = [enumerate(self.vary[it["name"]]) if it else [(None, 0.0)] for it in varied]
+            for values in product(*ways):
+                other = bsdf
+                for control, (_, value) in zip(varied, values, strict=True):
+                    other = with_value(other, control, value) if control else other
+                yield from self._views(k, other, tuple(at for at, _ in values))
+
+    def _begin(self, name: str, value: float | None) -> None:
+        """Take the value that is nearest to what a subject has."""
+        self.found.add(name)
+        values = self.vary[name]
+        nearest = min(range(len(values)), key=lambda at: abs(values[at] - (values[0] if value is None else value)))
+        self.start.setdefault(name, nearest)
+
+    def _views(self, k: int, bsdf: Bsdf, places: At) -> Iterator[tuple[At, Frame]]:
+        names = [name for name in self.vary if name != "theta"]
+        elsewhere = dict(zip(names, places, strict=True))
+
+        def at(theta: int | None) -> At:
+            return tuple(theta if name == "theta" else elsewhere[name] for name in self.vary)
+
+        with self.materials.loaded(bsdf) as loaded:
+            probe = ComponentProbe(loaded, self.state.component)
+            for name in self.views:
+                view = VIEWS[name]
+                shown = [replace(self.state, theta=theta) for theta in self.vary["theta"]]
+                is_same = len({view.depends(it) for it in shown}) == 1
+                for theta, state in enumerate(shown[:1] if is_same else shown):
+                    for frame in frames(name, probe, state, 0, k):
+                        yield at(None if is_same else theta), frame if isinstance(frame, str) else _rounded(frame)
+        progress = stages.Progress(self.scenes.stage(stages.Setting.of(self.state)))
+        while progress.spp < SPP:
+            with self.materials.loaded(bsdf) as loaded:
+                progress.advance(loaded)
+        pixels, header = stages.shown(progress, self.state.exposure, self.scenes.denoise)
+        payload = _jpeg(np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3])
+        header |= {"type": "picture", "serial": 0, "subject": k, "final": True, "mime": "image/jpeg"}
+        yield at(None), packed(payload, **header)
+
+    @property
+    def views(self) -> list[str]:
+        """The views that are drawn, besides the picture: all if nothing but the angle is varied, else those of the
+        state. The cartesian plot has its curves from the polar one."""
+        wanted = VIEWS if len(self.vary) == 1 else {"polar" if it == "cartesian" else it for it in self.state.views}
+        return [name for name in VIEWS if name in wanted and name != "cartesian"]
+
+
+def _rounded(frame: bytes) -> bytes:
+    """Return a frame of float32 with 12 bits of their mantissas, which can be compressed."""
     end = 4 + int.from_bytes(frame[:4], "little")
-    return {"header": json.loads(frame[4:end]), "payload": base64.b64encode(frame[end:]).decode()}
+    bits = np.frombuffer(frame[end:], np.uint32)
+    return frame[:end] + ((bits + np.uint32(0x400)) & np.uint32(0xFFFFF800)).tobytes()
+
+
+def _jpeg(pixels: np.ndarray) -> bytes:
+    stream = mi.MemoryStream()
+    mi.Bitmap(np.ascontiguousarray(pixels)).write(stream, mi.Bitmap.FileFormat.JPEG, 92)
+    return bytes(stream.raw_buffer())
 
 
 def _inlined(data: str) -> str:

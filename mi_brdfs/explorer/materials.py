@@ -42,6 +42,10 @@ class Materials:
     _loaded: dict[str, mi.BSDF] = field(default_factory=dict)
     """Materials of XML files, which take long to load."""
 
+    def forget(self) -> None:
+        """Load the materials of XML files again, as models have changed."""
+        self._loaded.clear()
+
     def expanded(self, bsdf: Bsdf) -> Bsdf:
         """Return a plugin dict with what its short forms stand for: a published material, beside which other members
         replace its own, the example of a model of which only the type is given, another number of lobes.

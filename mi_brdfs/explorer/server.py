@@ -10,7 +10,7 @@ import re
 import socket
 import tempfile
 from collections import ChainMap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,8 @@ from ..probe.sources import BSDFSource, is_measured
 from .export import CLIENT, client_file, index
 from .materials import Materials, kinds
 from .session import Engine, Session
-from .stages import UserScene
-from .state import StateError, checked_request, decoded, parse
+from .stages import Setting, UserScene
+from .state import State, StateError, checked_request, decoded, parse
 from .tours import tours
 from .views import Frame, text
 
@@ -246,17 +246,26 @@ def serve(
     host: str,
     variant: str,
     user: UserScene,
+    watched: Sequence[Path],
     sources: list[BSDFSource],
     initial: dict[str, Any],
     ready: Callable[[str], None],
     notebook: bool,
 ) -> None:
-    """Serve pages, to a notebook if that asks for them, until Ctrl-C; ``ready`` is called with their address."""
-    engine = Engine(variant, user)
+    """Serve pages, to a notebook if that asks for them, until Ctrl-C; ``ready`` is called with their address. Files of
+    models that are ``watched`` are imported again when they are saved.
+
+    Raises:
+        ValueError: if the user's scene has no such material or shape.
+        RuntimeError: what Mitsuba says where it cannot load the scene.
+    """
+    engine = Engine(variant, user, watched)
     port = on.getsockname()[1]
     explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])), notebook)
 
     async def run() -> None:
+        if user.scene:  # what is wrong with it is said before there is a page
+            await asyncio.wrap_future(engine.call(lambda: engine.stages.stage(Setting("", "scene", State.size))))
         runner = web.AppRunner(explorer.application(), access_log=None, logger=_logger(), auto_decompress=False)
         await runner.setup()
         await web.SockSite(runner, on, shutdown_timeout=1).start()

@@ -10,9 +10,10 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
@@ -20,6 +21,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..mitsuba.errors import one_line
+from ..mitsuba.guests import import_models
 from . import stages
 from .export import page
 from .materials import Materials, plain
@@ -34,6 +36,10 @@ DENOISED_AT = 16, 64, 256
 """The samples per pixel at which a picture is denoised."""
 RELEASE = 1.0
 """The seconds after which memory that is free is given back, as edits of any size leave it in pieces."""
+
+
+LOOK = 0.5
+"""The seconds after which imported files are looked at again."""
 
 
 class Cancelled(Exception):
@@ -89,6 +95,14 @@ class Session:
 
     def close(self) -> None:
         self.closed = True
+
+    def forget(self) -> None:
+        """Show all anew, as models have changed. Pictures stay until there are others."""
+        self._told.clear()
+        self._broken.clear()
+        self._shown.clear()
+        self._pictures.clear()
+        self.materials.forget()
 
     # --- The engine's side --------------------------------------------------------------------------------------------
 
@@ -276,9 +290,11 @@ class Session:
 class Engine(threading.Thread):
     """Serves all sessions in turn, a step of each."""
 
-    def __init__(self, variant: str, user: stages.UserScene) -> None:
+    def __init__(self, variant: str, user: stages.UserScene, watched: Sequence[Path] = ()) -> None:
         super().__init__(name="mi_brdfs explorer", daemon=True)
         self.variant = variant
+        self._watched = {path: _stamp(path) for path in watched}
+        self._looked = time.monotonic()
         self.stages = stages.Stages(user)
         self.sessions: list[Session] = []
         self._wake = threading.Event()
@@ -307,6 +323,9 @@ class Engine(threading.Thread):
         while not self._ended:
             while not self._calls.empty():
                 _run(*self._calls.get())
+            if self._watched and time.monotonic() - self._looked > LOOK:
+                self._read_again()
+                self._looked = time.monotonic()
             worked = [self._step(session) for session in list(self.sessions)]
             self.sessions = [session for session in self.sessions if not session.closed]
             if not any(worked):
@@ -322,6 +341,34 @@ class Engine(threading.Thread):
         except Exception as error:
             session.send(text(type="error", text=one_line(error)))
             return True
+
+    def _read_again(self) -> None:
+        """Import files again that have been saved; what is wrong with one is told, and its former models stay."""
+        for path, before in self._watched.items():
+            now = _stamp(path)
+            if now in (before, None):  # an editor may be about to put it in its place
+                continue
+            self._watched[path] = now
+            try:
+                import_models(str(path))
+            except (ImportError, ValueError) as error:
+                told = text(type="error", text=f"{path}: {error}")
+            else:
+                told = text(type="reloaded")
+                self.stages.forget()
+                for session in self.sessions:
+                    session.forget()
+            for session in self.sessions:
+                session.send(told)
+
+
+def _stamp(path: Path) -> Any:
+    """Return what changes when a file is saved, or None if there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
 
 
 def _run(function: Callable[[], Any], future: Future) -> None:

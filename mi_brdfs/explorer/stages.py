@@ -17,6 +17,7 @@ import numpy as np
 
 from .. import legacy
 from ..names import linked
+from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import CENTRE, RADIUS
 from ..rendering.output import tonemap
@@ -99,7 +100,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
     """Load the scene of a setting.
 
     Raises:
-        ValueError: if the user's scene has no such material.
+        ValueError: if the user's scene has no such material or shape.
     """
     if setting.shape == "scene":
         return _user_stage(setting, user)
@@ -125,11 +126,13 @@ def _user_stage(setting: Setting, user: UserScene) -> Stage:
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
     shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]
-    ids = list(dict.fromkeys(it.bsdf().id() for it in shapes))
-    wanted = user.material or (ids[0] if ids else None)
-    chosen = [it for it in shapes if it.bsdf().id() == wanted]
+    materials, names = ([it.id() for it in objects] for objects in ([it.bsdf() for it in shapes], shapes))
+    wanted = user.material or (materials[0] if shapes else None)
+    chosen = [it for it in shapes if it.bsdf().id() == wanted] or [it for it in shapes if it.id() == wanted]
     if not chosen:
-        raise ValueError(f"{user.scene} has no material {wanted}; it has {', '.join(ids)}.")
+        told = [f"{kind} {listed(dict.fromkeys(filter(None, ids)), 'and')}"
+                for kind, ids in (("materials", materials), ("shapes", names)) if any(ids)]  # fmt: skip
+        raise ValueError(f"{user.scene} has no material or shape {wanted}; it has {', and '.join(told) or 'neither'}.")
     film = scene.sensors()[0].film()
     width, height = (int(it) for it in film.size())
     scale = setting.size / max(width, height)
@@ -225,7 +228,7 @@ class Stages:
         """Return the scene of a setting.
 
         Raises:
-            ValueError: if the user's scene has no such material.
+            ValueError: if the user's scene has no such material or shape.
         """
         if setting not in self._loaded:
             self._loaded[setting] = load(setting, self.user)
@@ -233,6 +236,10 @@ class Stages:
                 self._loaded.popitem(last=False)
         self._loaded.move_to_end(setting)
         return self._loaded[setting]
+
+    def forget(self) -> None:
+        """Say of all kernels that they may have to be compiled."""
+        self._known.clear()
 
     def is_new(self, bsdf: Bsdf, purpose: str | Setting) -> bool:
         """Return whether kernels for a BSDF of this structure may have to be compiled, for a view or a picture."""

@@ -64,6 +64,8 @@ class State:
     exposure: float = 0.0
     size: int = 256
     views: tuple[str, ...] = ("picture", "lobe", "polar", "albedo")
+    dragged: bool = False
+    """Whether a hand moves something at this moment: lobes and their cuts are coarse."""
 
     @property
     def channels(self) -> list[tuple[str, int | None]]:
@@ -150,6 +152,7 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
         exposure=_number(data, "exposure"),
         size=int(_number(data, "size")),
         views=tuple(view for view in VIEWS if view in views),
+        dragged=data.get("dragged") is True,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +22,8 @@ Frame = str | bytes
 """A text or a binary frame of the websocket."""
 
 PARALLELS = 40
+COARSE = 16
+"""The parallels of a lobe, and of one that changes under the hand."""
 PIXELS = 96
 """The side of a hemisphere and of a slice, in pixels."""
 LOG2_COUNT = 7
@@ -74,7 +76,8 @@ class View:
 
 
 def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
-    for k, mesh in enumerate(lobes.meshes(probe, state.theta, state.phi, PARALLELS, state.channels[0][1])):
+    parallels = COARSE if state.dragged else PARALLELS
+    for k, mesh in enumerate(lobes.meshes(probe, state.theta, state.phi, parallels, state.channels[0][1])):
         wo = mesh.wo.astype(np.float64)
         theta = np.degrees(np.arctan2(np.hypot(wo[:, 0, 0], wo[:, 0, 1]), abs(wo[:, 0, 2])))
         phi = np.degrees(np.unwrap(np.arctan2(wo[-1, :, 1], wo[-1, :, 0])))
@@ -83,7 +86,16 @@ def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
 
 def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> Iterator[dict[str, Any]]:
     drawn = [(name, of_channel(channel)) for name, channel in state.channels]
+    if state.dragged:
+        drawn = [(name, _thinned(curve)) for name, curve in drawn]
     yield {"curves": [{"channel": name, "x": curve.theta, "y": curve.value} for name, curve in drawn]}
+
+
+def _thinned(curve: lobes.Curve) -> lobes.Curve:
+    """Return every other point of a curve, and its ends and peak."""
+    last, peak = len(curve.theta) - 1, int(np.nanargmax(curve.value))
+    kept = np.unique([0, *range(peak % 2, last, 2), last])
+    return lobes.Curve(curve.theta[kept], curve.value[kept])
 
 
 def _cut(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
@@ -91,7 +103,7 @@ def _cut(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
 
 
 def _albedo(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
-    return _curves(state, lambda channel: lobes.albedo(probe, state.phi, channel, LOG2_COUNT))
+    return _curves(replace(state, dragged=False), lambda channel: lobes.albedo(probe, state.phi, channel, LOG2_COUNT))
 
 
 def _slice(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
@@ -129,7 +141,7 @@ def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
 
 
 def _at_wi(state: State) -> Any:
-    return state.theta, state.phi, state.channel
+    return state.theta, state.phi, state.channel, state.dragged
 
 
 VIEWS = {
@@ -138,7 +150,7 @@ VIEWS = {
     "cartesian": View(_at_wi, _cut),
     "albedo": View(lambda state: (state.phi, state.channel), _albedo),
     "slice": View(lambda state: state.channel, _slice),
-    "hemisphere": View(_at_wi, _hemisphere),
+    "hemisphere": View(lambda state: _at_wi(state)[:3], _hemisphere),
     "sampler": View(lambda state: (state.theta, state.phi), _sampler),
 }
 """By name, in the order in which they are drawn."""

@@ -84,7 +84,7 @@ def _of_file(path: Path) -> ModuleType:
     spec: Any = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[path.stem] = module  # where dataclasses and pickle look it up
-    spec.loader.exec_module(module)
+    exec(spec.loader.source_to_code(path.read_bytes(), str(path)), module.__dict__)  # caches miss quick edits
     _files[path.stem] = str(path.resolve())
     return module
 

@@ -166,6 +166,7 @@ function drawBars() {
   for (const button of byId("views").children) {
     const wanted = state.views.includes(button.dataset.view);
     button.setAttribute("aria-pressed", String(wanted));
+    button.hidden = session.exported && !session.baked.includes(button.dataset.view);
     const { node } = cards[button.dataset.view];
     node.hidden = !wanted;
     node.style.order = state.views.indexOf(button.dataset.view);
@@ -216,6 +217,7 @@ function say(text) {
 
 function startMessages() {
   on("busy", ({ text }) => say(text));
+  on("reloaded", () => (byId("alert").hidden = true));
   on("idle", () => say(""));
   on("error", (text) => {
     byId("alert-text").textContent = text;

@@ -1,6 +1,7 @@
 // Controls of a subject's parameters, made from what the server declares of them.
 import { byId, clamp, element, format, fromDisplay, toDisplay } from "./util.js";
 import { changeSubject, session, setParameter } from "./session.js";
+import { scrub } from "./link.js";
 
 const STEPS = 1000;
 let built = "";
@@ -64,7 +65,45 @@ function drawList(host, bsdf) {
         ),
       ),
   );
-  byId("incidence").textContent = `θi = ${format(session.state.theta)}°, φi = ${format(session.state.phi)}°`;
+}
+
+/** Make the scrubbers of an exported page, each with its values listed. */
+export function drawScrubbers() {
+  byId("scrubbers").hidden = !session.scrubbers.length;
+  if (byId("scrubbers").children.length !== session.scrubbers.length)
+    byId("scrubbers").replaceChildren(...session.scrubbers.map(makeScrubber));
+  session.scrubbers.forEach(({ values, at }, k) => {
+    const [slider, told] = byId("scrubbers").children[k].querySelectorAll("input, output");
+    slider.value = at;
+    slider.setAttribute("aria-valuetext", format(values[at], 4));
+    told.textContent = format(values[at], 4);
+  });
+}
+
+function makeScrubber({ name, values }, k) {
+  const id = `scrub-${name}`;
+  const phi = session.state.phi ? `, φi = ${format(session.state.phi)}°` : "";
+  const oninput = ({ target }) => scrub(k, Number(target.value));
+  return element(
+    "div",
+    { class: "control" },
+    element(
+      "div",
+      { class: "name" },
+      element("label", { for: id }, name === "theta" ? `θi in degrees${phi}` : name.replaceAll("_", " ")),
+    ),
+    element(
+      "div",
+      { class: "pair" },
+      element(
+        "div",
+        {},
+        element("input", { type: "range", id, min: 0, max: values.length - 1, step: 1, oninput }),
+        element("div", { class: "values" }, ...values.map((value) => element("span", {}, format(value, 4)))),
+      ),
+      element("output", { for: id }),
+    ),
+  );
 }
 
 /** Return the rows under the headings of their groups; those left out follow as buttons. */

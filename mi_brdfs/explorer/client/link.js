@@ -1,6 +1,6 @@
 // The connection to the server, or the frames that an exported page carries.
-import { save } from "./util.js";
-import { adopt, emit, session, stateForServer } from "./session.js";
+import { element, save } from "./util.js";
+import { adopt, change, emit, session, setParameter, stateForServer } from "./session.js";
 
 let socket = null;
 let waiting = false;
@@ -50,18 +50,65 @@ export function connect() {
   };
 }
 
-function replay({ state, frames }) {
+let baked = [];
+
+/** Unpack the frames of an exported page, and show those of the places where its scrubbers stand. */
+async function replay({ state, scrubbers, views, frames, data }) {
   document.documentElement.classList.add("exported");
+  session.scrubbers = scrubbers.map((scrubber) => ({ ...scrubber, at: scrubber.start }));
+  session.baked = views;
   emit("exported", state);
-  for (const frame of frames) {
-    if (frame.header) {
-      const bytes = Uint8Array.from(atob(frame.payload), (letter) => letter.charCodeAt(0));
-      receivePayload(frame.header, bytes.buffer, 0);
-    } else {
-      const message = frame.text ?? frame;
-      receive(typeof message === "string" ? JSON.parse(message) : message);
-    }
+  const zipped = new Blob([Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0))]).stream();
+  const bytes = await new Response(zipped.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  let end = 0;
+  baked = await Promise.all(
+    frames.map(async ([at, length, isText]) => {
+      const buffer = bytes.slice(end, (end += length));
+      if (isText) return { at, message: JSON.parse(new TextDecoder().decode(buffer)) };
+      const [header, offset] = opened(buffer);
+      if (header.mime) header.pixels = await decoded(new Blob([new Uint8Array(buffer, offset)], { type: header.mime }));
+      return { at, header, buffer, offset };
+    }),
+  );
+  showBaked(() => true);
+  session.scrubbers.forEach((_, k) => scrub(k, session.scrubbers[k].at));
+}
+
+async function decoded(blob) {
+  const image = await createImageBitmap(blob);
+  const { width, height } = image;
+  const context = element("canvas", { width, height }).getContext("2d");
+  context.drawImage(image, 0, 0);
+  return context.getImageData(0, 0, width, height).data;
+}
+
+function showBaked(concerned) {
+  for (const { at, message, header, buffer, offset } of baked) {
+    if (!concerned(at) || !at.every((place, k) => place === null || place === session.scrubbers[k].at)) continue;
+    if (header) receivePayload(header, buffer, offset);
+    else receive(structuredClone(message));
+    if (message?.view === "polar") receive({ ...message, view: "cartesian" });
   }
+}
+
+/** Move a scrubber of an exported page to one of its values. */
+export function scrub(k, at) {
+  const { name, values } = Object.assign(session.scrubbers[k], { at });
+  if (name === "theta") change({ theta: values[at] });
+  session.state.subjects.forEach((_, subject) => {
+    const control = session.info[subject]?.controls.find((each) => each.name === name && each.kind === "number");
+    if (control) setParameter(subject, control, values[at]);
+  });
+  showBaked((places) => places[k] !== null);
+}
+
+/** Point wi to a direction, or in an exported page to the nearest one that it holds. */
+export function aimAt(theta, phi) {
+  if (!session.exported) return change({ theta, phi });
+  const k = session.scrubbers.findIndex(({ name }) => name === "theta");
+  const { values } = session.scrubbers[k];
+  const off = values.map((value) => Math.abs(value - theta));
+  scrub(k, off.indexOf(Math.min(...off)));
 }
 
 /** Keep an answer, unless a newer one is shown; return whether it was kept. */
@@ -94,8 +141,14 @@ function receive(message) {
 }
 
 function receiveBinary(buffer) {
+  const [header, offset] = opened(buffer);
+  receivePayload(header, buffer, offset);
+}
+
+/** Return the header of a binary frame, and where its payload begins. */
+function opened(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
-  receivePayload(JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length))), buffer, 4 + length);
+  return [JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length))), 4 + length];
 }
 
 function receivePayload(header, buffer, offset) {
@@ -103,7 +156,7 @@ function receivePayload(header, buffer, offset) {
     save(header.name, new Uint8Array(buffer, offset), header.mime);
     emit("saved", header.name);
   } else if (header.type === "picture") {
-    const pixels = new Uint8ClampedArray(buffer, offset, 4 * header.width * header.height);
+    const pixels = header.pixels ?? new Uint8ClampedArray(buffer, offset, 4 * header.width * header.height);
     keep("picture", header.subject, { ...header, pixels });
   } else {
     const values = new Float32Array(buffer, offset);

@@ -1,9 +1,9 @@
 // The lobe as a body to turn, drawn by WebGL; the arrow of wi can be dragged.
 import { clamp, decades, degrees, element, format, largest, radians } from "./util.js";
 import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geometry.js";
-import { change, session, visible } from "./session.js";
+import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { belowOf } from "./link.js";
+import { aimAt, belowOf } from "./link.js";
 import { colourOf } from "./drawing.js";
 
 const VERTEX = `#version 300 es
@@ -33,9 +33,7 @@ export function startLobe() {
   card.legend = [
     [
       null,
-      session.exported
-        ? "Drag to turn, or arrow keys"
-        : "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi",
+      "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi",
     ],
   ];
   tell(card, []);
@@ -257,7 +255,7 @@ function listen() {
     places?.areas.find(([left, top, width, height]) => x >= left && y >= top && x < left + width && y < top + height);
   const nearTip = (point, reach) => {
     const area = areaAt(point);
-    if (session.exported || !area) return null;
+    if (!area) return null;
     const tip = project(places.view, scaled(unit(session.state.theta, session.state.phi), ARROW), area);
     return Math.hypot(point[0] - tip[0], point[1] - tip[1]) < reach ? area : null;
   };
@@ -304,7 +302,8 @@ function listen() {
     event.preventDefault();
     if (!event.shiftKey) return turn(way[0] * 0.1, way[1] * 0.1);
     const { theta, phi } = session.state;
-    if (!session.exported) change({ theta: theta - 2 * way[1], phi: wrapped(phi + 5 * way[0]) });
+    const step = session.exported ? 10 : 2;
+    aimAt(theta - step * way[1], wrapped(phi + 5 * way[0]));
   });
   canvas.addEventListener("pointerleave", () => tell(cards.lobe, []));
 }
@@ -340,8 +339,5 @@ function aim([x, y], [left, top, width, height]) {
   if (!way) return;
   const theta = degrees(Math.atan2(Math.hypot(way[0], way[1]), Math.max(way[2], 0.001)));
   const phi = degrees(Math.atan2(way[1], way[0]));
-  change({
-    theta: Math.round(theta * 10) / 10,
-    phi: theta < 1 ? session.state.phi : Math.round(phi * 10) / 10,
-  });
+  aimAt(Math.round(theta * 10) / 10, theta < 1 ? session.state.phi : Math.round(phi * 10) / 10);
 }

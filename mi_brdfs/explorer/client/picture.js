@@ -42,7 +42,8 @@ function slideTo(share) {
 
 /** Return the size in pixels to ask for: what the layout shows, as far as pictures can follow edits. */
 export function wantedSize() {
-  const shown = stack?.querySelector(".frame")?.clientWidth || 256;
+  const frame = stack?.querySelector(".frame");
+  const shown = Math.max(frame?.clientWidth ?? 0, frame?.clientHeight ?? 0) || 256;
   return SIZES.findLast((size) => size <= shown * (window.devicePixelRatio || 1) * 1.05) ?? SIZES[0];
 }
 
@@ -150,6 +151,7 @@ function put(canvas, answer) {
   canvas.answer = answer;
   if (canvas.width !== answer.width || canvas.height !== answer.height)
     Object.assign(canvas, { width: answer.width, height: answer.height });
+  stack.style.setProperty("--aspect", answer.width / answer.height);
   canvas.getContext("2d").putImageData(new ImageData(answer.pixels, answer.width, answer.height), 0, 0);
 }
 
@@ -190,15 +192,15 @@ function drawDifference([a, b]) {
 /** Return the pictures as they are shown, on one canvas. */
 function flat() {
   const frames = [...stack.querySelectorAll(".frame")];
-  const size = Math.max(...[...stack.querySelectorAll("canvas")].map(({ width }) => width));
-  const result = element("canvas", { width: size * frames.length, height: size });
+  const { width, height } = [...stack.querySelectorAll("canvas")].sort((a, b) => b.width - a.width)[0];
+  const result = element("canvas", { width: width * frames.length, height });
   const context = result.getContext("2d");
   frames.forEach((frame, at) => {
     const layers = [...frame.querySelectorAll("canvas")];
     const difference = frame.querySelector("canvas.difference");
     for (const layer of difference ? [difference] : layers) {
       const share = modeOf() === "wipe" && layer === layers[1] ? session.state.wipe : 1;
-      context.drawImage(layer, 0, 0, share * layer.width, layer.height, at * size, 0, share * size, size);
+      context.drawImage(layer, 0, 0, share * layer.width, layer.height, at * width, 0, share * width, height);
     }
   });
   return result;

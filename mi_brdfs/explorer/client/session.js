@@ -15,6 +15,9 @@ export const session = {
   selected: 0,
   exported: document.getElementById("exported") !== null,
   connected: false,
+  /** What an exported page holds: its views, and its scrubbers with their places. */
+  baked: [],
+  scrubbers: [],
   hello: null,
   /** The server's account of each subject: error, controls, xml … */
   info: [],

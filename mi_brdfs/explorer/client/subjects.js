@@ -2,7 +2,7 @@
 import { PALETTE, byId, element } from "./util.js";
 import { addSubject, change, changeSubject, emit, hasRoom, on, removeSubject, session, tellFull } from "./session.js";
 import { colourOf } from "./drawing.js";
-import { drawControls, resetAll } from "./controls.js";
+import { drawControls, drawScrubbers, resetAll } from "./controls.js";
 
 const MOST_FOUND = 80;
 
@@ -66,6 +66,7 @@ export function drawSubjects() {
   byId("double").disabled = !hasRoom();
   byId("fit").hidden = subject.bsdf.type !== "tabulated" || !session.hello?.models?.length;
   drawControls();
+  drawScrubbers();
 }
 
 /** Show the selected subject alone, or all again. */
