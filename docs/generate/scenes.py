@@ -14,8 +14,9 @@ from pathlib import Path
 from mi_brdfs.gallery.families import year
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
-from mi_brdfs.rendering.output import display_image
+from mi_brdfs.rendering.output import denoised, display_image
 from mi_brdfs.rendering.passes import render
+from mi_brdfs.rendering.scene_file import SceneFile
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -33,7 +34,8 @@ LARGE = PICTURES / "large"
 CATALOGUE = ROOT / "scenes" / "catalogue.xml"
 FIRST_LIGHT = ROOT / "scenes" / "first_light.png"
 WIDTH, QUALITY = 400, 88
-FIRST_LIGHT_SPP = 1024
+FIRST_LIGHT_SPP = 32
+"""As in README.md's command, which denoises."""
 
 INTRODUCTION = """\
 # Scenes
@@ -93,7 +95,14 @@ def _draw(scene: Path, path: Path) -> None:
 
 
 def _draw_first(scene: Path, path: Path) -> None:
-    picture(scene, FIRST_LIGHT_SPP).save(path, optimize=True)
+    first_light(scene).save(path, optimize=True)
+
+
+def first_light(scene: Path = FIRST_LIGHT.with_suffix(".xml")) -> Image.Image:
+    """Return what README.md's first command renders."""
+    loaded = SceneFile(str(scene), {}, box_filter=True).load()
+    image = display_image(denoised(render(loaded, FIRST_LIGHT_SPP)).bitmap)
+    return Image.fromarray(np.array(image))
 
 
 def _reduce(large: Path, path: Path) -> None:
