@@ -65,7 +65,7 @@ def pictures() -> list[Picture]:
             Picture(PICTURES / large.name, partial(_bytes, large), partial(_reduce, large)),
         ]
     first = FIRST_LIGHT.with_suffix(".xml")
-    return [*found, Picture(FIRST_LIGHT, partial(sources, first), partial(_draw_first, first))]
+    return [*found, Picture(FIRST_LIGHT, partial(sources, first), _draw_first)]
 
 
 def readme() -> str:
@@ -94,13 +94,13 @@ def _draw(scene: Path, path: Path) -> None:
     picture(scene).save(path, quality=QUALITY, optimize=True)
 
 
-def _draw_first(scene: Path, path: Path) -> None:
-    first_light(scene).save(path, optimize=True)
+def _draw_first(path: Path) -> None:
+    first_light().save(path, optimize=True)
 
 
-def first_light(scene: Path = FIRST_LIGHT.with_suffix(".xml")) -> Image.Image:
+def first_light() -> Image.Image:
     """Return what README.md's first command renders."""
-    loaded = SceneFile(str(scene), {}, box_filter=True).load()
+    loaded = SceneFile(str(FIRST_LIGHT.with_suffix(".xml")), {}, box_filter=True).load()
     image = display_image(denoised(render(loaded, FIRST_LIGHT_SPP)).bitmap)
     return Image.fromarray(np.array(image))
 
