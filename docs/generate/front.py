@@ -26,7 +26,7 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 from matplotlib.figure import Figure
 from PIL import Image
 
-from .made import ROOT, Picture
+from .made import ROOT, Picture, code
 
 FOLDER = ROOT / "docs" / "pictures"
 SIZE = 640, 480
@@ -38,7 +38,13 @@ def pictures() -> list[Picture]:
     made: dict[str, Callable[[], Image.Image]] = {
         "explorer.jpg": _explorer, "lobes.png": _lobes, "fits.png": _fits, "checker.png": _checker, "globe.jpg": _globe,
     }  # fmt: skip
-    return [Picture(FOLDER / name, lambda name=name: [name], partial(_save, draw)) for name, draw in made.items()]
+    return [Picture(FOLDER / name, partial(_sources, name), partial(_save, draw)) for name, draw in made.items()]
+
+
+def _sources(name: str) -> list[str | bytes]:
+    """Return what a picture is made from."""
+    files = {"fits.png": [MEASURED], "globe.jpg": [GLOBE]}.get(name, [])
+    return [code(sys.modules[__name__]), *(file.read_bytes() for file in files if file.is_file())]
 
 
 def _save(draw: Callable[[], Image.Image], path: Path) -> None:
@@ -65,8 +71,14 @@ def _lobes() -> Image.Image:
 
 def _fits() -> Image.Image:
     """Two models beside a measurement."""
-    probes = [probe_of(it) for it in fit(MEASURED, ["ward", "walter"], starts=2)]
-    return _image(lobes(read(MEASURED), probes, 88)[1][1])
+    fits = fit(MEASURED, ["ward", "walter"], starts=2)
+    figure = lobes(read(MEASURED), [probe_of(it) for it in fits], 88)[-1][1]
+    _, data, *lines, _ = figure.axes[0].lines
+    for k, (line, it) in enumerate(zip(lines, fits, strict=True)):
+        line.set(label=it.bsdf["type"], color=f"C{k}")  # the report's colours are those of its style sheet
+    data.set(label="measured", color="black")
+    figure.axes[0].legend(frameon=False, fontsize=9)
+    return _image(figure)
 
 
 class Tilted(LambertLobe):
@@ -80,7 +92,7 @@ class Tilted(LambertLobe):
 class Faulty(Lambert):
     """A model with a fault."""
 
-    def lobes(self, p):  # type: ignore[no-untyped-def]
+    def lobes(self, p):
         return (Tilted(p.reflectance),)
 
 
@@ -93,11 +105,10 @@ def _checker() -> Image.Image:
 
 
 def _globe() -> Image.Image:
-    """The middle of the scene with a texture for each parameter."""
+    """The left of the scene with a texture for each parameter."""
     image = Image.open(GLOBE)
-    side = min(image.height * 4 / 3, image.width)
-    left = (image.width - side) / 2
-    return image.crop((round(left), 0, round(left + side), image.height)).resize(SIZE, Image.Resampling.LANCZOS)
+    box = 0, 0, round(image.height * SIZE[0] / SIZE[1]), image.height
+    return image.crop(box).resize(SIZE, Image.Resampling.LANCZOS)
 
 
 def _explorer() -> Image.Image:
