@@ -6,8 +6,9 @@ from pathlib import Path
 
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
-LINK = re.compile(r"(!?)(\[[^\]]*\])\((?!\w+:|#)([^)]+)\)")
-"""A relative link, or a picture."""
+PICTURE = re.compile(r"(!\[[^\]]*\])\((?!\w+:|#)([^)]+)\)")
+LINK = re.compile(r"(\])\((?!\w+:|#)([^)]+)\)")
+"""A relative link, maybe around a picture."""
 
 
 class Description(MetadataHookInterface):
@@ -23,4 +24,5 @@ class Description(MetadataHookInterface):
 def absolute(text: str, source: str) -> str:
     """Return Markdown whose relative links lead to a repository's pages, and pictures to its files, in the way of
     GitHub and GitLab."""
-    return LINK.sub(lambda link: f"{link[1]}{link[2]}({source}/{'raw' if link[1] else 'blob'}/HEAD/{link[3]})", text)
+    text = PICTURE.sub(rf"\1({source}/raw/HEAD/\2)", text)
+    return LINK.sub(rf"\1({source}/blob/HEAD/\2)", text)

@@ -1,4 +1,5 @@
-"""README.md works as it stands, from top to bottom, and what it says of numbers and of other files is so."""
+"""README.md and the guide in docs work as they stand, from top to bottom, and what they say of numbers and of other
+files is so."""
 
 import glob
 import importlib.util
@@ -21,6 +22,8 @@ from mi_brdfs.cli import app
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+GUIDE = ["README.md", *(f"docs/{page}.md" for page in ("python", "command_line", "machines", "measured", "mitsuba_06"))]
+TEXT = "".join((ROOT / page).read_text(encoding="utf-8") for page in GUIDE)
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 
 # --- Its blocks -----------------------------------------------------------------------------------------------------
@@ -30,25 +33,28 @@ SHORTER = {
     "mi-brdfs show": " --spp 4",
     "mi-brdfs gallery": " --size 64 --spp 4",
 }
-"""What the README names to make commands that take long shorter, and here is added to them."""
+"""What the guide names to make commands that take long shorter, and here is added to them."""
 LESS = {"mi-brdfs fit": " --starts 1", "mi-brdfs check": " --only albedo"}
 """And what is added besides: their own tests ask for all."""
 
 
 def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
 
 
 def lines():
-    """Return the lines of all shell blocks without what makes and fills an environment, as the tests run in one, and
-    without the command that runs them."""
-    for line in "".join(blocks("sh")).splitlines():
-        parts = [part for part in line.split("  #")[0].rstrip().split(" && ") if not makes_environment(part)]
+    """Return the lines of all shell blocks and the commands that answer questions, each once, without what makes and
+    fills an environment, as the tests run in one, and without the command that runs them."""
+    answers = re.findall(r"`(mi-brdfs\s[^`]*)`", README.split("## Questions\n")[1].split("\n## ")[0])
+    found = {}
+    for line in [*"".join(blocks("sh")).splitlines(), *(" ".join(answer.split()) for answer in answers)]:
+        parts = [part for part in re.split(r"\s+#", line)[0].split(" && ") if not makes_environment(part)]
         parts = [
             part + next((more for c, more in (SHORTER | LESS).items() if part.startswith(c)), "") for part in parts
         ]
         if parts and not parts[0].startswith("python -m pytest"):
-            yield " && ".join(parts)
+            found[" && ".join(parts)] = True
+    return list(found)
 
 
 def makes_environment(command):
@@ -61,7 +67,7 @@ def checkout(tmp_path_factory):
     return Path(shutil.copytree(ROOT, tmp_path_factory.mktemp("readme") / "checkout", ignore=leave_out))
 
 
-QUICK = "list", "info", "presets", "doctor", "plot", "convert"
+QUICK = "list", "info", "presets", "doctor", "plot", "convert", "upgrade"
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -82,9 +88,9 @@ def test_shell(line, checkout, monkeypatch):
 def test_no_command_is_left_out():
     assert {line.split()[1] for line in lines()} == {
         "list", "info", "presets", "doctor", "show", "render", "plot", "gallery", "measured", "convert", "fit",
-        "sweep", "explore", "check", "energy", "bench",
+        "sweep", "explore", "check", "energy", "bench", "upgrade",
     }  # fmt: skip
-    assert all(more.strip() in README for more in SHORTER.values())
+    assert all(more.strip() in TEXT for more in SHORTER.values())
 
 
 @pytest.mark.slow
@@ -114,16 +120,27 @@ def test_the_gate_finds_its_command():
 
 def test_extras_are_there():
     extras = set(re.findall(r"^(\w+) = ", PROJECT.split("[project.optional-dependencies]")[1].split("\n[")[0], re.M))
-    assert set(re.findall(r'"\.\[(\w+)\]"', README)) == {"llvm", "all", "cluster", "dev"} <= extras
+    assert set(re.findall(r'"\.\[([\w,]+)\]"', TEXT)) == {"llvm,denoise", "all", "cluster", "dev"}
+    assert {"llvm", "denoise", "all", "cluster", "dev"} <= extras
 
 
 def test_links_lead_to_files():
-    targets = re.findall(r"\]\((?!\w+:)([^)#]*)(?:#([\w-]+))?\)", README)
-    assert len(targets) > 30
-    for file, anchor in targets:
-        path = ROOT / file
-        assert path.exists(), file
-        assert not anchor or f"## {anchor}\n" in path.read_text(encoding="utf-8"), anchor
+    for page in [*GUIDE, "docs/limits.md", "docs/questions.md", "docs/testing.md", "CONTRIBUTING.md", "CHANGELOG.md"]:
+        targets = links((ROOT / page).read_text(encoding="utf-8"))
+        assert page != "README.md" or len(targets) > 30
+        for file, anchor in targets:
+            path = (ROOT / page).parent / file
+            assert path.exists(), (page, file)
+            assert not anchor or f"## {anchor}\n" in path.read_text(encoding="utf-8"), (page, anchor)
+
+
+def links(text):
+    """Return the relative links of a page, each with its anchor."""
+    return re.findall(r"\]\((?!\w+:)([^)#]*)(?:#([\w-]+))?\)", text)
+
+
+def test_readme_is_short():
+    assert len(README.split()) <= 1900
 
 
 def test_links_are_absolute_where_the_address_is_known(monkeypatch):

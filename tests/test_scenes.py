@@ -39,6 +39,18 @@ def test_picture_shows_the_scene(path):
     assert abs(squares(stored) - squares(now)).mean() < 0.01, f"stale: run python docs/generate {path.stem}"
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_first_picture_is_what_its_command_renders():
+    """Almost nothing in it is black or clipped."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"mi-brdfs render scenes/first_light.xml --spp {scenes.FIRST_LIGHT_SPP} --denoise\n" in readme
+    stored = np.array(mi.Bitmap(str(scenes.FIRST_LIGHT)), np.float64) / 255
+    now = np.array(scenes.first_light(), np.float64) / 255
+    assert stored.shape == now.shape and abs(squares(stored) - squares(now)).mean() < 0.005
+    assert (stored.max(axis=-1) < 0.03).mean() < 0.01 and (stored.min(axis=-1) > 0.99).mean() < 0.01
+
+
 def squares(image, side=8):
     """The means of an image over squares of pixels."""
     height, width, channels = image.shape

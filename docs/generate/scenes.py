@@ -14,8 +14,9 @@ from pathlib import Path
 from mi_brdfs.gallery.families import year
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
-from mi_brdfs.rendering.output import display_image
+from mi_brdfs.rendering.output import denoised, display_image
 from mi_brdfs.rendering.passes import render
+from mi_brdfs.rendering.scene_file import SceneFile
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -33,7 +34,8 @@ LARGE = PICTURES / "large"
 CATALOGUE = ROOT / "scenes" / "catalogue.xml"
 FIRST_LIGHT = ROOT / "scenes" / "first_light.png"
 WIDTH, QUALITY = 400, 88
-FIRST_LIGHT_SPP = 1024
+FIRST_LIGHT_SPP = 32
+"""As in README.md's command, which denoises."""
 
 INTRODUCTION = """\
 # Scenes
@@ -63,7 +65,7 @@ def pictures() -> list[Picture]:
             Picture(PICTURES / large.name, partial(_bytes, large), partial(_reduce, large)),
         ]
     first = FIRST_LIGHT.with_suffix(".xml")
-    return [*found, Picture(FIRST_LIGHT, partial(sources, first), partial(_draw_first, first))]
+    return [*found, Picture(FIRST_LIGHT, partial(sources, first), _draw_first)]
 
 
 def readme() -> str:
@@ -92,8 +94,15 @@ def _draw(scene: Path, path: Path) -> None:
     picture(scene).save(path, quality=QUALITY, optimize=True)
 
 
-def _draw_first(scene: Path, path: Path) -> None:
-    picture(scene, FIRST_LIGHT_SPP).save(path, optimize=True)
+def _draw_first(path: Path) -> None:
+    first_light().save(path, optimize=True)
+
+
+def first_light() -> Image.Image:
+    """Return what README.md's first command renders."""
+    loaded = SceneFile(str(FIRST_LIGHT.with_suffix(".xml")), {}, box_filter=True).load()
+    image = display_image(denoised(render(loaded, FIRST_LIGHT_SPP)).bitmap)
+    return Image.fromarray(np.array(image))
 
 
 def _reduce(large: Path, path: Path) -> None:

@@ -21,18 +21,21 @@ from . import notebooks
 from .reference import with_formulas
 
 GUIDE = {
-    "index": ["", "First light", "Models", "Noise and speed"],
-    "guide/python": ["From Python"],
-    "guide/command_line": ["From the command line"],
-    "guide/machines": ["On several machines"],
-    "guide/measured": ["Measured materials"],
-    "guide/mitsuba_06": ["Scenes of Mitsuba 0.6"],
-    "guide/questions": ["Questions"],
-    "development": ["What is tested", "Adding a model", "Licence"],
+    "docs/python.md": "guide/python",
+    "docs/command_line.md": "guide/command_line",
+    "docs/measured.md": "guide/measured",
+    "docs/machines.md": "guide/machines",
+    "docs/mitsuba_06.md": "guide/mitsuba_06",
+    "docs/questions.md": "guide/questions",
+    "docs/limits.md": "guide/limits",
 }
-"""The sections of README.md by page."""
+"""Pages of the guide by file."""
 
-FILES = {
+FILES = GUIDE | {
+    "README.md": "index",
+    "CONTRIBUTING.md": "development",
+    "CHANGELOG.md": "changelog",
+    "docs/testing.md": "testing",
     "mi_brdfs/models/README.md": "reference/index",
     "docs/folklore.md": "folklore",
     "docs/bench.md": "bench",
@@ -71,10 +74,11 @@ def write_pages(folder: Path) -> None:
 
 def _pages(folder: Path) -> dict[str, tuple[str, str]]:
     """Return the text of each page with the file that its links start from."""
-    pages = {page: ("README.md", text) for page, text in _guide().items()}
+    pages = {}
     for file, page in FILES.items():
         if (ROOT / file).is_file():
             pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
+    pages["index"] = ("README.md", _front())
     pages["folklore"] = ("docs/folklore.md", pages["folklore"][1].replace("## What", "# What", 1))
     for page in ("shading", "polarization"):
         text = re.sub(r"^## \[(\w+)\]\((.*)\)$", r"## \1\n\n[\2](\2)", pages[page][1], flags=re.MULTILINE)
@@ -100,30 +104,19 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
 # --- Texts ----------------------------------------------------------------------------------------------------------
 
 
-def _guide() -> dict[str, str]:
-    """Return the pages made of README.md; each of its sections is on one of them."""
+def _front() -> str:
+    """Return README.md with the contents of the site."""
     text = re.sub(r"<!-- .*? -->\n\n?", "", (ROOT / "README.md").read_text(encoding="utf-8"))
-    start, *parts = re.split(r"^## ", text, flags=re.MULTILINE)
-    sections = {"": start} | {part.split("\n")[0]: f"## {part}" for part in parts}
-    placed = [name for names in GUIDE.values() for name in names]
-    if sorted(placed) != sorted(sections):
-        raise ValueError(f"README.md and GUIDE differ: {set(placed) ^ set(sections)}")
-    pages = {page: "".join(sections[name] for name in names) for page, names in GUIDE.items()}
-    for page, names in GUIDE.items():
-        if len(names) == 1:
-            pages[page] = pages[page].removeprefix("#")
-    pages["development"] = f"# Development\n\n{pages['development']}"
-    pages["index"] += "".join(_contents())
-    return pages
+    return text + "".join(_contents())
 
 
 def _contents() -> Iterator[str]:
     for caption, pages in {
-        "Guide": [page for page in GUIDE if page.startswith("guide/")],
+        "Guide": list(GUIDE.values()),
         "Gallery": ["gallery", "scenes", "shading", "polarization"],
         "Notebooks": ["notebooks/index"],
         "Reference": ["reference/index", "folklore"],
-        "More": ["extending", "sampling", "bench", "development"],
+        "More": ["extending", "sampling", "bench", "testing", "development", "changelog"],
     }.items():
         yield CONTENTS.format(caption=caption, pages="\n".join(pages))
 

@@ -1,0 +1,134 @@
+"""Generate the small pictures of README.md: what the pack does, at a glance."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import mi_brdfs
+from mi_brdfs import plot
+from mi_brdfs.fit import fit
+from mi_brdfs.fit.figures import lobes, probe_of
+from mi_brdfs.lobes import LambertLobe
+from mi_brdfs.measured import read
+from mi_brdfs.models.lambert import Lambert
+from mi_brdfs.validation import check
+from mi_brdfs.validation.pictures import pictures as drawn
+
+import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
+
+from matplotlib.figure import Figure
+from PIL import Image
+
+from .made import ROOT, Picture, code
+
+FOLDER = ROOT / "docs" / "pictures"
+SIZE = 640, 480
+GLOBE = ROOT / "docs" / "scenes" / "large" / "textured.jpg"
+MEASURED = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
+
+
+def pictures() -> list[Picture]:
+    made: dict[str, Callable[[], Image.Image]] = {
+        "explorer.jpg": _explorer, "lobes.png": _lobes, "fits.png": _fits, "checker.png": _checker, "globe.jpg": _globe,
+    }  # fmt: skip
+    return [Picture(FOLDER / name, partial(_sources, name), partial(_save, draw)) for name, draw in made.items()]
+
+
+def _sources(name: str) -> list[str | bytes]:
+    """Return what a picture is made from."""
+    files = {"fits.png": [MEASURED], "globe.jpg": [GLOBE]}.get(name, [])
+    return [code(sys.modules[__name__]), *(file.read_bytes() for file in files if file.is_file())]
+
+
+def _save(draw: Callable[[], Image.Image], path: Path) -> None:
+    path.parent.mkdir(exist_ok=True)
+    draw().convert("RGB").save(path, quality=88, optimize=True)
+
+
+def _image(figure: Figure, dpi: float = 160) -> Image.Image:
+    """Return a figure, in the middle of a white picture of the common size."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi, facecolor="white", bbox_inches="tight", pad_inches=0.05)
+    image = Image.open(stream).convert("RGB")
+    image.thumbnail(SIZE, Image.Resampling.LANCZOS)
+    white = Image.new("RGB", SIZE, "white")
+    white.paste(image, tuple((all_ - own) // 2 for all_, own in zip(SIZE, image.size, strict=True)))
+    return white
+
+
+def _lobes() -> Image.Image:
+    """The lobe of Ward's model as it gets rougher."""
+    wards = [{"type": "ward", "alpha": alpha} for alpha in (0.1, 0.2, 0.4)]
+    return _image(plot.polar(*wards, angles=(40,), scale="log"))
+
+
+def _fits() -> Image.Image:
+    """Two models beside a measurement."""
+    fits = fit(MEASURED, ["ward", "walter"], starts=2)
+    figure = lobes(read(MEASURED), [probe_of(it) for it in fits], 88)[-1][1]
+    _, data, *lines, _ = figure.axes[0].lines
+    for k, (line, it) in enumerate(zip(lines, fits, strict=True)):
+        line.set(label=it.bsdf["type"], color=f"C{k}")  # the report's colours are those of its style sheet
+    data.set(label="measured", color="black")
+    figure.axes[0].legend(frameon=False, fontsize=9)
+    return _image(figure)
+
+
+class Tilted(LambertLobe):
+    """A sampler that leaves out light from one side."""
+
+    def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
+        wo = super().sample(wi, u, v)
+        return mi.Vector3f(abs(wo.x), wo.y, wo.z)
+
+
+class Faulty(Lambert):
+    """A model with a fault."""
+
+    def lobes(self, p):
+        return (Tilted(p.reflectance),)
+
+
+def _checker() -> Image.Image:
+    """What the sampler of a faulty model draws, what its density expects, and the difference."""
+    Faulty.plugins = ("faulty",)
+    mi_brdfs.register(Faulty)
+    (panels, *_) = drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0])
+    return _image(panels.drawing, dpi=240)
+
+
+def _globe() -> Image.Image:
+    """The left of the scene with a texture for each parameter."""
+    image = Image.open(GLOBE)
+    box = 0, 0, round(image.height * SIZE[0] / SIZE[1]), image.height
+    return image.crop(box).resize(SIZE, Image.Resampling.LANCZOS)
+
+
+def _explorer() -> Image.Image:
+    """The page of ``mi-brdfs explore ward walter``, in Chromium."""
+    from playwright.sync_api import sync_playwright
+
+    command = [sys.executable, "-m", "mi_brdfs", "explore", "ward", "walter", "--no-browser", "--port", "0"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        address = server.stdout.readline().strip()
+        with sync_playwright() as running, tempfile.TemporaryDirectory() as folder:
+            chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+            flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+            page = running.chromium.launch(executable_path=chromium, args=flags).new_page(
+                viewport={"width": 1280, "height": 960}, device_scale_factor=1
+            )
+            page.goto(address)
+            page.wait_for_timeout(20_000)
+            page.screenshot(path=f"{folder}/page.png")
+            return Image.open(f"{folder}/page.png").resize(SIZE, Image.Resampling.LANCZOS)
+    finally:
+        server.terminate()
+        server.wait(20)
