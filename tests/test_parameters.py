@@ -38,7 +38,7 @@ REJECTED = [
     ("walter", {"f0": 0.04, "int_ior": 1.5}, "walter: f0 excludes int_ior; give one of eta and k, material, f0, int_ior and"),
     ("walter", {"material": "Au", "eta": 1.5, "k": 1.0}, "walter: eta excludes material; give one of"),
     ("walter", {"eta": 1.5}, "walter: eta needs k beside it."),
-    ("walter", {"material": "gold"}, 'walter: material = "gold" is unknown; it must be "none", for F = 1, or one of Mitsuba\'s'),
+    ("walter", {"material": "gold"}, 'walter: material = "gold" is unknown; did you mean "Au"? It must be "none", for F = 1, or one of Mitsuba\'s'),
     ("walter", {"material": "Au_palik"}, 'walter: material = "Au_palik" is unknown; did you mean "Cu_palik"? It must be "none"'),
     ("walter", {"material": 3}, "walter: material = 3 is a number; it must be a name."),
     ("walter", {"int_ior": "glas"}, 'walter: int_ior = "glas" is unknown; it must be a number or one of vacuum, helium'),

@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from mutants import MUTANTS, of_others
+from support import ROOT
 from typer.testing import CliRunner
 
 import mi_brdfs
@@ -293,6 +294,7 @@ def test_materials_of_a_scene(tmp_path):
     assert [source.name for source in find_sources(str(path))] == ["a:b=c.xml"]
 
 
+SCAN = str(ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf")
 FITS = """[{"model": "ward", "file": "a.bsdf", "bsdf": {"type": "ward", "alpha": 0.2}},
 {"model": "phong", "file": "a.bsdf", "bsdf": {"type": "phong", "exponent": 9}}]"""
 
@@ -315,7 +317,7 @@ def test_materials_have_parameters_of_their_own(tmp_path):
     assert loaded(f"{fits}:ward:alpha=.3") == [{"type": "ward", "alpha": 0.3}]
     assert loaded(fits, alpha="0.4") == [{"type": "ward", "alpha": 0.4}, {"type": "phong", "exponent": 9}]
     assert loaded(f"{scene}:plastic:n=33", n="12")[0]["exponent.value"] == 33
-    words = ["ward", "phong", f"{fits}:phong", scene, '<bsdf type="ward"/>', "roughconductor", "scan.binary"]
+    words = ["ward", "phong", f"{fits}:phong", scene, '<bsdf type="ward"/>', "roughconductor", SCAN]
     given = shared(words, {"alpha": "1", "exponent": "2", "n": "3", "quantity": "f", "nope": "4"})
     assert [" ".join(own) for own in given] == [
         "alpha nope", "exponent nope", "exponent nope", "n nope", "nope", "alpha nope", "quantity nope",

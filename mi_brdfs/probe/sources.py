@@ -15,9 +15,8 @@ import mitsuba as mi
 import numpy as np
 
 from .. import legacy
-from ..mitsuba.registry import DATA, MODELS
 from ..names import tabulated
-from ..parameters import nested, published
+from ..parameters import published
 from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load
 from .directions import direction, on_side
@@ -144,27 +143,25 @@ def _declares(word: str, name: str) -> bool:
     file, ending, wanted = _parted(word)
     path = Path(file + ending)
     if is_measured(word):
-        return _has("tabulated", name)
+        return _has(tabulated(word), name)
     if word in published.names():
-        return _has(published.preset(word)["type"], name)
+        return _has(published.preset(word), name)
     if ending == ".json" and path.is_file():
         fits = _fits(path)
         rows = zip(_names_of(fits), fits, strict=True)
-        return any(_has(row["bsdf"]["type"], name) for own, row in rows if wanted in ("", own))
+        return any(_has(row["bsdf"], name) for own, row in rows if wanted in ("", own))
     if word.startswith("<") or ending:
         text = path.read_text(encoding="utf-8", errors="replace") if ending and path.is_file() else word
         return bool(re.search(rf"""\$\{{?{name}\b|<include|<default[^>]+["']{name}["']""", text))
-    return _has(word, name)
+    return _has({"type": word}, name)
 
 
-def _has(kind: str, name: str) -> bool:
-    """Return whether a plugin has a parameter."""
-    if model := (MODELS | DATA).get(kind):
-        return any(name in parameter.names for parameter in nested(model.declared()))
+def _has(bsdf: dict[str, Any], name: str) -> bool:
+    """Return whether a plugin has a parameter: whether it, or a value of it, is refused as such."""
     try:
-        mi.load_dict({"type": kind, name: 0.5})
+        load(bsdf | {name: 0.5})
     except (RuntimeError, TypeError) as error:
-        return "unreferenced" not in str(error)
+        return not re.search("unreferenced|unknown parameter", str(error))
     return True
 
 
