@@ -89,8 +89,8 @@ def client(llvm_rgb):
 WARD = {"bsdf": {"type": "ward"}}
 NO_STATES = [
     ([], "The state of a page is an object"),
-    *(({"subjects": it}, "one to 4 subjects") for it in (None, [], [WARD] * 5)),
-    ({"subjects": [3]}, "A subject is an object"),
+    *(({"subjects": it}, "one to 6 materials") for it in (None, [], [WARD] * 7)),
+    ({"subjects": [3]}, "A material is an object"),
     ({"subjects": [{"bsdf": {"alpha": 1}}]}, "needs a bsdf with a type"),
     ({"subjects": [{"bsdf": {"type": "tabulated", "filename": "/etc/passwd"}}]}, "filename cannot be a parameter"),
     ({"subjects": [{"bsdf": {"type": "ward", "x" * 99: 1}}]}, "cannot be a parameter"),
@@ -316,6 +316,15 @@ def test_pictures_are_refined_until_they_are_finished(client, monkeypatch):
     assert (pixels[..., 3] == 255).all() and 60 < pixels[..., :3].mean() < 200
 
 
+def test_another_size_keeps_the_picture_until_it_is_as_good(client, monkeypatch):
+    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 32)
+    before = of(client.show(WARD["bsdf"], refine=True, size=64), "picture")[-1]
+    found = of(client.show(WARD["bsdf"], refine=True, size=96), "picture")
+    assert found and {it["width"] for it in found} == {96}
+    assert all(it["spp"] >= before["spp"] or it["final"] for it in found)
+    assert of(client.show(WARD["bsdf"], size=64, exposure=1), "picture")[0]["spp"] == 1  # of other light
+
+
 def test_a_saved_picture_is_what_is_shown(client, monkeypatch, tmp_path):
     """And needs no room on the disk."""
     monkeypatch.setattr("tempfile.tempdir", "/dev/full")
@@ -366,10 +375,10 @@ def test_channels_and_components(client):
     assert max(max(it["y"]) for it in parts) < max(whole)
 
 
-def test_a_request_about_no_subject_is_answered(client):
+def test_a_request_about_no_material_is_answered(client):
     client.show({"type": "lambert"}, views=[])
     client.session.ask({"type": "chi2", "subject": 1})
-    assert [it["error"] for it in of(client.work(), "chi2", 1)] == ["There is no subject 1."]
+    assert [it["error"] for it in of(client.work(), "chi2", 1)] == ["There is no material 1."]
 
 
 def test_chi_square_on_request(client):

@@ -32,7 +32,7 @@ PAUSE = 0.15
 """The seconds without an edit after which pictures are refined: a pass at work would hold up the next one."""
 BACKLOG = 6
 """Frames that wait to be sent, from which on pictures are not refined."""
-DENOISED_AT = 16, 64, 256
+DENOISED_AT = 2, 6, 16, 64, 256
 """The samples per pixel at which a picture is denoised."""
 RELEASE = 1.0
 """The seconds after which memory that is free is given back, as edits of any size leave it in pieces."""
@@ -70,6 +70,7 @@ class Session:
         self._broken: set[str] = set()
         self._shown: dict[tuple[str, int], Any] = {}
         self._pictures: dict[int, tuple[Any, stages.Progress]] = {}
+        self._sent: dict[int, tuple[Any, int, int]] = {}
         self._idle = True
 
     # --- The server's side --------------------------------------------------------------------------------------------
@@ -219,7 +220,12 @@ class Session:
         return True
 
     def _send_picture(self, k: int, state: State, serial: int, denoise: Callable | None = None) -> None:
-        progress = self._pictures[k][1]
+        (key, setting), progress = self._pictures[k]
+        content = key, setting.stage, setting.shape, state.exposure
+        former, size, spp = self._sent.get(k, (None, 0, 0))
+        if content == former and setting.size != size and progress.spp < spp and not progress.finished:
+            return  # of another size, but so far no better than what is there
+        self._sent[k] = content, setting.size, progress.spp
         payload, header = stages.shown(progress, state.exposure, denoise)
         self.send(packed(payload, type="picture", serial=serial, subject=k, final=progress.finished, **header))
 
@@ -229,7 +235,7 @@ class Session:
         kind, k = request["type"], request.get("subject", 0)
         try:
             if k >= len(state.subjects):
-                raise StateError(f"There is no subject {k}.")
+                raise StateError(f"There is no material {k}.")
             if kind == "chi2":
                 self._test(k, state)
             elif kind == "fit":

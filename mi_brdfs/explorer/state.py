@@ -12,8 +12,8 @@ from typing import Any
 
 from ..parameters.messages import brief, listed
 
-SUBJECTS = 4
-"""The most subjects of a page."""
+SUBJECTS = 6
+"""The most materials of a page; the protocol calls them subjects."""
 PARAMETERS = 64
 """The most parameters of a subject."""
 LIMITS = {"theta": (0, 89), "phi": (-180, 180), "exposure": (-10, 10), "component": (0, 99), "size": (64, 1024),
@@ -133,9 +133,9 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
         raise StateError("The state of a page is an object.")
     subjects = data.get("subjects")
     if not isinstance(subjects, list) or not 1 <= len(subjects) <= SUBJECTS:
-        raise StateError(f"A page has one to {SUBJECTS} subjects.")
+        raise StateError(f"A page has one to {SUBJECTS} materials.")
     if not all(isinstance(it, Mapping) for it in subjects):
-        raise StateError("A subject is an object with a bsdf.")
+        raise StateError("A material is an object with a bsdf.")
     views = data.get("views", State.views)
     if not isinstance(views, (list, tuple)) or any(it not in VIEWS for it in views):
         raise StateError(f"views are {listed(VIEWS)}.")
@@ -163,7 +163,7 @@ def checked(bsdf: Any) -> Bsdf:
         StateError: if it is none, or names a file: those are known by names of their own.
     """
     if not isinstance(bsdf, Mapping) or not isinstance(bsdf.get("type"), str):
-        raise StateError("A subject needs a bsdf with a type.")
+        raise StateError("A material needs a bsdf with a type.")
     if len(bsdf) > PARAMETERS:
         raise StateError(f"A bsdf has at most {PARAMETERS} parameters.")
     for name, value in bsdf.items():

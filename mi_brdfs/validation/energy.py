@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..parameters.messages import listed
 from ..probe.arrays import Array, interaction, luminance, numbers
 from ..probe.bsdf import Part
 from ..probe.directions import direction, on_side
@@ -51,21 +52,21 @@ def albedo(run: Run) -> Findings:
             if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
-        if outcome.faults and _is_sampled_wrongly(run, part):
-            words = "Not judged, as the mean of the weights is the albedo only where pdf, chi2 and weight pass."
+        if outcome.faults and (failing := _failing(run, part)):
+            words = f"Not judged: mend {listed(failing, 'and')} first; only then the mean of the weights is the albedo."
             yield Finding("albedo", part.name, "skip", words, outcome.data)
             continue
         yield _judged(part, outcome, found, limits)
 
 
-def _is_sampled_wrongly(run: Run, part: Part) -> bool:
-    """Return whether a check of the sampler fails: then that is the fault, and not the energy."""
-    return any(
-        finding.verdict == "fail"
+def _failing(run: Run, part: Part) -> list[str]:
+    """Return the checks of the sampler that fail: then that is the fault, and not the energy."""
+    return [
+        finding.check
         for check in (sampling.weight, sampling.pdf, sampling.chi2)
         for finding in check(run)
-        if finding.subject == part.name
-    )
+        if finding.subject == part.name and finding.verdict == "fail"
+    ]
 
 
 TOLERANCE = 1e-3

@@ -266,7 +266,7 @@ function start() {
   }
   for (const view of ["polar", "cartesian", "albedo"]) cards[view].table = () => table(view);
   cards.sampler.table = () => [
-    ["subject", "theta_i_degrees", "efficiency"],
+    ["material", "theta_i_degrees", "efficiency"],
     ...visible().flatMap((k) =>
       (session.shown.sampler[k]?.eta.x ?? []).map((angle, at) => [
         session.state.subjects[k].name,
@@ -317,6 +317,14 @@ function start() {
     byId("tours").hidden = !session.hello.tours?.length;
     byId("version").textContent = `${session.hello.version} · ${session.hello.variant}`;
   });
+  // What is under a moving hand is drawn coarsely, and anew when the hand lets go.
+  addEventListener("pointerdown", ({ target }) => (session.dragged = target.matches("input[type=range], canvas")));
+  for (const end of ["pointerup", "pointercancel"]) {
+    addEventListener(end, () => {
+      if (session.dragged) sendState();
+      session.dragged = false;
+    });
+  }
   addEventListener("hashchange", openAddress);
   addEventListener("popstate", openAddress);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);

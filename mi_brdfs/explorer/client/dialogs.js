@@ -1,4 +1,4 @@
-// Data out, and fits: "Save and copy" and "Fit this".
+// Data out, and fits: "Share" and "Fit this".
 import { byId, element } from "./util.js";
 import { addSubject, fragment, hasRoom, on, session, tellFull } from "./session.js";
 import { post } from "./link.js";
@@ -17,13 +17,11 @@ export function startDialogs() {
   };
   for (const what of ["xml", "dict", "command"])
     byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
-  byId("copy-link").onclick = () =>
-    copy(
-      location.href.replace(/#.*/, "") +
-        "#" +
-        encodeURIComponent(decodeURIComponent(fragment().slice(1))).replaceAll("'", "%27"),
-      "link",
-    );
+  byId("copy-link").onclick = () => {
+    const uploaded = session.state.subjects.filter(({ bsdf }) => bsdf.file?.startsWith("upload-"));
+    const warning = uploaded.length ? ` It works only while this server runs, which has the uploaded ${uploaded[0].name}.` : "";
+    copy(location.href.replace(/#.*/, "") + fragment(), "link", warning);
+  };
   byId("save-png").onclick = () => cards.picture.tools.querySelector("button")?.click();
   byId("save-exr").onclick = () => ask({ type: "save", what: "exr", subject: session.selected });
   byId("save-page").onclick = () => ask({ type: "save", what: "page", state: session.state });
@@ -41,16 +39,16 @@ function ask(message) {
   byId("shared").textContent = post(message) ? "The server is at it …" : "The server does not answer.";
 }
 
-async function copy(text, what) {
+async function copy(text, what, warning = "") {
   try {
     await navigator.clipboard.writeText(text);
-    byId("shared").textContent = `Copied the ${what}.`;
+    byId("shared").textContent = `Copied the ${what}.${warning}`;
   } catch {
     // Without the permission, or from a file: an old way that needs none.
     const area = byId("share-dialog").appendChild(element("textarea", {}, text));
     area.select();
     byId("shared").textContent = document.execCommand("copy")
-      ? `Copied the ${what}.`
+      ? `Copied the ${what}.${warning}`
       : "The browser does not let the page copy.";
     area.remove();
   }

@@ -171,7 +171,7 @@ export function drawLobe() {
   card.note.textContent =
     "f cosθo as radius" +
     (log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "") +
-    (state.normalise ? ", over the maximum" : `, at most ${format(common)}`);
+    (state.normalise ? ", over their peaks" : `, at most ${format(common)}`);
 }
 
 function render(found) {

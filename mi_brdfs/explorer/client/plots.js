@@ -259,7 +259,7 @@ export function drawAlbedo() {
 export function table(view) {
   return [
     [
-      "subject",
+      "material",
       "channel",
       view === "albedo" ? "theta_i_degrees" : "theta_o_degrees",
       view === "albedo" ? "albedo" : "f_cos_theta_o",

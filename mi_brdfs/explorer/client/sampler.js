@@ -27,7 +27,7 @@ function drawDots(found, width, height) {
   const svg = drawing(
     width,
     height,
-    `Directions drawn by the samplers of ${found.length} subjects, seen from above, ωi on the left`,
+    `Directions drawn by the samplers of ${found.length} materials, seen from above, ωi on the left`,
   );
   const radius = height / 2 - 14;
   const [x, y] = [width / 2, height / 2];

@@ -10,6 +10,8 @@ const { subjects: MOST_SUBJECTS, own: OWN, defaults: DEFAULTS } = DECLARED;
 export const session = {
   state: structuredClone(DEFAULTS),
   serial: 0,
+  /** Whether a hand moves a slider or the arrow of wi. */
+  dragged: false,
   /** The subjects as they were sent. */
   sent: [],
   selected: 0,
@@ -96,7 +98,7 @@ export const hasRoom = () => session.state.subjects.length < MOST_SUBJECTS;
 
 /** Say that there is none, and what to do after removing a subject. */
 export const tellFull = (then = "first") =>
-  emit("error", `There is room for ${MOST_SUBJECTS} subjects: remove one ${then}.`);
+  emit("error", `There is room for ${MOST_SUBJECTS} materials: remove one ${then}.`);
 
 export function addSubject(bsdf, name) {
   if (!hasRoom()) return tellFull();
@@ -157,27 +159,32 @@ export function clean(given) {
 /** Return the state without what is the page's own. */
 export function stateForServer() {
   const sent = Object.fromEntries(Object.entries(session.state).filter(([name]) => !OWN.includes(name)));
-  return { ...sent, subjects: sent.subjects.map(({ bsdf, hidden }) => ({ bsdf, hidden })) };
+  return { ...sent, dragged: session.dragged, subjects: sent.subjects.map(({ bsdf, hidden }) => ({ bsdf, hidden })) };
 }
 
 // --- The address ----------------------------------------------------------------------------------------------------
 
-const swapQuotes = (text) => text.replace(/["']/g, (mark) => (mark === '"' ? "'" : '"'));
-
-/** Return the fragment of the address: what differs from the defaults, as JSON with ' for ", to be read by people. */
+/** Return the fragment of the address: what differs from the defaults, as JSON in base64url, which mail programs and
+ * chats leave as it is. */
 export function fragment() {
   const told = Object.entries(session.state).filter(
     ([name, value]) => name !== "size" && JSON.stringify(value) !== JSON.stringify(DEFAULTS[name]),
   );
-  const text = swapQuotes(JSON.stringify(Object.fromEntries(told)));
-  return "#" + text.replace(/[\s%"<>`#\\^|\u0080-\uffff]/gu, encodeURIComponent);
+  const bytes = new TextEncoder().encode(JSON.stringify(Object.fromEntries(told)));
+  const letters = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+  return "#" + letters.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
-/** Return the state that a fragment holds, or null. */
+function decoded(letters) {
+  const bytes = atob(letters.replaceAll("-", "+").replaceAll("_", "/"));
+  return new TextDecoder().decode(Uint8Array.from(bytes, (letter) => letter.charCodeAt(0)));
+}
+
+/** Return the state that a fragment holds, in base64url or as plain JSON, or null. */
 export function readFragment(text) {
   try {
     const plain = decodeURIComponent(text.replace(/^#/, ""));
-    const found = JSON.parse(plain.startsWith("{'") || plain === "{}" ? swapQuotes(plain) : plain);
+    const found = JSON.parse(plain.startsWith("{") ? plain : decoded(plain));
     return Array.isArray(found.subjects) ? clean(found) : null;
   } catch {
     return null;

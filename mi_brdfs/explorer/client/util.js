@@ -1,8 +1,8 @@
 // Elements, numbers, scales and colour maps.
 
-/** Colours of the subjects, Okabe and Ito's for the colour-blind, and dashes for curves that coincide. */
-export const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7"];
-export const DASHES = ["", "7 3", "2 2.5", "9 3 2 3"];
+/** Colours of the materials, Okabe and Ito's for the colour-blind, and dashes for curves that coincide. */
+export const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"];
+export const DASHES = ["", "7 3", "2 2.5", "9 3 2 3", "12 3", "5 2 1 2 1 2"];
 export const CHANNELS = { red: "#d1495b", green: "#2f9e6d", blue: "#3f7fd6" };
 
 /** Return an HTML element; `on…` attributes are listeners, true and false set and omit an attribute. */
