@@ -60,7 +60,7 @@ def albedos(bsdf, angles, azimuth=0):
 @pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
 @pytest.mark.parametrize("name", ROUGHNESS)
 def test_nothing_is_lost_in_a_white_furnace(name, distribution, shadowing):
-    """Within half a percent at all angles and azimuths, that of the tables."""
+    """Within half a percent at all angles and azimuths, that of the fit."""
     bsdf = facets("walk", ROUGHNESS[name], distribution, shadowing)
     for azimuth in (0, 30, 70, 90) if "brushed" in name else (0,):
         np.testing.assert_allclose(albedos(bsdf, ANGLES, azimuth), 1, atol=5e-3)
@@ -75,7 +75,7 @@ def test_nor_of_blinns_facets(alpha):
 
 @pytest.mark.parametrize("way", ["kulla-conty", "turquin"])
 def test_nor_by_the_published_ways(way):
-    """That of Turquin scales the lobe by tables that err by half a percent of what is lost, so of up to 70 %."""
+    """That of Turquin scales the lobe by polynomials that err by half a percent of what is lost, so of up to 70 %."""
     for name in "satin", "roughest", "brushed, rough":
         np.testing.assert_allclose(albedos(facets(way, ROUGHNESS[name]), ANGLES), 1, atol=5e-3)
 

@@ -7,8 +7,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, expm1, log1p, safe_sqrt
-from ..microfacet.escape import Escape, MeanEscape, Walks, textures
+from ..math import EPSILON, Spectrum, safe_sqrt
+from ..microfacet.escape import Escape, MeanEscape, Walks
 from ..microfacet.shadowing import Smith
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
@@ -31,7 +31,7 @@ class MultipleScattering(Lobe):
         self.walks, self.mean = walks, walks.mean
         lost = dr.maximum(self.mean.lost, EPSILON)
         self.b = self.GRAZING * lost * dr.sqrt(lost)
-        self.norm = log1p(dr.rcp(self.b))
+        self.norm = dr.log(1 + dr.rcp(self.b))
 
     def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
         """Return C for what becomes of light from both directions, or of the mean one; it is 1 if F is."""
@@ -48,7 +48,7 @@ class MultipleScattering(Lobe):
         return self.reflectance * self.colour(i, o) * (scale * cosine), cosine / ((self.b + wo.z * wo.z) * self.norm)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        cos2 = self.b * expm1(v.x * self.norm)
+        cos2 = self.b * (dr.exp(v.x * self.norm) - 1)
         sin, (sin_phi, cos_phi) = safe_sqrt(1 - cos2), dr.sincos(dr.two_pi * v.y)
         return mi.Vector3f(sin * cos_phi, sin * sin_phi, safe_sqrt(cos2))
 
@@ -109,9 +109,7 @@ def multiscattering(model: Any, lobe: MicrofacetLobe) -> tuple[Lobe, ...]:
     way, smith = model.parameters.chosen.get("multiscatter", "none"), lobe.shadowing
     if way == "none" or not isinstance(smith, Smith):
         return (lobe,)
-    if not model.captured:
-        model.captured += textures(smith)
-    walks = Walks(smith, *model.captured)
+    walks = Walks(smith)
     if way == "turquin":
         return (turquin(lobe, walks),)
     return lobe, (WalkLobe if way == "walk" else KullaContyLobe)(lobe, walks)

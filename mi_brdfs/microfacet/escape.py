@@ -1,19 +1,19 @@
 """Where light goes on a rough surface: how much of it escapes at the first reflection, at the second and later, and
-what it meets before. Tables of walks on Smith's surfaces, which tests/calibration/escape.py makes.
+what it meets before. Polynomials fitted to walks on Smith's surfaces, which tests/calibration/escape.py makes.
 
 A walk is that of E. Heitz, J. Hanika, E. d'Eon and C. Dachsbacher, Multiple-scattering microfacet BSDFs with the Smith
 model, ACM Transactions on Graphics 35(4), 2016, doi:10.1145/2897824.2925943. What it does depends on a direction by its
-cosine, the roughness α∥ along it, α⊥ across, and the correlation ρ of slopes along and across:
+cosine c in the space stretched by α, in which grazing angles of smooth surfaces take as much of the axis as those of
+rough ones, and by the roughness along it, α∥² = (αu cosφ)² + (αv sinφ)². The polynomials are in
 
-    α∥² = (αu cosφ)² + (αv sinφ)²,  α⊥² = (αu sinφ)² + (αv cosφ)²,  ρ² = 1 - (αu αv / (α∥ α⊥))²
+    1 - c,  x(α∥),  (x(αu) + x(αv))/2,  (x(αu) - x(αv))²,  where x(α) = α/√(1 + α²);
 
-which are four numbers as (θ, φ, αu, αv) are, but all that is tabulated is nearly linear in ρ²: three axes suffice, with
-polynomials in ρ² at their nodes. The cosine is that of the direction in the space stretched by α, in which grazing
-angles of smooth surfaces take as much of the axis as those of rough ones.
+the last two are the same for all directions, and facets are the same after both axes are exchanged.
 """
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,10 +25,6 @@ from ..math import EPSILON
 from .shadowing import Smith
 
 FILE = Path(__file__).with_name("escape.npz")
-ROUGHEST = 3.2
-"""The largest tabulated α: that of Burley's most anisotropic facets."""
-UPRIGHT = 1e-3
-"""The sin²θ below which the azimuth counts less and less: what is tabulated changes little with it there."""
 
 
 class Escape(NamedTuple):
@@ -58,57 +54,63 @@ class MeanEscape(NamedTuple):
 
 
 class Walks:
-    """What the :func:`textures` say of walks on a surface with Smith's term."""
+    """What becomes of light on a surface with Smith's term."""
 
-    def __init__(self, smith: Smith, towards: Any, mean: Any) -> None:
-        self.smith, self.towards = smith, towards
-        at = [_texel(_compressed(alpha), mean.shape[0]) for alpha in (smith.alpha_v, smith.alpha_u)]
-        root, second, third, schlick, dip, *_ = mean.eval(mi.Point2f(*at))
-        self.mean = MeanEscape(dr.square(root), second, third, schlick, dip)
+    def __init__(self, smith: Smith) -> None:
+        self.smith = smith
+        u, v = _compressed(smith.alpha_u), _compressed(smith.alpha_v)
+        # Without the difference where there is none, polynomials have half the terms, or fewer.
+        isotropic = smith.alpha_u is smith.alpha_v
+        mean, difference2 = (u, 0) if isotropic else (0.5 * (u + v), dr.square(u - v))
+        fitted = coefficients(f"{smith.facets}-{'correlated' if smith.correlated else 'separable'}", isotropic)
+        at = (mean, difference2)[: 1 if isotropic else 2]
+        self.towards = [[[polynomial(k, *at) for k in row] for row in fitted[name]] for name in Escape._fields]
+        at = (dr.sqrt(mean), difference2 / dr.maximum(dr.square(mean), EPSILON))[: len(at)]
+        lost, *others = (polynomial(fitted[f"mean-{name}"], *at) for name in MeanEscape._fields)
+        self.mean = MeanEscape(0.5 * (u * u + v * v) * lost, *others)
 
     def of(self, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
-        u2, v2, x2, y2 = (dr.square(each) for each in (self.smith.alpha_u, self.smith.alpha_v, v.x, v.y))
-        cos = v.z * dr.rsqrt(dr.maximum(v.z * v.z + u2 * x2 + v2 * y2, EPSILON))
-        # At the normal all azimuths are one.
-        even = UPRIGHT * dr.square(dr.square(v.z))
-        inverse = dr.rcp(dr.maximum(x2 + y2 + 2 * even, EPSILON))
-        x2, y2 = (x2 + even) * inverse, (y2 + even) * inverse
-        along2, across2 = u2 * x2 + v2 * y2, u2 * y2 + v2 * x2
-        at = [cos, _compressed(dr.sqrt(along2)), _compressed(dr.sqrt(across2))]
-        k = self.towards.eval(
-            mi.Point3f(*reversed([_texel(x, n) for x, n in zip(at, self.towards.shape[:3], strict=True)]))
+        slope2, sin2 = self.smith.slope2(v), dr.maximum(v.x * v.x + v.y * v.y, EPSILON)
+        at = (
+            1 - v.z * dr.rsqrt(dr.maximum(v.z * v.z + slope2, EPSILON)),
+            dr.sqrt(dr.maximum(slope2, EPSILON) / (sin2 + slope2)),
         )
-        rho2 = 1 - u2 * v2 / (along2 * across2)
-        lost = k[0] + rho2 * (k[1] + rho2 * k[2])
-        second, schlick, dip = k[3] + rho2 * k[4], k[5] + rho2 * k[6], k[7]
-        return Escape(dr.clip(lost, 0, 1), dr.clip(second, 0, 1), schlick, dip)
+        lost, second, schlick, dip = (polynomial(k, *at) for k in self.towards)
+        # Fits err where next to nothing is lost: there the lobe must not vanish.
+        return Escape(dr.clip(lost, 0.01 * self.mean.lost, 1), dr.clip(second, 0, 1), schlick, dip)
 
 
-def textures(smith: Smith) -> list[Any]:
-    """Return the tables for one of Smith's terms, as textures of the active variant."""
-    name = f"{smith.facets}-{'correlated' if smith.correlated else 'separable'}"
-    # Accelerated look-ups of CUDA would interpolate with eight bits.
-    options = {"use_accel": False, "wrap_mode": dr.WrapMode.Clamp}
+def polynomial(k: Any, *at: Any) -> Any:
+    """Return Σ k[i][j]… xⁱ yʲ … at x, y, …, without terms that only vanish."""
+    if not at:
+        return k if dr.is_array_v(k) else float(k)
+    total: Any = 0.0
+    for row in reversed(k):
+        value = polynomial(row, *at[1:])
+        total = value if isinstance(total, float) and not total else dr.fma(total, at[0], value)
+    return total
+
+
+@functools.cache
+def coefficients(name: str, isotropic: bool) -> dict[str, np.ndarray]:
+    """Return the polynomials of a Smith term by what they say. The axes are those of the variables, without the last,
+    and with one for the third and the second, which are then the same, if ``isotropic``."""
     with np.load(FILE) as data:
-        towards = np.concatenate([data[name], data[f"{smith.facets}-walk"]], axis=-1)
-        mean = data[f"{name}-mean"]
-    return [kind(_aligned(it), **options) for kind, it in ((mi.Texture3f, towards), (mi.Texture2f, mean))]
-
-
-def _aligned(values: np.ndarray) -> Any:
-    """Return a tensor in Dr.Jit's own memory: channels are looked up together only where arrays are aligned, as
-    NumPy's need not be."""
-    tensor = mi.TensorXf(np.float32(values)) * dr.opaque(mi.Float, 1)
-    dr.eval(tensor)
-    return tensor
+        fitted = {key.partition(":")[2]: data[key] for key in data if key.partition(":")[0] == name}
+    if not isotropic:
+        return fitted
+    merged = {}
+    for key, k in fitted.items():
+        k = k[..., 0]
+        if k.ndim == 3:
+            sums = np.zeros((len(k), 1, k.shape[1] + k.shape[2] - 1))
+            for j in range(k.shape[1]):
+                sums[:, 0, j : j + k.shape[2]] += k[:, j]
+            k = sums
+        merged[key] = k
+    return merged
 
 
 def _compressed(alpha: Any) -> Any:
-    """Return a place in [0, 1]: nodes are denser on smooth surfaces."""
-    return dr.clip((1 + 1 / ROUGHEST) * alpha / (1 + alpha), 0, 1)
-
-
-def _texel(x: mi.Float, count: int) -> mi.Float:
-    """Return the coordinate of a texture of which the outer texels' centres are at 0 and 1."""
-    return (x * (count - 1) + 0.5) / count
+    return alpha * dr.rsqrt(1 + alpha * alpha)

@@ -79,7 +79,7 @@ class Smith(Shadowing):
     conserving = True
 
     facets: ClassVar[str]
-    """Whose walks are tabulated (:mod:`.escape`)."""
+    """Whose walks are fitted (:mod:`.escape`)."""
 
     def __init__(self, alpha_u: mi.Float, alpha_v: mi.Float, correlated: bool) -> None:
         self.alpha_u, self.alpha_v, self.correlated = alpha_u, alpha_v, correlated

@@ -84,13 +84,13 @@ class Microfacet(Model):
     * none: it is lost
     * walk: a second lobe returns it, ρs C (1-E(wi)) (1-E(wo)) / (π (1-Ē)), where E(w) is the albedo for F = 1 and Ē its
       mean. Its colour C is that of a random walk on the surface (Heitz, Hanika, d'Eon and Dachsbacher 2016,
-      doi:10.1145/2897824.2925943), C = F₁(wi) F₁(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), with tabulated means F₁ and F₂ of F
+      doi:10.1145/2897824.2925943), C = F₁(wi) F₁(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), with fitted means F₁ and F₂ of F
       at the ends of a path and between them, and probabilities p and q that light escapes at its second reflection and
       at each later one; p = p(wi) + p(wo) - p̄, so that f is reciprocal
     * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
     * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
 
-    For F = 1 all of them conserve energy within 0.005 up to 85° and αu : αv = 8 : 1, which is the error of the tables.
+    For F = 1 all of them conserve energy within 0.005 up to 85° and αu : αv = 8 : 1, which is the error of the fit.
     The albedo of walk is that of the simulated walk within 0.005 up to 60°, and 0.02 at 80°, for Schlick's reflectance
     and metals, and within 0.012 for f82 = 0.6 on facets with αu : αv = 8 : 1 and, in rgb, for films.
 

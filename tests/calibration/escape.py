@@ -1,10 +1,10 @@
-"""The tables of multiple scattering: how much light escapes from Smith's surfaces at the first reflection, by
-quadrature in float64, and what becomes of the rest, by random walks.
+"""The polynomials of multiple scattering: how much light escapes from Smith's surfaces at the first reflection, by
+quadrature in float64, and what becomes of the rest, by random walks, of settings drawn at random.
 
     python tests/calibration/escape.py [--check]
 
-Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if tables made anew, of fewer walks, differ from it by
-more than their noise. The walks of Beckmann's facets serve for Blinn's, too, which have about the same shapes.
+Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if polynomials made anew, of fewer walks, differ from
+it by more than their noise. The walks of Beckmann's facets serve for Blinn's, too, which have about the same shapes.
 """
 
 from __future__ import annotations
@@ -13,40 +13,122 @@ import itertools
 import sys
 
 from harness import parser
-from scipy.interpolate import RegularGridInterpolator
 from scipy.special import erfc, erfinv
+from scipy.stats import qmc
 
-from mi_brdfs.microfacet.escape import FILE, ROUGHEST, UPRIGHT
+from mi_brdfs.microfacet.escape import FILE
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip
 import numpy as np  # isort: skip
 
-COSINES, ALPHAS = 28, 28
-WALK_COSINES, WALK_ALPHAS = 13, 9
-"""Nodes of the walks: what they say changes less, and splines are drawn through it."""
-WALKS = 1 << 15
+SETTINGS, WALKED = 1 << 14, 1 << 11
+WALKS = 1 << 12
 REFLECTIONS = 10
 TYPICAL = 0.85
 """What facets reflect where paths are averaged: as metals do, of which most light is lost at the first reflections."""
-CORRELATIONS = 0, 0.5, 0.9
-"""The ρ² of polynomials for E; those for walks are lines through the first and the second."""
+SMOOTHEST, ROUGHEST = 2e-3, 3.2
+"""The range of α, of which the upper end is that of Burley's most anisotropic facets."""
+PRECISE = 0.045, 1.05
+"""That in which the fit counts most, up to 9:1 and 86°."""
+DEGREES = {
+    "ggx": (11, (1.15, 1.9, 1, 3)),
+    "beckmann": (13, (1.25, 2.1, 1.1, 3.3)),
+    "blinn": (11, (1, 1, 1, 1)),
+    "second": (5, (1.1, 1.6, 1, 2)),
+    "schlick": (5, (1.1, 1.6, 1, 2)),
+    "dip": (4, (1.1, 1.6, 1, 2)),
+    "mean": (9, (1, 2)),
+}
+"""Of each polynomial, and what the exponents of its variables count; those for facets are of 1 - E."""
 
 
-def alphas(count: int) -> np.ndarray:
-    """Nodes of the roughness, which are evenly spaced in α/(1 + α)."""
-    x = np.linspace(0, ROUGHEST / (1 + ROUGHEST), count)
-    return np.maximum(x / (1 - x), 1e-3)
+def settings(count: int, isotropic: bool = False) -> tuple[np.ndarray, ...]:
+    """Return ``(cosθ, φ, αu, αv)``, well spread; half of the directions are even in θ and half in the stretched
+    cosine."""
+    u = qmc.Sobol(6, seed=1).random(count).T
+    low, high = np.where(u[4] < 0.7, 0.04, SMOOTHEST), np.where(u[4] < 0.7, 1.4, ROUGHEST)
+    alpha = np.minimum(low * (high / low) ** u[0], 1.0 if isotropic else ROUGHEST)
+    ratio = np.where(u[5] < 0.3, 1, np.where(u[5] < 0.8, 10, 40.0) ** u[1])
+    other = alpha if isotropic else np.maximum(alpha / ratio, SMOOTHEST / 2)
+    swapped = (u[5] * 64) % 1 < 0.5
+    alpha_u, alpha_v, phi = np.where(swapped, other, alpha), np.where(swapped, alpha, other), np.pi / 2 * u[2]
+    along = np.hypot(alpha_u * np.cos(phi), alpha_v * np.sin(phi))
+    stretched = np.clip(u[3] * 2 % 1, 1e-3, 1 - 1e-9)
+    even = np.radians(89.9) * (u[3] * 2 % 1)
+    theta = np.where(u[3] < 0.5, np.arctan(np.sqrt(1 / stretched**2 - 1) / along), even)
+    return np.maximum(np.cos(theta), 1e-4), phi, alpha_u, alpha_v
 
 
-def direction(cos: np.ndarray, along: np.ndarray, across: np.ndarray, rho2: float) -> tuple[np.ndarray, ...]:
-    """Return ``(cosθ, φ, αu, αv)`` for a stretched cosine, the roughness along the direction and across, and ρ²."""
-    rho = np.sqrt(rho2) * along * across
-    mean, half = (along**2 + across**2) / 2, np.hypot((along**2 - across**2) / 2, rho)
-    u2 = mean + half
-    v2 = along**2 * across**2 * (1 - rho2) / u2
-    tan = np.sqrt(1 / np.clip(cos, 1e-3, 1 - 1e-9) ** 2 - 1) / along
-    return 1 / np.hypot(1, tan), 0.5 * np.arctan2(2 * rho, along**2 - across**2), np.sqrt(u2), np.sqrt(v2)
+def importance(cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alpha_v: np.ndarray) -> np.ndarray:
+    """Return how much an error counts."""
+    low, high = np.minimum(alpha_u, alpha_v), np.maximum(alpha_u, alpha_v)
+    precise = (low >= PRECISE[0]) & (high <= PRECISE[1]) & (high <= 9 * low) & (cos >= np.cos(np.radians(86)))
+    return np.where(precise, 16, np.where((high < 2) & (high <= 16 * low), 3, 1.0))
+
+
+# --- The polynomials ------------------------------------------------------------------------------------------------
+
+
+def compressed(alpha: np.ndarray) -> np.ndarray:
+    return alpha / np.sqrt(1 + alpha * alpha)
+
+
+def variables(cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alpha_v: np.ndarray) -> list[np.ndarray]:
+    along = np.hypot(alpha_u * np.cos(phi), alpha_v * np.sin(phi))
+    m = 1 - cos / np.sqrt(cos * cos + along**2 * (1 - cos * cos))
+    return [m, compressed(along), *variables_of_roughness(alpha_u, alpha_v)]
+
+
+def variables_of_roughness(alpha_u: np.ndarray, alpha_v: np.ndarray) -> list[np.ndarray]:
+    u, v = compressed(alpha_u), compressed(alpha_v)
+    return [(u + v) / 2, (u - v) ** 2]
+
+
+def variables_of_means(alpha_u: np.ndarray, alpha_v: np.ndarray) -> list[np.ndarray]:
+    mean, difference2 = variables_of_roughness(alpha_u, alpha_v)
+    return [np.sqrt(mean), difference2 / mean**2]
+
+
+def exponents(degree: float, steps: tuple[float, ...], isotropic: bool) -> list[tuple[int, ...]]:
+    """Return those of a polynomial's terms. At the normal there is no roughness along the direction."""
+    every = itertools.product(*(range(int(degree / step) + 1) for step in steps))
+    few = [e for e in every if np.dot(e, steps) <= degree and (len(e) == 2 or e[0] or not e[1])]
+    return [e for e in few if not (isotropic and (e[-1] or (len(e) == 4 and e[1])))]
+
+
+def terms(at: list[np.ndarray], powers: list[tuple[int, ...]]) -> np.ndarray:
+    """Return the products of powers, one for each term on the last axis."""
+    of_each = zip(at, np.transpose(powers), strict=True)
+    return np.prod([(x[:, None] ** np.arange(max(e) + 1))[:, e] for x, e in of_each], axis=0)
+
+
+def fitted(
+    name: str, at: list[np.ndarray], values: np.ndarray, weight: np.ndarray, isotropic: bool, rounds: int
+) -> np.ndarray:
+    """Return the coefficients of the polynomial with the least weighted squares; with more rounds, of those that make
+    the largest error least, which Lawson's algorithm approaches by giving large errors more weight."""
+    powers = exponents(*DEGREES[name], isotropic)
+    if name in (*SHAPES, "blinn"):  # smooth surfaces lose nothing
+        powers = [e for e in powers if e[0] or sum(e) > 1]
+    basis, emphasis = terms(at, powers), np.ones(len(values))
+    best, least = np.zeros(len(powers)), np.inf
+    for _ in range(rounds):
+        scale = weight * np.sqrt(emphasis)
+        k = np.linalg.lstsq(basis * scale[:, None], values * scale, rcond=1e-13)[0]
+        error = weight * abs(basis @ k - values)
+        if error.max() < least:
+            best, least = k, error.max()
+        emphasis *= 0.3 + 0.7 * error / error.max()
+        emphasis /= emphasis.mean()
+    dense = np.zeros([max(each) + 1 for each in zip(*powers, strict=True)])
+    dense[tuple(np.transpose(powers))] = best
+    return dense
+
+
+def evaluated(k: np.ndarray, at: list[np.ndarray]) -> np.ndarray:
+    powers = [tuple(e) for e in np.argwhere(k)]
+    return terms(at, powers) @ k[tuple(np.transpose(powers))]
 
 
 # --- The first reflection -------------------------------------------------------------------------------------------
@@ -212,6 +294,7 @@ def walks(shape: str, cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alp
         "schlick": schlick / total,
         "dip": dip / total,
         "left": left[1] / left[0],
+        "lost": left[0],
         "between": np.stack(between) / left[1],
     }
 
@@ -226,117 +309,93 @@ def _means(values: mi.Float, count: int) -> np.ndarray:
     return dr.block_sum(values, count).numpy().astype(np.float64) / count
 
 
-# --- The tables -----------------------------------------------------------------------------------------------------
+# --- What becomes of light ------------------------------------------------------------------------------------------
 
 
-def walk_tables(shape: str, count: int) -> dict[str, RegularGridInterpolator]:
-    """Return what :func:`walks` finds, by the places of stretched cosine and roughness along and across, as the
-    coefficients of a line in ρ²: shape (…, 2, channels)."""
-    nodes = np.linspace(0, 1, WALK_COSINES), alphas(WALK_ALPHAS), alphas(WALK_ALPHAS), CORRELATIONS[:2]
-    grid = [each.ravel() for each in np.meshgrid(*nodes, indexing="ij")]
-    settings = [each.ravel() for each in np.broadcast_arrays(*direction(*grid[:3], rho2=grid[3]))]
-    found = [walks(shape, *(each[k : k + 64] for each in settings), count) for k in range(0, len(grid[0]), 64)]
-    axes = np.linspace(0, 1, WALK_COSINES), *2 * [np.linspace(0, 1, WALK_ALPHAS)]
-    tables = {}
-    for name in found[0]:
-        values = np.concatenate([each[name].reshape(-1, len(each["second"])) for each in found], axis=1)
-        values = values.reshape(-1, *map(len, axes), 2)
-        # Where nothing is lost, as on smooth surfaces from above, take what rougher ones do.
-        for i, j in itertools.product(reversed(range(WALK_ALPHAS - 1)), repeat=2):
-            here, rougher = values[:, :, i, j], values[:, :, i + 1, j + 1]
-            here[...] = np.where(np.isfinite(here), here, rougher)
-        start, end = np.moveaxis(values, (-1, 0), (0, -1))
-        line = np.stack([start, (end - start) / CORRELATIONS[1]], axis=-2)
-        tables[name] = RegularGridInterpolator(axes, line, method="cubic")
-    return tables
+def walked(shape: str, count: int, isotropic: bool) -> dict[str, np.ndarray]:
+    """Return the polynomials of what :func:`walks` finds."""
+    at = settings(WALKED)
+    parts = [walks(shape, *(each[k : k + 256] for each in at), count) for k in range(0, WALKED, 256)]
+    found = {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
+    found |= {"schlick between": found["between"][0], "dip between": found.pop("between")[1]}
+    # Weigh by what light there is: its standard deviation falls with the root of that, and less counts less.
+    weight = np.minimum(importance(*at), 1.2) * np.sqrt(found.pop("lost"))
+    polynomials = {}
+    for name, values in found.items():
+        seen = np.isfinite(values) & (weight > 1e-2)
+        here = [x[seen] for x in variables(*at)]
+        kind = name.split()[0] if name.split()[0] in DEGREES else "second"
+        polynomials[name] = fitted(kind, here, values[seen], weight[seen], False, 1)
+    return polynomials
 
 
-def first_table(shape: str, correlated: bool) -> np.ndarray:
-    """Return 1 - E as the coefficients of a parabola in ρ², shape (cosines, along, across, 3); for Blinn's facets,
-    which are isotropic, (cosines, along, 1, 3)."""
-    cos = np.linspace(0, 1, COSINES)
-    if shape == "blinn":
-        values = np.array([[blinn_lost(correlated, direction(c, a, a, 0)[0], a) for a in alphas(ALPHAS)] for c in cos])
-        return np.stack([values, 0 * values, 0 * values], axis=-1)[:, :, None]
-    grid = itertools.product(cos, alphas(ALPHAS), alphas(ALPHAS), CORRELATIONS)
-    values = np.array([lost(shape, correlated, *map(float, direction(*at))) for at in grid])
-    return values.reshape(COSINES, ALPHAS, ALPHAS, 3) @ np.linalg.inv(np.vander(CORRELATIONS, increasing=True)).T
-
-
-def tables_of(
-    shape: str, first: np.ndarray, walked: dict[str, RegularGridInterpolator]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tables of walks towards directions and of means, as :mod:`mi_brdfs.microfacet.escape` reads them."""
-    places = [np.linspace(0, 1, count) for count in first.shape[:3]]
-    if shape == "blinn":
-        places[2] = places[1]
-    x = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1)
-
-    def line(name):
-        values = walked[name](x)[..., 0]
-        return np.diagonal(values, axis1=1, axis2=2).transpose(0, 2, 1)[:, :, None] if shape == "blinn" else values
-
-    walk = np.concatenate([line("second"), line("schlick"), line("dip")[..., :1]], axis=-1)
-    return walk, mean_table(shape, first, walked)
-
-
-def mean_table(shape: str, first: np.ndarray, walked: dict[str, RegularGridInterpolator]) -> np.ndarray:
-    """Return means over the hemisphere for αu and αv, the root of 1 - E first, which is nearly
-    proportional to α: shape (αu, αv, 8); for Blinn's facets, (α, 1, 8)."""
-    phi = np.pi / 2 * (np.arange(8) + 0.5) / 8
-    axes = [np.linspace(0, 1, count) for count in first.shape[:2]]
-    if shape == "blinn":
-        look_up = RegularGridInterpolator(axes, first[:, :, 0])
+def first(shape: str, correlated: bool) -> np.ndarray:
+    """Return the polynomial of 1 - E."""
+    isotropic = shape == "blinn"
+    at = settings(SETTINGS, isotropic)
+    if isotropic:
+        values = np.array([blinn_lost(correlated, float(c), float(a)) for c, a in zip(at[0], at[2], strict=True)])
     else:
-        look_up = RegularGridInterpolator([*axes, axes[1]], first)
-    alpha = alphas(ALPHAS)
-    result = np.zeros((ALPHAS, 1 if shape == "blinn" else ALPHAS, 8))
-    for i, j in np.ndindex(result.shape[:2]):
-        u2, v2 = alpha[i] ** 2, alpha[i if shape == "blinn" else j] ** 2
-        c, x2 = NODES[:, None], np.cos(phi) ** 2
-        stretched = c / np.sqrt(c * c + (u2 * x2 + v2 * (1 - x2)) * (1 - c * c))
-        x2 = ((1 - c * c) * x2 + UPRIGHT * c**4) / (1 - c * c + 2 * UPRIGHT * c**4)
-        along2, across2 = u2 * x2 + v2 * (1 - x2), u2 * (1 - x2) + v2 * x2
-        place = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
-        rho2 = np.maximum(1 - u2 * v2 / (along2 * across2), 0)
-        k = look_up(np.stack([stretched, *place][: 2 if shape == "blinn" else 3], axis=-1))
-        weight = WEIGHTS[:, None] * 2 * c / len(phi)
-        lost = weight * np.maximum(k[..., 0] + rho2 * (k[..., 1] + rho2 * k[..., 2]), 0)
-        at = np.stack([stretched, *place], axis=-1)
+        values = np.array([lost(shape, correlated, *map(float, each)) for each in zip(*at, strict=True)])
+    # Where Blinn's facets reflect more than they get, nothing is added. Turquin's scale divides by what is not lost.
+    weight = np.where(values < -0.02, 0.1, 1) * importance(*at) / np.sqrt(np.maximum(1 - values, 0.05))
+    return fitted(shape, variables(*at), np.maximum(values, -1), weight, isotropic, 24)
 
-        def along_line(name, channel=0, at=at, rho2=rho2):
-            start, slope = np.moveaxis(walked[name](at)[..., channel], -1, 0)
-            return start + rho2 * slope
 
-        left = lost * along_line("left")
-        later = np.clip(along_line("third"), 0, 1), along_line("between", 0), along_line("between", 1)
-        result[i, j, :2] = np.sqrt(np.sum(lost)), np.sum(lost * np.clip(along_line("second"), 0, 1)) / np.sum(lost)
-        result[i, j, 2:5] = [np.sum(left * each) / np.sum(left) for each in later]
+def means(k: dict[str, np.ndarray], isotropic: bool) -> dict[str, np.ndarray]:
+    """Return polynomials of means over the hemisphere: of 1 - E, over (x(αu)² + x(αv)²)/2."""
+    alpha, phi = np.geomspace(SMOOTHEST, 1 if isotropic else ROUGHEST, 24), np.pi / 2 * (np.arange(8) + 0.5) / 8
+    pairs = np.array([(a, b) for a in alpha for b in alpha if (a == b if isotropic else b <= a <= 50 * b)]).T
+    found = []
+    for a, b in pairs.T:
+        at = [x.ravel() for x in np.broadcast_arrays(NODES[:, None], phi, a, b)]
+        weight = (WEIGHTS[:, None] * 2 * NODES[:, None] / len(phi) + 0 * phi).ravel()
+        here = variables(*at)
+        said = {name: evaluated(each, here) for name, each in k.items()}
+        escaping = weight * np.clip(said["lost"], 0, 1)
+        left = escaping * np.clip(said["left"], 0, 1)
+        found.append({
+            "lost": escaping.sum() / np.mean(compressed(np.array([a, b])) ** 2),
+            "second": escaping @ np.clip(said["second"], 0, 1) / escaping.sum(),
+            "third": left @ np.clip(said["third"], 0, 1) / left.sum(),
+            "schlick": left @ said["schlick between"] / left.sum(),
+            "dip": left @ said["dip between"] / left.sum(),
+        })  # fmt: skip
+    at, result = variables_of_means(*pairs), {}
+    for name in found[0]:
+        values = np.array([each[name] for each in found])
+        weight = np.where((pairs[1] > 0.02) & (pairs[0] < 1.5) & (pairs[0] < 9 * pairs[1]), 8, 1) / abs(values)
+        result[f"mean-{name}"] = fitted("mean", at, values, weight, isotropic, 24)
     return result
 
 
 def made(count: int) -> dict[str, np.ndarray]:
-    """Return all tables, of ``count`` walks for each setting."""
+    """Return all polynomials, of ``count`` walks for each setting."""
     arrays = {}
-    walked = {shape: walk_tables(shape, count) for shape in SHAPES}
-    for shape, walk in {**walked, "blinn": walked["beckmann"]}.items():
+    walk = {shape: walked(shape, count, False) for shape in SHAPES}
+    for shape in (*SHAPES, "blinn"):
         for correlated in (False, True):
-            name, first = f"{shape}-{'correlated' if correlated else 'separable'}", first_table(shape, correlated)
-            arrays[name] = first
-            arrays[f"{shape}-walk"], arrays[f"{name}-mean"] = tables_of(shape, first, walk)
-    return {name: values.astype(np.float16) for name, values in arrays.items()}
+            isotropic = shape == "blinn"
+            k = {**walk["beckmann" if isotropic else shape], "lost": first(shape, correlated)}
+            k |= means(k, isotropic)
+            name = f"{shape}-{'correlated' if correlated else 'separable'}"
+            arrays |= {f"{name}:{key}": k[key] for key in k if " " not in key and key not in ("left", "third")}
+    return {name: values.astype(np.float32) for name, values in arrays.items()}
 
 
 if __name__ == "__main__":
     checked = parser(__doc__).parse_args().check
     mi.set_variant("llvm_ad_rgb")
-    tables = made(WALKS >> 4 if checked else WALKS)
+    polynomials = made(WALKS >> 4 if checked else WALKS)
     if not checked:
-        np.savez_compressed(FILE, **tables)
+        np.savez_compressed(FILE, **polynomials)
         print(f"{FILE}: {FILE.stat().st_size} bytes")
         sys.exit()
+    # By their values at the settings, as coefficients may differ where the sum does not.
+    at, errors = variables(*settings(WALKED)), {}
     with np.load(FILE) as kept:
-        # By the mean, as what little light does is noise.
-        errors = {name: float(abs(tables[name].astype(float) - kept[name]).mean()) for name in tables}
+        for name, k in polynomials.items():
+            here = at if k.ndim == 4 else at[2:]
+            errors[name] = float(abs(evaluated(k, here) - evaluated(kept[name], here)).mean())
     print(*(f"{name}: {error:.4f}" for name, error in errors.items()), sep="\n")
     sys.exit(max(errors.values()) > 0.01)
