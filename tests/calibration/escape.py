@@ -33,7 +33,7 @@ PRECISE = 0.045, 1.05
 """That in which the fit counts most, up to 9:1 and 86°."""
 DEGREES = {
     "ggx": (11, (1.15, 1.9, 1, 3)),
-    "beckmann": (13, (1.25, 2.1, 1.1, 3.3)),
+    "beckmann": (14, (1.25, 2.2, 1.1, 3.4)),
     "blinn": (11, (1, 1, 1, 1)),
     "second": (5, (1.1, 1.6, 1, 2)),
     "schlick": (5, (1.1, 1.6, 1, 2)),
