@@ -96,8 +96,6 @@ def corners(
 
 
 MOST_CHANNELS = 4096
-AT_ONCE = 1 << 20
-"""The most values that are filled in together."""
 MARGIN = 1e-5
 """By how much a float32 angle may miss the end of an axis."""
 
@@ -182,29 +180,18 @@ class Grid:
     def _filled(self) -> np.ndarray:
         """Return the values, with the mean of the measured neighbours along an axis in place of missing ones: one axis
         after the other, which also reaches the corners of cells."""
-        if not np.isnan(self.values).any():
-            return self.values
-        filled = self.values.copy()
-        channels = filled.shape[-1]
-        together = max(1, AT_ONCE * channels // filled.size)
-        for first in range(0, channels, together):
-            part = filled[..., first : first + together]
-            values, stride = part.flatten(), part.size
-            missing = np.flatnonzero(np.isnan(values))
-            for axis in self.axes:
-                count = len(axis.nodes)
-                stride //= count
-                k = missing // stride % count
-                near = []
-                for step in (-1, 1):
-                    other = (k + step) % count
-                    value = values[missing + (other - k) * stride]
-                    near.append(np.where((axis.period is not None) | (other == k + step), value, np.nan))
-                lower, upper = near
-                mean = np.where(np.isnan(upper), lower, lower / 2 + upper / 2)
-                values[missing] = np.where(np.isnan(lower), upper, mean)
-            part[...] = values.reshape(part.shape)
-        return filled
+        values, missing = self.values, np.isnan(self.values)
+        for k, axis in enumerate(self.axes if missing.any() else ()):
+            near = []
+            for step, end in ((1, 0), (-1, -1)):
+                other = np.roll(values, step, axis=k)
+                if axis.period is None:
+                    np.moveaxis(other, k, 0)[end] = np.nan
+                near.append(other)
+            lower, upper = near
+            mean = np.where(np.isnan(upper), lower, lower / 2 + upper / 2)
+            values = np.where(missing, np.where(np.isnan(lower), upper, mean), values)
+        return values
 
     def evaluate(
         self,
@@ -263,8 +250,8 @@ class Samples:
     values: np.ndarray
     anisotropic: bool
 
-    def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.wi, self.wo, self.values
+    def pairs(self, chosen: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.wi[chosen], self.wo[chosen], self.values[chosen]
 
 
 @dataclass(frozen=True)

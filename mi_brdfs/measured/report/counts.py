@@ -73,9 +73,6 @@ def census(data: Grid | Samples) -> Census:
 
 
 def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    if isinstance(data, Samples):
-        yield data.pairs()
-        return
-    count = math.prod(data.values.shape[:-1])
+    count = data.values[..., 0].size
     for start in range(0, count, AT_ONCE):
         yield data.pairs(slice(start, start + AT_ONCE))
