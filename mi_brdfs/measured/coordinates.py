@@ -17,15 +17,14 @@ TWO_PI = 2 * np.pi
 
 
 class Coordinates:
-    """Where pairs of directions lie on the axes of a grid."""
+    """Where pairs of directions lie on the axes of a grid; by itself, for what depends on no direction."""
 
     names: tuple[str, ...] = ()
-    """The axes, in the order of the array's; none of what depends on no direction."""
+    """The axes, in the order of the array's."""
     poles: tuple[tuple[int, int], ...] = ()
     """Pairs of axes, of a polar angle and of an azimuth that means nothing where that is 0."""
     reciprocal = False
     """Whether exchanging the two directions changes nothing."""
-
     anisotropic = False
     """Whether turning both directions about the normal changes the place."""
     mirrored = False

@@ -21,7 +21,8 @@ from ..measured.coordinates import HalfDifference, polar_angle, spherical
 from ..measured.measurement import usable
 from ..measured.report.albedo import albedos
 from ..measured.report.counts import batches, census
-from ..measured.report.summary import azimuths, ends, table
+from ..measured.report.summary import azimuths, ends
+from ..measured.scattered import as_grid
 from ..observer import to_srgb
 from ..parameters.messages import brief, printable
 from ..probe.arrays import luminance
@@ -160,7 +161,7 @@ class LitTable:
 
     def __init__(self, measurement: Measurement, phi: float | None = None) -> None:
         measurement = in_colour(measurement)
-        self.measurement, self.grid = measurement, table(measurement.data)
+        self.measurement, self.grid = measurement, as_grid(measurement.data, "zero")
         name, material = printable(measurement.path.name), measurement.material
         name = name if material in ("", brief(measurement.path.stem)) else f"{material} ({name})"
         self.name = name.replace("$", r"\$")  # no formula, to Matplotlib
