@@ -166,6 +166,9 @@ def test_at_the_poles(tmp_path, llvm_rgb):
             dr.backward([*places, scale][output])
             assert np.isfinite([numbers(scale).T, *(numbers(place).T for place in places)]).all()
             assert np.isfinite([numbers(w.grad) for w in given]).all()
+        with mi.variant_context("scalar_rgb"):
+            places, scale = coordinates.prepared().locate_scaled(mi.Vector3f(wi[1]), mi.Vector3f(wo[1]), DRJIT)
+            assert np.isfinite([*places, scale]).all()
 
 
 def spoiled(name, change):
