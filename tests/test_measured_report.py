@@ -125,22 +125,6 @@ def test_directions_that_are_none_are_refused(direction):
                 function(*pair)
 
 
-def test_a_narrow_lobe_in_a_table(tmp_path):
-    """GGX facets of alpha .01 at normal incidence, where θh is θd, in MERL's own cells: the integral over the table
-    agrees with one over θo of what it interpolates."""
-    dimensions = 90, 4, 4
-    theta_h, _, _ = centres(dimensions)
-    f = 1e-4 / (4 * np.pi * (np.cos(theta_h) ** 2 * (1e-4 - 1) + 1) ** 2)
-    grid = read(write(tmp_path / "a.binary", f[..., None], dimensions)).data
-    (found,) = albedos(grid, np.zeros(1))
-    theta = np.pi / 2 * np.linspace(0, 1, 200_001) ** 4
-    nodes = np.append(0, np.sqrt(theta_h[:, 0, 0] * 2 / np.pi))
-    f = np.interp(np.sqrt(theta / np.pi), nodes, np.append(f[0, 0, 0], f[:, 0, 0]))
-    middle, step = (theta[1:] + theta[:-1]) / 2, np.diff(theta)
-    expected = 2 * np.pi * np.sum((f[1:] + f[:-1]) / 2 * np.cos(middle) * np.sin(middle) * step)
-    assert found[0] == pytest.approx(expected, rel=2e-3)
-
-
 # --- The summary ----------------------------------------------------------------------------------------------------
 
 

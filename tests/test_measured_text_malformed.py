@@ -254,8 +254,6 @@ def test_missing_and_negative_values_are_kept(tmp_path, text, ending):
 HOSTILE = "\x1b]0;a title\x07\x9b31m\u202e\u2066Ø\u2028"
 NOTED = {
     "zemax": ("bsdf", f"# Sample: {HOSTILE}\n# Remark {HOSTILE}\n# Made by: {HOSTILE}\n" + ZEMAX),
-    "lighttools": ("bsdf", f"# Material: {HOSTILE}\n# Made by: {HOSTILE}\n" + LIGHTTOOLS),
-    "cornell": ("brdf", replaced(CORNELL, "A test", HOSTILE)),
     "alta": ("dat", replaced(ALTA, "A test", HOSTILE).replace("#VS", f"#MADE {HOSTILE}\n#VS")),
     "csv": ("csv", replaced(CSV, "a test", HOSTILE)),
     "mbsdf": ("mbsdf", f'NVIDIA ARC MBSDF V1\nname="{HOSTILE}"\n{HOSTILE}="{HOSTILE}"\nMBSDF_DATA=\n'),
@@ -277,20 +275,6 @@ def test_no_text_of_a_file_controls_a_terminal(tmp_path, format):
     with pytest.raises(FileError) as caught:
         read(path)
     assert str(caught.value).isprintable()
-
-
-@pytest.mark.parametrize("header", ["theta_i_{}_deg", "theta_i_deg,theta_o_deg,phi_o_deg,{}nm"])
-def test_no_column_controls_a_terminal(tmp_path, header):
-    with pytest.raises(FileError) as caught:
-        written(tmp_path, header.format(HOSTILE) + "\n1\n", "csv")
-    assert str(caught.value).isprintable()
-
-
-def test_latin_1_is_read(tmp_path):
-    text = "# material: Blåbærgrød\n# angles: °\n" + CSV[CSV.index("theta") :].replace("_deg", "")
-    assert written(tmp_path, text.encode("latin-1"), "csv").material == "Blåbærgrød"
-    micrometres = ZEMAX.replace("Made for a test", "Wavelength 0.65 µm").encode("latin-1")
-    assert written(tmp_path, micrometres).wavelengths == [650]
 
 
 @pytest.mark.slow

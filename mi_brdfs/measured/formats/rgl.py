@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,13 +85,12 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     ndf, sigma, vndf = adapted(source, phi_i, THETA_I, resolution)
     coordinates = Adaptive(phi_i, THETA_I, ndf, sigma, vndf)
     u = np.linspace(0, 1, resolution)
-    slices: list[tuple[np.ndarray, ...]] = []
-    for azimuth in phi_i:
-        for theta in np.minimum(THETA_I, LAST):
-            places = np.meshgrid(*([azimuth, theta, u, u] if span else [theta, u, u]), indexing="ij")
-            slices.append(_slices(source, coordinates, [place.reshape(1, *place.shape[-2:]) for place in places]))
+    slices = []
+    for azimuth, theta in itertools.product(phi_i, np.minimum(THETA_I, LAST)):
+        places = *([azimuth] if span else []), theta, *np.meshgrid(u, u, indexing="ij")
+        slices.append(_slice(source, coordinates, np.broadcast_arrays(*places)))
     values, luminance, valid = (
-        np.concatenate(fields).reshape(len(phi_i), -1, *fields[0].shape[1:]) for fields in zip(*slices, strict=True)
+        np.array(each).reshape(len(phi_i), len(THETA_I), *each[0].shape) for each in zip(*slices, strict=True)
     )
     dark = ~luminance.any(axis=(-2, -1), keepdims=True)
     channels = {"rgb": values}
@@ -111,9 +112,9 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     write_tensors(path, fields)
 
 
-def _slices(source: Source, coordinates: Adaptive, places: list[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Return ``(values, density, valid)`` at places, shapes (θi, channels, u2, u1), and (θi, u2, u1) twice: the table's
-    values, what directions are to be drawn in proportion to, and which of them are above the horizon."""
+def _slice(source: Source, coordinates: Adaptive, places: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Return ``(values, density, valid)`` at places, shapes (channels, u2, u1), and (u2, u1) twice: the table's values,
+    what directions are to be drawn in proportion to, and which of them are above the horizon."""
     wi, wo = coordinates.directions(*places)
     above = wo.z > 1e-6
     given, taken = stacked(wi)[above], stacked(wo)[above]
@@ -124,7 +125,7 @@ def _slices(source: Source, coordinates: Adaptive, places: list[np.ndarray]) -> 
     values[above] = f / scale[:, None]
     density = np.zeros(above.shape)
     density[above] = brightness(f) * wo.z[above] * coordinates.solid_angle(*places)[above]
-    return values.transpose(0, 3, 2, 1), density.transpose(0, 2, 1), above.transpose(0, 2, 1)
+    return values.transpose(2, 1, 0), density.T, above.T
 
 
 def _equal(array: np.ndarray) -> bool:

@@ -147,19 +147,17 @@ def write(path: Path, source: Source) -> None:
     )
     rotations, theta_i, azimuths, radials = (np.radians(each) for each in angles)
     coordinates = SpecularPolar(mirrored=False, anisotropic=True)
+    channels = 3 if source.wavelengths is None else 1
     tables, stated = [], []
-    for rotation in rotations:
-        for theta in theta_i:
-            phi_i = np.pi / 2 - rotation
-            wi, wo = map(stacked, coordinates.directions(theta, *np.meshgrid(azimuths, radials, indexing="ij"), phi_i))
-            seen = wo[..., 2] > 1e-9
-            around, solid_angle = hemisphere(theta, phi_i)
-            each = np.concatenate([wo[seen], around])
-            f = source.evaluate(np.broadcast_to(wi, each.shape), each)
-            table = np.zeros((*seen.shape, f.shape[-1]))
-            table[seen] = f[: -len(around)]
-            tables.append(table)
-            stated.append((solid_angle * around[:, 2]) @ f[-len(around) :])
+    for rotation, theta in itertools.product(rotations, theta_i):
+        phi_i = np.pi / 2 - rotation
+        wi, wo = map(stacked, coordinates.directions(theta, *np.meshgrid(azimuths, radials, indexing="ij"), phi_i))
+        seen = wo[..., 2] > 1e-9
+        every, solid_angle = hemisphere(theta, phi_i)
+        table = np.zeros((*seen.shape, channels))
+        table[seen] = source.evaluate(np.broadcast_to(wi, wo[seen].shape), wo[seen])
+        tables.append(table)
+        stated.append((solid_angle * every[:, 2]) @ source.evaluate(np.broadcast_to(wi, every.shape), every))
     values, albedos = np.array(tables), np.array(stated)
     content = "XYZ" if np.any(np.ptp(values, axis=-1)) else "Monochrome"
     if content == "XYZ":
