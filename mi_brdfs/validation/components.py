@@ -19,8 +19,9 @@ COUNT = 4000
 def components(run: Run) -> Findings:
     """Check that the components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
     ``sampled_type`` lie within what was asked for and drawn, the density of a delta function's sample is how often it
-    is drawn, and its weight what it is alone over that, ``eta`` is 1 for light that stays on its side, what a context excludes is black, and a type mask of one
-    bit or several lets through the components of these types."""
+    is drawn, and its weight what it is alone over that, ``eta`` is 1 for light that stays on its side, what a context
+    excludes is black, and a type mask of one bit or several lets through the components of these types, drawn as
+    ``pdf`` says."""
     probe = run.probe
     for part in probe.parts:
         outcome = Outcome("components", part.name)

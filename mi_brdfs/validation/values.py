@@ -39,9 +39,9 @@ def _bad(values: Array, signed: bool = False) -> Array:
 
 
 def finite(run: Run) -> Findings:
-    """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing and in the horizon, at the
-    mirror direction, towards the light, and for samples with variates of 0 and just below 1. Channels of values and
-    weights may be negative where the page of a model says so, of colours outside sRGB."""
+    """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing and in the
+    horizon, at the mirror direction, towards the light, and for samples with variates of 0 and just below 1. Channels
+    of values and weights may be negative where the page of a model says so, of colours outside sRGB."""
     signed = any(model is not None and model.signed for model in run.probe.models)
     for part in run.probe.parts:
         outcome = Outcome("finite", part.name)
