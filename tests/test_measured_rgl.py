@@ -195,6 +195,7 @@ PATCHED = {
     "65535 dimensions": (FIRST, b"\xff\xff", "bytes of the shape of 'description' should follow"),
     "type": (FIRST + 2, b"\x0c", "at byte 18, field 'description' is of the unknown type 12"),
     "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "at byte 18, field 'description' should have"),
+    "overlap": (FIRST + 3, struct.pack("<Q", 100), "'description' starts, but the table of contents reaches to byte"),
     "10 GB": (FIRST + 11, struct.pack("<Q", 10**10), "but the file ends at"),
 }
 SPOILED = {

@@ -147,12 +147,16 @@ class Field:
     def count(self) -> int:
         return math.prod(self.shape)
 
+    @property
+    def end(self) -> int:
+        return self.offset + self.count * np.dtype(self.dtype).itemsize
+
 
 class TensorFile:
     """A file of named arrays.
 
     Raises:
-        FileError: if it is none, or an array is not in it as a whole.
+        FileError: if it is none, or an array is not in it as a whole, or shares bytes with another.
     """
 
     def __init__(self, path: Path) -> None:
@@ -173,12 +177,17 @@ class TensorFile:
                 raise file.error(f"field {shortened(name)} is {wrong}", start)
             shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {shortened(name)}"))
             field = self.fields[name] = Field(TYPES[type], offset, shape)
-            if offset + field.count * np.dtype(field.dtype).itemsize > file.size:
+            if field.end > file.size:
                 raise file.error(
                     f"field {shortened(name)} should have {field.count:,} values from byte {offset:,} on, but the file "
                     f"ends at {file.size:,}",
                     start,
                 )
+        end, before = file.offset, "the table of contents"
+        for name, field in sorted(self.fields.items(), key=lambda item: item[1].offset):
+            if field.count and field.offset < end:
+                raise file.error(f"field {shortened(name)} starts, but {before} reaches to byte {end:,}", field.offset)
+            end, before = max(end, field.end), f"field {shortened(name)}"
 
     def error(self, name: str, problem: str, index: int = 0) -> FileError:
         """Return an error at a value of a field."""
