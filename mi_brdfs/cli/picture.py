@@ -130,8 +130,10 @@ def _answering_ctrl_c() -> Iterator[None]:
 
 
 def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
-    from ..rendering.output import display_image, write
+    from ..rendering.output import broken_pixels, display_image, write
 
+    if count := broken_pixels(picture):
+        err.print(f"{count} pixels have values that are not finite, as a parameter, a texture or a light may have.")
     image = display_image(picture.bitmap)
     files = [(picture.bitmap, exr), (image, display)]
     if image is None:
