@@ -27,41 +27,40 @@ def plot(
             "name=a,b,c draws each value."
         ),
     ] = None,
-    kind: Annotated[
-        str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere, albedo or sphere.")
-    ] = "polar",
-    output: Annotated[Path | None, file_option("-o", "A .png, .svg, .pdf, .jpg; .html for sphere.")] = None,
+    kind: Annotated[str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere or albedo.")] = "polar",
+    output: Annotated[Path | None, file_option("-o", "A .png, .svg, .pdf or .jpg.")] = None,
     angles: Annotated[
-        str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 10,40,70; 45 for sphere.")
+        str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 10,40,70.")
     ] = None,
     azimuth: Annotated[
         float | None, typer.Option(metavar="DEGREES", help="Azimuth of incidence, from dp_du. Default: 0.")
     ] = None,
     scale: Annotated[
-        str | None,
-        typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian, sphere. Default: both."),
+        str | None, typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian. Default: both.")
     ] = None,
     normalize: Annotated[
-        bool, typer.Option("--normalize", help="Divide each curve by its maximum, for polar, cartesian, sphere.")
+        bool, typer.Option("--normalize", help="Divide each curve by its maximum, for polar, cartesian.")
     ] = False,
     rgb: Annotated[
         bool, typer.Option("--rgb", help="Draw red, green and blue, not the luminance, for polar, cartesian, albedo.")
     ] = False,
-    title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure; not for sphere.")] = None,
+    title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure.")] = None,
     labels: Annotated[
         str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
     ] = None,
     size: Annotated[
-        str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels; not for sphere. Default: as needed.")
+        str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels. Default: as needed.")
     ] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
-    hemisphere, as albedo curves, or as bodies to turn in a browser (sphere)."""
+    hemisphere, or as albedo curves. `mi-brdfs explore MATERIAL… --export FILE.html` writes a lobe in 3D."""
     from ..plot import command as asked
 
     if kind not in asked.KINDS:
-        fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
+        kinds = ", ".join(asked.KINDS)
+        lobe = "mi-brdfs explore MATERIAL… --export FILE.html"
+        fail(f"--kind {kind}: there is no such kind; there are {kinds}; for a lobe in 3D, {lobe}", Exit.USAGE)
     with failing(Exit.USAGE):
         options = asked.options_of(
             kind,
