@@ -2,12 +2,13 @@
 
 import re
 import sys
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib import pyplot, rcParams
-from support import call, context, direction
+from support import ROOT, call, context, direction
 from typer.testing import CliRunner
 
 from mi_brdfs import plot
@@ -22,6 +23,7 @@ MIRROR = {"type": "walter", "alpha": 0.01}
 PHONG = {"type": "phong", "exponent": 2000, "diffuse_reflectance": 0, "specular_reflectance": 0.4}
 SHEET = {"type": "wrap", "domain": "sphere", "reflectance": 0.6}
 COLOURED = {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
+LOFT = str(ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf")
 LUMINANCE = 0.2126 * 0.2 + 0.7152 * 0.5 + 0.0722 * 0.8
 
 
@@ -297,6 +299,34 @@ def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
     assert ["10°" in label for label in curves(figure)] == [True, False]
 
 
+def test_side_by_side_each_bsdf_has_a_panel_on_one_scale():
+    """With a colour for each angle, and a row for each scale; the last of five panels leaves no empty axes."""
+    narrow, wide = ({"type": "phong", "exponent": n, "diffuse_reflectance": 0} for n in (2000, 20))
+    figure = plot.cartesian(wide, narrow, angles=(10, 40), side_by_side=True)
+    assert [ax.get_title() for ax in figure.axes] == ["phong exponent=20", "phong exponent=2000", "", ""]
+    linear, other, log, _ = figure.axes
+    assert linear.get_ylim() == other.get_ylim() and [linear.get_yscale(), log.get_yscale()] == ["linear", "log"]
+    tops = [max(value.max() for _, value in curves(figure, panel).values()) for panel in (0, 1)]
+    assert other.get_ylim()[1] == pytest.approx(1.05 * tops[1]) and tops[1] > 20 * tops[0]
+    assert [["10°" in name for name in curves(figure, panel)] for panel in range(4)] == 4 * [[True, False]]
+    alike = plot.polar(*5 * [PHONG], angles=(10,), scale="log", labels=list("abcde"), side_by_side=True)
+    assert [ax.get_title() for ax in alike.axes] == list("abcde")
+
+
+def test_gaps_of_measured_files_are_gaps():
+    """Beyond its cone about the mirror direction, unless asked what renders there; and its curves have no dashes."""
+    angles = {"angles": (60,), "scale": "log"}
+    figure = plot.cartesian("ward", LOFT, **angles)
+    theta, value = curves(figure)[Path(LOFT).name]
+    seen = np.isfinite(value)
+    assert theta[seen].min() == pytest.approx(60 - 90, abs=0.1) and (np.diff(np.flatnonzero(seen)) == 1).all()
+    assert [line.get_linestyle() for line in figure.axes[0].lines if line.get_label()[0] != "_"] == ["-", "-"]
+    held = curve(plot.cartesian(f"{LOFT}:extrapolate=hold", **angles))
+    assert np.isfinite(held[1]).all() and np.interp(-60, *held) > 0
+    (picture,) = maps(plot.hemisphere(LOFT, angles=(60,), resolution=40))
+    assert np.isnan(picture[20, 2]) and picture[20, 33] > 0  # 79° on the side of wi, and near the mirror direction
+
+
 def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):
     loaded = mi.load_dict({"type": "ward", "id": "brushed"})
     (tmp_path / "two.xml").write_text(
@@ -382,15 +412,27 @@ def run(*arguments):
 
 
 def test_the_command_passes_on_what_it_is_told(folder, monkeypatch):
-    def kind(*bsdfs, angles=(), azimuth=0, scale="both", normalize=False, rgb=False):
-        told.append((bsdfs, list(angles), azimuth, scale, normalize, rgb))
+    def kind(*bsdfs, angles=(), azimuth=0, scale="both", normalize=False, rgb=False, side_by_side=False):
+        told.append((bsdfs, list(angles), azimuth, scale, normalize, rgb, side_by_side))
         return plot.albedo("lambert")
 
     told = []
     monkeypatch.setitem(command.KINDS, "polar", kind)
-    done = run("ward", "lambert", "--angles", "10,60.5", "--azimuth", 30, "--scale", "log", "--rgb", "-o", "a.svg")
+    done = run(
+        "ward",
+        "lambert",
+        "--angles",
+        "10,60.5",
+        "--azimuth",
+        30,
+        "--scale",
+        "log",
+        "--rgb",
+        "--side-by-side",
+        "-oa.svg",
+    )
     assert done.exit_code == 0 and done.stdout == "a.svg\n"
-    assert told == [(("ward", "lambert"), [10, 60.5], 30, "log", False, True)]
+    assert told == [(("ward", "lambert"), [10, 60.5], 30, "log", False, True, True)]
     assert "<svg" in (folder / "a.svg").read_text()
 
 
@@ -422,6 +464,7 @@ WRONG = {
     "angle": (["ward", "--angles", "95"], 2, "degrees, not 95"),
     "mirror": (["conductor"], 2, "no lobe to draw"),
     "angles": (["ward", "--angles", "ten"], 2, "--angles ten: write degrees"),
+    "no panels": (["ward", "--kind", "albedo", "--side-by-side"], 2, "--side-by-side does not apply to albedo"),
     "no scale": (["ward", "--kind", "albedo", "--scale", "log"], 2, "--scale does not apply to albedo"),
     "no azimuth": (["ward", "--azimuth", "nan"], 2, "--azimuth nan: give degrees"),
     "no maximum": (["ward", "--kind", "hemisphere", "--normalize"], 2, "--normalize does not apply to hemisphere"),

@@ -44,6 +44,9 @@ def plot(
     rgb: Annotated[
         bool, typer.Option("--rgb", help="Draw red, green and blue, not the luminance, for polar, cartesian, albedo.")
     ] = False,
+    side_by_side: Annotated[
+        bool, typer.Option("--side-by-side", help="Draw each BSDF in a panel of its own, for polar, cartesian.")
+    ] = False,
     title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure.")] = None,
     labels: Annotated[
         str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
@@ -69,6 +72,7 @@ def plot(
             scale=scale,
             normalize=normalize or None,
             rgb=rgb or None,
+            side_by_side=side_by_side or None,
             title=title,
             labels=labels and labels.split(","),
             size=asked.size_of(size),

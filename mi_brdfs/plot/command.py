@@ -78,7 +78,7 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
     options = {name: value for name, value in options.items() if value is not None}
     for name in options:
         if name not in taken:
-            raise ValueError(f"--{name} does not apply to {kind}")
+            raise ValueError(f"--{name.replace('_', '-')} does not apply to {kind}")
     return options
 
 

@@ -121,7 +121,7 @@ def _draw_lobes(ax: Axes, it: LitTable) -> None:
         for k, (name, theta) in enumerate(zip(names, it.angles, strict=True))
     ]
     calm(ax)
-    draw_cartesian(ax, curves, True, False, it.quantity)
+    draw_cartesian(ax, curves, True, False, it.quantity, curves)
     for line, nodes in zip(curves, it.nodes(it.angles), strict=True):
         ax.plot(*nodes, color=line.look["color"], **NODE)
         ax.set_ylim(top=max(ax.get_ylim()[1], 1.3 * largest([nodes.value])))
@@ -200,7 +200,8 @@ class LitTable:
         peaks = [end + near * side for end in (-theta_i, theta_i) for side in (-1, 1)]
         theta = np.unique(np.concatenate([np.linspace(-90, 90, 361), *peaks]))
         curve = refined(lambda t: self.luminance(self.grid.evaluate(wi, toward(t))), theta[abs(theta) < 90])
-        return curve._replace(value=np.where(self.measurement.data.measured(wi, toward(curve.theta)), curve.value, np.nan))
+        seen = self.measurement.data.measured(wi, toward(curve.theta))
+        return curve._replace(value=np.where(seen, curve.value, np.nan))
 
     def nodes(self, angles: Sequence[float] | np.ndarray) -> list[Curve]:
         """Return what the table has near the plane of incidence, for each of some angles of incidence."""
