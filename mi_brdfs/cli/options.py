@@ -15,6 +15,7 @@ import typer
 
 from .. import writing
 from ..mitsuba import llvm
+from ..mitsuba.fastest import fastest
 from ..starting import signals_held
 from ..variants import is_measurable
 from .terminal import Exit, err, fail, failing
@@ -164,22 +165,17 @@ def set_variant(wanted: str | None) -> str:
     """Activate the requested variant, or the fastest that works, and return its name."""
     if wanted and wanted not in mi.variants():
         fail(f"there is no variant {wanted}; this Mitsuba has {', '.join(mi.variants())}")
-    for name in [wanted] if wanted else ["cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb", "scalar_rgb"]:
-        if name not in mi.variants():
-            continue
-        if name.startswith("llvm") and (text := llvm.problem()):
-            if wanted:
-                fail(text)
-            err.print(f"mi-brdfs: using scalar_rgb, which is slow: {text}")
-            continue
-        try:
-            # Ctrl-C would make an ImportError of this import, and another variant would be taken.
-            with signals_held():
-                mi.set_variant(name)
-            return name
-        except ImportError:
-            continue
-    fail(f"{wanted} does not work on this machine; `mi-brdfs doctor` says why")
+    chosen, problem = wanted or fastest() or "scalar_rgb", llvm.problem()
+    if problem and chosen.startswith("llvm"):
+        fail(problem)
+    if problem and not wanted and chosen == "scalar_rgb":
+        err.print(f"mi-brdfs: using scalar_rgb, which is slow: {problem}")
+    try:
+        with signals_held():
+            mi.set_variant(chosen)
+    except ImportError:
+        fail(f"{chosen} does not work on this machine; `mi-brdfs doctor` says why")
+    return chosen
 
 
 def set_tracing_variant(wanted: str | None, ending: str = "") -> str:
