@@ -244,9 +244,9 @@ ERRORS = {
     "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
     "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),
     "reserved -D": (["scenes/box.xml", "-Dfilename=1"], 2, "-D filename: "),
-    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "a.bmp: unknown image format"),
-    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 1, "cannot write to the folder gone"),
-    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 1, "taken.exr is a folder"),
+    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "-o a.bmp: write a .exr, .png, .jpg or .jpeg"),
+    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 2, "there is no folder gone"),
+    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 2, "-o taken.exr: it is a folder"),
     "unknown variant": (["scenes/box.xml", "--variant", "llvm"], 1, "no variant llvm; this Mitsuba has scalar_rgb, "),
 }
 

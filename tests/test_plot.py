@@ -472,7 +472,7 @@ WRONG = {
     "lobe": (["ward", "--kind", "sphere"], 2, "for a lobe in 3D, mi-brdfs explore MATERIAL… --export FILE.html"),
     "label": (["ward", "phong", "--labels", "a"], 2, "there are 2 BSDFs, but 1 labels"),
     "no channels": (["ward", "--kind", "hemisphere", "--rgb"], 2, "--rgb does not apply to hemisphere"),
-    "format": (["ward", "-o", "ward.bmp"], 2, "ward.bmp: polar is written as .png, .svg, .pdf or .jpg"),
+    "format": (["ward", "-o", "ward.bmp"], 2, "-o ward.bmp: write a .png, .svg, .pdf or .jpg"),
     "folder": (["ward", "-o", "gone/ward.png"], 2, "there is no folder gone"),
     "unwritable": (["ward", "-o", "taken.png"], 2, "-o taken.png: it is a folder"),
     "variant": (["ward", "--variant", "scalar_rgb"], 2, "vectorized and unpolarized"),

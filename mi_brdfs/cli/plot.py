@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
+from .options import FIGURES, MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
 from .terminal import Exit, fail, failing, out, stdout_to_stderr
 
 
@@ -28,7 +28,7 @@ def plot(
         ),
     ] = None,
     kind: Annotated[str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere or albedo.")] = "polar",
-    output: Annotated[Path | None, file_option("-o", "A .png, .svg, .pdf or .jpg.")] = None,
+    output: Annotated[Path | None, file_option("-o", "A .png, .svg, .pdf or .jpg.", endings=FIGURES)] = None,
     angles: Annotated[
         str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 10,40,70.")
     ] = None,
@@ -77,7 +77,7 @@ def plot(
             labels=labels and labels.split(","),
             size=asked.size_of(size),
         )
-        file = asked.output_file(output, kind, targets)
+    file = output or asked.default_file(kind, targets)
     set_tracing_variant(variant)
     with stdout_to_stderr():
         with failing(Exit.USAGE):

@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from ..mitsuba.registry import plugin_names
-from ..parameters.messages import listed
 from ..probe.sources import degrees_of, shared, split, value_of
 from ..writing import replacing
 from . import albedo, cartesian, hemisphere, polar
 
 KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo)}
 """The functions by the value of ``--kind``."""
-PICTURES = ".png", ".svg", ".pdf", ".jpg"
 DPI = 200
 
 
@@ -99,19 +97,10 @@ def size_of(text: str | None) -> tuple[float, float] | None:
     return width, height
 
 
-def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
-    """Return the file to write, by default one in the working directory, named after its content.
-
-    Raises:
-        ValueError: if this kind of figure cannot be written in the format of the name.
-    """
-    if path is None:
-        words = ["bsdf" if word.startswith("<") else Path(split(word)[0]).stem for word in targets]
-        words = list(dict.fromkeys(words))
-        return Path(re.sub(r"[^\w-]+", "_", "-".join([*words, kind]))[-100:] + PICTURES[0])
-    if path.suffix.lower() not in PICTURES:
-        raise ValueError(f"{path}: {kind} is written as {listed(PICTURES)}")
-    return path
+def default_file(kind: str, targets: Sequence[str]) -> Path:
+    """Return the file to write where none is named: in the working directory, named after its content."""
+    words = dict.fromkeys("bsdf" if word.startswith("<") else Path(split(word)[0]).stem for word in targets)
+    return Path(re.sub(r"[^\w-]+", "_", "-".join([*words, kind]))[-100:] + ".png")
 
 
 def write(figure: Any, path: Path) -> None:
