@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 import psutil
 import pytest
-from mutants import MUTANTS, TWO, Mutant, changed, diffuse, in_spectra, lambert, of_others
+from mutants import MUTANTS, TWO, Mutant, changed, diffuse, half_of_the_mirror, in_spectra, lambert, of_others
 from support import shared
 from typer.testing import CliRunner
 
@@ -524,6 +524,13 @@ def test_delta_functions_are_skipped_with_a_reason():
     assert "delta function" in report.findings[0].message and "Check a rough BSDF" in report.why_not_judged
     mixed = check({"type": "plastic"}, only=["chi2", "pdf", "weight"], angles=(30,))
     assert mixed.passed and [finding.verdict for finding in mixed.findings] == ["skip", *["pass"] * 6]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_delta_functions_carry_what_they_carry_alone():
+    fault = check(half_of_the_mirror(), only=["components"], angles=(30,)).failures[0]
+    assert "component 0 (delta reflection) carry 0.0" in fault.message, fault
+    assert not check({"type": "plastic"}, only=["components"], angles=(30,)).failures
 
 
 @pytest.mark.slow

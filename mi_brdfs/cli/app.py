@@ -40,10 +40,13 @@ def main() -> None:
     try:
         app(prog_name="mi-brdfs")
     except OSError as error:
-        if error.errno != errno.ENOSPC:
+        if error.errno == errno.ENOSPC:
+            err.print(f"mi-brdfs: cannot write {error.filename or 'to the standard output'}: {error.strerror}")
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is left in the buffer
+        elif error.errno == errno.ENAMETOOLONG:  # which Python raises wherever it looks at a path
+            err.print(f"mi-brdfs: {error.filename}: {error.strerror}")
+        else:
             raise
-        err.print(f"mi-brdfs: cannot write {error.filename or 'to the standard output'}: {error.strerror}")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is left in the buffer
         sys.exit(Exit.ERROR)
 
 

@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import Array, context, interaction, numbers, vectors
-from ..probe.bsdf import Part, Samples
+from ..probe.bsdf import BSDFProbe, Part, Samples
 from ..probe.directions import angles_of, direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
@@ -19,8 +19,9 @@ COUNT = 4000
 def components(run: Run) -> Findings:
     """Check that the components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
     ``sampled_type`` lie within what was asked for and drawn, the density of a delta function's sample is how often it
-    is drawn, ``eta`` is 1 for light that stays on its side, what a context excludes is black, and a type mask of one
-    bit or several lets through the components of these types."""
+    is drawn, and its weight what it is alone over that, ``eta`` is 1 for light that stays on its side, what a context
+    excludes is black, and a type mask of one bit or several lets through the components of these types, drawn as
+    ``pdf`` says."""
     probe = run.probe
     for part in probe.parts:
         outcome = Outcome("components", part.name)
@@ -90,10 +91,24 @@ def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Sample
 
 
 def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that the density that samples of delta functions state is how often they are drawn."""
+    """Check that the density that samples of delta functions state is how often they are drawn, and that they carry as
+    much light as if they were drawn alone."""
     for incident in run.incidents(part) if run.probe.deltas else ():
         samples = run.samples(part, incident)
         for k in run.probe.deltas:
+            alone = run.probe.sample(_delta(run.probe, k), incident.wi, random(SCATTERED, SEED)).weight
+            together = samples.weight * (samples.component == k)[:, None]
+            (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
+            error = abs(got - expected)
+            if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
+                channel = int(np.argmax(error))
+                outcome.fault(
+                    f"for light from {incident.name} samples of {run.probe.name_of(k)} carry {got[channel]:.4g} of the "
+                    f"light, but {expected[channel]:.4g} where only these are drawn",
+                    float(error.max()),
+                    wi=incident.wi,
+                    seed=SEED,
+                )
             own = (samples.component == k) & samples.weight.any(axis=1)
             share, density = own.mean(), samples.density[own].mean() if own.any() else 0
             # Six standard errors: a false alarm once in 1e8.
@@ -105,6 +120,10 @@ def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
                     wi=incident.wi,
                     seed=SEED,
                 )
+
+
+def _delta(probe: BSDFProbe, k: int) -> Part:
+    return Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
 
 
 def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
@@ -175,11 +194,17 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
     for mask in (kind, kind | int(absent), every & ~kind):
         if any(it & mask not in (0, it) for it in kinds):
             continue  # of a component in part
-        value = probe.eval(part._replace(context=context(mask=mask)), wi, wo)
+        chosen = part._replace(context=context(mask=mask))
+        value = probe.eval(chosen, wi, wo)
         expected = sum((of for it, of in alone if it & mask), np.zeros(value.shape))
         error = relative(value, expected, 1)
         name, why = f"with the type mask {mask:#x} eval", "is what the components of these types make"
         outcome.wrong(error * (error > 10 * run.rounding(probe.whole)), name, value, why, wi, wo, expected=expected)
+        samples = probe.sample(chosen, wi, random(COUNT, 13))
+        error = relative(samples.pdf, samples.density, unknown=0) * samples.lit
+        name, why = f"with the type mask {mask:#x} pdf", "is the density that sample states"
+        over = error * (error > 10 * run.rounding(probe.whole))
+        outcome.wrong(over, name, samples.pdf, why, wi, samples.wo, expected=samples.density, seed=13)
 
 
 def flags(run: Run) -> Findings:
@@ -215,7 +240,7 @@ def flags(run: Run) -> Findings:
             _check_differentials(run, outcome, part)
         yield outcome.finding("They fit what it does.")
     for k in probe.deltas:
-        part = Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
+        part = _delta(probe, k)
         outcome = Outcome("flags", part.name)
         if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
             _check_delta_turned(run, outcome, part)
