@@ -14,7 +14,19 @@ import mitsuba as mi
 import numpy as np
 import psutil
 import pytest
-from mutants import MUTANTS, TWO, Mutant, changed, diffuse, half_of_the_mirror, in_spectra, lambert, of_others
+from mutants import (
+    MUTANTS,
+    TWO,
+    Mutant,
+    adapted,
+    changed,
+    diffuse,
+    half_of_the_mirror,
+    in_spectra,
+    lambert,
+    of_others,
+    without_fields,
+)
 from support import shared
 from typer.testing import CliRunner
 
@@ -565,6 +577,12 @@ class Raises(Lambert):
         if dr.grad_enabled(p.reflectance):
             raise TypeError("no derivative.\nAt all")
         return p
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_fields_that_sample_leaves_empty_are_named():
+    report = check(Mutant("empty", (), Lambert, adapted(sample=without_fields)).register(), only=["weight"])
+    assert "sample leaves eta empty: begin with dr.zeros(mi.BSDFSample3f)" in report.failures[0].message
 
 
 @pytest.mark.usefixtures("llvm_rgb")
