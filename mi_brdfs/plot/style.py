@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 COLOURS = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"
 # Styles too, so that coinciding curves are both visible; their number is coprime to that of the colours.
 STYLES = "-", (0, (4, 2)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5))
+UNBROKEN = {"linestyle": "-"}
+"""The look of what has gaps, which must not be taken for dashes."""
 CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}
 INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
 TEXT, SMALL = 9, 8
