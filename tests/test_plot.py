@@ -338,6 +338,12 @@ def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):
     assert legend(plot.albedo(loaded, labels=["mine"])) == ["mine"]
 
 
+def test_a_users_dollars_are_no_formulas():
+    figure = plot.polar({"type": "lambert"}, {"type": "wrap"}, labels=["$x", "$y"], title=r"$\frac{")
+    figure.canvas.draw()
+    assert legend(figure)[:2] == [r"\$x", r"\$y"] and figure.get_suptitle() == r"\$\frac{"
+
+
 def test_what_is_left_out_is_said():
     assert plot.polar("plastic").get_suptitle() == "plastic without its delta lobe"
 

@@ -17,6 +17,7 @@ from ..probe.arrays import CENTRE, Array
 from ..probe.bsdf import BSDFProbe, Part
 from ..probe.sources import find_sources, name_of
 from ..variants import is_measurable
+from .style import plain
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 
@@ -58,7 +59,7 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
         found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
-    return [Named(label.lstrip("_"), probe) for label, probe in found]
+    return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
 
 
 def check_angles(angles: Sequence[float]) -> None:

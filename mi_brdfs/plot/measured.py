@@ -24,12 +24,12 @@ from ..measured.report.counts import batches, census
 from ..measured.report.summary import azimuths, ends, table
 from ..measured.scattered import as_grid
 from ..observer import to_srgb
-from ..parameters.messages import brief, printable
+from ..parameters.messages import brief
 from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
-from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure
+from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -162,9 +162,9 @@ class LitTable:
     def __init__(self, measurement: Measurement, phi: float | None = None) -> None:
         measurement = in_colour(measurement)
         self.measurement, self.grid = measurement, as_grid(measurement.data)
-        name, material = printable(measurement.path.name), measurement.material
+        name, material = measurement.path.name, measurement.material
         name = name if material in ("", brief(measurement.path.stem)) else f"{material} ({name})"
-        self.name = name.replace("$", r"\$")  # no formula, to Matplotlib
+        self.name = plain(name)
         self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
         self.phi = float(azimuths(self.grid)[0]) if phi is None else phi
         self.coloured = self.grid.values.shape[-1] > 1

@@ -172,7 +172,7 @@ def _planar(
         if not ax.lines:
             ax.remove()
     if title or len(panels) == 1:
-        style.set_title(figure, title or headings[0])
+        style.set_title(figure, style.plain(title) if title else headings[0])
     marks = {"mirror direction": Line2D([], [], linestyle="", **MIRROR, color=FAINT)}
     if draw is _draw_polar:
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}

@@ -13,6 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
+from ..parameters.messages import printable
+
 # Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow, too pale for lines.
 COLOURS = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"
 # Styles too, so that coinciding curves are both visible; their number is coprime to that of the colours.
@@ -50,6 +52,11 @@ def calm(ax: Axes) -> None:
     ax.tick_params(which="both", labelsize=SMALL, labelcolor=INK, color=FAINT, length=0)
     for spine in ax.spines.values():
         spine.set(color=FAINT, linewidth=0.6)
+
+
+def plain(text: str) -> str:
+    """Return a text of the user's, in which Matplotlib is to see no formulas and SVG no control characters."""
+    return printable(text).replace("$", r"\$")
 
 
 def set_title(figure: Figure, text: str) -> None:
