@@ -482,6 +482,30 @@ def leaked_derivative(own, self, ctx, si, wo, active):
     return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
 
 
+def lifted(own, self, ctx, si, wo, active):
+    """Turns the caller's direction to the front."""
+    wo.z = abs(wo.z)
+    return own(self, ctx, si, wo, active)
+
+
+def without_fields(own, self, *given):
+    bs, weight = own(self, *given)
+    empty = mi.BSDFSample3f()
+    empty.wo, empty.pdf, empty.sampled_type = bs.wo, bs.pdf, bs.sampled_type
+    return empty, weight
+
+
+class SharesKept(adapter.ModelBSDF):
+    """Draws lobes, and states densities, by the shares that the first call had; pdf has the present ones."""
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        valid, mixture, components, frame = self._mixture(ctx, si, active)
+        if len(mixture.lobes) > 1:
+            self.kept = getattr(self, "kept", mixture.probabilities)
+            mixture.probabilities = self.kept
+        return self._sample(valid, mixture, components, frame, sample1, sample2)
+
+
 def no_number_in_the_horizon(own, self, ctx, si, wo, active):
     """Divides zero by zero where light comes along the surface."""
     value, pdf = own(self, ctx, si, wo, active)
@@ -734,6 +758,8 @@ MUTANTS = [
     mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
     mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
     mutant("colours of wavelengths beside", "spectral", colour(beside)),
+    mutant("direction lifted in place", "calls", Lambert, adapted(eval=lifted)),
+    mutant("shares of the first call", "updates", Phong, SharesKept, **TWO),
     mutant("not a number in the horizon", "finite", Lambert, adapted(eval_pdf=no_number_in_the_horizon)),
     mutant("density of a mask", "components", Ward, adapted(pdf=halved_for_a_mask), **TWO),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),

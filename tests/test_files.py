@@ -111,6 +111,11 @@ def test_a_name_that_is_too_long_gets_a_sentence(arguments):
     assert (done.returncode, done.stderr) == (1, f"mi-brdfs: {arguments[-1]}: File name too long\n")
 
 
+def test_letters_that_the_output_cannot_have_are_replaced():
+    done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
+
+
 def swept(folder):
     return CliRunner().invoke(app, ["sweep", str(LOFT), *FITTED, "--workers", "0", "-o", str(folder)])
 
@@ -132,6 +137,13 @@ def test_a_sweep_tells_of_a_full_disk(tmp_path, monkeypatch):
         ]
     )
     assert not list((tmp_path / "made" / "results").iterdir())
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
+def test_results_that_are_no_files_are_left_out(tmp_path):
+    os.mkfifo(tmp_path / "pipe.parquet")
+    with pytest.warns(store.StoreWarning, match=r"pipe\.parquet holds no fits, and is left out: it is no regular file"):
+        assert not list(store.Store(tmp_path).rows())
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -32,6 +32,10 @@ def components(run: Run) -> Findings:
             _check_sum(run, outcome)
             _check_there_and_back(run, outcome, part)
         yield outcome.finding("Sums, sampled components and types are as asked for.")
+    for part in (_delta(probe, k) for k in probe.deltas):
+        outcome = Outcome("components", part.name)
+        _check_alone(run, outcome, part)
+        yield outcome.finding("It carries as much light as where it is drawn alone.")
     for part in probe.components:
         outcome = Outcome("components", f"{part.name} masked out")
         _check_masks(run, outcome, part)
@@ -91,24 +95,10 @@ def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Sample
 
 
 def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that the density that samples of delta functions state is how often they are drawn, and that they carry as
-    much light as if they were drawn alone."""
+    """Check that the density that samples of delta functions state is how often they are drawn."""
     for incident in run.incidents(part) if run.probe.deltas else ():
         samples = run.samples(part, incident)
         for k in run.probe.deltas:
-            alone = run.probe.sample(_delta(run.probe, k), incident.wi, random(SCATTERED, SEED)).weight
-            together = samples.weight * (samples.component == k)[:, None]
-            (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
-            error = abs(got - expected)
-            if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
-                channel = int(np.argmax(error))
-                outcome.fault(
-                    f"for light from {incident.name} samples of {run.probe.name_of(k)} carry {got[channel]:.4g} of the "
-                    f"light, but {expected[channel]:.4g} where only these are drawn",
-                    float(error.max()),
-                    wi=incident.wi,
-                    seed=SEED,
-                )
             own = (samples.component == k) & samples.weight.any(axis=1)
             share, density = own.mean(), samples.density[own].mean() if own.any() else 0
             # Six standard errors: a false alarm once in 1e8.
@@ -120,6 +110,26 @@ def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
                     wi=incident.wi,
                     seed=SEED,
                 )
+
+
+def _check_alone(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that samples of a delta function carry as much light among others as if it were drawn alone."""
+    for incident in run.incidents(run.probe.whole):
+        samples = run.samples(run.probe.whole, incident)
+        together = samples.weight * (samples.component == part.component)[:, None]
+        alone = run.probe.sample(part, incident.wi, random(SCATTERED, SEED)).weight
+        (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
+        error = abs(got - expected)
+        # Six standard errors: a false alarm once in 1e8.
+        if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
+            channel = int(np.argmax(error))
+            outcome.fault(
+                f"for light from {incident.name} its samples carry {got[channel]:.4g} of the light among those of "
+                f"others, but {expected[channel]:.4g} where only these are drawn",
+                float(error.max()),
+                wi=incident.wi,
+                seed=SEED,
+            )
 
 
 def _delta(probe: BSDFProbe, k: int) -> Part:

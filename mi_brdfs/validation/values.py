@@ -60,14 +60,14 @@ def finite(run: Run) -> Findings:
             for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
                 w = on_side(direction(theta, 30), side)
                 samples = run.probe.sample(part, w, u)
-                length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
-                bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
+                length = np.linalg.norm(samples.wo.astype(np.float64), axis=1)
+                bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(abs(length - 1) < 1e-3))
                 if bad.any():
                     k = int(np.argmax(bad))
                     outcome.fault(
                         f"for light from {theta:g}° a sample has the weight {_shown(samples.weight[k])}, the density "
-                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}, for the variates "
-                        f"{u[k].tolist()}",
+                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}, of length "
+                        f"{length[k]:.4g}, for the variates {u[k].tolist()}",
                         bad.sum(),
                         wi=w,
                     )
