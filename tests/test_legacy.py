@@ -19,7 +19,8 @@ import pytest
 import reference
 from support import ROOT, context, direction, hemisphere, interaction, numbers
 
-from mi_brdfs.legacy import Upgraded, load_legacy, upgrade
+from mi_brdfs import load_legacy
+from mi_brdfs.legacy import Upgraded, upgrade
 
 UV = 0.375, 0.375
 """The centre of a texel of the pictures, in the second column of four."""
