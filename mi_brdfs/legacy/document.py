@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-from .tables import KNOWN
+from .tables import PLUGINS
 
-OBJECTS = {*KNOWN, "camera", "luminaire"}
+OBJECTS = {*PLUGINS, "camera", "luminaire"}
 """The elements that are plugins; the last two are those of 0.3."""
 
 MOST_ELEMENTS, DEEPEST, LONGEST = 1_000_000, 60, 100_000
@@ -73,6 +73,10 @@ class Element:
         """Return the value of a number, and the default for a texture."""
         found = self[name]
         return float(found.value if found and found.tag in ("float", "integer") else default)
+
+    @property
+    def label(self) -> str:
+        return self.name or self.type or self.tag
 
     def numbers(self, *counts: int) -> list[float]:
         """Return the numbers in its value, of which there are as many as one of the counts says, if there are any."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .document import Element, plugin, prop, written
-from .tables import LIMITS
+from .tables import PLUGINS
 
 if TYPE_CHECKING:
     from .upgrade import Work
@@ -82,28 +82,18 @@ def scaled_down(work: Work, element: Element, *names: str) -> Element:
     return plugin("bsdf", "blendbsdf", plugin("bsdf", "diffuse", reflectance=[0.0]), element, weight=share)
 
 
-def limit_numbers(work: Work, element: Element) -> None:
-    """Bring the numbers of a BSDF into their ranges."""
+@rule("bsdf", "phong", "ward", "roughdiffuse", "diffuse")
+def _classical(work: Work, element: Element) -> Element:
+    entry = PLUGINS["bsdf"][element.type]
+    if variant := element["variant"]:
+        variant.value = variant.value.strip().lower()
+    pair_of_alpha(work, element)
     for child in element.of("float"):
-        low, high = LIMITS.get(element.type, {}).get(child.name, (-math.inf, math.inf))
+        low, high = entry.limits.get(child.name, (-math.inf, math.inf))
         if not low <= float(child.value) <= high:
             work.approximated(child, f"{child.name} of {element.type} is limited to {low:g} … {high:g}")
             child.value = written(min(max(float(child.value), low), high))
-
-
-@rule("bsdf", "phong", "ward")
-def _phong_or_ward(work: Work, element: Element) -> Element:
-    if variant := element.text("variant"):
-        element.set("variant", variant)
-    pair_of_alpha(work, element)
-    limit_numbers(work, element)
-    return scaled_down(work, element, "diffuse_reflectance", "specular_reflectance")
-
-
-@rule("bsdf", "roughdiffuse", "diffuse")
-def _diffuse(work: Work, element: Element) -> Element:
-    limit_numbers(work, element)
-    return scaled_down(work, element, "reflectance")
+    return scaled_down(work, element, *sorted(name for name in entry.known if "reflectance" in name))
 
 
 @rule("bsdf", "plastic", "roughplastic", "dielectric", "thindielectric", "roughdielectric")
@@ -178,6 +168,8 @@ def _map(work: Work, element: Element) -> Element | None:
         work.dropped(element, f"a {element.type} without a texture")
         return inner[0]
     for texture in textures:
+        if element.type == "normalmap":
+            texture.name = "normalmap"
         target = work.resolved(texture)
         if target.scale != [1.0] and element.type == "bumpmap":
             element.set("scale", sum(target.scale) / len(target.scale))
@@ -294,23 +286,17 @@ def _film(work: Work, element: Element) -> None:
         work.changed(element, f"{element.type} is hdrfilm, whose values are linear; mi-brdfs render writes a PNG, too")
     element.type = "hdrfilm"
     if given := element.pop("pixel_format"):
-        word = given.value.split(",")[0].strip().lower()
-        word = {"luminancealpha": "luminance_alpha", "spectrum": "rgb", "spectrumalpha": "rgba"}.get(word, word)
-        element.set("pixel_format", word)
-        if word.replace("_", "") != given.value.strip().lower():
+        word = given.value.lower().split(",")[0].strip().replace("spectrum", "rgb").replace("rgbalpha", "rgba")
+        element.set("pixel_format", word.replace("ealpha", "e_alpha"))
+        if word != given.value.strip().lower():
             work.approximated(element, f"pixelFormat {given.value} is {word}")
 
 
 @rule("sensor", "perspective", "thinlens")
 def _perspective(work: Work, element: Element) -> None:
-    if "fov" not in element and "focal_length" not in element:
+    if not ("fov" in element or "focal_length" in element):
         element.pop("fov_axis")
         element.set("focal_length", "50mm")
-
-
-SKIN = {"sigma_s": [0.74, 0.88, 1.01], "sigma_a": [0.032, 0.17, 0.48]}
-"""σs and σa of skin in 1/mm (H. W. Jensen et al., A practical model for subsurface light transport, SIGGRAPH 2001),
-the default of 0.6."""
 
 
 @rule("medium", "homogeneous")
@@ -318,12 +304,13 @@ def _homogeneous(work: Work, element: Element) -> None:
     values = {
         name: it.numbers(1, 3) for name in ("sigma_s", "sigma_a", "sigma_t", "albedo") if (it := element.pop(name))
     }
-    material = element.pop("material")
-    if material or not values:
-        work.approximated(element, f"the medium {material.value if material else ''} has the coefficients of skin")
-        values = values or SKIN
+    if "material" in element or not values:
+        work.approximated(element, f"the medium {element.text('material')} has the coefficients of skin")
+        element.pop("material")
+        # In 1/mm: H. W. Jensen et al., A practical model for subsurface light transport, SIGGRAPH 2001.
+        values = values or {"sigma_s": [0.74, 0.88, 1.01], "sigma_a": [0.032, 0.17, 0.48]}
     if "sigma_t" not in values:
-        scattered, absorbed = (np.array(values.get(name, [0.0])) for name in SKIN)
+        scattered, absorbed = (np.array(values.get(name, [0.0])) for name in ("sigma_s", "sigma_a"))
         extinct = scattered + absorbed
         albedo = np.divide(scattered, extinct, np.zeros_like(extinct), where=extinct != 0)
         values = {"sigma_t": extinct.tolist(), "albedo": albedo.tolist()}

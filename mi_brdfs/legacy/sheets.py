@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from .document import Element, plugin, prop
-from .tables import OLD_NAMES, OLD_TYPES
+from .tables import PLUGINS
 
 
 def modernize(scene: Element, minor: int, say: Callable[[Element, str], None]) -> None:
@@ -46,12 +46,12 @@ def _from_2(element: Element) -> None:
 def _from_3(element: Element, say: Callable[[Element, str], None]) -> None:
     old = element.tag, element.type
     element.tag = {"camera": "sensor", "luminaire": "emitter"}.get(element.tag, element.tag)
-    if new := OLD_TYPES.get(element.tag, {}).get(element.type):
-        element.type = new
-    names = OLD_NAMES[""] | OLD_NAMES.get(element.type, {})
-    for child in element.children:
-        if child.name in names:
-            child.name = names[child.name]
+    plugins = PLUGINS.get(element.tag, {})
+    if new := plugins.get(f"{element.type}*"):
+        element.type = new.type
+    for child in element.children if element.type in plugins else ():
+        if new_name := plugins[element.type].renamed.get(f"{child.name}*"):
+            child.name = new_name
     if old[0] == "camera":
         smaller = element.pop("map_smaller_side")
         if element.type == "perspective":

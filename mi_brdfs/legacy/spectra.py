@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..srgb import decoded
 from .document import Element, floats
 
 
@@ -39,9 +40,7 @@ def _channels(element: Element, folder: Path) -> list[float]:
         return _of_light(*np.array(pairs, float).T)
     is_hexadecimal = re.fullmatch(r"#[0-9a-fA-F]{6}", text)
     rgb = [byte / 255 for byte in bytes.fromhex(text[1:])] if is_hexadecimal else floats(text)
-    if element.tag != "srgb":
-        return rgb
-    return [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in rgb]
+    return decoded(rgb).tolist() if element.tag == "srgb" else rgb
 
 
 def _of_light(wavelengths: np.ndarray, values: np.ndarray) -> list[float]:

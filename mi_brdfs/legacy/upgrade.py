@@ -17,14 +17,14 @@ from .document import OBJECTS, Element, Reader, plugin, prop, root_of
 from .rules import RULES, colours
 from .sheets import modernize
 from .spectra import rgb_of
-from .tables import HELD, KNOWN, NEAREST, RENAMED, SUCCESSORS, SUPPLIED
+from .tables import PLUGINS
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
 COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
 NUMBERS = ("alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight")
 """Properties that Mitsuba 3 reads of a texture as numbers."""
-STAND_INS = {"shape": "cube", "emitter": "constant", "volume": "constvolume", "texture": ""}
-"""What takes the place of plugins whose files are missing; of a texture it is grey."""
+STAND_INS = {"shape": "cube", "emitter": "constant", "volume": "constvolume", "texture": "grey"}
+"""What takes the place of plugins whose files are missing."""
 Kind = Literal["changed", "approximated", "dropped", "replaced"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
@@ -141,10 +141,8 @@ class Work:
             scene.children.insert(scene.children.index(sensors[0]), sensors[-1])
             self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
         if self.missing:
-            more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
-            raise ValueError(
-                f"{self.missing[0]}{more}; put the files there, or let stand-ins take their place (--lenient)."
-            )
+            first = self.missing[0] + f", and {len(self.missing) - 1} more" * (len(self.missing) > 1)
+            raise ValueError(f"{first}; put the files there, or let stand-ins take their place (--lenient).")
         return scene
 
     def _complete(self, root: Element) -> None:
@@ -173,18 +171,18 @@ class Work:
         if element.tag == "ref":
             return self._reference(element)
         if element.tag in COLOURS:
-            return self._colour(element)
+            if element.tag != "rgb" or element.value.strip().startswith("#"):
+                self.changed(element, f"<{element.tag}> is written as linear <rgb>, as 0.6 reads it")
+            return replace(prop(name, rgb_of(element, self.path.parent)), place=element.place)
         if element.tag == "animation":
             self.approximated(element, "an animated transform is its first one")
             return next((replace(it, attributes={"name": name}) for it in element.of("transform")), None)
         if element.tag in ("float", "integer"):
-            try:
-                float(element.value)
-            except ValueError:
-                raise element.error(f"{element.value!r} is no number") from None
+            element.numbers(1)
+            element.value = element.value.strip(", \t\n")
         if element.tag in PROPERTIES:
             return element
-        if element.tag not in KNOWN:
+        if element.tag not in PLUGINS:
             self.dropped(element, f"<{element.tag}>, which Mitsuba does not have")
             return None
         result = self._object(element)
@@ -213,28 +211,26 @@ class Work:
         if target.tag not in OBJECTS or target.scale != [1.0]:
             return target.copy(element.name)
         name = {"name": element.name} if element.name else {}
-        return Element("ref", {"id": target.attributes["id"]} | name, place=element.place)
-
-    def _colour(self, element: Element) -> Element:
-        if element.tag != "rgb" or element.value.strip().startswith("#"):
-            self.changed(element, f"<{element.tag}> is written as linear <rgb>, as 0.6 reads it")
-        return replace(prop(element.name, rgb_of(element, self.path.parent)), place=element.place)
+        element.attributes = {"id": target.attributes["id"]} | name
+        return element
 
     def _object(self, element: Element) -> Element | None:
         """Return what a plugin becomes, or None."""
         was = element.type
         element.children = self._parts(element)
         self._sort_names(element)
-        self._find_file(element)
-        if (element.tag, element.type) not in RULES and element.type not in KNOWN[element.tag]:
-            succeeded = self._succeeded(element)
-            if succeeded is not element:
-                return succeeded
+        if self._is_missing(element):
+            if element.tag == "texture":
+                return prop(element.name, [0.5])
+            element.type = STAND_INS[element.tag]
+        if (element.tag, element.type) not in RULES and (succeeded := self._succeeded(element)) is not element:
+            return succeeded
         rule = RULES.get((element.tag, element.type))
         result = (rule(self, element) if rule else None) or element
-        for name, value in (SUPPLIED.get(was, {}) | SUPPLIED.get(element.type, {})).items():
-            if name not in element:
-                element.set(name, value)
+        entries = [PLUGINS[element.tag].get(type) for type in (was, element.type)]
+        supplied = next((it.supplied for it in entries if it and it.type == element.type), {})
+        for name in [name for name in supplied if name not in element]:
+            element.set(name, supplied[name])
         held = {self.resolved(it).tag for it in element.children}
         if element.tag == "shape" and "medium" in held and not held & {"bsdf", "emitter"}:
             element.children.append(plugin("bsdf", "null"))
@@ -247,10 +243,11 @@ class Work:
     def _sort_names(self, element: Element) -> None:
         """Give properties their names in Mitsuba 3, and leave out those that a later one of the same name replaces, or
         a texture at any place."""
-        names = RENAMED.get(element.type, {})
+        entry = PLUGINS[element.tag].get(element.type)
+        names = entry.renamed if entry else {}
         for child in element.of(*PROPERTIES, *COLOURS, "texture", "ref", "volume"):
             if child.name in names:
-                self.changed(child, f"{child.name or child.tag} of {element.type} is {names[child.name]}")
+                self.changed(child, f"{child.name} of {element.type} is {names[child.name]}")
                 if names[child.name] in element and child.tag not in ("texture", "ref"):  # which counts, in any order
                     element.children.remove(child)
                     element.children.insert(0, child)
@@ -269,62 +266,55 @@ class Work:
                     swapped.set(name, float(np.mean(it.numbers())))
                 element.children[element.children.index(child)] = swapped
 
-    def _left_out(self, element: Element, kept: Element) -> None:
-        for child in element.children:
-            if child is not kept:
-                self.dropped(child, f"{child.name or child.type or child.tag} of {element.type}")
-
     def _succeeded(self, element: Element) -> Element | None:
         """Return a plugin under its name in Mitsuba 3, or what is nearest to it."""
         kind, was = element.tag, element.type
-        nearest = "volpath" if kind == "integrator" and self.has_media else NEAREST.get(kind)
-        if inner := next((it for it in element.children if self.resolved(it).tag == kind), None):
-            self.approximated(element, f"the {kind} {was} is the one in it")
-            self._left_out(element, inner)
+        new = PLUGINS[kind].get(was) or PLUGINS[kind].get("")
+        if new and new.type == was:
+            return element
+        inner, text = next((it for it in element.children if self.resolved(it).tag == kind), None), "the one in it"
+        if inner is None and new is None and kind == "texture":
+            inner, text = next(iter(element.of("rgb")), prop("", [0.5])), "a constant colour; it has no successor"
+        if inner:
+            self.approximated(element, f"the {kind} {was} is {text}")
+            for child in element.children:
+                if child is not inner:
+                    self.dropped(child, f"{child.label} of {was}")
             return inner
-        if kind == "texture" and was not in SUCCESSORS[kind]:
-            self.approximated(element, f"the texture {was} has no successor; it is a constant colour")
-            constant = next(iter(element.of("rgb")), prop("", [0.5]))
-            self._left_out(element, constant)
-            return constant.copy(element.name)
-        if (new := SUCCESSORS.get(kind, {}).get(was, nearest)) is None:
+        if new is None:
             self.dropped(element, f"the {kind} {was} has no successor")
             return None
-        self.approximated(element, f"the {kind} {was} is {new}")
-        element.type = new
+        element.type = "volpath" if kind == "integrator" and self.has_media else new.type
+        self.approximated(element, f"the {kind} {was} is {element.type}")
         return element
 
     def _clean(self, element: Element, was: str) -> None:
         """Leave out the properties that a plugin does not have in Mitsuba 3."""
-        known = f"{KNOWN.get(element.tag, {}).get(element.type, '')} {HELD.get(element.tag, '')}".split()
-        for child in [*element.children] if element.tag in KNOWN else ():
-            if child.name not in known and f"<{self.resolved(child).tag}>" not in known:
+        entry = PLUGINS.get(element.tag, {}).get(element.type)
+        for child in [*element.children] if entry else ():
+            if entry and not {child.name, f"<{self.resolved(child).tag}>"} & entry.known:
                 element.children.remove(child)
                 if child.name != "ensure_energy_conservation":
-                    self.dropped(
-                        child, f"{child.name or child.type or child.tag} of {was}, which Mitsuba 3 does not have"
-                    )
+                    self.dropped(child, f"{child.label} of {was}, which Mitsuba 3 does not have")
             elif child.scale != [1.0]:
                 self.approximated(child, "the texture scale of a bitmap has no successor; it is left out")
                 element.children[element.children.index(child)] = replace(child, scale=[1.0])
 
-    def _find_file(self, element: Element) -> None:
-        """Write the name of a plugin's file as Mitsuba 3 finds it, or let a stand-in take the plugin's place."""
+    def _is_missing(self, element: Element) -> bool:
+        """Write the name of a plugin's file as Mitsuba 3 finds it, or leave out what a stand-in has not."""
         given = element["filename"]
         if given is None or element.tag not in STAND_INS:
-            return
+            return False
         names = (given.value, given.value.replace("\\", "/"))  # which may have been written on Windows
         if found := next((it for name in names if os.path.isfile(it := self.path.parent / name)), None):
             given.value = str(found) if os.path.isabs(given.value) else os.path.relpath(found, self.folder)
-            return
+            return False
         if not self.lenient:
             self.missing.append(f"{element.place}: there is no file {given.value}")
         self.said("replaced", element, f"{given.value} is missing")
-        element.type = STAND_INS[element.tag]
-        is_shape = element.tag == "shape"
-        element.children = [
-            it for it in element.children if it.tag not in PROPERTIES or (is_shape and it.name == "to_world")
-        ]
+        kept = "to_world" if element.tag == "shape" else ""
+        element.children = [it for it in element.children if it.tag not in PROPERTIES or it.name == kept]
+        return True
 
     def maxima(self, texture: Element) -> np.ndarray:
         """Return the largest value in each channel, as 0.6 knows it."""
