@@ -47,6 +47,7 @@ TEXTURES = {
     "bright": (SCALE.format(1.5, BITMAP.format("picture.exr", "")), 1.5 * COLUMNS[1], 1.5 * COLUMNS.max(axis=0)),
     "checks": ('<texture type="checkerboard"/>', 0.4, 0.4),
     "ten": (CHECKS.format(10, 100), 10, 100),
+    "white": (CHECKS.format(0.5, 2), 0.5, 2),
     "dark": (CHECKS.format(0.1, 0.9), 0.1, 0.9),
     "half": (SCALE.format(0.5, CHECKS.format(0.1, 0.9)), 0.05, 0.45),
 }
@@ -128,9 +129,9 @@ def old(version, kind, properties, wi, wo):
         return [value * (1 if kept else 0.99 / largest) for value, _ in colours]
 
     if kind == "roughdiffuse":
-        name = "reflectance"
-        if "diffuseReflectance" in textures or "reflectance" not in constants | textures:
-            name = "diffuseReflectance"
+        # Of textures the later one, of constants reflectance.
+        given = [name for name in textures if name.endswith("eflectance")]
+        name = given[-1] if given else "reflectance" if "reflectance" in constants else "diffuseReflectance"
         (rgb,) = scaled(reflectance(name, 0.5))
         sigma = number("alpha", 0.2) / np.sqrt(2)
         fast = constants.get("useFastApprox") == ("boolean", "true")

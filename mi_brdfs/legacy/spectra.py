@@ -18,28 +18,25 @@ def rgb_of(element: Element, folder: Path) -> list[float]:
     Raises:
         ValueError: in a sentence, for what 0.6 does not read either.
     """
+    text = element.value.strip(", \t\n")
     try:
-        rgb = _channels(element, folder)
+        if element.tag == "blackbody":
+            kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
+            rgb = _of_light(*_blackbody(kelvin, float(element.attributes.get("scale", 1))))
+        elif "filename" in element.attributes:
+            lines = (folder / element.attributes["filename"]).read_text(encoding="utf-8").splitlines()
+            rgb = _of_light(*np.loadtxt(lines, usecols=(0, 1), ndmin=2).T)
+        elif ":" in text:
+            pairs = [pair.split(":") for pair in re.split(r"[,\s]+(?=\S)", re.sub(r"\s*:\s*", ":", text))]
+            rgb = _of_light(*np.array(pairs, float).T)
+        elif re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+            rgb = [byte / 255 for byte in bytes.fromhex(text[1:])]
+        else:
+            rgb = floats(text)
     except (ValueError, OSError, RuntimeError) as error:
         raise element.error(f"it has no colour that can be read: {error}") from None
     if len(rgb) not in (1, 3) or not np.isfinite(rgb).all():
         raise element.error(f"{element.value!r} has not one or three numbers")
-    return rgb
-
-
-def _channels(element: Element, folder: Path) -> list[float]:
-    text = element.value.strip(", \t\n")
-    if element.tag == "blackbody":
-        kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
-        return _of_light(*_blackbody(kelvin, float(element.attributes.get("scale", 1))))
-    if "filename" in element.attributes:
-        lines = (folder / element.attributes["filename"]).read_text(encoding="utf-8").splitlines()
-        return _of_light(*np.loadtxt(lines, usecols=(0, 1), ndmin=2).T)
-    if ":" in text:
-        pairs = [pair.split(":") for pair in re.split(r"[,\s]+(?=\S)", re.sub(r"\s*:\s*", ":", text))]
-        return _of_light(*np.array(pairs, float).T)
-    is_hexadecimal = re.fullmatch(r"#[0-9a-fA-F]{6}", text)
-    rgb = [byte / 255 for byte in bytes.fromhex(text[1:])] if is_hexadecimal else floats(text)
     return decoded(rgb).tolist() if element.tag == "srgb" else rgb
 
 

@@ -133,6 +133,11 @@ class Work:
         self._complete(root)
         self.has_media = any(it.tag == "medium" for it in root.walk())
         scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
+        used = {it.attributes.get("id") for it in scene.walk() if it.tag == "ref"}
+        for texture in scene.of("texture"):
+            if texture.type == "checkerboard" and texture.attributes.get("id") not in used:
+                scene.children.remove(texture)  # whose colours may be above 1
+                self.changed(texture, "a checkerboard is written where it is used, if it is")
         for extra in scene.of(*PROPERTIES):
             scene.children.remove(extra)
             self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 does not have")
