@@ -97,7 +97,8 @@ def _check_films(state: Any) -> None:
 
 
 def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
-    """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it.
+    """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it; on
+    both sides, in place of ``twosided``.
 
     Raises:
         ValueError: if there is none.
@@ -112,12 +113,18 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
         for name in node.props.keys():
             value = node.props[name]
             if isinstance(value, mi.Properties.ResolvedReference):
-                own = state.nodes[value.index()].type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]
-                if own:
-                    node.props[name] = bsdf
+                usual = state.nodes[value.index()]
+                if usual.type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]:
+                    wrapped = usual.props.plugin_name() == "twosided"
+                    node.props[name] = _on_both_sides(bsdf) if wrapped else bsdf
                     found = True
     if is_shape and not found:
         state.nodes[ids[id]].props["bsdf"] = bsdf
+
+
+def _on_both_sides(bsdf: mi.BSDF) -> mi.BSDF:
+    seen = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+    return bsdf if seen else mi.load_dict({"type": "twosided", "bsdf": bsdf})
 
 
 def _rootless(path: str) -> str:
