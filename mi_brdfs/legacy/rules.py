@@ -55,9 +55,8 @@ def scaled_down(work: Work, element: Element, *names: str) -> Element:
     parts = [work.resolved(element[name] or prop(name, [defaults.get(name, 0.5)])).copy(name) for name in names]
     largest = np.max(np.sum([work.maxima(it) for it in parts], axis=0))
     factor = 1.0
-    if (
-        largest > 1 + 1e-6 and element.text("ensure_energy_conservation") != "false"
-    ):  # as in single precision, where .7 + .3 is 1
+    # In single precision .7 + .3 is 1.
+    if largest > 1 + 1e-6 and element.text("ensure_energy_conservation") != "false":
         factor = float(0.99 / largest)
         work.changed(element, f"{' + '.join(names)} of {element.type} is above 1, which 0.6 scales down to .99")
     # Bitmaps cannot be multiplied, but the BSDF can, if the constants make up for what is not to be.
@@ -87,7 +86,8 @@ def _classical(work: Work, element: Element) -> Element:
     entry = PLUGINS["bsdf"][element.type]
     if variant := element["variant"]:
         variant.value = variant.value.strip().lower()
-    pair_of_alpha(work, element)
+    if element.type == "ward":
+        pair_of_alpha(work, element)
     for child in element.of("float"):
         low, high = entry.limits.get(child.name, (-math.inf, math.inf))
         if not low <= float(child.value) <= high:
