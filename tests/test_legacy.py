@@ -19,7 +19,8 @@ import pytest
 import reference
 from support import ROOT, context, direction, hemisphere, interaction, numbers
 
-from mi_brdfs.legacy import Upgraded, load_legacy, upgrade
+from mi_brdfs import load_legacy
+from mi_brdfs.legacy import Upgraded, upgrade
 
 UV = 0.375, 0.375
 """The centre of a texel of the pictures, in the second column of four."""
@@ -46,6 +47,7 @@ TEXTURES = {
     "bright": (SCALE.format(1.5, BITMAP.format("picture.exr", "")), 1.5 * COLUMNS[1], 1.5 * COLUMNS.max(axis=0)),
     "checks": ('<texture type="checkerboard"/>', 0.4, 0.4),
     "ten": (CHECKS.format(10, 100), 10, 100),
+    "white": (CHECKS.format(0.5, 2), 0.5, 2),
     "dark": (CHECKS.format(0.1, 0.9), 0.1, 0.9),
     "half": (SCALE.format(0.5, CHECKS.format(0.1, 0.9)), 0.05, 0.45),
 }
@@ -127,9 +129,9 @@ def old(version, kind, properties, wi, wo):
         return [value * (1 if kept else 0.99 / largest) for value, _ in colours]
 
     if kind == "roughdiffuse":
-        name = "reflectance"
-        if "diffuseReflectance" in textures or "reflectance" not in constants | textures:
-            name = "diffuseReflectance"
+        # Of textures the later one, of constants reflectance.
+        given = [name for name in textures if name.endswith("eflectance")]
+        name = given[-1] if given else "reflectance" if "reflectance" in constants else "diffuseReflectance"
         (rgb,) = scaled(reflectance(name, 0.5))
         sigma = number("alpha", 0.2) / np.sqrt(2)
         fast = constants.get("useFastApprox") == ("boolean", "true")

@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .. import legacy
+from .. import loading
 from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
@@ -122,7 +122,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
-    scene = legacy.load(Path(str(user.scene)), {})
+    scene = loading.load(Path(str(user.scene)), {})
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
     shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]

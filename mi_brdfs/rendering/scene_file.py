@@ -10,7 +10,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..legacy.upgrade import looking_in, parsed
+from ..loading import looking_in, parsed
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
