@@ -87,10 +87,10 @@ MALFORMED = [
     (b'{"type": "cancel"}', "This is no message"),
     ("x" * 65_537, "A message has 65536 letters at most"),
     ('{"type": "chi2", "subject": 0}', "Nothing is shown yet"),
-    ('{"type": "chi2", "subject": 9}', "subject is a number from 0 to 3"),
-    ('{"type": "chi2", "subject": true}', "subject is a number from 0 to 3"),
+    ('{"type": "chi2", "subject": 9}', "subject is a number from 0 to 5"),
+    ('{"type": "chi2", "subject": true}', "subject is a number from 0 to 5"),
     ('{"type": "fit", "subject": 0, "model": 3}', "A fit needs a model and a metric"),
-    ('{"type": "save", "what": "everything"}', "What can be saved is exr or page"),
+    ('{"type": "save", "what": "everything"}', "What can be saved is exr, page or scene"),
     ('{"type": "save", "what": "page", "state": []}', "The state of a page is an object"),
     (b"x" * 100_000_000, "A message has 65536 letters at most"),
 ]
@@ -239,7 +239,8 @@ def test_an_uploaded_file_of_any_name_is_a_subject(address):
 
 
 def test_a_malformed_upload_is_refused_in_a_sentence(address):
-    for name, payload in (("x.binary", b"no MERL file"), ("x.bsdf", b"\0" * 1000), ("x.exr", os.urandom(5000))):
+    for name, payload in (("x.binary", b"no MERL file"), ("x.bsdf", b"\0" * 1000), ("x.exr", os.urandom(5000)),
+                          ("x.obj", b"v 0 0 nought"), ("x.ply", b"ply")):  # fmt: skip
         status, answer = uploaded(address, name, payload)
         assert status == 422 and answer["error"] and not re.search("/tmp|Traceback", answer["error"]), name
     test_the_server_greets_and_answers(address)

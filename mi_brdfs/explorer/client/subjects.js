@@ -186,7 +186,6 @@ function startDrop() {
 async function uploadAll(files) {
   byId("add-dialog").close();
   for (const file of files) {
-    if (!hasRoom()) return tellFull();
     emit("busy", { text: `Uploading ${file.name} …` });
     try {
       const response = await fetch(`upload?${new URLSearchParams({ name: file.name })}`, {
@@ -198,8 +197,16 @@ async function uploadAll(files) {
         .json()
         .catch(() => ({ error: `The server refused ${file.name} (${response.status}).` }));
       if (answer.error) throw new Error(answer.error);
-      session.hello.files = [...session.hello.files, answer];
-      addSubject({ type: "tabulated", file: answer.file }, answer.name);
+      if (answer.file) {
+        session.hello.files = [...session.hello.files, answer];
+        addSubject({ type: "tabulated", file: answer.file }, answer.name);
+      } else if (answer.stage) {
+        for (const words of ["stages", "turned"]) session.hello[words] = [...session.hello[words], answer.stage];
+        change(answer);
+      } else {
+        session.hello.shapes = [...session.hello.shapes, answer.shape];
+        change(answer);
+      }
     } catch (error) {
       emit(
         "error",
