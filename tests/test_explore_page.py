@@ -328,8 +328,8 @@ def test_a_notebook_is_told_what_cannot_be_shown(monkeypatch):
     ]:
         with pytest.raises(ValueError, match=sentence):
             explore(given)
-    with pytest.raises(ValueError, match="A page shows 4 BSDFs at most, not 5"):
-        explore(*["ward"] * 5)
+    with pytest.raises(ValueError, match="A page shows 6 BSDFs at most, not 7"):
+        explore(*["ward"] * 7)
 
 
 def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
@@ -352,13 +352,14 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
     ("arguments", "sentence"),
     [
         (["wrd"], "ward"),
-        (["ward"] * 5, "4 BSDFs at most"),
+        (["ward"] * 7, "6 BSDFs at most"),
         (["ward", "--scene", "none.xml"], "no such file"),
         (
             ["ward", "--scene", f"{ROOT / 'scenes' / 'cornell_box.xml'}:gold"],
             "no material or shape gold; it has shapes",
         ),
         (["ward", "--environment", "none.exr"], "no such file"),
+        (["ward", "--mesh", str(LOFT)], "give a file whose name ends in .ply or .obj"),
         (["ward", "-D", "alpah=1"], "unknown parameter alpah; did you mean alpha"),
         (["ward", "--export", "none/x.html"], "there is no folder"),
         (["ward", "--vary", "alpha=0.1"], "--vary is for pages of --export"),
@@ -611,6 +612,57 @@ def test_measured_files_of_any_name_are_loaded_and_copied(tab, address):
 
 
 @pytest.mark.slow
+def test_camera_light_and_shape_are_chosen_in_the_picture(tab, address, tmp_path):
+    mi.set_variant("llvm_ad_rgb")
+    mi.load_dict({"type": "cube"}).write_ply(str(tmp_path / "box.ply"))
+    mi.Bitmap(np.ones((2, 4, 3), np.float32)).write(str(tmp_path / "sky.exr"))
+    sent = []
+    tab.on("websocket", lambda socket: socket.on("framesent", lambda frame: sent.append(str(frame))))
+    opened(tab, address, {"subjects": [{"bsdf": {"type": "ward"}, "name": "ward"}], "views": ["picture"]})
+    for file, select in (("box.ply", "#shape"), ("sky.exr", "#stage")):
+        tab.locator("#file").set_input_files(str(tmp_path / file))
+        tab.wait_for_function(f"() => document.querySelector('{select}').value === '{file}'")
+    tab.locator("#turn").fill("90")
+    box = tab.locator(".pictures canvas").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x - 80, y + 40, steps=4)
+    tab.mouse.up()
+    tab.wait_for_timeout(200)
+    state = json.loads(sent[-1][sent[-1].index("{") :])["state"]
+    assert [state[it] for it in ("yaw", "pitch", "turn", "shape", "stage")] == [40, 20, 90, "box.ply", "sky.exr"]
+    assert not tab.locator("#alert").is_visible()
+
+
+@pytest.mark.slow
+def test_a_fit_is_wiped_over_what_was_measured(tab, tmp_path):
+    process, address = serving(str(LOFT))
+    opened(tab, address)
+    tab.locator("#fit").click()
+    tab.locator("#fit-model").select_option("lambert")
+    tab.locator("#fit-start").click()
+    tab.locator("#fit-ranking button").click()
+    tab.wait_for_selector(".pictures .divider")
+    names = tab.locator(".pictures figcaption b").all_inner_texts()
+    process.terminate()
+    assert names == [LOFT.name, "lambert, fitted"] and not tab.locator("#fit-dialog").is_visible()
+
+
+@pytest.mark.slow
+def test_a_published_material_is_found_by_its_picture(tab, address):
+    opened(tab, address, {"subjects": [{"bsdf": {"type": "lambert"}, "name": "lambert"}], **STILL})
+    tab.locator("#add").click()
+    tab.locator("#search").fill("blue acrylic")
+    assert tab.locator(".preset b").first.inner_text() == "blue acrylic"
+    picture = tab.evaluate("async () => { const it = new Image(); it.src = 'client/published.jpg'; await it.decode(); "
+                           "return [it.naturalWidth, it.naturalHeight]; }")  # fmt: skip
+    assert picture[0] / 38 == picture[1] / 27  # 1026 square balls
+    tab.get_by_label("ngan/ward/blue-acrylic", exact=True).click()
+    tab.wait_for_function("() => document.querySelector('#subject-type').innerText === 'ward'")
+
+
+@pytest.mark.slow
 def test_a_tour_runs(tab, address):
     opened(tab, address)
     tab.locator("#tours").click()
@@ -637,7 +689,11 @@ def test_pictures_keep_the_aspect_of_their_scene(tab, tmp_path):
     process, address = serving("lambert", "--scene", str(tmp_path / "wide.xml"))
     opened(tab, address)
     box = tab.locator(".pictures canvas").bounding_box()
+    tab.locator("#share").click()
+    tab.locator("#write-scene").click()
+    tab.wait_for_function("() => document.querySelector('#shared').innerText.includes('wide-lambert.xml')")
     process.terminate()
+    assert (tmp_path / "wide.xml").read_text() == SCENE and '"lambert"' in (tmp_path / "wide-lambert.xml").read_text()
     assert box["width"] / box["height"] == pytest.approx(16 / 9, rel=0.01)
 
 

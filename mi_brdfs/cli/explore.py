@@ -32,7 +32,7 @@ from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 def explore(
     targets: Annotated[
         list[str] | None,
-        typer.Argument(metavar="MATERIAL…", help=f"Up to four. {MATERIAL}"),
+        typer.Argument(metavar="MATERIAL…", help=f"Up to six. {MATERIAL}"),
     ] = None,
     parameters: Parameters = None,
     scene: Annotated[

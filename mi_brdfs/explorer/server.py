@@ -24,8 +24,8 @@ from ..mitsuba.errors import one_line
 from ..mitsuba.registry import all_models, presets
 from ..parameters.messages import brief, printable
 from ..probe.sources import BSDFSource, is_measured
-from .export import CLIENT, client_file, index
-from .materials import Materials, kinds
+from .export import CLIENT, index
+from .materials import BALLS_ACROSS, Materials, kinds
 from .session import Engine, Session
 from .stages import LIGHTS, MESHES, Setting, UserScene
 from .state import UPLOAD, StateError, checked_request, decoded, parse
@@ -39,7 +39,7 @@ LARGEST_FRAME = 128 << 20
 """The bytes of a message, too long or not, that are waited for: more end the connection."""
 UPLOADS = 16
 """The most files that a session may hold."""
-KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
+KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript", "jpg": "image/jpeg"}
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
     "frame-ancestors "
@@ -101,7 +101,9 @@ class Explorer:
         name = request.match_info["name"]
         if name not in {it.name for it in CLIENT.iterdir()}:
             raise web.HTTPNotFound
-        return web.Response(text=client_file(name), content_type=KINDS[name.rpartition(".")[2]])
+        return web.Response(
+            body=(CLIENT / name).read_bytes(), content_type=KINDS[name.rpartition(".")[2]], charset="utf-8"
+        )
 
     async def _upload(self, request: web.Request) -> web.Response:
         """Keep a measured file, a mesh or an environment map that can be read: its bytes are the body, its name is in
@@ -190,6 +192,7 @@ class Explorer:
             variant=self.engine.variant,
             types=kinds(),
             presets=presets(),
+            across=BALLS_ACROSS,
             files=named,
             scene=scenes.user.scene.name if scenes.user.scene else None,
             stages=scenes.names,

@@ -88,6 +88,8 @@ class UserScene:
 
     scene: Path | None = None
     material: str | None = None
+    has_sky: bool = False
+    """Whether the scene has an environment to be turned; known once it is loaded."""
     lights: dict[str, Path] = field(default_factory=dict)
     meshes: dict[str, Path] = field(default_factory=dict)
 
@@ -114,9 +116,15 @@ class Stage:
 
     def __post_init__(self) -> None:
         self.usual = [shape.bsdf() for shape in self.shapes]
-        self._sensor = mi.traverse(self.scene.sensors()[0])
-        self._skies = [mi.traverse(it) for it in self.scene.emitters() if it.class_name() == "EnvironmentMapEmitter"]
-        self._usual_sensor, *self._usual_skies = (_matrix(it) for it in (self._sensor, *self._skies))
+        skies = [it for it in self.scene.emitters() if it.class_name() == "EnvironmentMapEmitter"]
+        self._skies = [(it, _matrix(it)) for it in map(mi.traverse, skies)]
+        sensor = mi.traverse(self.scene.sensors()[0])
+        self._sensor = (sensor, _matrix(sensor)) if "to_world" in sensor else None
+
+    @property
+    def has_sky(self) -> bool:
+        """Whether there is an environment to be turned."""
+        return bool(self._skies)
 
     @cached_property
     def passes(self) -> Any:
@@ -138,14 +146,17 @@ class Stage:
     def _take(self, pose: Pose) -> None:
         """Put camera and light into their places. The camera goes around where it looks at, at the distance of the
         shapes; up is the axis of the world that is nearest to its own."""
-        camera = self._usual_sensor
-        right, up, ahead, place = camera[:3].T
-        up = np.sign(up) * (abs(up) == abs(up).max())
-        centre = np.mean([it.bbox().center() for it in self.shapes], axis=0)
-        pivot = place + ahead * ((centre - place) @ ahead)
-        around = _translated(pivot) @ _turned(up, pose.yaw) @ _turned(right, pose.pitch) @ _translated(-pivot)
-        _put(self._sensor, around @ camera)
-        for sky, usual in zip(self._skies, self._usual_skies, strict=True):
+        up = np.array([0.0, 0.0, 1.0])
+        if self._sensor:
+            sensor, usual = self._sensor
+            right, own_up, ahead, place = usual[:3].T
+            axis = abs(own_up).argmax()
+            up = np.eye(3)[axis] * np.sign(own_up[axis])
+            centre = np.mean([it.bbox().center() for it in self.shapes], axis=0)
+            pivot = place + ahead * ((centre - place) @ ahead)
+            around = _translated(pivot) @ _turned(up, pose.yaw) @ _turned(right, pose.pitch) @ _translated(-pivot)
+            _put(sensor, around @ usual)
+        for sky, usual in self._skies:
             _put(sky, _turned(up, pose.turn) @ usual)
         if self.light is not None:
             theta, phi = pose.incidence
@@ -237,7 +248,9 @@ def _user_stage(setting: Setting, user: UserScene) -> Stage:
     params["film.size"] = params["film.crop_size"] = size
     params["film.crop_offset"] = [0, 0]
     params.update()
-    return Stage(scene, chosen)
+    stage = Stage(scene, chosen)
+    user.has_sky = stage.has_sky
+    return stage
 
 
 @dataclass
@@ -318,8 +331,8 @@ class Stages:
 
     @property
     def turned(self) -> list[str]:
-        """The words for light that can be turned."""
-        return ["studio", *self.user.lights]
+        """The words for light that can be turned, and for the user's scene if that of it can."""
+        return ["studio", *self.user.lights, *(["scene"] if self.user.has_sky else [])]
 
     @property
     def shapes(self) -> list[str]:

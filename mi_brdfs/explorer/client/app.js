@@ -172,7 +172,8 @@ function drawBars() {
   const own = session.exported ? [] : [["", "file …"]];
   setWords("stage", hello?.stages ?? [state.stage], { incidence: "from ωi" }, ...own);
   setWords("shape", hello?.shapes ?? [state.shape], { scene: hello?.scene }, ...own);
-  byId("turn-row").hidden = state.shape !== "scene" && !hello?.turned.includes(state.stage);
+  byId("stage").parentElement.hidden = state.shape === "scene";
+  byId("turn-row").hidden = !hello?.turned.includes(state.shape === "scene" ? "scene" : state.stage);
   setOptions(byId("component"), [
     ["", "all components"],
     ...(info[session.selected]?.components ?? []).map((name, k) => [k, name]),

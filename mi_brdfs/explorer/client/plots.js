@@ -224,8 +224,9 @@ export function drawCartesian() {
     : whole
     ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] }
     : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
+  // At grazing angles, f may be without end.
   const scale = valueScale(
-    curves.map(({ y }) => y),
+    curves.map(({ x, y }) => (axis.high === 90 ? y.filter((value, k) => x[k] <= 85) : y)),
     session.state.scale === "log",
   );
   const { theta } = session.state;
