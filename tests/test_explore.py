@@ -16,7 +16,7 @@ import pytest
 from latency import edited
 from support import ROOT
 
-from mi_brdfs.explorer.export import index, page
+from mi_brdfs.explorer.export import CLIENT, index, page
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
 from mi_brdfs.explorer.stages import Progress, Stages, UserScene, rgba
@@ -561,6 +561,14 @@ def test_an_exported_page_holds_each_place_of_its_scrubbers(llvm_rgb, monkeypatc
     assert places["lobe", 0] == places["polar", 0] == grid and places["lobe", 1] == [(it, None) for it in range(3)]
     assert places["albedo", 0] == places["picture", 0] == [(None, 0), (None, 1)]
     assert "sampler" not in held["views"]
+
+
+def test_the_scripts_of_an_exported_page_can_be_one():
+    """What their outermost level names is theirs alone."""
+    scripts = [it.read_text() for it in CLIENT.iterdir() if it.name.endswith(".js")]
+    declared = re.compile(r"^(?:export )?(?:async )?(?:function|class|const|let) (\w+)", re.MULTILINE)
+    names = [name for script in scripts for name in declared.findall(script)]
+    assert len(names) > 100 and sorted(set(names)) == sorted(names)
 
 
 def test_a_page_that_cannot_be_exported_is_refused(llvm_rgb, monkeypatch):

@@ -138,7 +138,7 @@ class Session:
             return True
         did = self._tell(state, serial) or self._draw(state, serial)
         if not did and time.perf_counter() - self._edited >= PAUSE:
-            did = self._fit_next(state) | self._refine(state, serial)
+            did = self._fit_next() | self._refine(state, serial)
         if not did and not self._idle:
             self.send(text(type="idle"))
         self._idle = not did
@@ -292,7 +292,7 @@ class Session:
         models = [it.plugins[0] for it in chosen]
         self._fits = Fits(request["metric"], observe(source.source), models, len(models))
 
-    def _fit_next(self, state: State) -> bool:
+    def _fit_next(self) -> bool:
         """Fit the next model, and say how good it is, unless the page changes meanwhile: then it begins anew."""
         fits = self._fits
         if not fits:

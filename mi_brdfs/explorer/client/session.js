@@ -177,7 +177,7 @@ export function fragment() {
   return "#" + letters.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
-function decoded(letters) {
+function fromLetters(letters) {
   const bytes = atob(letters.replaceAll("-", "+").replaceAll("_", "/"));
   return new TextDecoder().decode(Uint8Array.from(bytes, (letter) => letter.charCodeAt(0)));
 }
@@ -186,7 +186,7 @@ function decoded(letters) {
 export function readFragment(text) {
   try {
     const plain = decodeURIComponent(text.replace(/^#/, ""));
-    const found = JSON.parse(plain.startsWith("{") ? plain : decoded(plain));
+    const found = JSON.parse(plain.startsWith("{") ? plain : fromLetters(plain));
     return Array.isArray(found.subjects) ? clean(found) : null;
   } catch {
     return null;
