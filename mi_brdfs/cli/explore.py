@@ -91,6 +91,8 @@ def explore(
     if export:
         _export(export, user, sources, state, varied)
         return
+    if not host:
+        fail("--host: name an address of this machine, or 0.0.0.0 for all of them", Exit.USAGE)
     with failing(Exit.USAGE, PortError):
         on = listening(host, port)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..parameters.messages import brief, printable
 from .arrays import NUMPY, components, stacked
-from .coordinates import Coordinates
+from .coordinates import Coordinates, polar_angle
 
 Interpolation = Literal["trilinear", "nearest"]
 Extrapolation = Literal["hold", "zero"]
@@ -100,6 +100,8 @@ AT_ONCE = 1 << 20
 """The most values that are filled in together."""
 MARGIN = 1e-5
 """By how much a float32 angle may miss the end of an axis."""
+LEEWAY = 1e-3
+"""By how much an angle may miss the range of samples, whose angles are written with few digits."""
 
 
 @dataclass(frozen=True)
@@ -265,6 +267,29 @@ class Samples:
 
     def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.wi, self.wo, self.values
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """Which samples have values in all channels."""
+        return np.isfinite(self.values).all(axis=1)
+
+    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        """Return whether directions are above the horizon, and their polar angles, exchanged or not, within the ranges
+        of the samples' own. Shapes are those of :meth:`Grid.measured`."""
+        (low_i, high_i), (low_o, high_o) = self._ranges
+        theta_i, theta_o = polar_angle(components(wi)), polar_angle(components(wo))
+
+        def within(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+            return (low_i <= first) & (first <= high_i) & (low_o <= second) & (second <= high_o)
+
+        above = (theta_i < np.pi / 2) & (theta_o < np.pi / 2)
+        return above & (within(theta_i, theta_o) | within(theta_o, theta_i))
+
+    @cached_property
+    def _ranges(self) -> list[tuple[float, float]]:
+        """The ends of the polar angles of wi and of wo, and a little more."""
+        angles = [polar_angle(components(it[self.known])) for it in (self.wi, self.wo)]
+        return [(each.min() - LEEWAY, each.max() + LEEWAY) for each in angles]
 
 
 @dataclass(frozen=True)

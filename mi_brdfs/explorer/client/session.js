@@ -177,7 +177,7 @@ export function fragment() {
   return "#" + letters.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
-function fromLetters(letters) {
+function fromBase64url(letters) {
   const bytes = atob(letters.replaceAll("-", "+").replaceAll("_", "/"));
   return new TextDecoder().decode(Uint8Array.from(bytes, (letter) => letter.charCodeAt(0)));
 }
@@ -186,7 +186,7 @@ function fromLetters(letters) {
 export function readFragment(text) {
   try {
     const plain = decodeURIComponent(text.replace(/^#/, ""));
-    const found = JSON.parse(plain.startsWith("{") ? plain : fromLetters(plain));
+    const found = JSON.parse(plain.startsWith("{") ? plain : fromBase64url(plain));
     return Array.isArray(found.subjects) ? clean(found) : null;
   } catch {
     return null;
