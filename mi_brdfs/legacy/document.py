@@ -17,9 +17,9 @@ from .tables import PLUGINS
 OBJECTS = {*PLUGINS, "camera", "luminaire"}
 """The elements that are plugins; the last two are those of 0.3."""
 
-MOST_ELEMENTS, DEEPEST, LONGEST = 1_000_000, 60, 100_000
-"""Bounds of the number of elements, of their nesting, and of the length of an attribute, which includes and parameters
-may multiply."""
+MOST_ELEMENTS, DEEPEST, LONGEST, MOST_FILES = 1_000_000, 60, 100_000, 1000
+"""Bounds of the number of elements, of their nesting, of the length of an attribute, and of the files read, which
+includes and parameters may multiply."""
 
 
 def _attribute(name: str) -> property:
@@ -84,6 +84,8 @@ class Element:
             numbers = floats(self.value)
         except ValueError:
             raise self.error(f"{self.value!r} has something else than numbers") from None
+        if any(number != number for number in numbers):
+            raise self.error(f"{self.value!r} is no number")
         if counts and len(numbers) not in counts:
             raise self.error(f"{self.value!r} has {len(numbers)} numbers")
         return numbers
@@ -167,7 +169,7 @@ class Reader:
         self.missing: list[Element] = []
         """Includes whose files are missing, if ``lenient``."""
         self.used: set[str] = set()
-        self.count = 0
+        self.count = self.files = 0
         self.reading: list[Path] = []
 
     def read(self, path: Path) -> Element:
@@ -180,6 +182,9 @@ class Reader:
         if path.resolve() in self.reading:
             raise ValueError(f"{path}: the file includes itself.")
         self.reading.append(path.resolve())
+        self.files += 1
+        if self.files > MOST_FILES:
+            raise ValueError(f"{path}: the scene includes more than {MOST_FILES} files.")
         parser = expat.ParserCreate()
         open_: list[Element] = [Element("")]
 

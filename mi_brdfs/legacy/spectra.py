@@ -24,8 +24,9 @@ def rgb_of(element: Element, folder: Path) -> list[float]:
             kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
             rgb = _of_light(*_blackbody(kelvin, float(element.attributes.get("scale", 1))))
         elif "filename" in element.attributes:
-            lines = (folder / element.attributes["filename"]).read_text(encoding="utf-8").splitlines()
-            rgb = _of_light(*np.loadtxt(lines, usecols=(0, 1), ndmin=2).T)
+            if not (path := folder / element.attributes["filename"]).is_file():  # a pipe would never end
+                raise ValueError(f"there is no file {path}")
+            rgb = _of_light(*np.loadtxt(path, usecols=(0, 1), ndmin=2, encoding="utf-8").T)
         elif ":" in text:
             pairs = [pair.split(":") for pair in re.split(r"[,\s]+(?=\S)", re.sub(r"\s*:\s*", ":", text))]
             rgb = _of_light(*np.array(pairs, float).T)

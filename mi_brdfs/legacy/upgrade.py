@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import re
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field, replace
 from functools import partialmethod
 from pathlib import Path
@@ -82,9 +83,15 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     path = Path(path)
     if is_new(path):
         try:
-            return Upgraded("3", path.read_text(encoding="utf-8"))
+            text = path.read_text(encoding="utf-8")
+            root = ET.fromstring(text.encode())
         except UnicodeDecodeError as error:
             raise ValueError(f"{path}: the file is no UTF-8: {error}.") from None
+        except (ET.ParseError, LookupError, ValueError) as error:
+            raise ValueError(f"{path}: no well-formed XML: {error}.") from None
+        if root.tag != "scene" or not re.fullmatch(r"[\d.]+", version := root.get("version", "").strip()):
+            raise ValueError(f"{path}: the file has a <{root.tag}> of version {version!r}, no scene of Mitsuba.")
+        return Upgraded("3", text)
     reader = Reader(path, {name: str(value) for name, value in parameters.items()}, lenient)
     root = reader.read(path)
     if unused := [name for name in parameters if name not in reader.used]:

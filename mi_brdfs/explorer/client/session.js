@@ -145,6 +145,8 @@ export function clean(given) {
       hidden: hidden === true,
       colour: Number.isInteger(colour) && colour in PALETTE ? colour : k,
     }));
+  for (const name of ["stage", "shape"])
+    if (session.hello && !session.hello[`${name}s`].includes(state[name])) state[name] = DEFAULTS[name];
   if (!Number.isInteger(state.component)) state.component = null;
   for (const [name, limits] of Object.entries(LIMITS))
     if (state[name] !== null) state[name] = clamp(state[name], ...limits);
