@@ -84,13 +84,14 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     if is_new(path):
         try:
             text = path.read_text(encoding="utf-8")
-            root = ET.fromstring(text.encode())
+            tree = ET.fromstring(text.encode())
         except UnicodeDecodeError as error:
             raise ValueError(f"{path}: the file is no UTF-8: {error}.") from None
         except (ET.ParseError, LookupError, ValueError) as error:
             raise ValueError(f"{path}: no well-formed XML: {error}.") from None
-        if root.tag != "scene" or not re.fullmatch(r"[\d.]+", version := root.get("version", "").strip()):
-            raise ValueError(f"{path}: the file has a <{root.tag}> of version {version!r}, no scene of Mitsuba.")
+        version = tree.get("version", "").strip()
+        if tree.tag != "scene" or not re.fullmatch(r"[\d.]+", version):
+            raise ValueError(f"{path}: the file has a <{tree.tag}> of version {version!r}, no scene of Mitsuba.")
         return Upgraded("3", text)
     reader = Reader(path, {name: str(value) for name, value in parameters.items()}, lenient)
     root = reader.read(path)
