@@ -114,9 +114,6 @@ def load(setting: Setting, user: UserScene) -> Stage:
         bsdf = scene["body"].bsdf()
         to_world = mi.ScalarTransform4f().translate([0, 0, CENTRE]).scale(RADIUS)
         scene["body"] = {"type": "sphere", "to_world": to_world, "bsdf": bsdf}
-        scene["ground"]["to_world"] = mi.ScalarTransform4f().translate([0, 0, CENTRE - RADIUS]) @ mi.ScalarTransform4f(
-            scene["ground"]["to_world"]
-        )
     loaded = mi.load_dict(scene)
     return Stage(loaded, [shape for shape in loaded.shapes() if shape.id() == "body"])
 
