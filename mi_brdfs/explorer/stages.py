@@ -20,7 +20,7 @@ from .. import loading
 from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
-from ..preview.body import CENTRE, RADIUS
+from ..preview.body import RADIUS
 from ..rendering.output import tonemap
 from ..rendering.passes import pass_source
 from ..srgb import encoded_8bit
@@ -203,16 +203,15 @@ def load(setting: Setting, user: UserScene) -> Stage:
     if setting.shape != "body":
         mesh = user.meshes.get(setting.shape)
         shape = {"type": mesh.suffix[1:].lower(), "filename": linked(str(mesh))} if mesh else {"type": "sphere"}
-        to_world, bottom = _placed(setting.shape, mi.load_dict(shape))
+        to_world = _placed(setting.shape, mi.load_dict(shape))
         scene["body"] = {**shape, "to_world": to_world, "bsdf": scene["body"].bsdf()}
-        scene["ground"]["to_world"] = mi.ScalarTransform4f().translate([0, 0, bottom]) @ scene["ground"]["to_world"]
     loaded = mi.load_dict(scene)
     bodies = [shape for shape in loaded.shapes() if shape.id() == "body"]
     return Stage(loaded, bodies, loaded.emitters()[0] if setting.stage == INCIDENCE else None)
 
 
-def _placed(name: str, shape: mi.Shape) -> tuple[mi.ScalarTransform4f, float]:
-    """Return what puts a shape, whose y is up, into the ball; and the height of its lowest point.
+def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
+    """Return what puts a shape, whose y is up, on the floor, no larger than the ball.
 
     Raises:
         ValueError: if it has no size.
@@ -224,8 +223,9 @@ def _placed(name: str, shape: mi.Shape) -> tuple[mi.ScalarTransform4f, float]:
     if not (np.isfinite(reach) and reach > 0):
         raise ValueError(f"{name} has no triangles.")
     scale = RADIUS / reach
-    to_world = mi.ScalarTransform4f().translate([0, 0, CENTRE]).rotate([1, 0, 0], 90).scale(scale)
-    return to_world.translate(-np.array(box.center())), CENTRE - scale * float(box.extents().y) / 2
+    height = scale * float(box.extents().y) / 2
+    to_world = mi.ScalarTransform4f().translate([0, 0, height]).rotate([1, 0, 0], 90).scale(scale)
+    return to_world.translate(-np.array(box.center()))
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
