@@ -44,7 +44,7 @@ install()
 
 _LAZY = ("bench", "cluster", "fit", "gallery", "legacy", "plot", "sweep", "testing", "validation")
 """Modules that are imported when they are used: some need extras, and all take time."""
-_ELSEWHERE = {"explore": "explorer", "load_legacy": "legacy"}
+_ELSEWHERE = {"explore": "explorer", "load_legacy": "loading"}
 """Functions of such modules."""
 
 

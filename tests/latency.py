@@ -21,7 +21,7 @@ PICTURE, CURVES = ["picture"], ["lobe", "polar", "albedo"]
 
 def alone(*arguments: str) -> list[str]:
     """The command of the explorer where no other extra is installed."""
-    others = ["matplotlib", "plotly", "PIL", "jinja2", "flip_evaluator", "distributed", "pyarrow", "scipy"]
+    others = ["matplotlib", "PIL", "jinja2", "flip_evaluator", "distributed", "pyarrow", "scipy"]
     code = f"import sys; sys.modules.update(dict.fromkeys({others})); from mi_brdfs.cli import main; main()"
     return [sys.executable, "-c", code, "explore", *arguments]
 

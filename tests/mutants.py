@@ -482,6 +482,70 @@ def leaked_derivative(own, self, ctx, si, wo, active):
     return value + dr.select(mi.Bool(active), 0, every - dr.detach(every)), pdf
 
 
+def lifted(own, self, ctx, si, wo, active):
+    """Turns the caller's direction to the front."""
+    wo.z = abs(wo.z)
+    return own(self, ctx, si, wo, active)
+
+
+def without_fields(own, self, *given):
+    bs, weight = own(self, *given)
+    empty = mi.BSDFSample3f()
+    empty.wo, empty.pdf, empty.sampled_type = bs.wo, bs.pdf, bs.sampled_type
+    return empty, weight
+
+
+class SharesKept(adapter.ModelBSDF):
+    """Draws lobes, and states densities, by the shares that the first call had; pdf has the present ones."""
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        valid, mixture, components, frame = self._mixture(ctx, si, active)
+        if len(mixture.lobes) > 1:
+            self.kept = getattr(self, "kept", mixture.probabilities)
+            mixture.probabilities = self.kept
+        return self._sample(valid, mixture, components, frame, sample1, sample2)
+
+
+def no_number_in_the_horizon(own, self, ctx, si, wo, active):
+    """Divides zero by zero where light comes along the surface."""
+    value, pdf = own(self, ctx, si, wo, active)
+    return value + dr.select(si.wi.z == 0, dr.nan, 0), pdf
+
+
+def halved_for_a_mask(own, self, ctx, si, wo, active):
+    """A type mask leaves the shares of lobes as they are."""
+    every = ctx.type_mask == int(mi.BSDFFlags.All)
+    return own(self, ctx, si, wo, active) * (1 if every else 0.5)
+
+
+def half_of_the_mirror():
+    """The dict of a copy of Mitsuba's plastic, whose mirror is drawn half of the time and weighted as if always."""
+
+    class Plastic(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.inner = mi.load_dict({"type": "plastic"})
+            self.m_components = [self.inner.flags(k) for k in range(2)]
+            self.m_flags = self.inner.flags()
+
+        def sample(self, ctx, si, u, v, active=True):
+            bs, weight = self.inner.sample(ctx, si, u, v, active)
+            alone = ctx.component == 0
+            return bs, weight * dr.select((bs.sampled_component == 0) & (not alone), bs.pdf, 1)
+
+        def eval(self, *given):
+            return self.inner.eval(*given)
+
+        def pdf(self, *given):
+            return self.inner.pdf(*given)
+
+        def eval_pdf(self, *given):
+            return self.inner.eval_pdf(*given)
+
+    mi.register_bsdf("half_of_the_mirror", Plastic)
+    return {"type": "half_of_the_mirror"}
+
+
 def ignored_mode(own, self, ctx, si, active):
     """Reflects light from an emitter as light from the camera."""
     radiance = mi.BSDFContext()
@@ -694,6 +758,10 @@ MUTANTS = [
     mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
     mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
     mutant("colours of wavelengths beside", "spectral", colour(beside)),
+    mutant("direction lifted in place", "calls", Lambert, adapted(eval=lifted)),
+    mutant("shares of the first call", "updates", Phong, SharesKept, **TWO),
+    mutant("not a number in the horizon", "finite", Lambert, adapted(eval_pdf=no_number_in_the_horizon)),
+    mutant("density of a mask", "components", Ward, adapted(pdf=halved_for_a_mask), **TWO),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
     mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),
     mutant("wrong component", "components", Ward, sampled(sampled_component=lambda bs, w, si, u: mi.UInt32(0))),

@@ -39,6 +39,30 @@ def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     return directions.hemisphere(count, seed, lowest)
 
 
+def pairs(count: int, seed: int, lowest: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
+    """Independent uniform directions ``(wi, wo)``, float64."""
+    return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
+
+
+def turned(w: np.ndarray, phi: float) -> np.ndarray:
+    """Directions turned about the normal by an angle in radians."""
+    x, y, z = w.T
+    return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
+
+
+def spherical(theta, phi) -> np.ndarray:
+    """The directions of polar angles and azimuths in degrees, shape (…, 3)."""
+    theta, phi = np.broadcast_arrays(np.radians(theta), np.radians(phi))
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def written(folder: Path, name: str, content: str | bytes) -> Path:
+    """A new file."""
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
 def observed() -> tuple[np.ndarray, np.ndarray]:
     """``(wavelengths, weights)``: each quarter of a nm, and the linear sRGB that a reflectance there has under D65 for
     the CIE 1931 observer, of white 1 in each channel."""

@@ -24,6 +24,7 @@ from mi_brdfs.probe.sources import value_of
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
+TURNED = '<rotate y="1" angle="180"/>'
 SCENE = """<scene version="3.0.0">
   <default name="res" value="24"/>
   <default name="spp" value="3"/>
@@ -186,30 +187,36 @@ def test_the_output_option_names_either_file_and_the_seed_the_noise(folder):
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("processes", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_materials_of_a_scene_are_replaced(folder, processes):
-    """By the id of a BSDF, wherever it is referred to, or of a shape; also where it had none."""
+    """By the id of a BSDF, wherever it is referred to, or of a shape; also where it had none. What was seen from both
+    sides still is."""
     (folder / "balls.xml").write_text(
         '<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/><sensor type="orthographic">'
         '<transform name="to_world"><scale x="3" y="3"/><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>'
         '<film type="hdrfilm"><integer name="width" value="3"/><integer name="height" value="3"/>'
         '<rfilter type="box"/></film></sensor><bsdf type="diffuse" id="paint"/>'
         + "".join(
-            f'<shape type="rectangle" id="{id}">{inner}<transform name="to_world"><translate x="{x}"/></transform>'
-            "</shape>"
-            for id, x, inner in (("a", -2, '<ref id="paint"/>'), ("b", 0, '<ref id="paint"/>'), ("c", 2, ""))
+            f'<shape type="rectangle" id="{id}">{inner}<transform name="to_world">{turn}<translate x="{x}" y="{y}"/>'
+            "</transform></shape>"
+            for id, x, y, inner, turn in (
+                ("a", -2, 0, '<ref id="paint"/>', ""),
+                ("b", 0, 0, '<ref id="paint"/>', ""),
+                ("c", 2, 0, "", ""),
+                ("back", 0, 2, '<bsdf type="twosided" id="both"><bsdf type="diffuse"/></bsdf>', TURNED),
+            )
         )
         + "</scene>"
     )
     words = ["--workers", processes] * bool(processes)
     black, white = "lambert:reflectance=0", "lambert:reflectance=1"
-    for replaced, expected in [
-        ((f"paint={black}", f"c={white}"), [0, 0, 1]),
-        ((f"a={white}", f"b={black}"), [1, 0, 0.5]),
+    for replaced, expected, back in [
+        ((f"paint={black}", f"c={white}", f"both={white}"), [0, 0, 1], 1),
+        ((f"a={white}", f"b={black}", "back=thindielectric"), [1, 0, 0.5], 1),
     ]:
         options = [word for it in replaced for word in ("--replace", it)]
         done = invoke("render", "balls.xml", "--spp", 256, "-o", "it.exr", *options, *words, cwd=folder)
         assert done.exit_code == 0, done.stderr
-        row = np.array(mi.Bitmap(str(folder / "it.exr")))[1, :, 0]
-        np.testing.assert_allclose(row, expected, atol=0.02)
+        picture = np.array(mi.Bitmap(str(folder / "it.exr")))[..., 0]
+        np.testing.assert_allclose([*picture[1], *picture[::2, 1]], [*expected, back, 1], atol=0.02)
 
 
 @pytest.mark.slow
@@ -237,9 +244,9 @@ ERRORS = {
     "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
     "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),
     "reserved -D": (["scenes/box.xml", "-Dfilename=1"], 2, "-D filename: "),
-    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "a.bmp: unknown image format"),
-    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 1, "cannot write to the folder gone"),
-    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 1, "taken.exr is a folder"),
+    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "-o a.bmp: write a .exr, .png, .jpg or .jpeg"),
+    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 2, "there is no folder gone"),
+    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 2, "-o taken.exr: it is a folder"),
     "unknown variant": (["scenes/box.xml", "--variant", "llvm"], 1, "no variant llvm; this Mitsuba has scalar_rgb, "),
 }
 

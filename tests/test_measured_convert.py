@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import hemisphere
+from support import pairs
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
@@ -15,23 +15,15 @@ import mitsuba as mi  # isort: skip
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
-RED = {"type": "rgb", "value": [0.8, 0.2, 0.1]}
 
-
-@pytest.mark.parametrize(
-    "bsdf",
-    [
-        pytest.param({"type": "burley", "base_color": RED}, marks=pytest.mark.slow),
-        {"type": "ward", "alpha": 0.05, "diffuse_reflectance": 0.05, "specular_reflectance": RED},
-    ],
-    ids=str,
-)
-def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path, bsdf):
+def test_a_baked_bsdf_is_itself_to_one_percent_of_its_peak(tmp_path):
+    red = {"type": "rgb", "value": [0.8, 0.2, 0.1]}
+    bsdf = {"type": "ward", "alpha": 0.05, "diffuse_reflectance": 0.05, "specular_reflectance": red}
     result = convert(bsdf, tmp_path / "x.binary")
     assert result.format == "MERL" and result.losses == ()
     assert result.rms < 0.001 and result.largest < 0.01
     # What the file holds, found without the code that judged it.
-    wi, wo = (w.astype(np.float64) for w in (hemisphere(4000, 1, 0.3), hemisphere(4000, 2, 0.3)))
+    wi, wo = pairs(4000, 1, 0.3)
     found = read(tmp_path / "x.binary").data.evaluate(wi, wo)
     probe = BSDFProbe(mi.load_dict(bsdf))
     f = probe.eval(probe.whole, wi, wo) / wo[:, 2:]
@@ -82,9 +74,9 @@ def test_every_format_keeps_a_smooth_measurement(tmp_path, name, format):
 
 @pytest.mark.slow
 def test_scattered_samples_are_put_on_a_grid(tmp_path):
-    wi, wo = (hemisphere(400, seed, 0.2).astype(np.float64) for seed in (5, 6))
+    wi, wo = pairs(400, 5, 0.2)
     samples = Samples(wi, wo, np.full((400, 3), 0.25), anisotropic=False)
-    result = convert(Measurement("some file", "test", samples), tmp_path / "x.binary")
+    result = convert(Measurement("some file", "test", samples), tmp_path / "x.csv")
     (loss,) = result.losses
     assert "θi 1.865 to 78.46° and θo 4.601 to 78.21°" in loss and result.largest < 1e-6
 
@@ -97,7 +89,7 @@ def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
     spectral = measurement(lambda i, o, d: 1 + np.cos(i), 4, np.array([450.0, 500, 550, 600]))
     one, other = convert(spectral, path).losses
     assert "4 wavelengths" in one and "reciprocal" in other
-    wi, wo = (w.astype(np.float64) for w in (hemisphere(100, 3, 0.5), hemisphere(100, 4, 0.5)))
+    wi, wo = pairs(100, 3, 0.5)
     mean = 1 + (wi[:, 2] + wo[:, 2]) / 2
     np.testing.assert_allclose(read(path).data.evaluate(wi, wo)[:, 0], mean, rtol=0.02)
 
@@ -110,11 +102,9 @@ def test_spectra_become_rgb_and_both_orders_their_mean(tmp_path):
         ({"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3}, "x.binary", "anisotropic"),
         ({"type": "constant"}, "x.binary", "not a BSDF"),
         ({"type": "ward"}, "x.exr", "no way to write .*x.exr; .* .binary"),
-        ({"type": "ward"}, "x", "no way to write"),
         ({"type": "ward"}, "folder.binary", "not a regular file"),
         (measurement(lambda i, o, d: -1 + 0 * i, 3), "x.binary", "no positive value"),
         (measurement(lambda i, o, d: 1 + 0 * i, 1025, np.arange(1025.0)), "x.bsdf", "1,025 wave.* at most 1,024 of"),
-        (measurement(lambda i, o, d: 1 + 0 * i, 1540, np.arange(1540.0)), "x.csv", "1,540 wave.* at most 1,539 of"),
         ("nowhere.binary", "x.binary", "No such file"),
     ],
     ids=lambda given: "negative" if isinstance(given, Measurement) else str(given),
@@ -132,7 +122,7 @@ def test_a_folder_that_is_not_there_is_named(tmp_path):
 
 
 def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(tmp_path, monkeypatch):
-    path = tmp_path / "x.binary"
+    path = tmp_path / "x.csv"
     convert({"type": "lambert"}, path)
     before = path.read_bytes()
     with pytest.raises(ValueError, match="onto itself"):
@@ -142,7 +132,7 @@ def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(
         path.write_bytes(b"half of it")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mi_brdfs.measured.formats.merl.write", full)
+    monkeypatch.setattr("mi_brdfs.measured.formats.csv.write", full)
     with pytest.raises(OSError):
         convert({"type": "ward"}, path)
     assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
@@ -165,23 +155,17 @@ def run(*words):
 
 
 def test_the_command(tmp_path):
-    path = tmp_path / "x.binary"
+    path = tmp_path / "x.csv"
     status, text = run("phong", path, "-D", "exponent=20")
-    assert status == 0 and "MERL" in text and "% of its peak" in text
-    assert run('<bsdf type="lambert"/>', tmp_path / "y.csv")[0] == 0
-    assert run(tmp_path / "y.csv", tmp_path / "z.csv")[0] == 0
+    assert status == 0 and "CSV" in text and "% of its peak" in text
+    assert run(path, tmp_path / "z.csv")[0] == 0
     for words, answer in (
         ((path, path), "onto itself"),
         ((path, tmp_path / "y.binary", "-D", "alpha=1"), "no parameter but quantity"),
         (("wardd", path), 'did you mean "ward"?'),
-        (("nowhere.bsdf", path), "No such file or directory"),
         (("ward", tmp_path), "it is a folder"),
         (("ward", tmp_path / "none" / "x.binary"), "there is no folder"),
         (("ward", path, "--format", "zip"), "as zip"),
-        (("ward", path, "--variant", "llvm_ad_spectral"), "vectorized rgb variant"),
     ):
         status, text = run(*words)
         assert status == 2 and answer in text, (words, text)
-    path.write_bytes(path.read_bytes()[:1000])
-    status, text = run(path, tmp_path / "y.binary")
-    assert status == 2 and "at byte 12" in text

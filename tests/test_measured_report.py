@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from merl_tables import centres, lowest, write
+from support import spherical
 from typer.testing import CliRunner
 
 from mi_brdfs import plot
@@ -15,7 +16,7 @@ from mi_brdfs.cli import app, measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
-from mi_brdfs.measured.report.albedo import albedos, coverage, hemisphere
+from mi_brdfs.measured.report.albedo import albedos, hemisphere
 from mi_brdfs.measured.report.reciprocity import reciprocity_error
 from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.observer import to_srgb
@@ -49,10 +50,6 @@ def goniometer(values=1 / np.pi, radial=60.0, anisotropic=False, stated=None, ch
     shape = *(len(axis.nodes) for axis in axes), channels
     grid = Grid(SpecularPolar(not anisotropic, anisotropic), tuple(axes), np.broadcast_to(values, shape).copy())
     return Measurement(Path("paint.bsdf"), "Zemax", grid, wavelengths=np.array([650.0]), stated_albedos=stated or {})
-
-
-def directions(theta, phi):
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
 
 
 def rows(measurement):
@@ -90,28 +87,26 @@ def test_a_table_is_integrated_as_it_is_evaluated(anisotropic, extrapolate):
     grid = goniometer(np.random.default_rng(1).random((3, 24 if anisotropic else 13, 13, *[4] * anisotropic, 2)),
                       anisotropic=anisotropic, channels=2).data  # fmt: skip
     grid.values[1, 2:5] = np.nan
-    wi, (wo, solid_angle) = directions(0.6, 0.4), hemisphere(0.6, 0.4)
+    wi, (wo, solid_angle) = spherical(*np.degrees([0.6, 0.4])), hemisphere(0.6, 0.4)
     expected = solid_angle @ grid.evaluate(wi, wo, extrapolate=extrapolate)
     np.testing.assert_allclose(grid.integrated(wi, wo, solid_angle, extrapolate), expected, rtol=1e-9)
 
 
 CHANNELS = 1000
 FEW = Grid(Spherical(False), tuple(Axis(np.arange(1.0, n)) for n in (2, 3, 3)), np.ones((1, 2, 2, CHANNELS)))
-SCATTERED = Samples(*(directions(*np.random.default_rng(k).random((2, 20))) for k in (1, 2)), np.ones((20, CHANNELS)),
-                    False)  # fmt: skip
-WAVELENGTHS = np.linspace(300, 1300, CHANNELS)
+SCATTERED = Samples(*(spherical(*np.random.default_rng(k).random((2, 20)) * 60) for k in (1, 2)),
+                    np.ones((20, CHANNELS)), False)  # fmt: skip
 
 
 @pytest.mark.parametrize(
     "function, megabytes",
     [
         (lambda: albedos(FEW, np.array([0.5])), 30),
-        (lambda: coverage(FEW, np.array([0.5])), 30),
         (lambda: as_grid(SCATTERED), 400),
-        (lambda: LitTable(Measurement(Path("x"), "test", SCATTERED, WAVELENGTHS)), 30),
+        (lambda: LitTable(Measurement(Path("x"), "test", SCATTERED, np.linspace(300, 1300, CHANNELS))), 30),
         (lambda: to_srgb(np.linspace(300, 4300, 4001)), 10),
     ],
-    ids=["albedo", "coverage", "scattered", "picture", "colours"],
+    ids=["albedo", "scattered", "picture", "colours"],
 )
 def test_many_wavelengths_take_little_memory(function, megabytes):
     tracemalloc.start()
@@ -128,22 +123,6 @@ def test_directions_that_are_none_are_refused(direction):
         for pair in ((up, np.array([direction])), (np.array([direction]), up)):
             with pytest.raises(ValueError, match=r"^directions must (have the length 1, not|be arrays of shape)"):
                 function(*pair)
-
-
-def test_a_narrow_lobe_in_a_table(tmp_path):
-    """GGX facets of alpha .01 at normal incidence, where θh is θd, in MERL's own cells: the integral over the table
-    agrees with one over θo of what it interpolates."""
-    dimensions = 90, 4, 4
-    theta_h, _, _ = centres(dimensions)
-    f = 1e-4 / (4 * np.pi * (np.cos(theta_h) ** 2 * (1e-4 - 1) + 1) ** 2)
-    grid = read(write(tmp_path / "a.binary", f[..., None], dimensions)).data
-    (found,) = albedos(grid, np.zeros(1))
-    theta = np.pi / 2 * np.linspace(0, 1, 200_001) ** 4
-    nodes = np.append(0, np.sqrt(theta_h[:, 0, 0] * 2 / np.pi))
-    f = np.interp(np.sqrt(theta / np.pi), nodes, np.append(f[0, 0, 0], f[:, 0, 0]))
-    middle, step = (theta[1:] + theta[:-1]) / 2, np.diff(theta)
-    expected = 2 * np.pi * np.sum((f[1:] + f[:-1]) / 2 * np.cos(middle) * np.sin(middle) * step)
-    assert found[0] == pytest.approx(expected, rel=2e-3)
 
 
 # --- The summary ----------------------------------------------------------------------------------------------------
@@ -179,17 +158,12 @@ def test_reciprocity_is_by_how_much_the_halves_differ(tmp_path):
     assert not found.reciprocal
     assert found.reciprocity.median == pytest.approx(0.25, rel=1e-5)
     assert found.reciprocity.percentile95 == pytest.approx(0.25, rel=1e-5)
-    f[:] = 0.3
-    f[[3, 33], 0] = 0.3, 0.6  # at one of 30 pairs of φd, too few for these percentiles
-    found = summarize(read(write(tmp_path / "almost.binary", f, dimensions)))
-    assert found.reciprocity.median == pytest.approx(0, abs=1e-5)
-    assert found.reciprocity.percentile95 == pytest.approx(0, abs=1e-5)
 
 
 def test_reciprocity_of_scattered_samples():
     """Only of those with a partner: 0.2 and 0.3 differ by a third, however an isotropic sample is turned."""
-    theta_i, phi_i, theta_o, phi_o = np.radians([[20, 0, 50, 90], [50, 10, 20, -80], [50, 0, 20, 40], [30, 0, 70, 0]]).T
-    wi, wo = directions(theta_i, phi_i), directions(theta_o, phi_o)
+    theta_i, phi_i, theta_o, phi_o = np.transpose([[20, 0, 50, 90], [50, 10, 20, -80], [50, 0, 20, 40], [30, 0, 70, 0]])
+    wi, wo = spherical(theta_i, phi_i), spherical(theta_o, phi_o)
     samples = Samples(wi, wo, np.array([[0.2], [0.3], [9.0], [9.0]]), anisotropic=False)
     found = reciprocity_error(samples)
     assert found.pairs == 2
@@ -198,12 +172,12 @@ def test_reciprocity_of_scattered_samples():
 
 
 def test_scattered_samples(tmp_path):
-    """Are counted as they are, and drawn within the angles that were measured, up to a cell of their grid: a grey of
-    albedo .3, less what lies beyond 70°."""
+    """Are counted as they are, and drawn in one piece within the angles that were measured, also from one at the end of
+    their range: a grey of albedo .3, less what lies beyond 70°, of which the albedo has up to a cell of their grid."""
     angles = np.meshgrid([10, 40], np.arange(0, 71, 10), np.arange(0, 181, 15))
-    theta_i, theta_o, phi = np.radians(angles).reshape(3, -1)
+    theta_i, theta_o, phi = np.reshape(angles, (3, -1))
     f = np.full((len(phi), 1), 0.3 / np.pi)
-    samples = Samples(directions(theta_i, 0 * phi), directions(theta_o, phi), f, anisotropic=False)
+    samples = Samples(spherical(theta_i, 0 * phi), spherical(theta_o, phi), f, anisotropic=False)
     measurement = Measurement(tmp_path / "felt.csv", "CSV", samples, wavelengths=np.array([550.0]))
     words = rows(measurement)
     assert words["values"] == "208, of 208 pairs of directions"
@@ -214,7 +188,8 @@ def test_scattered_samples(tmp_path):
     for curve in (first, second, *nodes):
         seen = np.isfinite(curve[1])
         np.testing.assert_allclose(curve[1][seen], 0.3 / np.pi, rtol=1e-4)
-        assert abs(curve[0][seen]).max() == pytest.approx(70, abs=6)
+        assert abs(curve[0][seen]).max() == pytest.approx(70, abs=0.6)  # curves have a point every half degree
+        assert (np.diff(np.flatnonzero(seen)) == 1).all()
     assert all(set(range(-70, 71, 10)) <= set(theta.round()) for theta, _ in nodes)
 
 
@@ -230,21 +205,16 @@ def test_nothing_was_measured_both_ways():
 
 def test_what_a_table_is_in_words(lambert):
     words = rows(read(lambert))
-    assert words["format"] == "MERL" and words["material"] == "lambert"
-    assert words["symmetry"] == "isotropic" and words["wavelengths"] == "linear sRGB"
+    assert (words["format"], words["material"], words["symmetry"]) == ("MERL", "lambert", "isotropic")
     assert words["values"] == "162,000, of 30 θh × 30 θd × 60 φd × 3 channels"
-    assert words["measured"] == "all directions"
-    assert words["reciprocity"] == "exact, by the coordinates of the table"
+    assert words["measured"] == "all directions" and words["wavelengths"] == "linear sRGB"
     assert words["largest albedo"].startswith("0.8 at ") and words["largest albedo"].endswith(", blue")
     assert words["negative"] == words["missing"] == words["zero"] == "none"
-    words = rows(goniometer())
-    assert words["symmetry"] == "isotropic and symmetric to the plane of incidence"
-    assert words["values"] == "507, of 3 θi × 13 azimuths × 13 radial angles" and words["wavelengths"] == "650 nm"
     words = rows(goniometer(anisotropic=True))
     assert words["symmetry"] == "anisotropic" and "φi = 0°" in words["largest albedo"]
     spectral = goniometer(np.linspace(0.1, 0.2, 31), channels=31)
-    spectral = dataclasses.replace(spectral, wavelengths=np.arange(400.0, 701, 10))
-    words = rows(spectral)
+    words = rows(dataclasses.replace(spectral, wavelengths=np.arange(400.0, 701, 10)))
+    assert words["symmetry"] == "isotropic and symmetric to the plane of incidence"
     assert words["wavelengths"] == "31 from 400 to 700 nm" and words["largest albedo"].endswith(", 700 nm")
 
 
@@ -268,12 +238,6 @@ def test_each_rotation_has_its_stated_albedo():
     assert [it.phi_i for it in found.scatter] == [0, 90, 180, 270]
     np.testing.assert_allclose([it.integrated for it in found.scatter], [0.1, 0.2, 0.3, 0.4], rtol=1e-3)
     assert (found.largest_albedo.value, found.largest_albedo.phi_i) == (pytest.approx(0.4, rel=1e-3), 270)
-
-
-def test_of_many_stated_albedos_some_are_looked_at(monkeypatch):
-    monkeypatch.setattr("mi_brdfs.measured.report.summary.FIGURES", 4)
-    measurement = goniometer(0.3 / np.pi, radial=150, anisotropic=True, stated={0.0: [0.3] * 10}, turns=10)
-    assert [it.phi_i for it in summarize(measurement).scatter] == pytest.approx([0, 108, 216, 324])
 
 
 def test_the_largest_albedo_may_be_at_any_azimuth():
@@ -380,9 +344,6 @@ def test_albedos_are_drawn_beside_those_that_are_stated(lambert):
 
 def test_several_files_have_a_row_each(lambert):
     figure = plot.measured(lambert, goniometer())
-    assert [ax.get_title(loc="left") for ax in figure.axes if ax.get_title(loc="left")] == [
-        "lambert.binary",
-        "paint.bsdf",
-    ]
+    assert [row.get_suptitle() for row in figure.subfigs] == ["lambert.binary", "paint.bsdf"]
     with pytest.raises(ValueError, match="no measured file"):
         plot.measured()

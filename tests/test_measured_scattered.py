@@ -4,14 +4,10 @@ back."""
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, context, direction, efficiencies, hemisphere, shared
+from support import call, context, direction, efficiencies, pairs, shared, turned
 
 from mi_brdfs.measured import Samples, read, scattered
 from mi_brdfs.measured.scattered import embedded, gridded, nearest, weights
-
-
-def pairs(count, seed, lowest=0.05):
-    return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
 
 
 def glossy(wi, wo):
@@ -50,13 +46,13 @@ def test_nearest_points_are_the_nearest():
 
 
 def test_distance_knows_the_symmetries():
-    (wi, wo), mirror, phi = pairs(100, 3), np.array([1, -1, 1]), 0.7
-    turn = np.array([[np.cos(phi), -np.sin(phi), 0], [np.sin(phi), np.cos(phi), 0], [0, 0, 1]])
+    (wi, wo), mirror = pairs(100, 3, 0.05), np.array([1, -1, 1])
+    turn = turned(wi, 0.7), turned(wo, 0.7)
     for anisotropic in (False, True):
         np.testing.assert_allclose(embedded(wo, wi, anisotropic), embedded(wi, wo, anisotropic), atol=1e-9)
     np.testing.assert_allclose(embedded(wi * mirror, wo * mirror, False), embedded(wi, wo, False), atol=1e-9)
-    np.testing.assert_allclose(embedded(wi @ turn, wo @ turn, False), embedded(wi, wo, False), atol=1e-9)
-    assert np.all(np.linalg.norm(embedded(wi @ turn, wo @ turn, True) - embedded(wi, wo, True), axis=1) > 0.02)
+    np.testing.assert_allclose(embedded(*turn, False), embedded(wi, wo, False), atol=1e-9)
+    assert np.all(np.linalg.norm(embedded(*turn, True) - embedded(wi, wo, True), axis=1) > 0.02)
 
 
 @pytest.mark.parametrize(
@@ -64,12 +60,12 @@ def test_distance_knows_the_symmetries():
 )
 def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
     """Better than from the nearest neighbour; in four dimensions, 2000 samples are few."""
-    wi, wo = pairs(2000, 5)
+    wi, wo = pairs(2000, 5, 0.05)
     values = f(wi, wo)
     grid = gridded(Samples(wi, wo, values, anisotropic))
     assert np.nanmin(grid.values) >= values.min()
     assert np.nanmax(grid.values) <= values.max()
-    wi_2, wo_2 = pairs(1000, 9, lowest=0.2)
+    wi_2, wo_2 = pairs(1000, 9, 0.2)
     found, expected = grid.evaluate(wi_2, wo_2), f(wi_2, wo_2)
     points, others = embedded(wi, wo, anisotropic), embedded(wi_2, wo_2, anisotropic)
     neighbour = values[nearest(points, others, 1)[:, 0]]
@@ -79,7 +75,7 @@ def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
 
 def test_beyond_the_measured_range(monkeypatch):
     monkeypatch.setattr(scattered, "MOST_NODES", 20_000)
-    wi, wo = pairs(2000, 13, lowest=0.5)
+    wi, wo = pairs(2000, 13, 0.5)
     samples = Samples(wi, wo, glossy(wi, wo), False)
     inside, outside = direction(30)[None], direction(80, 60)[None]
     held, zero = gridded(samples), gridded(samples, "zero")
@@ -90,7 +86,7 @@ def test_beyond_the_measured_range(monkeypatch):
 
 
 def test_missing_values_and_few_samples():
-    wi, wo = pairs(30, 15)
+    wi, wo = pairs(30, 15, 0.05)
     values = glossy(wi, wo)
     values[3] = np.nan
     assert np.all(gridded(Samples(wi, wo, values, False)).evaluate(wi, wo) > 0.05)

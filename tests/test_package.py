@@ -70,7 +70,7 @@ def test_style_and_types(tool):
 # fmt: off
 TRUNK = {
     "math", "srgb", "observer", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba",
-    "ranges", "names", "variants", "legacy", "writing", "starting", "given", "preview", "probe", "rendering",
+    "ranges", "names", "variants", "legacy", "loading", "writing", "starting", "given", "preview", "probe", "rendering",
     "__version__",
     "info", "doctor",
 }

@@ -7,7 +7,7 @@ from support import direction, small_picture
 
 import mi_brdfs
 from mi_brdfs.preview import STAGES
-from mi_brdfs.preview.body import ANGLE, AZIMUTH, BEVEL, CENTRE, ELEVATION, RADIUS
+from mi_brdfs.preview.body import AZIMUTH, CENTRE, LENGTH, RADIUS, TILT
 from mi_brdfs.preview.studio import environment
 
 GOLD = {"type": "walter", "material": "Au", "alpha": 0.1}
@@ -72,23 +72,24 @@ def test_the_studio_is_the_same_every_time():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-def test_the_body_is_a_ball_with_a_facet_and_a_groove():
-    """Normals agree with the triangles, also where the ball was cut."""
+def test_the_body_is_a_ball_and_a_ribbon():
+    """Normals agree with the triangles; u runs around the leaning axis, and from left to right."""
     params = mi.traverse(mi_brdfs.preview_scene({"type": "lambert"})["body"])
     positions, normals = (np.array(params[f"vertex_{name}"]).reshape(-1, 3) for name in ("positions", "normals"))
+    faces, u = np.array(params["faces"]).reshape(-1, 3), np.array(params["vertex_texcoords"]).reshape(-1, 2)[:, 0]
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
-    around = np.linalg.norm(positions - [0, 0, CENTRE], axis=1)
-    level = abs(positions[:, 2] - CENTRE) < 0.2
-    np.testing.assert_allclose(around[level], RADIUS, atol=1e-3)
-    flat = normals @ (facet := direction(np.degrees(np.pi / 2 - ELEVATION), np.degrees(AZIMUTH))) > 0.99999
-    assert flat.sum() > 1000
-    distance = (positions[flat] - [0, 0, CENTRE]) @ facet
-    np.testing.assert_allclose(distance, RADIUS * np.cos(ANGLE), atol=BEVEL / 2)
-    groove = (positions[:, 2] < CENTRE - 0.3) & (positions[:, 2] > CENTRE - 0.6)
-    assert around[groove].min() == pytest.approx(RADIUS - 0.055, abs=2e-3)
-    corners = positions[np.array(params["faces"]).reshape(-1, 3)]
+    corners = positions[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    large = np.linalg.norm(across, axis=1) > 1e-6
-    own = normals[np.array(params["faces"]).reshape(-1, 3)].mean(axis=1)
-    cosine = (across * own).sum(axis=1) / np.linalg.norm(across, axis=1).clip(1e-12) / np.linalg.norm(own, axis=1)
-    assert np.quantile(cosine[large], 0.01) > 0.97 and cosine[large].min() > 0.8
+    own, area = normals[faces].mean(axis=1), np.linalg.norm(across, axis=1)
+    cosine = (across * own).sum(axis=1) / area.clip(1e-12) / np.linalg.norm(own, axis=1)
+    assert cosine[area > 1e-6].min() > 0.999
+
+    ball = np.isclose(np.linalg.norm(positions - [0, 0, CENTRE], axis=1), RADIUS, atol=1e-5)
+    axis = direction(np.degrees(TILT), np.degrees(AZIMUTH))
+    level = abs(normals @ axis) < 0.01
+    before = np.cross(axis, normals[ball & level & (abs(u - 0.5) < 0.01)].mean(axis=0))
+    later = normals[ball & level & (u > 0.5) & (u < 0.6)].mean(axis=0)
+    assert before @ later > 0.2
+    ribbon, x = positions[~ball], positions[~ball, 0]
+    np.testing.assert_allclose(x, LENGTH * (u[~ball] - 0.5), atol=1e-5)
+    assert ribbon[:, 2].min() > 0 and (normals[~ball, 1] < 0).all()  # above the floor, towards the camera

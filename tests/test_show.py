@@ -66,14 +66,22 @@ def test_it_shows_a_material(folder, words, name):
     assert r > 0.02 and ((r > 50 * g and r > 50 * b) if name == "ward" else abs(r - g) < 0.3 * r)
 
 
+def test_pixels_that_are_not_finite_are_counted(folder):
+    done = run("show", "diffuse:reflectance=nan", "--size", 16, "--spp", 2, "-o", "nan.exr")
+    count = np.sum(~np.isfinite(image(folder / "nan.exr")).all(axis=-1))
+    assert count and f"{count} pixels have values that are not finite" in done.stderr
+
+
 RENDER = "render", "scene.xml", "--variant", "scalar_rgb"
 WRONG = [
+    (["explore", "ward", "--host", ""], "--host: name an address of this machine, or 0.0.0.0 for all of them"),
     (["show", "wrad"], 'there is no plugin "wrad"; did you mean "ward"?'),
     (["show", "ward", "--stage", "opera"], "--stage opera: there is no such stage; there are studio, lamp, point"),
     (["show", "ward", "-Dalpha"], "-D alpha: write -D name=value"),
     (["show", "ward", "--param", "alpha=7"], "ward: alpha = 7 is not allowed; it must be a number in"),
     (["show", "scene.xml"], "scene.xml has several materials; show one of scene.xml:ball, scene.xml:moon"),
     (["show", "gone.xml"], "gone.xml: no such file"),
+    (["show", "gone.xml:a"], "gone.xml:a: "),  # and no emoji
     ([*RENDER, "--sensor", "2"], "--sensor 2: there is no such sensor; there are 0 (front), 1 (away)"),
     ([*RENDER, "--sensor", "side"], "--sensor side: there is no such sensor"),
     ([*RENDER, "--crop", "1,2,3"], "--crop 1,2,3: write four whole numbers, X,Y,WIDTH,HEIGHT"),
@@ -83,7 +91,7 @@ WRONG = [
 
 @pytest.mark.parametrize("words, text", WRONG)
 def test_it_says_what_is_wrong(folder, words, text):
-    done = run(*words, "--spp", 1)
+    done = run(*words, *["--spp", "1"] * (words[0] != "explore"))
     assert done.exit_code == 2 and done.stdout == ""
     assert text in done.stderr and done.stderr.count("\n") == 1, done.stderr
 

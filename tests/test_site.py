@@ -7,12 +7,14 @@ import sys
 from html.parser import HTMLParser
 from urllib.parse import unquote
 
+import mitsuba as mi
 import pytest
 import typer
 from generate import models
 from generate.made import ROOT
 from generate.notebooks import NOTEBOOKS
 from typer.testing import CliRunner
+from website import live
 from website.__main__ import main
 from website.pages import write_pages
 
@@ -26,7 +28,11 @@ def site(tmp_path_factory):
     if any(importlib.util.find_spec(name) is None for name in ("sphinx", "furo", "myst_parser")):
         pytest.skip("the site's extra is not installed: pip install -e '.[site]'")
     folder = tmp_path_factory.mktemp("site") / "html"
-    command = [sys.executable, ROOT / "docs" / "website", folder]
+    code = (
+        "import runpy, sys; del sys.argv[0]; import mi_brdfs.explorer.export as export; export.SPP = 1; "
+        "runpy.run_path(sys.argv[0], run_name='__main__')"
+    )
+    command = [sys.executable, "-c", code, ROOT / "docs" / "website", folder]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{folder / 'index.html'}\n", "")
     return folder
@@ -58,7 +64,8 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
     assert len(pages) > 45
     for path, page in pages.items():
         for target in set(page.loads) - {"#"}:
-            assert not re.match(r"\w+:|//", target) and (path.parent / target.split("?")[0]).is_file(), (path, target)
+            assert target.startswith("data:") or not re.match(r"\w+:|//", target), (path, target)
+            assert target.startswith("data:") or (path.parent / target.split("?")[0]).is_file(), (path, target)
         for target in page.links:
             if re.match(r"\w+:", target):
                 assert target.startswith(("https://", "http://")), (path, target)
@@ -90,6 +97,26 @@ def test_every_part_is_there(site):
         assert page.count("<details>") >= 2 and "<img" in page
     for name in "index", "gallery", "scenes", "shading", "folklore", "bench", "extending", "development":
         assert (site / f"{name}.html").is_file()
+
+
+@pytest.mark.slow
+def test_the_front_page_leads_to_pages_of_the_explorer(site):
+    """They are small and have scrubbers."""
+    links = Page(site / "index.html").links
+    for name in live.PAGES:
+        page = site / f"{name}.html"
+        text = page.read_text(encoding="utf-8")
+        assert page.name in links and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
+
+
+@pytest.mark.slow
+def test_links_to_pages_have_pictures_and_formulas_a_font(site):
+    for path in (site / "index.html", site / "reference" / "ward.html"):
+        (card,) = re.findall(r'<meta property="og:image" content="([^"]+)"', path.read_text(encoding="utf-8"))
+        assert tuple(mi.Bitmap(str(path.parent / card)).size()) == (1200, 630)
+    (font,) = re.findall(r'@font-face {[^}]*url\("([^"]+)"\)', (site / "_static" / "site.css").read_text())
+    assert (site / "_static" / font).read_bytes().startswith(b"wOF2")
+    assert "SIL Open Font License" in (site / "_static" / font.replace(".woff2", "_license.txt")).read_text()
 
 
 @pytest.mark.slow

@@ -14,7 +14,19 @@ import mitsuba as mi
 import numpy as np
 import psutil
 import pytest
-from mutants import MUTANTS, TWO, Mutant, changed, diffuse, in_spectra, lambert, of_others
+from mutants import (
+    MUTANTS,
+    TWO,
+    Mutant,
+    adapted,
+    changed,
+    diffuse,
+    half_of_the_mirror,
+    in_spectra,
+    lambert,
+    of_others,
+    without_fields,
+)
 from support import shared
 from typer.testing import CliRunner
 
@@ -526,6 +538,13 @@ def test_delta_functions_are_skipped_with_a_reason():
     assert mixed.passed and [finding.verdict for finding in mixed.findings] == ["skip", *["pass"] * 6]
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_delta_functions_carry_what_they_carry_alone():
+    fault = check(half_of_the_mirror(), only=["components"], angles=(30,)).failures[0]
+    assert fault.subject == "component 0 (delta reflection)" and "but 0.04017 where only" in fault.message, fault
+    assert not check({"type": "plastic"}, only=["components"], angles=(30,)).failures
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("inner", ["diffuse", "lambert"])
@@ -534,7 +553,9 @@ def test_masks(inner):
     only = [word for word in CHECKS if word not in ("gradients", "recompiles", "continuity", "spectral", "colours")]
     report = check({"type": "mask", "opacity": 0.4, "inner": {"type": inner}}, only=only, angles=(60,))
     part = "component 0 (diffuse reflection)"
-    assert {finding.subject for finding in report.failures} == {part, f"{part} masked out"}, report
+    assert {finding.subject for finding in report.failures} == {part, f"{part} masked out", "component 1 (null)"}, (
+        report
+    )
     judged = {finding.check for finding in report.findings if finding.verdict == "pass" and finding.subject == "whole"}
     assert judged >= {"support", "weight", "pdf", "chi2", "components", "active", "mode"}
 
@@ -558,6 +579,12 @@ class Raises(Lambert):
         if dr.grad_enabled(p.reflectance):
             raise TypeError("no derivative.\nAt all")
         return p
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_fields_that_sample_leaves_empty_are_named():
+    report = check(Mutant("empty", (), Lambert, adapted(sample=without_fields)).register(), only=["weight"])
+    assert "sample leaves eta empty: begin with dr.zeros(mi.BSDFSample3f)" in report.failures[0].message
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -297,7 +297,7 @@ def test_faint_deviations_are_in_the_window():
     wrong = replace(trial, counts=trial.partition.histogram(stray))
     assert [view.side for view in views(wrong)] == [1, -1]
     nothing = replace(trial, partition=replace(trial.partition, integrals=0 * trial.expected), counts=0 * trial.counts)
-    assert not list(views(nothing)) and "next to nothing is drawn" in page([Report("x", [], [nothing])])
+    assert not list(views(nothing)) and "almost nothing is drawn" in page([Report("x", [], [nothing])])
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import typer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from generate import bench, front, models, notebooks, polarization, readme, scenes, shading
+from generate import balls, bench, front, models, notebooks, polarization, readme, scenes, shading
 from generate.made import ROOT, Page, Picture
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
@@ -19,7 +19,14 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 def everything() -> list[Page | Picture]:
     """Return all generated files, each after its sources."""
     pages = [*scenes.pages(), *models.pages(), *readme.pages(), *bench.pages()]
-    drawn = [*models.pictures(), *scenes.pictures(), *shading.pictures(), *polarization.pictures(), *front.pictures()]
+    drawn = [
+        *models.pictures(),
+        *scenes.pictures(),
+        *shading.pictures(),
+        *polarization.pictures(),
+        *front.pictures(),
+        *balls.pictures(),
+    ]
     return [*pages, *drawn, *notebooks.pictures()]
 
 
@@ -31,8 +38,8 @@ def main(
     check: Annotated[bool, typer.Option("--check", help="List what is stale; exit with 1 if anything is.")] = False,
 ) -> None:
     """Make stale pages and pictures: the models' reference, the table in README.md, the results of the bench, the
-    scenes' page and the scene with all models; thumbnails, sweeps, pictures of scenes, those of README.md, and the
-    outputs of notebooks."""
+    scenes' page and the scene with all models; thumbnails, sweeps, pictures of scenes, those of README.md,
+    the explorer's balls of published materials, and the outputs of notebooks."""
     mi.set_variant("llvm_ad_rgb")
     made, wanted = everything(), set(names or ())
     if unknown := wanted - {each.path.stem for each in made}:

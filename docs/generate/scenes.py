@@ -21,7 +21,7 @@ from mi_brdfs.rendering.scene_file import SceneFile
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from . import labels
 from .labels import labelled, labels_of
@@ -33,6 +33,10 @@ PICTURES = ROOT / "docs" / "scenes"
 LARGE = PICTURES / "large"
 CATALOGUE = ROOT / "scenes" / "catalogue.xml"
 FIRST_LIGHT = ROOT / "scenes" / "first_light.png"
+CARD = ROOT / "docs" / "pictures" / "card.jpg"
+"""What other sites show of a link to the site."""
+CARD_SIZE = 1200, 630
+CARD_WORDS = "mi_brdfs", "The classical BRDFs\nas plugins for Mitsuba 3"
 WIDTH, QUALITY = 400, 88
 FIRST_LIGHT_SPP = 32
 """As in README.md's command, which denoises."""
@@ -65,7 +69,8 @@ def pictures() -> list[Picture]:
             Picture(PICTURES / large.name, partial(_bytes, large), partial(_reduce, large)),
         ]
     first = FIRST_LIGHT.with_suffix(".xml")
-    return [*found, Picture(FIRST_LIGHT, partial(sources, first), _draw_first)]
+    found.append(Picture(FIRST_LIGHT, partial(sources, first), _draw_first))
+    return [*found, Picture(CARD, lambda: [*sources(first), repr((CARD_SIZE, CARD_WORDS))], _draw_card)]
 
 
 def readme() -> str:
@@ -98,9 +103,19 @@ def _draw_first(path: Path) -> None:
     first_light().save(path, optimize=True)
 
 
-def first_light() -> Image.Image:
+def _draw_card(path: Path) -> None:
+    width, height = CARD_SIZE
+    image = first_light(width=width, height=height)
+    draw = ImageDraw.Draw(image)
+    for text, size, y in zip(CARD_WORDS, (80, 34), (36, 136), strict=True):
+        draw.text((690, y), text, "white", ImageFont.load_default(size))
+    image.save(path, quality=QUALITY, optimize=True)
+
+
+def first_light(**size: int) -> Image.Image:
     """Return what README.md's first command renders."""
-    loaded = SceneFile(str(FIRST_LIGHT.with_suffix(".xml")), {}, box_filter=True).load()
+    given = {name: str(value) for name, value in size.items()}
+    loaded = SceneFile(str(FIRST_LIGHT.with_suffix(".xml")), given, box_filter=True).load()
     image = display_image(denoised(render(loaded, FIRST_LIGHT_SPP)).bitmap)
     return Image.fromarray(np.array(image))
 

@@ -7,14 +7,17 @@ import sys
 import tempfile
 from pathlib import Path
 
+from generate.scenes import CARD
 from sphinx.application import Sphinx
 from sphinx.util.docutils import docutils_namespace, patch_docutils
 
 import mi_brdfs
 
+from . import live
 from .pages import write_pages
 
 HERE = Path(__file__).parent
+LOGO = str(HERE / "static" / "logo.svg")
 SETTINGS = {
     "project": "mi_brdfs",
     "author": "The mi_brdfs authors",
@@ -26,7 +29,17 @@ SETTINGS = {
     "myst_heading_anchors": 3,
     "html_theme": "furo",
     "html_title": "mi_brdfs",
-    "html_static_path": [str(HERE / "static")],
+    "html_static_path": [str(HERE / "static"), str(CARD)],
+    "html_logo": LOGO,
+    "html_favicon": LOGO,
+    "html_theme_options": {
+        f"{scheme}_css_variables": {
+            "color-brand-primary": accent,
+            "color-brand-content": accent,
+            "color-brand-visited": accent,
+        }
+        for scheme, accent in (("light", "#0b5fa5"), ("dark", "#6db4f2"))
+    },
     "html_css_files": ["site.css"],
     "html_copy_source": False,
     "html_show_sphinx": False,
@@ -41,8 +54,10 @@ def build(folder: Path) -> int:
         source = Path(scratch) / "source"
         write_pages(source)
         shutil.rmtree(folder, ignore_errors=True)
+        live.write_pages(Path(scratch) / "live")
+        settings = SETTINGS | {"html_extra_path": [str(Path(scratch) / "live")]}
         app = Sphinx(
-            source, None, folder, Path(scratch) / "doctrees", "html", SETTINGS,
+            source, None, folder, Path(scratch) / "doctrees", "html", settings,
             status=None, warning=sys.stderr, warningiserror=True, keep_going=True,
         )  # fmt: skip
         app.build()

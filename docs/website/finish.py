@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from html import escape
 from itertools import count
 
 from sphinx.application import Sphinx
 
+CARD = "_static/card.jpg"
+DESCRIPTION = "The classical BRDFs as plugins for Mitsuba 3, and tools that plot, fit and check any BSDF."
 MANY = 4
 """The number of columns from which a table is too wide for a phone."""
 TABLE = re.compile(r"<table class=\"(.*?)</table>", re.DOTALL)
@@ -20,12 +23,20 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def _finish(context: dict) -> None:
-    """Name the heading in each cell of a wide table, name strips of pictures, and let links show pictures, which
-    MyST makes downloads."""
+    """Describe the page to sites that show links to it, name the heading in each cell of a wide table, name strips of
+    pictures, and let links show pictures, which MyST makes downloads."""
     if body := context.get("body"):
         body = TABLE.sub(_with_headings, body)
         body = re.sub(r'<img (?=alt="\w+: )', '<img class="strip" ', body)
+        context["metatags"] += _described(context)
         context["body"] = re.sub(r' download=""(?= href="[^"]+\.(?:jpg|png)")', "", body)
+
+
+def _described(context: dict) -> str:
+    """Return what sites that show a link to the page show of it."""
+    title, card = re.sub(r"<.*?>", "", context["title"]), context["pathto"](CARD, resource=True)
+    words = {"title": title, "type": "website", "description": escape(DESCRIPTION), "image": card}
+    return "".join(f'<meta property="og:{name}" content="{text}" />\n' for name, text in words.items())
 
 
 def _with_headings(table: re.Match) -> str:

@@ -17,7 +17,7 @@ from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Plugin
 from mi_brdfs.tabulated.tabulated import Tabulated
 
-from . import notebooks
+from . import live, notebooks
 from .reference import with_formulas
 
 GUIDE = {
@@ -105,9 +105,9 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
 
 
 def _front() -> str:
-    """Return README.md with the contents of the site."""
+    """Return README.md with pages to try and the contents of the site."""
     text = re.sub(r"<!-- .*? -->\n\n?", "", (ROOT / "README.md").read_text(encoding="utf-8"))
-    return text + "".join(_contents())
+    return text.replace("\n## ", f"\n{live.links()}\n\n## ", 1) + "".join(_contents())
 
 
 def _contents() -> Iterator[str]:

@@ -35,15 +35,21 @@ def main() -> None:
     warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
     if sys.stdout is None:  # a daemon may have closed it
         sys.stdout = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
-    cast(TextIOWrapper, sys.stdout).reconfigure(errors="surrogateescape")  # names of files need not be UTF-8
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        # Names of files need not be UTF-8, nor need what output goes to, as on Windows.
+        is_utf8 = stream.encoding.lower().replace("-", "") == "utf8"
+        cast(TextIOWrapper, stream).reconfigure(errors="surrogateescape" if is_utf8 else "replace")
     exit_on_sigterm()
     try:
         app(prog_name="mi-brdfs")
     except OSError as error:
-        if error.errno != errno.ENOSPC:
+        if error.errno == errno.ENOSPC:
+            err.print(f"mi-brdfs: cannot write {error.filename or 'to the standard output'}: {error.strerror}")
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is left in the buffer
+        elif error.errno == errno.ENAMETOOLONG:  # which Python raises wherever it looks at a path
+            err.print(f"mi-brdfs: {error.filename}: {error.strerror}")
+        else:
             raise
-        err.print(f"mi-brdfs: cannot write {error.filename or 'to the standard output'}: {error.strerror}")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is left in the buffer
         sys.exit(Exit.ERROR)
 
 

@@ -32,7 +32,7 @@ from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 def explore(
     targets: Annotated[
         list[str] | None,
-        typer.Argument(metavar="MATERIAL…", help=f"Up to four. {MATERIAL}"),
+        typer.Argument(metavar="MATERIAL…", help=f"Up to six. {MATERIAL}"),
     ] = None,
     parameters: Parameters = None,
     scene: Annotated[
@@ -41,6 +41,9 @@ def explore(
     ] = None,
     environment: Annotated[
         Path | None, typer.Option(metavar="FILE.exr", help="An environment map to light the pictures with.")
+    ] = None,
+    mesh: Annotated[
+        Path | None, typer.Option(metavar="FILE.ply|obj", help="Show the pictures on this mesh, whose y axis is up.")
     ] = None,
     export: Annotated[
         Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
@@ -64,26 +67,32 @@ def explore(
     except ImportError:
         fail('this needs the extra of this name: pip install "mi_brdfs[explore]"')
     given = parameters_of(parameters)
-    if environment and not environment.is_file():
-        fail(f"--environment {environment}: no such file", Exit.USAGE)
+    for option, path in (("environment", environment), ("mesh", mesh)):
+        if path and not path.is_file():
+            fail(f"--{option} {path}: no such file", Exit.USAGE)
     if vary and not export:
         fail("--vary is for pages of --export; in the live page move the sliders", Exit.USAGE)
     varied = _varied(vary or [])
     chosen = set_tracing_variant(variant, "_rgb")
 
     from ..explorer.server import PortError, listening, serve
-    from ..explorer.stages import UserScene
+    from ..explorer.stages import MESHES, UserScene
+    from ..parameters.messages import brief
 
     file, _, material = (scene or "").partition(".xml:")
-    user = UserScene(Path(f"{file}.xml" if material else file) if scene else None, material or None, environment)
+    user = UserScene(Path(f"{file}.xml" if material else file) if scene else None, material or None)
     if user.scene and not user.scene.is_file():
         fail(f"--scene {user.scene}: no such file", Exit.USAGE)
     sources, subjects = _subjects(targets or ["walter"], given)
-    state: dict[str, Any] = {"subjects": subjects, "stage": "environment" if environment else "studio"}
-    state["shape"] = "scene" if scene else "body"
+    state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body"}
+    if mesh and mesh.suffix.lower() not in MESHES:
+        fail(f"--mesh {mesh}: give a file whose name ends in {' or '.join(MESHES)}", Exit.USAGE)
+    state |= dict(user.add(it, brief(it.name)) for it in (environment, mesh) if it)
     if export:
         _export(export, user, sources, state, varied)
         return
+    if not host:
+        fail("--host: name an address of this machine, or 0.0.0.0 for all of them", Exit.USAGE)
     with failing(Exit.USAGE, PortError):
         on = listening(host, port)
 
@@ -179,7 +188,7 @@ def _export(
 
     with stdout_to_stderr(), failing(Exit.ERROR):
         scenes = Stages(user)
-        state = parse(data, scenes.names)
+        state = parse(data, scenes.names, scenes.shapes)
         text = page(state, Materials({it.word: it for it in sources}), scenes, data, varied)
     write_text(file, text)
     out.print(str(file))

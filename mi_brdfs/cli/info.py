@@ -46,8 +46,8 @@ def _options(model: type[Plugin], word: str) -> list[str] | None:
     found = [option for name, _, option in others if name in model.plugins and option]
     for parameter in nested(model.declared()):
         found += [name for name in parameter.names if name in names or key(name) == wanted]
-        words = {*map(str, parameter.words), *map(str, parameter.tried)}
-        found += [f"{parameter.names[0]}={it}" for it in words if it in names or key(it) == wanted]
+        choices = map(str, parameter.choices)
+        found += [f"{parameter.names[0]}={it}" for it in choices if it in names or key(it) == wanted]
     named = {it.partition("=")[0]: it for it in found}
     is_named = not names.isdisjoint(model.plugins) or wanted in key(" ".join([*model.plugins, model.summary()]))
     return sorted(named.values()) if found or is_named else None

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.table import Table
 
 from ..mitsuba.errors import one_line
 from .app import command
-from .options import check_output, file_option, parameters_of, parameters_option, quantity_of, write_json, writing_to
-from .terminal import Exit, err, fail, out, print_table
-
-if TYPE_CHECKING:
-    from ..measured import Measurement
+from .options import FIGURES, file_option, parameters_of, parameters_option, quantity_of, write_json, writing_to
+from .terminal import Exit, err, out, print_table
 
 FORMATS = "MERL, RGL, MBSDF, Zemax, LightTools, ALTA, Cornell, CSV or UTIA"
 """Those that can be read, as the help says, which does not wait for the readers."""
@@ -25,7 +22,7 @@ def measured(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help=f"Measured BRDFs: {FORMATS}.")],
     plot_file: Annotated[
         Path | None,
-        typer.Option("--plot", metavar="FILE", help="Also draw slices, lobes and albedos: .png, .svg, .pdf or .jpg."),
+        file_option("--plot", "Also draw slices, lobes and albedos: .png, .svg, .pdf or .jpg.", endings=FIGURES),
     ] = None,
     parameters: Annotated[
         list[str] | None,
@@ -38,7 +35,8 @@ def measured(
     from ..measured import read, summarize  # imports numpy
 
     if plot_file is not None:
-        _check_picture(plot_file)
+        from .. import plot  # what it needs is there, or the error says what brings it
+        from ..plot.command import write
     held = quantity_of(parameters_of(parameters))
     drawn, findings, failed = [], [], 0
     for file in files:
@@ -61,24 +59,8 @@ def measured(
         drawn += [measurement] if plot_file is not None else []
     write_json(json_file, findings)
     if plot_file is not None and drawn:
-        _draw(drawn, plot_file)
+        with writing_to(plot_file):
+            write(plot.measured(*drawn), plot_file)
+        out.print(str(plot_file))
     if failed:
         raise typer.Exit(Exit.ERROR)
-
-
-def _check_picture(file: Path) -> None:
-    """Fail if no picture can be drawn, or not into this file: before the work."""
-    from ..plot.command import PICTURES
-
-    if file.suffix.lower() not in PICTURES:
-        fail(f"--plot {file}: write a {', '.join(PICTURES[:-1])} or {PICTURES[-1]}", Exit.USAGE)
-    check_output("--plot", file)
-
-
-def _draw(measurements: list[Measurement], file: Path) -> None:
-    from .. import plot
-    from ..plot.command import write
-
-    with writing_to(file):
-        write(plot.measured(*measurements), file)
-    out.print(str(file))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +15,8 @@ import typer
 
 from .. import writing
 from ..mitsuba import llvm
+from ..mitsuba.fastest import fastest
+from ..parameters.messages import listed
 from ..starting import signals_held
 from ..variants import is_measurable
 from .terminal import Exit, err, fail, failing
@@ -27,11 +29,15 @@ def parameters_option(help: str, metavar: str = "name=value") -> Any:
     return typer.Option("-D", "--param", metavar=metavar, help=help)
 
 
-def file_option(name: str, help: str, metavar: str = "FILE") -> Any:
+FIGURES = ".png", ".svg", ".pdf", ".jpg"
+"""The endings of files with drawings."""
+
+
+def file_option(name: str, help: str, metavar: str = "FILE", endings: Sequence[str] = ()) -> Any:
     """Return an option for a file to be written, which is checked before the work whose result it is to hold."""
 
     def checked(file: Path | None) -> Path | None:
-        check_output(name, file)
+        check_output(name, file, endings)
         return file
 
     names = ["-o", "--output"] if name == "-o" else [name]
@@ -124,10 +130,12 @@ def source_of(word: str, parameters: dict[str, str], verb: str = "name") -> BSDF
     return source
 
 
-def check_output(option: str, file: Path | None) -> None:
-    """Fail if a file cannot be written."""
+def check_output(option: str, file: Path | None, endings: Sequence[str] = ()) -> None:
+    """Fail if a file cannot be written, or its name has none of some endings."""
     if file is None:
         return
+    if endings and file.suffix.lower() not in endings:
+        fail(f"{option} {file}: write a {listed(endings)}", Exit.USAGE)
     if not file.absolute().parent.is_dir():
         fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
     if file.is_dir():
@@ -164,22 +172,17 @@ def set_variant(wanted: str | None) -> str:
     """Activate the requested variant, or the fastest that works, and return its name."""
     if wanted and wanted not in mi.variants():
         fail(f"there is no variant {wanted}; this Mitsuba has {', '.join(mi.variants())}")
-    for name in [wanted] if wanted else ["cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb", "scalar_rgb"]:
-        if name not in mi.variants():
-            continue
-        if name.startswith("llvm") and (text := llvm.problem()):
-            if wanted:
-                fail(text)
-            err.print(f"mi-brdfs: using scalar_rgb, which is slow: {text}")
-            continue
-        try:
-            # Ctrl-C would make an ImportError of this import, and another variant would be taken.
-            with signals_held():
-                mi.set_variant(name)
-            return name
-        except ImportError:
-            continue
-    fail(f"{wanted} does not work on this machine; `mi-brdfs doctor` says why")
+    chosen, problem = wanted or fastest() or "scalar_rgb", llvm.problem()
+    if problem and chosen.startswith("llvm"):
+        fail(problem)
+    if problem and not wanted and chosen == "scalar_rgb":
+        err.print(f"mi-brdfs: using scalar_rgb, which is slow: {problem}")
+    try:
+        with signals_held():
+            mi.set_variant(chosen)
+    except ImportError:
+        fail(f"{chosen} does not work on this machine; `mi-brdfs doctor` says why")
+    return chosen
 
 
 def set_tracing_variant(wanted: str | None, ending: str = "") -> str:

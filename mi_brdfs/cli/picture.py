@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,13 +16,11 @@ import mitsuba as mi
 import typer
 from rich.progress import TextColumn
 
-from .options import writing_to
+from .options import check_output, writing_to
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..rendering.passes import Picture
-
-DISPLAY_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 Output = Annotated[
     Path | None,
@@ -41,17 +38,10 @@ Denoise = Annotated[
 
 def output_files(output: Path) -> tuple[Path, Path]:
     """Return the paths of the EXR and the display image for ``output``, if they can be written."""
-    suffix = output.suffix.lower()
-    if suffix != ".exr" and suffix not in DISPLAY_SUFFIXES:
-        fail(f"{output}: unknown image format; use .exr, .png or .jpg", Exit.USAGE)
-    files = (output, output.with_suffix(".png")) if suffix == ".exr" else (output.with_suffix(".exr"), output)
+    is_exr = output.suffix.lower() == ".exr"
+    files = (output, output.with_suffix(".png")) if is_exr else (output.with_suffix(".exr"), output)
     for file in files:
-        if file.is_dir():
-            fail(f"{file} is a folder")
-    try:
-        tempfile.TemporaryFile(dir=output.parent).close()
-    except OSError as error:
-        fail(f"cannot write to the folder {output.parent}: {error.strerror}")
+        check_output("-o", file, (".exr", ".png", ".jpg", ".jpeg"))
     return files
 
 
@@ -130,8 +120,10 @@ def _answering_ctrl_c() -> Iterator[None]:
 
 
 def _write(picture: Picture, exr: Path, display: Path) -> list[Path]:
-    from ..rendering.output import display_image, write
+    from ..rendering.output import broken_pixels, display_image, write
 
+    if count := broken_pixels(picture):
+        err.print(f"{count} pixels have values that are not finite, as a parameter, a texture or a light may have.")
     image = display_image(picture.bitmap)
     files = [(picture.bitmap, exr), (image, display)]
     if image is None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
+from .options import FIGURES, MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
 from .terminal import Exit, fail, failing, out, stdout_to_stderr
 
 
@@ -27,41 +27,43 @@ def plot(
             "name=a,b,c draws each value."
         ),
     ] = None,
-    kind: Annotated[
-        str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere, albedo or sphere.")
-    ] = "polar",
-    output: Annotated[Path | None, file_option("-o", "A .png, .svg, .pdf, .jpg; .html for sphere.")] = None,
+    kind: Annotated[str, typer.Option(metavar="KIND", help="polar, cartesian, hemisphere or albedo.")] = "polar",
+    output: Annotated[Path | None, file_option("-o", "A .png, .svg, .pdf or .jpg.", endings=FIGURES)] = None,
     angles: Annotated[
-        str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 10,40,70; 45 for sphere.")
+        str | None, typer.Option(metavar="DEGREES", help="Angles of incidence. Default: 10,40,70.")
     ] = None,
     azimuth: Annotated[
         float | None, typer.Option(metavar="DEGREES", help="Azimuth of incidence, from dp_du. Default: 0.")
     ] = None,
     scale: Annotated[
-        str | None,
-        typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian, sphere. Default: both."),
+        str | None, typer.Option(metavar="SCALE", help="linear, log or both, for polar, cartesian. Default: both.")
     ] = None,
     normalize: Annotated[
-        bool, typer.Option("--normalize", help="Divide each curve by its maximum, for polar, cartesian, sphere.")
+        bool, typer.Option("--normalize", help="Divide each curve by its maximum, for polar, cartesian.")
     ] = False,
     rgb: Annotated[
         bool, typer.Option("--rgb", help="Draw red, green and blue, not the luminance, for polar, cartesian, albedo.")
     ] = False,
-    title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure; not for sphere.")] = None,
+    side_by_side: Annotated[
+        bool, typer.Option("--side-by-side", help="Draw each BSDF in a panel of its own, for polar, cartesian.")
+    ] = False,
+    title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure.")] = None,
     labels: Annotated[
         str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
     ] = None,
     size: Annotated[
-        str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels; not for sphere. Default: as needed.")
+        str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels. Default: as needed.")
     ] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
-    hemisphere, as albedo curves, or as bodies to turn in a browser (sphere)."""
+    hemisphere, or as albedo curves. `mi-brdfs explore MATERIAL… --export FILE.html` writes a lobe in 3D."""
     from ..plot import command as asked
 
     if kind not in asked.KINDS:
-        fail(f"--kind {kind}: there is no such kind; there are {', '.join(asked.KINDS)}", Exit.USAGE)
+        kinds = ", ".join(asked.KINDS)
+        lobe = "mi-brdfs explore MATERIAL… --export FILE.html"
+        fail(f"--kind {kind}: there is no such kind; there are {kinds}; for a lobe in 3D, {lobe}", Exit.USAGE)
     with failing(Exit.USAGE):
         options = asked.options_of(
             kind,
@@ -70,11 +72,12 @@ def plot(
             scale=scale,
             normalize=normalize or None,
             rgb=rgb or None,
+            side_by_side=side_by_side or None,
             title=title,
             labels=labels and labels.split(","),
             size=asked.size_of(size),
         )
-        file = asked.output_file(output, kind, targets)
+    file = output or asked.default_file(kind, targets)
     set_tracing_variant(variant)
     with stdout_to_stderr():
         with failing(Exit.USAGE):

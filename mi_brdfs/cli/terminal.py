@@ -17,8 +17,8 @@ from rich.table import Table
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 
-out = Console(markup=False, highlight=False, soft_wrap=True)
-err = Console(markup=False, highlight=False, soft_wrap=True, stderr=True)
+out = Console(markup=False, emoji=False, highlight=False, soft_wrap=True)
+err = Console(markup=False, emoji=False, highlight=False, soft_wrap=True, stderr=True)
 
 
 class Exit(IntEnum):
@@ -32,7 +32,7 @@ class Exit(IntEnum):
 
 def print_table(table: Table) -> None:
     """Print a table, with each row on one line where another program reads it."""
-    console = Console(markup=False, highlight=False, width=None if out.is_terminal else 400)
+    console = Console(markup=False, emoji=False, highlight=False, width=None if out.is_terminal else 400)
     console.print(table)
 
 

@@ -9,7 +9,7 @@ import typer
 
 from .app import command
 from .options import file_option, parameters_of, parameters_option, write_text
-from .terminal import Exit, err, failing, out
+from .terminal import Exit, err, fail, failing, out
 
 
 @command("Look", "upgrade old.xml -o new.xml")
@@ -26,6 +26,8 @@ def upgrade(
     """Write an old scene as one of Mitsuba 3, and say what changed, line by line."""
     from ..legacy import upgrade  # imports numpy
 
+    if not old.is_file():
+        fail(f"{old}: no such file", Exit.USAGE)
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
     for line in [*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]:

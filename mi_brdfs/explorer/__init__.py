@@ -50,7 +50,7 @@ def explore(*subjects: str | Path | dict[str, Any]) -> Page:
     :meth:`~Page.close`, and with the notebook's own process.
 
     Args:
-        subjects: up to four: plugin dicts of numbers, words and colours; or words as ``mi-brdfs explore`` takes them,
+        subjects: up to six: plugin dicts of numbers, words and colours; or words as ``mi-brdfs explore`` takes them,
             the names of plugins and of published materials, and paths of measured files. By default, ``walter``.
 
     Raises:

@@ -66,8 +66,8 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
             word = bsdf.get(parameter.names[0], next(iter(parameter.words)))
             own = parameter.words.get(word, {}) if isinstance(word, str) else {}
             yield from _controls(own.values(), bsdf, group)
-        elif parameter.tried:
-            control = _choice(parameter.names[0], parameter.text, parameter.tried, bsdf, group)
+        elif parameter.choices:
+            control = _choice(parameter.names[0], parameter.text, parameter.choices, bsdf, group)
             yield control | {"value": bsdf.get(parameter.names[0]), "default": None, "optional": True}
         elif not isinstance(parameter, (File, Preset)):
             for row in parameter.rows():

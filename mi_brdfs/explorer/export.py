@@ -20,7 +20,7 @@ from . import stages
 from .controls import LOBES, with_value
 from .materials import Materials
 from .state import Bsdf, State, StateError, declared
-from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
+from .views import VIEWS, Frame, frames, packed, text
 
 SPP = 64
 """Samples per pixel of its pictures."""
@@ -65,10 +65,11 @@ def page(
         raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(baked.known, 'and')}.")
     told = page_state.get("subjects") or [{} for _ in state.subjects]
     subjects = [{**it, "bsdf": bsdf} for it, bsdf in zip(told, baked.subjects, strict=True)]
+    is_same = state.axis == "theta_o"  # the cartesian plot has the curves of the polar one
     content = {
         "state": {**page_state, "subjects": subjects},
         "scrubbers": [{"name": name, "values": values, "start": baked.start[name]} for name, values in vary.items()],
-        "views": ["picture", *baked.views, *(["cartesian"] if "polar" in baked.views else [])],
+        "views": ["picture", *baked.views, *(["cartesian"] if "polar" in baked.views and is_same else [])],
         "frames": [(at, len(frame), is_text) for at, frame, is_text in frames],
         "data": base64.b64encode(gzip.compress(b"".join(frame for _, frame, _ in frames), mtime=0)).decode(),
     }
@@ -134,15 +135,14 @@ class _Baked:
             return tuple(theta if name == "theta" else elsewhere[name] for name in self.vary)
 
         with self.materials.loaded(bsdf) as loaded:
-            probe = ComponentProbe(loaded, self.state.component)
             for name in self.views:
                 view = VIEWS[name]
                 shown = [replace(self.state, theta=theta) for theta in self.vary["theta"]]
                 is_same = len({view.depends(it) for it in shown}) == 1
                 for theta, state in enumerate(shown[:1] if is_same else shown):
-                    for frame in frames(name, probe, state, 0, k):
+                    for frame in frames(name, loaded, state, 0, k):
                         yield at(None if is_same else theta), frame if isinstance(frame, str) else _rounded(frame)
-        progress = stages.Progress(self.scenes.stage(stages.Setting.of(self.state)))
+        progress = self.scenes.progress(stages.Setting.of(self.state))
         while progress.spp < SPP:
             with self.materials.loaded(bsdf) as loaded:
                 progress.advance(loaded)
@@ -154,9 +154,11 @@ class _Baked:
     @property
     def views(self) -> list[str]:
         """The views that are drawn, besides the picture: all if nothing but the angle is varied, else those of the
-        state. The cartesian plot has its curves from the polar one."""
-        wanted = VIEWS if len(self.vary) == 1 else {"polar" if it == "cartesian" else it for it in self.state.views}
-        return [name for name in VIEWS if name in wanted and name != "cartesian"]
+        state. Along θo, the cartesian plot has its curves from the polar one."""
+        wanted = set(VIEWS if len(self.vary) == 1 else self.state.views)
+        if self.state.axis == "theta_o" and "cartesian" in wanted:
+            wanted = wanted - {"cartesian"} | {"polar"}
+        return [name for name in VIEWS if name in wanted]
 
 
 def _rounded(frame: bytes) -> bytes:

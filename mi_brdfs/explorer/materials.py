@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -32,6 +33,9 @@ BUILT_IN = (
     "roughdielectric", "roughplastic", "thindielectric",
 )  # fmt: skip
 """Mitsuba's BSDFs that need nothing but numbers and colours."""
+
+BALLS, BALLS_ACROSS = Path(__file__).parent / "client" / "published.jpg", 38
+"""The sheet with a ball of each published material, and how many are beside each other."""
 
 
 @dataclass

@@ -20,14 +20,15 @@ from aiohttp.http_exceptions import HttpProcessingError
 
 from .. import __version__
 from ..measured import FileError, read
+from ..mitsuba.errors import one_line
 from ..mitsuba.registry import all_models, presets
 from ..parameters.messages import brief, printable
 from ..probe.sources import BSDFSource, is_measured
-from .export import CLIENT, client_file, index
-from .materials import Materials, kinds
+from .export import CLIENT, index
+from .materials import BALLS_ACROSS, Materials, kinds
 from .session import Engine, Session
-from .stages import Setting, UserScene
-from .state import State, StateError, checked_request, decoded, parse
+from .stages import LIGHTS, MESHES, Setting, UserScene
+from .state import UPLOAD, StateError, checked_request, decoded, parse
 from .tours import tours
 from .views import Frame, text
 
@@ -38,7 +39,7 @@ LARGEST_FRAME = 128 << 20
 """The bytes of a message, too long or not, that are waited for: more end the connection."""
 UPLOADS = 16
 """The most files that a session may hold."""
-KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
+KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript", "jpg": "image/jpeg"}
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
     "frame-ancestors "
@@ -100,25 +101,36 @@ class Explorer:
         name = request.match_info["name"]
         if name not in {it.name for it in CLIENT.iterdir()}:
             raise web.HTTPNotFound
-        return web.Response(text=client_file(name), content_type=KINDS[name.rpartition(".")[2]])
+        return web.Response(
+            body=(CLIENT / name).read_bytes(), content_type=KINDS[name.rpartition(".")[2]], charset="utf-8"
+        )
 
     async def _upload(self, request: web.Request) -> web.Response:
-        """Keep a measured file that can be read: its bytes are the body, its name is in the address."""
+        """Keep a measured file, a mesh or an environment map that can be read: its bytes are the body, its name is in
+        the address."""
         name = Path(request.query.get("name", "")).name or "unnamed"
         ending = re.search(r"\.(?!xml$)[a-z]{1,9}$", name, re.IGNORECASE)
         try:
             if request.content_type != "application/octet-stream":
                 raise FileError("An upload is the bytes of a file, sent as application/octet-stream.")
-            if len(self.uploads) >= UPLOADS:
+            if len(list(Path(self.folder.name).iterdir())) >= UPLOADS:
                 raise FileError(f"There are {UPLOADS} uploaded files already; start the explorer anew.")
             payload, number = await request.read(), next(self.numbers)
             path = Path(self.folder.name) / f"{number}{ending[0] if ending else ''}"
             path.write_bytes(payload)
+            is_shown = path.suffix.lower() in (*LIGHTS, *MESHES)
+
+            def take() -> dict[str, str]:
+                if is_shown:
+                    return self.engine.stages.add(path, brief(name))
+                read(path)
+                return {}
+
             try:
-                await asyncio.wrap_future(self.engine.call(lambda: read(path)))
-            except ValueError as error:
+                shown = await asyncio.wrap_future(self.engine.call(take))
+            except (ValueError, RuntimeError) as error:
                 path.unlink()
-                raise FileError(str(error).replace(str(path), name)) from None
+                raise FileError(one_line(error).replace(str(path), name)) from None
         except MALFORMED:
             return _refusal(400, "This upload is malformed.")
         except web.HTTPRequestEntityTooLarge:
@@ -126,7 +138,9 @@ class Explorer:
         except (FileError, OSError) as error:
             told = printable(str(error)) if isinstance(error, FileError) else f"It cannot be kept: {error.strerror}."
             return _refusal(422, told)
-        key = f"upload-{number}/{brief(name)}"
+        if shown:
+            return web.json_response(shown)
+        key = f"{UPLOAD}{number}/{brief(name)}"
         self.uploads[key] = BSDFSource(name, key, str(path))
         return web.json_response({"file": key, "name": name})
 
@@ -178,10 +192,12 @@ class Explorer:
             variant=self.engine.variant,
             types=kinds(),
             presets=presets(),
+            across=BALLS_ACROSS,
             files=named,
             scene=scenes.user.scene.name if scenes.user.scene else None,
             stages=scenes.names,
             shapes=scenes.shapes,
+            turned=scenes.turned,
             models=[model.plugins[0] for model in all_models()],
             metrics=list(METRICS),
             tours=tours(),
@@ -257,15 +273,16 @@ def serve(
 
     Raises:
         ValueError: if the user's scene has no such material or shape.
-        RuntimeError: what Mitsuba says where it cannot load the scene.
+        RuntimeError: what Mitsuba says where it cannot load the scene, the mesh or the environment.
     """
     engine = Engine(variant, user, watched)
     port = on.getsockname()[1]
     explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])), notebook)
 
     async def run() -> None:
-        if user.scene:  # what is wrong with it is said before there is a page
-            await asyncio.wrap_future(engine.call(lambda: engine.stages.stage(Setting("", "scene", State.size))))
+        if user != UserScene():  # what is wrong with it is said before there is a page
+            first = Setting.of(parse(initial, engine.stages.names, engine.stages.shapes))
+            await asyncio.wrap_future(engine.call(lambda: engine.stages.stage(first)))
         runner = web.AppRunner(explorer.application(), access_log=None, logger=_logger(), auto_decompress=False)
         await runner.setup()
         await web.SockSite(runner, on, shutdown_timeout=1).start()

@@ -8,11 +8,14 @@ between cost nothing.
 from __future__ import annotations
 
 import ctypes
+import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import chain, count
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -22,11 +25,13 @@ import mitsuba as mi
 
 from ..mitsuba.errors import one_line
 from ..mitsuba.guests import import_models
+from ..mitsuba.registry import find_models
+from ..rendering.scene_file import with_material
 from . import stages
 from .export import page
 from .materials import Materials, plain
-from .state import MEASURED, Bsdf, State, StateError, key_of
-from .views import VIEWS, ComponentProbe, Frame, frames, packed, text
+from .state import EVERY, GIVEN, MEASURED, UPLOAD, Bsdf, State, StateError, key_of
+from .views import VIEWS, Frame, frames, packed, text
 
 PAUSE = 0.15
 """The seconds without an edit after which pictures are refined: a pass at work would hold up the next one."""
@@ -34,6 +39,8 @@ BACKLOG = 6
 """Frames that wait to be sent, from which on pictures are not refined."""
 DENOISED_AT = 2, 6, 16, 64, 256
 """The samples per pixel at which a picture is denoised."""
+STARTS = 4
+"""The starts of a fit, besides those from published materials."""
 RELEASE = 1.0
 """The seconds after which memory that is free is given back, as edits of any size leave it in pieces."""
 
@@ -42,8 +49,20 @@ LOOK = 0.5
 """The seconds after which imported files are looked at again."""
 
 
-class Cancelled(Exception):
-    """The page does not wait for it any more."""
+class Disturbed(Exception):
+    """The page has changed what it shows, or does not wait for a fit any more."""
+
+
+@dataclass
+class Fits:
+    """Fits of some models to what was measured, one after the other."""
+
+    metric: str
+    observed: Any
+    models: list[str]
+    total: int
+    skipped: list[str] = field(default_factory=list)
+    """What was said of models that cannot be fitted."""
 
 
 class Session:
@@ -65,7 +84,7 @@ class Session:
         self._latest: tuple[State, int] | None = None
         self._edited = 0.0
         self._requests: list[Mapping[str, Any]] = []
-        self._cancelled = False
+        self._fits: Fits | None = None
         self._told: dict[int, str] = {}
         self._broken: set[str] = set()
         self._shown: dict[tuple[str, int], Any] = {}
@@ -88,7 +107,7 @@ class Session:
         """
         with self._lock:
             if request["type"] == "cancel":
-                self._cancelled = True
+                self._fits = None
             elif self._latest is None:
                 raise StateError("Nothing is shown yet.")
             else:
@@ -111,14 +130,15 @@ class Session:
         """Do the next thing, and return whether there was one."""
         with self._lock:
             latest, request = self._latest, self._requests.pop(0) if self._requests else None
-            self._cancelled = self._cancelled and request is None
         if latest is None or self.closed:
             return False
         state, serial = latest
         if request:
             self._answer(request, state)
             return True
-        did = self._tell(state, serial) or self._draw(state, serial) or self._refine(state, serial)
+        did = self._tell(state, serial) or self._draw(state, serial)
+        if not did and time.perf_counter() - self._edited >= PAUSE:
+            did = self._fit_next() | self._refine(state, serial)
         if not did and not self._idle:
             self.send(text(type="idle"))
         self._idle = not did
@@ -179,19 +199,19 @@ class Session:
         if view == "picture":
             key = key_of(given), stages.Setting.of(state)
             if self._pictures.get(k, (None,))[0] != key:
-                progress = stages.Progress(self.scenes.stage(key[1].quick()))
+                progress = self.scenes.progress(key[1].quick())
                 with self.materials.loaded(bsdf) as loaded:
                     progress.advance(loaded)
                 self._pictures[k] = key, progress
             self._send_picture(k, state, serial)
             return
         with self.materials.loaded(bsdf) as loaded:
-            for frame in frames(view, ComponentProbe(loaded, state.component), state, serial, k):
+            for frame in frames(view, loaded, state, serial, k):
                 self.send(frame)
 
     def _refine(self, state: State, serial: int) -> bool:
         """Add a pass to the picture that has the fewest."""
-        if "picture" not in state.views or self.waiting() > BACKLOG or time.perf_counter() - self._edited < PAUSE:
+        if "picture" not in state.views or self.waiting() > BACKLOG:
             return False
         setting = stages.Setting.of(state)
         rough = [
@@ -202,9 +222,8 @@ class Session:
         if not rough:
             return False
         _, k, given = min(rough, key=lambda it: it[:2])
-        stage = self.scenes.stage(setting)
-        if self._pictures[k][1].stage is not stage:  # so far it was a quick one
-            self._pictures[k] = self._pictures[k][0], stages.Progress(stage)
+        if self._pictures[k][1].stage is not self.scenes.stage(setting):  # so far it was a quick one
+            self._pictures[k] = self._pictures[k][0], self.scenes.progress(setting)
         progress, before = self._pictures[k][1], self._pictures[k][1].spp
         try:
             with self.materials.loaded(self.materials.expanded(given)) as loaded:
@@ -221,7 +240,7 @@ class Session:
 
     def _send_picture(self, k: int, state: State, serial: int, denoise: Callable | None = None) -> None:
         (key, setting), progress = self._pictures[k]
-        content = key, setting.stage, setting.shape, state.exposure
+        content = key, replace(setting, size=0), state.exposure
         former, size, spp = self._sent.get(k, (None, 0, 0))
         if content == former and setting.size != size and progress.spp < spp and not progress.finished:
             return  # of another size, but so far no better than what is there
@@ -242,13 +261,13 @@ class Session:
                 self._fit(k, request, state)
             elif request["what"] == "exr":
                 self._save_exr(k, state)
+            elif request["what"] == "scene":
+                self._save_scene(k, state)
             else:
                 self._save_page(state, request)
-        except Cancelled:
-            self.send(text(type="fit", subject=k, error="Cancelled."))
         except (StateError, RuntimeError, ValueError, OSError) as error:
-            self.send(text(type=kind if kind in ("fit", "chi2") else "error", subject=k, error=one_line(error),
-                           text=one_line(error)))  # fmt: skip
+            answer = {"fit": "fitted", "chi2": "chi2"}.get(kind, "error")
+            self.send(text(type=answer, subject=k, error=one_line(error), text=one_line(error)))
 
     def _test(self, k: int, state: State) -> None:
         from ..validation import check
@@ -259,7 +278,8 @@ class Session:
         self.send(text(type="chi2", subject=k, passed=report.passed, text=told))
 
     def _fit(self, k: int, request: Mapping[str, Any], state: State) -> None:
-        from ..fit import fit
+        """Begin with fits, in place of others."""
+        from ..fit import find_metric, observe
 
         bsdf = state.subjects[k]
         if bsdf["type"] != MEASURED:
@@ -267,15 +287,43 @@ class Session:
         source = self.materials.files.get(str(bsdf.get("file")))
         if source is None:
             raise StateError("This file is not here any more; drop it in again.")
+        find_metric(request["metric"])
+        chosen = find_models([] if request["model"] == EVERY else [request["model"]])
+        models = [it.plugins[0] for it in chosen]
+        self._fits = Fits(request["metric"], observe(source.source), models, len(models))
+
+    def _fit_next(self) -> bool:
+        """Fit the next model, and say how good it is, unless the page changes meanwhile: then it begins anew."""
+        fits = self._fits
+        if not fits:
+            return False
+        from ..fit import fit
+
+        edited, past = self._edited, fits.total - len(fits.models)
 
         def progress(done: int, total: int) -> None:
-            if self._cancelled or self.closed:
-                raise Cancelled
-            self.send(text(type="fit", subject=k, done=done, total=total, bsdf=None))
+            if self._edited != edited or self._fits is not fits or self.closed:
+                raise Disturbed
+            self.send(text(type="fit", done=past + done / total, total=fits.total))
 
-        best = fit(source.source, request["model"], metric=request["metric"], starts=4, progress=progress)[0]
-        told = f"Error {best.held_out:.3g} on directions that were not fitted. " + " ".join(best.remarks())
-        self.send(text(type="fit", subject=k, done=1, total=1, bsdf=plain(best.bsdf), text=told.strip()))
+        if fits.models:
+            found: dict[str, Any] = {}
+            try:
+                best = fit(fits.observed, fits.models[0], metric=fits.metric, starts=STARTS, progress=progress)[0]
+                error = best.held_out if math.isfinite(best.held_out) else None
+                found = {"bsdf": plain(best.bsdf), "model": best.model, "error": error}
+                found["text"] = " ".join(best.remarks())
+            except Disturbed:
+                return True
+            except (RuntimeError, ValueError) as error:
+                fits.skipped.append(one_line(error))
+            if self._fits is fits:
+                del fits.models[0]
+                self.send(text(type="fit", done=past + 1, total=fits.total, **found))
+            return True
+        self._fits = None
+        self.send(text(type="fitted", error=fits.skipped[0] if len(fits.skipped) == fits.total else None))
+        return True
 
     def _save_exr(self, k: int, state: State) -> None:
         if k not in self._pictures:
@@ -284,6 +332,24 @@ class Session:
         self._pictures[k][1].bitmap().write(stream, mi.Bitmap.FileFormat.OpenEXR)
         name = f"{state.subjects[k]['type']}.exr"
         self.send(packed(stream.raw_buffer(), type="file", name=name, mime="image/x-exr"))
+
+    def _save_scene(self, k: int, state: State) -> None:
+        """Write the user's scene with a material in it, beside the scene and never over a file."""
+        user, bsdf = self.scenes.user, state.subjects[k]
+        if user.scene is None:
+            raise StateError("There is no scene: start the explorer with --scene FILE.xml.")
+        if bsdf["type"] == GIVEN or str(bsdf.get("file", "")).startswith(UPLOAD):
+            raise StateError("A scene cannot hold this: it is XML already, or a file that goes with the explorer.")
+        xml = self.materials.written(self.materials.expanded(bsdf))["xml"]
+        if not xml.startswith("<bsdf"):
+            raise StateError(xml.strip("<!- >"))
+        replaced = with_material(user.scene, user.material or self.scenes.material, xml)
+        stem = f"{user.scene.stem}-{bsdf['type']}"
+        for name in (f"{stem}{number}.xml" for number in chain([""], (f"-{n}" for n in count(2)))):
+            with suppress(FileExistsError), open(user.scene.with_name(name), "x", encoding="utf-8", newline="") as file:
+                file.write(replaced)
+                break
+        self.send(text(type="written", text=f"Written to {file.name}."))
 
     def _save_page(self, state: State, request: Mapping[str, Any]) -> None:
         payload = page(state, self.materials, self.scenes, request.get("state") or {}).encode()

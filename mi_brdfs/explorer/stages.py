@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .. import legacy
+from .. import loading
 from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
-from ..preview.body import CENTRE, RADIUS
+from ..preview.body import RADIUS
 from ..rendering.output import tonemap
 from ..rendering.passes import pass_source
 from ..srgb import encoded_8bit
-from .state import Bsdf, State
+from .state import INCIDENCE, SHAPES, Bsdf, State
 
 MOST = 256
 """Samples per pixel, after which a picture is finished."""
@@ -37,8 +38,21 @@ STEP = 128
 """Larger sides are multiples of it: scenes of a few sizes stay loaded."""
 PEAK = 8.0
 """The radiance that is shown as white, the same in all pictures."""
-ENVIRONMENT = "environment"
-"""The stage whose light is the user's."""
+IRRADIANCE = 3.0
+"""Of the light from ωi, on what faces it."""
+LIGHTS, MESHES = (".exr", ".hdr"), (".ply", ".obj")
+"""The endings of uploads that are environments, and of files that are meshes."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """What moves within a scene, in degrees."""
+
+    turn: float = 0.0
+    yaw: float = 0.0
+    pitch: float = 0.0
+    incidence: tuple[float, float] = (0.0, 0.0)
+    """From where the light comes that follows ωi: θ and φ."""
 
 
 @dataclass(frozen=True)
@@ -48,25 +62,45 @@ class Setting:
     stage: str
     shape: str
     size: int
+    pose: Pose = Pose()
 
     @classmethod
     def of(cls, state: State) -> Setting:
         """Return the setting of a state; the user's scene has its own light."""
         size = -(-state.size // STEP) * STEP if state.size > QUICK else state.size
-        return cls("" if state.shape == "scene" else state.stage, state.shape, size)
+        stage = "" if state.shape == "scene" else state.stage
+        incidence = (state.theta, state.phi) if stage == INCIDENCE else (0.0, 0.0)
+        return cls(stage, state.shape, size, Pose(state.turn, state.yaw, state.pitch, incidence))
 
     def quick(self) -> Setting:
         """Return it for the first pass after an edit, of few pixels."""
         return replace(self, size=min(self.size, QUICK))
 
+    def scene(self) -> Setting:
+        """Return it for all poses."""
+        return replace(self, pose=Pose())
+
 
 @dataclass
 class UserScene:
-    """What the command line named: a scene, which of its BSDFs is replaced, and an environment map."""
+    """What the command line named, and what was dropped in: a scene, which of its BSDFs is replaced, and environment
+    maps and meshes by name."""
 
     scene: Path | None = None
     material: str | None = None
-    environment: Path | None = None
+    has_sky: bool = False
+    """Whether the scene has an environment to be turned; known once it is loaded."""
+    lights: dict[str, Path] = field(default_factory=dict)
+    meshes: dict[str, Path] = field(default_factory=dict)
+
+    def add(self, path: Path, name: str) -> tuple[str, str]:
+        """Take a mesh, or else an environment map, and return what it is, ``shape`` or ``stage``, and the word for it:
+        its name, with a number if that is taken."""
+        kind, files = ("shape", self.meshes) if path.suffix.lower() in MESHES else ("stage", self.lights)
+        taken = {*self.lights, *self.meshes, *STAGES, *SHAPES, INCIDENCE}
+        word = next(it for it in chain([name], (f"{name} {k}" for k in count(2))) if it not in taken)
+        files[word] = path
+        return kind, word
 
 
 @dataclass
@@ -75,18 +109,32 @@ class Stage:
 
     scene: mi.Scene
     shapes: list[mi.Shape]
+    light: mi.Emitter | None = None
+    """The light that follows ωi."""
     usual: list[mi.BSDF] = field(init=False)
+    pose: Pose | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self.usual = [shape.bsdf() for shape in self.shapes]
+        skies = [it for it in self.scene.emitters() if it.class_name() == "EnvironmentMapEmitter"]
+        self._skies = [(it, _matrix(it)) for it in map(mi.traverse, skies)]
+        sensor = mi.traverse(self.scene.sensors()[0])
+        self._sensor = (sensor, _matrix(sensor)) if "to_world" in sensor else None
+
+    @property
+    def has_sky(self) -> bool:
+        """Whether there is an environment to be turned."""
+        return bool(self._skies)
 
     @cached_property
     def passes(self) -> Any:
         return pass_source(self.scene.integrator())
 
     @contextmanager
-    def showing(self, bsdf: mi.BSDF) -> Iterator[None]:
-        """Give the shapes a BSDF."""
+    def showing(self, bsdf: mi.BSDF, pose: Pose) -> Iterator[None]:
+        """Give the shapes a BSDF, and camera and light their places."""
+        if pose != self.pose:
+            self._take(pose)
         for shape in self.shapes:
             shape.set_bsdf(bsdf)
         try:
@@ -95,34 +143,93 @@ class Stage:
             for shape, usual in zip(self.shapes, self.usual, strict=True):
                 shape.set_bsdf(usual)
 
+    def _take(self, pose: Pose) -> None:
+        """Put camera and light into their places. The camera goes around where it looks at, at the distance of the
+        shapes; up is the axis of the world that is nearest to its own."""
+        up = np.array([0.0, 0.0, 1.0])
+        if self._sensor:
+            sensor, usual = self._sensor
+            right, own_up, ahead, place = usual[:3].T
+            axis = abs(own_up).argmax()
+            up = np.eye(3)[axis] * np.sign(own_up[axis])
+            centre = np.mean([it.bbox().center() for it in self.shapes], axis=0)
+            pivot = place + ahead * ((centre - place) @ ahead)
+            around = _translated(pivot) @ _turned(up, pose.yaw) @ _turned(right, pose.pitch) @ _translated(-pivot)
+            _put(sensor, around @ usual)
+        for sky, usual in self._skies:
+            _put(sky, _turned(up, pose.turn) @ usual)
+        if self.light is not None:
+            theta, phi = pose.incidence
+            # The usual camera looks along y, and that of lobes against it.
+            _put(mi.traverse(self.light), _turned([0, 0, 1], phi + 180) @ _turned([0, 1, 0], theta + 180))
+        self.pose = pose
+
+
+def _matrix(params: Any) -> np.ndarray:
+    return np.array(params["to_world"].matrix, np.float64).reshape(4, 4)
+
+
+def _put(params: Any, matrix: np.ndarray) -> None:
+    params["to_world"] = mi.Transform4f(mi.Matrix4f(matrix.tolist()))
+    params.update()
+
+
+def _turned(axis: Any, angle: float) -> np.ndarray:
+    return np.array(mi.ScalarTransform4f().rotate(axis, angle).matrix)
+
+
+def _translated(by: Any) -> np.ndarray:
+    return np.array(mi.ScalarTransform4f().translate(by).matrix)
+
 
 def load(setting: Setting, user: UserScene) -> Stage:
     """Load the scene of a setting.
 
     Raises:
-        ValueError: if the user's scene has no such material or shape.
+        ValueError: if the user's scene has no such material or shape, or a mesh has no size.
+        RuntimeError: what Mitsuba says of a file that it cannot read.
     """
     if setting.shape == "scene":
         return _user_stage(setting, user)
-    own = setting.stage == ENVIRONMENT
-    scene = preview_scene(mi.load_dict({"type": "diffuse"}), "studio" if own else setting.stage)
-    if own:
-        scene["studio"] |= {"filename": linked(str(user.environment))}
+    environment = user.lights.get(setting.stage)
+    lights = "point" if setting.stage == INCIDENCE else "studio" if environment else setting.stage
+    scene = preview_scene(mi.load_dict({"type": "diffuse"}), lights)
+    if environment:
+        scene["studio"] |= {"filename": linked(str(environment))}
         del scene["studio"]["bitmap"]
+    if setting.stage == INCIDENCE:
+        scene["light"] = {"type": "directional", "irradiance": IRRADIANCE}
     scene["sensor"]["film"] |= {"width": setting.size, "height": setting.size, "rfilter": {"type": "box"}}
-    if setting.shape == "sphere":
-        bsdf = scene["body"].bsdf()
-        to_world = mi.ScalarTransform4f().translate([0, 0, CENTRE]).scale(RADIUS)
-        scene["body"] = {"type": "sphere", "to_world": to_world, "bsdf": bsdf}
-        scene["ground"]["to_world"] = mi.ScalarTransform4f().translate([0, 0, CENTRE - RADIUS]) @ mi.ScalarTransform4f(
-            scene["ground"]["to_world"]
-        )
+    if setting.shape != "body":
+        mesh = user.meshes.get(setting.shape)
+        shape = {"type": mesh.suffix[1:].lower(), "filename": linked(str(mesh))} if mesh else {"type": "sphere"}
+        to_world = _placed(setting.shape, mi.load_dict(shape))
+        scene["body"] = {**shape, "to_world": to_world, "bsdf": scene["body"].bsdf()}
     loaded = mi.load_dict(scene)
-    return Stage(loaded, [shape for shape in loaded.shapes() if shape.id() == "body"])
+    bodies = [shape for shape in loaded.shapes() if shape.id() == "body"]
+    return Stage(loaded, bodies, loaded.emitters()[0] if setting.stage == INCIDENCE else None)
+
+
+def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
+    """Return what puts a shape, whose y is up, on the floor, no larger than the ball.
+
+    Raises:
+        ValueError: if it has no size.
+    """
+    box, reach = shape.bbox(), 1.0
+    if isinstance(shape, mi.Mesh):
+        vertices = np.array(shape.vertex_positions_buffer()).reshape(-1, 3) - np.array(box.center())
+        reach = float(np.linalg.norm(vertices, axis=1).max(initial=0))
+    if not (np.isfinite(reach) and reach > 0):
+        raise ValueError(f"{name} has no triangles.")
+    scale = RADIUS / reach
+    height = scale * float(box.extents().y) / 2
+    to_world = mi.ScalarTransform4f().translate([0, 0, height]).rotate([1, 0, 0], 90).scale(scale)
+    return to_world.translate(-np.array(box.center()))
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
-    scene = legacy.load(Path(str(user.scene)), {})
+    scene = loading.load(Path(str(user.scene)), {})
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
     shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]
@@ -141,7 +248,9 @@ def _user_stage(setting: Setting, user: UserScene) -> Stage:
     params["film.size"] = params["film.crop_size"] = size
     params["film.crop_offset"] = [0, 0]
     params.update()
-    return Stage(scene, chosen)
+    stage = Stage(scene, chosen)
+    user.has_sky = stage.has_sky
+    return stage
 
 
 @dataclass
@@ -149,6 +258,7 @@ class Progress:
     """A picture on its way."""
 
     stage: Stage
+    pose: Pose = Pose()
     sums: Any = 0
     spp: int = 0
     next_pass: int = 1
@@ -162,7 +272,7 @@ class Progress:
     def advance(self, bsdf: mi.BSDF) -> None:
         """Render a pass, of about as long as an edit may wait."""
         start, sensor = time.perf_counter(), self.stage.scene.sensors()[0]
-        with self.stage.showing(bsdf):
+        with self.stage.showing(bsdf, self.pose):
             passed = self.stage.passes.sums(self.stage.scene, sensor, seed=self.spp, spp=self.next_pass)
             self.sums = self.sums + passed
             dr.eval(self.sums)
@@ -217,25 +327,54 @@ class Stages:
     @property
     def names(self) -> list[str]:
         """The words for the light."""
-        return [*STAGES, *([ENVIRONMENT] if self.user.environment else [])]
+        return [*STAGES, INCIDENCE, *self.user.lights]
+
+    @property
+    def turned(self) -> list[str]:
+        """The words for light that can be turned, and for the user's scene if that of it can."""
+        return ["studio", *self.user.lights, *(["scene"] if self.user.has_sky else [])]
 
     @property
     def shapes(self) -> list[str]:
         """The words for what is lit."""
-        return ["body", "sphere", *(["scene"] if self.user.scene else [])]
+        return ["body", "sphere", *self.user.meshes, *(["scene"] if self.user.scene else [])]
 
     def stage(self, setting: Setting) -> Stage:
-        """Return the scene of a setting.
+        """Return the scene of a setting, in whatever pose.
 
         Raises:
-            ValueError: if the user's scene has no such material or shape.
+            ValueError, RuntimeError: as :func:`load`.
         """
+        setting = setting.scene()
         if setting not in self._loaded:
             self._loaded[setting] = load(setting, self.user)
             while len(self._loaded) > KEPT:
                 self._loaded.popitem(last=False)
         self._loaded.move_to_end(setting)
         return self._loaded[setting]
+
+    def add(self, path: Path, name: str) -> dict[str, str]:
+        """Take a mesh or an environment map that can be loaded, and return which member of a state it is a word for.
+
+        Raises:
+            ValueError, RuntimeError: as :func:`load`.
+        """
+        kind, word = self.user.add(path, name)
+        try:
+            self.stage(Setting("studio", word, QUICK) if kind == "shape" else Setting(word, "body", QUICK))
+        except Exception:
+            del (self.user.meshes if kind == "shape" else self.user.lights)[word]
+            raise
+        return {kind: word}
+
+    @property
+    def material(self) -> str:
+        """The id of the user's material that is replaced."""
+        return self.stage(Setting("", "scene", QUICK)).usual[0].id()
+
+    def progress(self, setting: Setting) -> Progress:
+        """Return a picture that begins."""
+        return Progress(self.stage(setting), setting.pose)
 
     def forget(self) -> None:
         """Say of all kernels that they may have to be compiled."""
@@ -244,6 +383,7 @@ class Stages:
     def is_new(self, bsdf: Bsdf, purpose: str | Setting) -> bool:
         """Return whether kernels for a BSDF of this structure may have to be compiled, for a view or a picture."""
         words = tuple(sorted((name, it if isinstance(it, (str, bool)) else None) for name, it in bsdf.items()))
+        purpose = purpose.scene() if isinstance(purpose, Setting) else purpose
         # Dr.Jit compiles a picture's kernel for the emitters and BSDFs of all scenes that are loaded.
         scenes = frozenset({*self._loaded, purpose}) if isinstance(purpose, Setting) else None
         known = (words, purpose, scenes) in self._known

@@ -17,11 +17,12 @@ SUBJECTS = 6
 PARAMETERS = 64
 """The most parameters of a subject."""
 LIMITS = {"theta": (0, 89), "phi": (-180, 180), "exposure": (-10, 10), "component": (0, 99), "size": (64, 1024),
-          "wipe": (0, 1)}  # fmt: skip
+          "wipe": (0, 1), "turn": (-180, 180), "yaw": (-180, 180), "pitch": (-15, 70)}  # fmt: skip
 """The least and the largest value of members: of ``size`` in pixels, of ``exposure`` in stops, of angles in degrees."""
 VIEWS = "picture", "lobe", "polar", "cartesian", "albedo", "slice", "hemisphere", "sampler"
 WORDS = {
     "channel": ("luminance", "rgb", "red", "green", "blue"),
+    "axis": ("theta_o", "theta_h", "theta_d", "phi"),
     "compare": ("side", "wipe", "difference"),
     "scale": ("linear", "log"),
     "lobes": ("over", "side"),
@@ -32,9 +33,15 @@ OF_THE_PAGE: dict[str, Any] = {
 }  # fmt: skip
 """The members that only the page needs, how it shows what it has: it does not send them."""
 SHAPES = "body", "sphere", "scene"
+INCIDENCE = "incidence"
+"""The light that comes from ωi."""
+UPLOAD = "upload-"
+"""How the names of uploaded files begin."""
+EVERY = "all"
+"""In place of a model's name, all of them."""
 MEASURED, GIVEN, PRESET = "tabulated", "given", "preset"
 """The types of subjects that are files, materials of the command line, and published materials."""
-REQUESTS, SAVED = ("chi2", "fit", "cancel", "save"), ("exr", "page")
+REQUESTS, SAVED = ("chi2", "fit", "cancel", "save"), ("exr", "page", "scene")
 LONGEST = 1 << 16
 """The most letters of a message."""
 LARGEST = 3.4e38
@@ -59,9 +66,18 @@ class State:
     phi: float = 0.0
     channel: str = "luminance"
     component: int | None = None
+    cosine: bool = True
+    """Whether lobes, curves and hemispheres show f |cosθo|, and not f."""
+    axis: str = "theta_o"
+    """What the cartesian plot goes along: θo in the plane of incidence, θh or θd at φd = 90°, or φo - φi at θo = θi."""
     stage: str = "studio"
     shape: str = "body"
     exposure: float = 0.0
+    turn: float = 0.0
+    """By how much the environment is turned about the vertical."""
+    yaw: float = 0.0
+    pitch: float = 0.0
+    """By how much the camera has gone around what it looks at, and up."""
     size: int = 256
     views: tuple[str, ...] = ("picture", "lobe", "polar", "albedo")
     dragged: bool = False
@@ -147,9 +163,14 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
         phi=_number(data, "phi"),
         channel=_word(data, "channel", WORDS["channel"]),
         component=None if component is None else int(_number(data, "component")),
+        cosine=data.get("cosine") is not False,
+        axis=_word(data, "axis", WORDS["axis"]),
         stage=_word(data, "stage", stages),
         shape=_word(data, "shape", shapes),
         exposure=_number(data, "exposure"),
+        turn=_number(data, "turn"),
+        yaw=_number(data, "yaw"),
+        pitch=_number(data, "pitch"),
         size=int(_number(data, "size")),
         views=tuple(view for view in VIEWS if view in views),
         dragged=data.get("dragged") is True,

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..measured.coordinates import HalfDifference
 from ..probe import curves as lobes
-from ..probe.arrays import luminance
+from ..probe.arrays import CENTRE, Array, luminance
 from ..probe.bsdf import BSDFProbe, Part
 from ..probe.directions import direction
 from ..probe.variates import lattice, sampling_efficiency
@@ -28,6 +30,10 @@ PIXELS = 96
 """The side of a hemisphere and of a slice, in pixels."""
 LOG2_COUNT = 7
 """Samples for each angle of an albedo, 2^11 in all."""
+FLATTEST = 1e-6
+"""The least cosine that values are divided by."""
+STEPS = 181
+"""The points of a curve over θh, θd or φ, besides those where it bends."""
 DOTS = 400
 BINS = 48
 HEAVIEST = 4.0
@@ -56,9 +62,15 @@ def _plain(value: Any) -> Any:
 
 @dataclass
 class ComponentProbe(BSDFProbe):
-    """A probe whose whole is one component, where the BSDF has it."""
+    """A probe whose whole is one component, where the BSDF has it, and whose values are f without the cosine if that is
+    asked for."""
 
     component: int | None = None
+    cosine: bool = True
+
+    def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
+        value = super().eval(part, wi, wo, uv)
+        return value if self.cosine else value / np.maximum(abs(wo[:, 2:]), FLATTEST)
 
     @cached_property
     def whole(self) -> Part:
@@ -106,14 +118,48 @@ def _albedo(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     return _curves(replace(state, dragged=False), lambda channel: lobes.albedo(probe, state.phi, channel, LOG2_COUNT))
 
 
+def _graph(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+    if state.axis == "theta_o":
+        return _cut(probe, state)
+    even = np.linspace(0, 1, STEPS)
+    # Highlights, about θh = 0 and φ = 180°, may be as narrow as they like.
+    near = even**3
+    at = {
+        "theta_h": lobes.GRAZING * near,
+        "theta_d": lobes.GRAZING * even,
+        "phi": 180 + 180 * np.concatenate([-near[:0:-1], near]),
+    }[state.axis]
+
+    def along(channel: int | None) -> lobes.Curve:
+        return lobes.refined(lambda angles: lobes.value(probe, *_pair(state, angles), channel), at)
+
+    return _curves(state, along)
+
+
+def _pair(state: State, angles: Array) -> tuple[Array, Array]:
+    """Return wi and wo at angles along the axis of a state, each of shape (N, 3)."""
+    if state.axis == "phi":
+        same = np.full(len(angles), state.theta)
+        return direction(same, state.phi + 0 * angles).T, direction(same, state.phi + angles).T
+    zero, tilt = 0 * angles, np.radians(state.phi - 90)  # of h, so that at θh = 0 wi has the azimuth φi
+    theta_h, theta_d = (angles, zero + state.theta) if state.axis == "theta_h" else (zero, angles)
+    return _half_difference(np.radians(theta_h), np.radians(theta_d), tilt)
+
+
+def _half_difference(theta_h: Array, theta_d: Array, phi_h: float) -> tuple[Array, Array]:
+    """Return wi and wo at half and difference angles in radians, for φd = 90°, each of shape (N, 3)."""
+    places = np.sqrt(theta_h * 2 / np.pi), theta_d, np.full(theta_h.shape, np.pi / 2), np.full(theta_h.shape, phi_h)
+    wi, wo = (np.stack([w.x, w.y, w.z], axis=-1) for w in HalfDifference(anisotropic=True).directions(*places))
+    return wi.astype(np.float32), wo.astype(np.float32)
+
+
 def _slice(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     at = (np.arange(PIXELS) + 0.5) * (np.pi / 2) / PIXELS
     theta_h, theta_d = (it.ravel() for it in np.meshgrid(at, at))
-    wi, wo = HalfDifference().directions(np.sqrt(theta_h * 2 / np.pi), theta_d, np.full(theta_h.shape, np.pi / 2))
-    pair = [np.stack(np.broadcast_arrays(w.x, w.y, w.z), axis=-1).astype(np.float32) for w in (wi, wo)]
+    pair = _half_difference(theta_h, theta_d, 0)
     seen = np.minimum(pair[0][:, 2], pair[1][:, 2]) > 1e-3
     wi_seen, wo_seen = (np.where(seen[:, None], w, np.array([0, 0, 1], np.float32)) for w in pair)
-    f = lobes.value(probe, wi_seen, wo_seen, state.channels[0][1]) / wo_seen[:, 2]
+    f = lobes.value(replace(probe, cosine=False), wi_seen, wo_seen, state.channels[0][1])
     values = np.where(seen, f, np.nan)
     yield {"payload": values.astype("<f4").tobytes(), "width": PIXELS, "height": PIXELS}
 
@@ -141,23 +187,24 @@ def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
 
 
 def _at_wi(state: State) -> Any:
-    return state.theta, state.phi, state.channel, state.dragged
+    return state.theta, state.phi, state.channel, state.cosine, state.dragged
 
 
 VIEWS = {
     "lobe": View(_at_wi, _lobe),
     "polar": View(_at_wi, _cut),
-    "cartesian": View(_at_wi, _cut),
+    "cartesian": View(lambda state: (*_at_wi(state), state.axis), _graph),
     "albedo": View(lambda state: (state.phi, state.channel), _albedo),
     "slice": View(lambda state: state.channel, _slice),
-    "hemisphere": View(lambda state: _at_wi(state)[:3], _hemisphere),
+    "hemisphere": View(lambda state: _at_wi(replace(state, dragged=False)), _hemisphere),
     "sampler": View(lambda state: (state.theta, state.phi), _sampler),
 }
 """By name, in the order in which they are drawn."""
 
 
-def frames(name: str, probe: ComponentProbe, state: State, serial: int, subject: int) -> Iterable[Frame]:
+def frames(name: str, bsdf: mi.BSDF, state: State, serial: int, subject: int) -> Iterable[Frame]:
     """Yield the frames of a view of a subject."""
+    probe = ComponentProbe(bsdf, state.component, state.cosine)
     for found in VIEWS[name].frames(probe, state):
         common = {"serial": serial, "subject": subject}
         if "payload" in found:

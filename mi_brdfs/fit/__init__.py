@@ -76,7 +76,7 @@ def fit(
             (N, 3) and (N,) or (N, channels), with one channel or linear sRGB, f in 1/sr, as of an isotropic material;
             or what :func:`observe` made of one of these; or a list of them. Values of files weigh by the solid angles
             of their cells, and scattered ones alike.
-        model: the name of a plugin of this package or of a guest, or several.
+        model: the name of a plugin of the pack or of a third-party package, or several.
         metric: "log", "l2", "ngan", "cube-root", "bieron-l2" or "bieron-log".
         given: parameters that are fixed, by name, None to leave one out, "free" to seek one that is not sought
             otherwise; words of choices, a tuple for a fit of each.

@@ -84,9 +84,12 @@ class Section:
         elif against > 0:
             told.append(f"{name} is close, {larger}, but its BIC is worse by {against:.0f}.")
         else:
-            told.append(f"{name} is close, {larger}, and its BIC is better by {-against:.0f}.")
-        winners = {"held-out error": min(fits, key=lambda it: it.held_out), "BIC": min(fits, key=lambda it: it.bic)}
-        told += [f"By the {kind} it would be {it.model}." for kind, it in winners.items() if it is not best]
+            told.append(f"{name} is close: {larger}.")
+        nearest, likeliest = min(fits, key=lambda it: it.held_out), min(fits, key=lambda it: it.bic)
+        if nearest is not best:
+            told.append(f"By the held-out error it would be {nearest.model}.")
+        if likeliest is not best:
+            told.append(f"By the BIC it would be {likeliest.model}, which is better by {best.bic - likeliest.bic:.0f}.")
         return " ".join([*told, agreement])
 
 

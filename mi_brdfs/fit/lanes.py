@@ -4,7 +4,7 @@ each setting; and which unknowns an isotropic material says nothing about."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager
 from functools import cached_property
 from itertools import combinations
 
@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..mitsuba import llvm
+from ..mitsuba.fastest import fastest
 from ..probe.arrays import Array, context, floats, interaction, numbers, per_lane, vectors
 from ..probe.directions import hemisphere
 from ..variants import activated
@@ -37,14 +38,10 @@ def rgb_variant() -> Iterator[None]:
     if active is not None and active.endswith("_ad_rgb"):
         yield
         return
-    with ExitStack() as stack:
-        for name in ("cuda_ad_rgb", "metal_ad_rgb", "llvm_ad_rgb"):
-            if name in mi.variants() and not (name.startswith("llvm") and llvm.problem()):
-                with suppress(ImportError):
-                    stack.enter_context(activated(name))
-                    break
-        else:
-            raise FitError(f"A fit needs a variant with derivatives: {llvm.problem() or 'none works on this machine'}.")
+    found = fastest()
+    if found is None:
+        raise FitError(f"A fit needs a variant with derivatives: {llvm.problem() or 'none works on this machine'}.")
+    with activated(found):
         yield
 
 

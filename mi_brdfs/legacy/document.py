@@ -7,20 +7,25 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-OBJECTS = {
-    "bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "sensor", "shape", "subsurface",
-    "texture", "volume", "camera", "luminaire",
-}  # fmt: skip
+from .tables import PLUGINS
+
+OBJECTS = {*PLUGINS, "camera", "luminaire"}
 """The elements that are plugins; the last two are those of 0.3."""
 
-MOST_ELEMENTS, DEEPEST, LONGEST = 1_000_000, 60, 100_000
-"""Bounds of the number of elements, of their nesting, and of the length of an attribute, which includes and parameters
-may multiply."""
+MOST_ELEMENTS, DEEPEST, LONGEST, MOST_FILES = 1_000_000, 60, 100_000, 1000
+"""Bounds of the number of elements, of their nesting, of the length of an attribute, and of the files read, which
+includes and parameters may multiply."""
+
+
+def _attribute(name: str) -> property:
+    return property(
+        lambda self: self.attributes.get(name, ""), lambda self, value: self.attributes.update({name: value})
+    )
 
 
 @dataclass(eq=False)
@@ -32,24 +37,10 @@ class Element:
     children: list[Element] = field(default_factory=list)
     place: str = ""
     """The file and the line that it comes from."""
-    scale: list[float] | None = None
+    scale: list[float] = field(default_factory=lambda: [1.0])
     """Of a texture, what it is multiplied by, which Mitsuba 3 has no plugin for."""
 
-    @property
-    def type(self) -> str:
-        return self.attributes.get("type", "")
-
-    @type.setter
-    def type(self, type: str) -> None:
-        self.attributes["type"] = type
-
-    @property
-    def name(self) -> str:
-        return self.attributes.get("name", "")
-
-    @property
-    def value(self) -> str:
-        return self.attributes.get("value", "")
+    type, name, value = _attribute("type"), _attribute("name"), _attribute("value")
 
     def __contains__(self, name: str) -> bool:
         return any(child.name == name for child in self.children)
@@ -64,20 +55,57 @@ class Element:
         self.children = [child for child in self.children if child.name not in names]
         return found[-1] if found else None
 
-    def text(self, name: str, default: str = "") -> str:
+    def put(self, child: Element) -> None:
+        """Give a property, in place of those of its name."""
+        self.pop(child.name)
+        self.children.append(child)
+
+    def set(self, name: str, value: Any) -> None:
+        """Give a property a value."""
+        self.put(prop(name, value))
+
+    def text(self, name: str) -> str:
         """Return the value of a property in lower case."""
         found = self[name]
-        return found.value.strip().lower() if found else default
+        return found.value.strip().lower() if found else ""
 
     def number(self, name: str, default: float) -> float:
         """Return the value of a number, and the default for a texture."""
         found = self[name]
-        return float(found.value) if found and found.tag in ("float", "integer") else default
+        return float(found.value if found and found.tag in ("float", "integer") else default)
 
-    def set(self, tag: str, name: str, value: Any) -> None:
-        """Give a property, in place of those of its name."""
-        self.pop(name)
-        self.children.append(Element(tag, {"name": name, "value": written(value)}))
+    @property
+    def label(self) -> str:
+        return self.name or self.type or self.tag
+
+    def numbers(self, *counts: int) -> list[float]:
+        """Return the numbers in its value, of which there are as many as one of the counts says, if there are any."""
+        try:
+            numbers = floats(self.value)
+        except ValueError:
+            raise self.error(f"{self.value!r} has something else than numbers") from None
+        if any(number != number for number in numbers):
+            raise self.error(f"{self.value!r} is no number")
+        if counts and len(numbers) not in counts:
+            raise self.error(f"{self.value!r} has {len(numbers)} numbers")
+        return numbers
+
+    def to_world(self) -> Element:
+        """Return its transform, which it is given if it has none."""
+        transform = self["to_world"] or Element("transform", {"name": "to_world"})
+        self.put(transform)
+        return transform
+
+    def error(self, text: str) -> ValueError:
+        """Return an error that says what is wrong with it."""
+        return ValueError(f"{self.place}: {self.tag} {self.type or self.name}: {text}.")
+
+    def copy(self, name: str) -> Element:
+        """Return a copy with another name and without an id, which stays with the original."""
+        attributes = {**self.attributes, "name": name}
+        for key in ("name",) * (not name) + ("id",) * (self.tag != "ref"):
+            attributes.pop(key, None)
+        return replace(self, attributes=attributes, children=[*self.children])
 
     def of(self, *tags: str) -> list[Element]:
         """Return the children of some tags."""
@@ -101,60 +129,62 @@ class Element:
         return tree
 
 
+def prop(name: str, value: Any) -> Element:
+    """Return a property of the type that its value has; a list is a colour."""
+    tags = {bool: "boolean", int: "integer", float: "float", str: "string", list: "rgb"}
+    return Element(tags[type(value)], {"name": name, "value": written(value)})
+
+
+def plugin(kind: str, type: str, *children: Element, **properties: Any) -> Element:
+    """Return a plugin with some properties."""
+    return Element(kind, {"type": type}, [*(prop(*it) for it in properties.items()), *children])
+
+
+def floats(text: str) -> list[float]:
+    return [float(number) for number in re.split(r"[,\s]+", text.strip(", \t\n"))]
+
+
 def written(value: Any) -> str:
     """Return a value as an attribute."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
         return f"{value:.9g}"
-    return ", ".join(map(written, value)) if isinstance(value, (list, tuple)) else str(value)
-
-
-def snake_case(name: str) -> str:
-    """Return a name of 0.6 as Mitsuba 3 writes it: ``int_ior`` for ``intIOR``."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.strip()).lower()
+    return ", ".join(map(written, value)) if isinstance(value, list) else str(value)
 
 
 def root_of(path: Path) -> tuple[str, dict[str, str]]:
     """Return the tag and the attributes of a file's root, nothing if it is no XML."""
-    found: list[tuple[str, dict[str, str]]] = []
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda tag, attributes: found.append((tag, attributes))
-    with open(path, "rb") as file, suppress(expat.ExpatError, LookupError):
-        while not found and (part := file.read(65536)):
-            parser.Parse(part)
-    return found[0] if found else ("", {})
+    with open(path, "rb") as file, suppress(ET.ParseError, LookupError, ValueError):
+        for _, root in ET.iterparse(file, ["start"]):
+            return root.tag, root.attrib
+    return "", {}
 
 
-def read_document(path: Path, given: Mapping[str, str], lenient: bool) -> tuple[Element, list[tuple[str, str]]]:
-    """Return the ``<scene>`` of a file, with its includes in their places and the values of its parameters, and places
-    and names of includes that are missing, if ``lenient``.
-
-    Raises:
-        ValueError: if it is none, in a sentence that names file and line.
-        OSError: if a file cannot be read.
-    """
-    reader = _Reader(path, given, lenient)
-    root = reader.read(path)
-    if unused := [name for name in given if name not in reader.used]:
-        raise ValueError(f"{path}: the scene has no parameter {unused[0]}.")
-    return root, reader.missing
-
-
-class _Reader:
+class Reader:
     """Reads elements in the order of the document, as what ``<default>`` says holds from there on."""
 
-    def __init__(self, scene: Path, given: Mapping[str, str], lenient: bool) -> None:
-        self.scene, self.values, self.lenient = scene, dict(given), lenient
-        self.missing: list[tuple[str, str]] = []
+    def __init__(self, scene: Path, values: Mapping[str, str], lenient: bool) -> None:
+        self.scene, self.values, self.lenient = scene, dict(values), lenient
+        self.missing: list[Element] = []
+        """Includes whose files are missing, if ``lenient``."""
         self.used: set[str] = set()
-        self.count = 0
+        self.count = self.files = 0
         self.reading: list[Path] = []
 
     def read(self, path: Path) -> Element:
+        """Return the ``<scene>`` of a file, with its includes in their places and the values of its parameters.
+
+        Raises:
+            ValueError: if it is none, in a sentence that names file and line.
+            OSError: if a file cannot be read.
+        """
         if path.resolve() in self.reading:
             raise ValueError(f"{path}: the file includes itself.")
         self.reading.append(path.resolve())
+        self.files += 1
+        if self.files > MOST_FILES:
+            raise ValueError(f"{path}: the scene includes more than {MOST_FILES} files.")
         parser = expat.ParserCreate()
         open_: list[Element] = [Element("")]
 
@@ -166,7 +196,7 @@ class _Reader:
             attributes = {name: self._substituted(value, place) for name, value in attributes.items()}
             element = Element({"lookAt": "lookat"}.get(tag, tag), attributes, place=place)
             if "name" in attributes and tag not in ("default", "scene"):
-                attributes["name"] = snake_case(attributes["name"])
+                element.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", element.name.strip()).lower()  # intIOR: int_ior
             if tag in OBJECTS:
                 element.type = element.type.strip().lower()
             open_[-1].children.append(element)
@@ -174,14 +204,12 @@ class _Reader:
 
         def end(tag: str) -> None:
             element = open_.pop()
-            if tag not in ("default", "include"):
-                return
-            open_[-1].children.pop()
             if tag == "default":
                 self.values.setdefault(element.name, element.value)
-                return
-            if found := self._found(element, path):
+            elif tag == "include" and (found := self._found(element, path)):
                 open_[-1].children += self.read(found).children
+            if tag in ("default", "include"):
+                open_[-1].children.remove(element)
 
         def refuse(*_: Any) -> None:
             raise ValueError(f"{path}: a scene has no DOCTYPE; take it out.")
@@ -200,11 +228,10 @@ class _Reader:
 
     def _substituted(self, value: str, place: str) -> str:
         """Return an attribute with the values of the parameters, the longest name first."""
-        if "$" in value:
-            for name in sorted(self.values, key=len, reverse=True):
-                if f"${name}" in value:
-                    self.used.add(name)
-                    value = value.replace(f"${name}", self.values[name])
+        for name in sorted(self.values, key=len, reverse=True) if "$" in value else ():
+            if f"${name}" in value:
+                self.used.add(name)
+                value = value.replace(f"${name}", self.values[name])
         if len(value) > LONGEST:
             raise ValueError(f"{place}: an attribute has more than {LONGEST} letters.")
         if (missing := re.search(r"\$(\w+)", value)) and "[" not in value:  # as labels of films have it
@@ -216,7 +243,7 @@ class _Reader:
         for folder in (self.scene.parent, path.parent):
             if name and os.path.isfile(folder / name):
                 return folder / name
-        if self.lenient:
-            self.missing.append((include.place, name))
-            return None
-        raise ValueError(f"{include.place}: there is no file {name} to include.")
+        if not self.lenient:
+            raise ValueError(f"{include.place}: there is no file {name} to include.")
+        self.missing.append(include)
+        return None

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import importlib
 import re
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from .document import Element
+from ..srgb import decoded
+from .document import Element, floats
 
 
 def rgb_of(element: Element, folder: Path) -> list[float]:
@@ -18,38 +18,27 @@ def rgb_of(element: Element, folder: Path) -> list[float]:
     Raises:
         ValueError: in a sentence, for what 0.6 does not read either.
     """
-    try:
-        rgb = _channels(element, folder)
-    except (ValueError, OSError) as error:
-        raise ValueError(
-            f"{element.place}: <{element.tag}> {element.name} has no colour that can be read: {error}."
-        ) from None
-    if len(rgb) not in (1, 3) or not np.isfinite(rgb).all():
-        raise ValueError(
-            f"{element.place}: <{element.tag}> {element.name} = {element.value} has not one or three numbers."
-        )
-    return rgb
-
-
-def _channels(element: Element, folder: Path) -> list[float]:
     text = element.value.strip(", \t\n")
-    if element.tag == "blackbody":
-        kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
-        return _of_light(*_blackbody(kelvin, float(element.attributes.get("scale", 1))))
-    if "filename" in element.attributes:
-        text = re.sub(r"#.*", "", (folder / element.attributes["filename"]).read_text(encoding="utf-8"))
-        table = np.array([line.split()[:2] for line in text.splitlines() if line.strip()], float)
-        return _of_light(*table.T)
-    if ":" in text:
-        pairs = [pair.split(":") for pair in re.split(r"[,\s]+(?=\S)", re.sub(r"\s*:\s*", ":", text))]
-        return _of_light(*np.array(pairs, float).T)
-    if re.fullmatch(r"#[0-9a-fA-F]{6}", text):
-        rgb = [byte / 255 for byte in bytes.fromhex(text[1:])]
-    else:
-        rgb = [float(number) for number in re.split(r"[,\s]+", text)]
-    if element.tag != "srgb":
-        return rgb
-    return [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in rgb]
+    try:
+        if element.tag == "blackbody":
+            kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
+            rgb = _of_light(*_blackbody(kelvin, float(element.attributes.get("scale", 1))))
+        elif "filename" in element.attributes:
+            if not (path := folder / element.attributes["filename"]).is_file():  # a pipe would never end
+                raise ValueError(f"there is no file {path}")
+            rgb = _of_light(*np.loadtxt(path, usecols=(0, 1), ndmin=2, encoding="utf-8").T)
+        elif ":" in text:
+            pairs = [pair.split(":") for pair in re.split(r"[,\s]+(?=\S)", re.sub(r"\s*:\s*", ":", text))]
+            rgb = _of_light(*np.array(pairs, float).T)
+        elif re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+            rgb = [byte / 255 for byte in bytes.fromhex(text[1:])]
+        else:
+            rgb = floats(text)
+    except (ValueError, OSError, RuntimeError) as error:
+        raise element.error(f"it has no colour that can be read: {error}") from None
+    if len(rgb) not in (1, 3) or not np.isfinite(rgb).all():
+        raise element.error(f"{element.value!r} has not one or three numbers")
+    return decoded(rgb).tolist() if element.tag == "srgb" else rgb
 
 
 def _of_light(wavelengths: np.ndarray, values: np.ndarray) -> list[float]:
@@ -57,17 +46,8 @@ def _of_light(wavelengths: np.ndarray, values: np.ndarray) -> list[float]:
     which Y is the mean under the observer's."""
     if not (np.diff(wavelengths) > 0).all():
         raise ValueError("wavelengths must increase")
-    fine, weights = _observer()
-    return np.maximum(np.interp(fine, wavelengths, values, 0, 0) @ weights, 0).tolist()
-
-
-@cache
-def _observer() -> tuple[np.ndarray, np.ndarray]:
     scalar = importlib.import_module("mitsuba.scalar_rgb")  # whose functions compute without kernels
-    wavelengths = np.arange(360.0, 831.0)
-    xyz = np.array([np.array(scalar.cie1931_xyz(w)).ravel() for w in wavelengths])
-    matrix = np.array([np.array(scalar.xyz_to_srgb(row)).ravel() for row in np.eye(3).tolist()])
-    return wavelengths, xyz @ matrix / xyz[:, 1].sum()
+    return [float(v) for v in scalar.spectrum_list_to_srgb(wavelengths, values, bounded=False, d65=False)]
 
 
 def _blackbody(kelvin: float, scale: float) -> tuple[np.ndarray, np.ndarray]:

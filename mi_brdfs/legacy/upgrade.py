@@ -5,25 +5,27 @@ from __future__ import annotations
 import importlib
 import os
 import re
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field, replace
+from functools import partialmethod
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
 import mitsuba as mi
 import numpy as np
 
-from ..names import check_name
-from .document import OBJECTS, Element, read_document, root_of
-from .rules import CHECKS, KNOWN, NEAREST, NUMBERS, RENAMED, RULES, SUCCESSORS, channels, colour, number
+from .document import OBJECTS, Element, Reader, plugin, prop, root_of
+from .rules import RULES, colours
 from .sheets import modernize
 from .spectra import rgb_of
+from .tables import PLUGINS
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
-LOOK_AT = ("origin", "target", "up")
 COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
+NUMBERS = ("alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight")
+"""Properties that Mitsuba 3 reads of a texture as numbers."""
+STAND_INS = {"shape": "cube", "emitter": "constant", "volume": "constvolume", "texture": "grey"}
+"""What takes the place of plugins whose files are missing."""
 Kind = Literal["changed", "approximated", "dropped", "replaced"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
@@ -81,82 +83,29 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     path = Path(path)
     if is_new(path):
         try:
-            return Upgraded("3", path.read_text(encoding="utf-8"))
+            text = path.read_text(encoding="utf-8")
+            tree = ET.fromstring(text.encode())
         except UnicodeDecodeError as error:
             raise ValueError(f"{path}: the file is no UTF-8: {error}.") from None
-    root, without = read_document(path, {name: str(value) for name, value in parameters.items()}, lenient)
+        except (ET.ParseError, LookupError, ValueError) as error:
+            raise ValueError(f"{path}: no well-formed XML: {error}.") from None
+        version = tree.get("version", "").strip()
+        if tree.tag != "scene" or not re.fullmatch(r"[\d.]+", version):
+            raise ValueError(f"{path}: the file has a <{tree.tag}> of version {version!r}, no scene of Mitsuba.")
+        return Upgraded("3", text)
+    reader = Reader(path, {name: str(value) for name, value in parameters.items()}, lenient)
+    root = reader.read(path)
+    if unused := [name for name in parameters if name not in reader.used]:
+        raise ValueError(f"{path}: the scene has no parameter {unused[0]}.")
     is_old = any(it.tag in ("camera", "luminaire") for it in root.walk())
     version = root.attributes.get("version", "0.2.0" if is_old else "0.6.0").strip()
     if not (found := re.fullmatch(r"0\.([0-6])(\.\d+)*", version)):
         raise ValueError(f"{path}: version {version} is none of 0.2 to 0.6.")
     work = Work(path, lenient, Path(folder) if folder is not None else path.parent)
-    for place, name in without:
-        work.changes.append(Change(place, "dropped", f"the include {name}, which is missing"))
+    for include in reader.missing:
+        work.dropped(include, f"the include {include.attributes.get('filename', '')}, which is missing")
     scene = work.scene(root, int(found[1]))
     return Upgraded(version, scene.to_xml(), work.changes)
-
-
-def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters: Any) -> Any:
-    """Load a scene file of Mitsuba 0.2 to 0.6 as :func:`upgrade` changes it, or one of Mitsuba 3 as it is. A warning
-    counts the changes, if there are any.
-
-    Raises:
-        ValueError: as :func:`upgrade`.
-        RuntimeError: what Mitsuba says where it cannot load the scene.
-    """
-    return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient)
-
-
-def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> Any:
-    """Load a scene file, old or new."""
-    with looking_in(path.parent):
-        config = mi.parser.ParserConfig(mi.variant())
-        state, upgraded = parsed(config, path, lenient, parameters)
-        try:
-            mi.parser.transform_all(config, state)
-            return mi.parser.instantiate(config, state)
-        except RuntimeError as error:  # of a file that was given a version
-            place = "string" if upgraded else str(path)
-            raise RuntimeError(
-                str(error).replace("loading string (line", f"loading {place} (line")
-            ) from error.__cause__
-
-
-def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
-    """Return a scene file as Mitsuba's parser has it, and the text of an upgraded one."""
-    check_name(str(path))
-    if is_new(path):
-        tag, attributes = root_of(path)
-        if not tag or "version" in attributes:
-            return mi.parser.parse_file(config, str(path), **parameters), None
-        return mi.parser.parse_string(config, versioned(path.read_text(encoding="utf-8-sig")), **parameters), None
-    new = upgrade(path, lenient=lenient, **parameters)
-    warnings.warn(
-        f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade says what.", stacklevel=3
-    )
-    return mi.parser.parse_string(config, new.xml), new.xml
-
-
-def versioned(text: str) -> str:
-    """Return XML with a version in its root, as Mitsuba 3 demands; as it is if it has one."""
-    root = re.match(r"\s*(<[?!].*?>\s*)*<[\w:]+", text, re.DOTALL)
-    if not root or "version=" in text[root.end() :].partition(">")[0]:
-        return text
-    return f'{text[: root.end()]} version="3.0.0"{text[root.end() :]}'
-
-
-@contextmanager
-def looking_in(*folders: Path) -> Iterator[None]:
-    """Look for files in these folders first, and forget these and those that a scene adds."""
-    before = mi.file_resolver()
-    resolver = mi.FileResolver(before)
-    for folder in reversed(folders):
-        resolver.prepend("" if folder == Path(".") else str(folder))  # messages show it in front of names
-    mi.set_file_resolver(resolver)
-    try:
-        yield
-    finally:
-        mi.set_file_resolver(before)
 
 
 def is_new(path: Path) -> bool:
@@ -176,328 +125,237 @@ class Work:
         self.missing: list[str] = []
         self.has_media = False
 
-    def changed(self, element: Element, text: str, kind: Kind = "changed") -> None:
+    def said(self, kind: Kind, element: Element, text: str) -> None:
         self.changes.append(Change(element.place or self.path.name, kind, text))
 
-    def approximated(self, element: Element, text: str) -> None:
-        self.changed(element, text, "approximated")
-
-    def dropped(self, element: Element, text: str) -> None:
-        self.changed(element, text, "dropped")
+    changed = partialmethod(said, "changed")
+    approximated = partialmethod(said, "approximated")
+    dropped = partialmethod(said, "dropped")
 
     def resolved(self, element: Element) -> Element:
         """Return what a reference refers to, or the element itself."""
-        if element.tag != "ref":
-            return element
-        return self.ids.get(element.attributes.get("id", "")) or element
-
-    # --- The scene ---------------------------------------------------------------------------------------------------
+        return (element.tag == "ref" and self.ids.get(element.attributes.get("id", ""))) or element
 
     def scene(self, root: Element, minor: int) -> Element:
         modernize(root, minor, self.changed)
+        self._complete(root)
         self.has_media = any(it.tag == "medium" for it in root.walk())
-        parts = self._parts(root)
-        for extra in (it for it in parts if it.tag in PROPERTIES):
-            self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 does not have")
-        scene = Element("scene", {"version": "3.0.0"}, [it for it in parts if it.tag not in PROPERTIES])
-        self._complete(root, scene)
-        if self.missing:
-            more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
-            raise ValueError(
-                f"{self.missing[0]}{more}; put the files there, or let stand-ins take their place (--lenient)."
-            )
-        return scene
-
-    def _complete(self, root: Element, scene: Element) -> None:
-        """Write out what 0.6 supplies by itself."""
-        root = Element("scene", place=root.place)
-        if not scene.of("integrator"):
-            scene.children.insert(0, Element("integrator", {"type": "direct"}))
-            self.changed(root, "a scene without an integrator has direct")
-        for extra in scene.of("integrator")[:-1]:
+        scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
+        used = {it.attributes.get("id") for it in scene.walk() if it.tag == "ref"}
+        for texture in scene.of("texture"):
+            if texture.type == "checkerboard" and texture.attributes.get("id") not in used:
+                scene.children.remove(texture)  # whose colours may be above 1
+                self.changed(texture, "a checkerboard is written where it is used, if it is")
+        for extra in scene.of(*PROPERTIES):
             scene.children.remove(extra)
-            self.dropped(extra, "an integrator before another one")
-        sensors = scene.of("sensor")
-        if not sensors:
-            self.dropped(root, "a scene without a sensor has none: 0.6 sees all of it along z")
-        elif len(sensors) > 1:
-            scene.children = [it for it in scene.children if it is not sensors[-1]]
+            self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 does not have")
+        if len(sensors := scene.of("sensor")) > 1:
+            scene.children.remove(sensors[-1])
             scene.children.insert(scene.children.index(sensors[0]), sensors[-1])
             self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
-        lights = [it for it in scene.walk() if it.tag == "emitter"]
-        if not lights:
-            sun = Element(
-                "emitter", {"type": "sunsky"}, [number("float", "sun_scale", "2"), number("float", "sky_scale", "2")]
-            )
+        if self.missing:
+            first = self.missing[0] + f", and {len(self.missing) - 1} more" * (len(self.missing) > 1)
+            raise ValueError(f"{first}; put the files there, or let stand-ins take their place (--lenient).")
+        return scene
+
+    def _complete(self, root: Element) -> None:
+        """Add what 0.6 supplies by itself."""
+        if not root.of("integrator"):
+            root.children.insert(0, plugin("integrator", "direct"))
+            self.changed(root, "a scene without an integrator has direct")
+        for extra in root.of("integrator")[:-1]:
+            root.children.remove(extra)
+            self.dropped(extra, "an integrator before another one")
+        if not root.of("sensor"):
+            self.dropped(root, "a scene without a sensor has none: 0.6 sees all of it along z")
+        if not any(it.tag == "emitter" for it in root.walk()):
             turn = Element("transform", {"name": "to_world"}, [Element("rotate", {"y": "1", "angle": "-120"})])
-            sun.children.append(turn)
-            RULES["emitter", "sunsky"](self, sun)
-            scene.children.append(sun)
+            root.children.append(plugin("emitter", "sunsky", turn, scale=2.0))
             self.changed(root, "a scene without an emitter has sun and sky")
 
-    # --- Elements ----------------------------------------------------------------------------------------------------
-
     def _parts(self, element: Element) -> list[Element]:
-        return [it for child in element.children if (it := self._part(child, element)) is not None]
+        return [it for child in element.children if (it := self._part(child)) is not None]
 
-    def _part(self, element: Element, parent: Element) -> Element | None:
-        id = element.attributes.get("id", "")
-        if element.tag == "null":
-            self.ids[id] = None
-            return None
-        if element.tag == "alias":
-            self.ids[element.attributes.get("as", "")] = self.ids.get(id)
+    def _part(self, element: Element) -> Element | None:
+        id, name = element.attributes.get("id", ""), element.name
+        if element.tag in ("null", "alias"):
+            self.ids[element.attributes.get("as", id)] = self.ids.get(id)
             return None
         if element.tag == "ref":
-            return self._reference(element, parent)
+            return self._reference(element)
         if element.tag in COLOURS:
-            return self._colour(element)
+            if element.tag != "rgb" or element.value.strip().startswith("#"):
+                self.changed(element, f"<{element.tag}> is written as linear <rgb>, as 0.6 reads it")
+            return replace(prop(name, rgb_of(element, self.path.parent)), place=element.place)
         if element.tag == "animation":
-            return self._animation(element)
+            self.approximated(element, "an animated transform is its first one")
+            return next((replace(it, attributes={"name": name}) for it in element.of("transform")), None)
+        if element.tag in ("float", "integer"):
+            element.numbers(1)
+            element.value = element.value.strip(", \t\n")
         if element.tag in PROPERTIES:
-            if element.tag in ("float", "integer"):
-                try:
-                    float(element.value)
-                except ValueError:
-                    said = f"{element.place}: <{element.tag}> {element.name} = {element.value!r} is no number."
-                    raise ValueError(said) from None
-            if element.name == "to_world" and parent.tag == "sensor":
-                _normalize(element)
             return element
-        if element.tag not in (*KNOWN, "subsurface"):
+        if element.tag not in PLUGINS:
             self.dropped(element, f"<{element.tag}>, which Mitsuba does not have")
             return None
-        name = element.name
-        try:
-            result = self._object(element)
-        except ValueError as error:
-            said = str(error)
-            raise ValueError(
-                said if ".xml:" in said else f"{element.place}: {element.tag} {element.type}: {said}."
-            ) from None
-        if result is not element:
+        result = self._object(element)
+        if result is not element:  # which may be in it
             element.attributes.pop("id", None)
             element.attributes.pop("name", None)
         if id:
-            self.ids[id] = result
-        if result is None or (result.tag not in OBJECTS and not name):  # a colour that only references need
+            self.ids[id] = result and self.resolved(result)
+        if result is None or (result.tag in COLOURS and not name):  # a colour that only references need
             return None
-        result.attributes |= ({"id": id} if id and result.tag in OBJECTS else {}) | ({"name": name} if name else {})
+        if id and result.tag in OBJECTS:
+            result.attributes.setdefault("id", id)
+        if name:
+            result.name = name
         return result
 
-    def _reference(self, element: Element, parent: Element) -> Element | None:
+    def _reference(self, element: Element) -> Element | None:
         id = element.attributes.get("id", "")
         if id not in self.ids:
-            raise ValueError(f"{element.place}: there is no {id!r} before this reference.")
+            raise element.error(f"there is no {id!r} before this reference")
         target = self.ids[id]
         if target is None:
             self.dropped(element, "references to what has no successor")
             return None
         # What became a colour has no id, and what is scaled differs from what others refer to.
-        checks = target.type == "checkerboard" and element.name in NUMBERS
-        if target.tag not in OBJECTS or target.scale or checks:
-            attributes = {name: value for name, value in target.attributes.items() if name != "id"}
-            named = {"name": element.name} if element.name else {}
-            copy = Element(target.tag, attributes | named, target.children, element.place, target.scale)
-            return RULES["texture", "checkerboard"](self, copy) if checks else copy
-        return Element(
-            "ref",
-            {"id": target.attributes["id"]} | ({"name": element.name} if element.name else {}),
-            place=element.place,
-        )
-
-    def _colour(self, element: Element) -> Element:
-        rgb = rgb_of(element, self.path.parent)
-        if element.tag != "rgb" or element.value.strip().startswith("#"):
-            self.changed(element, f"<{element.tag}> is written as linear <rgb>, as 0.6 reads it")
-        return Element("rgb", {"name": element.name, "value": ", ".join(f"{v:.9g}" for v in rgb)}, place=element.place)
-
-    def _animation(self, element: Element) -> Element | None:
-        self.approximated(element, "an animated transform is its first one")
-        first = next(iter(element.of("transform")), None)
-        return first and Element("transform", {"name": element.name}, first.children, element.place)
+        if target.tag not in OBJECTS or target.scale != [1.0]:
+            return target.copy(element.name)
+        name = {"name": element.name} if element.name else {}
+        element.attributes = {"id": target.attributes["id"]} | name
+        return element
 
     def _object(self, element: Element) -> Element | None:
         """Return what a plugin becomes, or None."""
+        was = element.type
         element.children = self._parts(element)
-        self._last_of_each_name(element)
-        kind, was = element.tag, element.type
-        for child in element.children:
-            if new := RENAMED.get((was, child.name)):
-                child.attributes["name"] = new
-                self.changed(child, f"a property of {was} is {new}")
-        if kind == "subsurface":
-            self.dropped(element, f"the subsurface {was} has no successor")
-            return None
-        if (stand_in := self._without_files(element)) is not element:
-            return stand_in
-        media = [it for it in element.children if it.name in ("interior", "exterior")]
-        if (
-            kind == "shape"
-            and media
-            and not element.of("bsdf", "emitter")
-            and len(element.of("ref", "medium")) == len(media)
-        ):
-            element.children.append(Element("bsdf", {"type": "null"}))
-        rule = RULES.get((kind, was))
-        result = rule(self, element) if rule else self._succeeded(element)
-        if result is None:
-            return None
-        if was != "scale":
-            self._left_out(element, result)
-        if result.tag != kind:
-            return result
-        if result is not element:
-            result.place = element.place
-        return self._cleaned(result)
+        self._sort_names(element)
+        if self._is_missing(element):
+            if element.tag == "texture":
+                return prop(element.name, [0.5])
+            element.type = STAND_INS[element.tag]
+        if (element.tag, element.type) not in RULES and (succeeded := self._succeeded(element)) is not element:
+            return succeeded
+        rule = RULES.get((element.tag, element.type))
+        result = (rule(self, element) if rule else None) or element
+        entries = [PLUGINS[element.tag].get(type) for type in (was, element.type)]
+        supplied = next((it.supplied for it in entries if it and it.type == element.type), {})
+        for name in [name for name in supplied if name not in element]:
+            element.set(name, supplied[name])
+        held = {self.resolved(it).tag for it in element.children}
+        if element.tag == "shape" and "medium" in held and not held & {"bsdf", "emitter"}:
+            element.children.append(plugin("bsdf", "null"))
+        if element.tag == "sensor" and "to_world" in element:
+            _normalize(element.to_world())
+        for it in result.walk():
+            self._clean(it, was)
+        return result
 
-    def _left_out(self, element: Element, result: Element) -> None:
-        """Say which properties of a plugin are not in what it has become."""
-        there = list(result.walk())
-        used = {"ensure_energy_conservation", *(text for it in there for text in (it.name, it.value) if text)}
-        for child in element.children:
-            if child.tag not in ("bsdf", "ref") and child not in there and not {child.name, child.value} & used:
-                self.dropped(child, f"{child.name or child.type} of {element.type}")
-
-    def _last_of_each_name(self, element: Element) -> None:
-        """Leave out the properties that a later one of the same name replaces, or a texture at any place."""
+    def _sort_names(self, element: Element) -> None:
+        """Give properties their names in Mitsuba 3, and leave out those that a later one of the same name replaces, or
+        a texture at any place."""
+        entry = PLUGINS[element.tag].get(element.type)
+        names = entry.renamed if entry else {}
+        for child in element.of(*PROPERTIES, *COLOURS, "texture", "ref", "volume"):
+            if child.name in names:
+                self.changed(child, f"{child.name} of {element.type} is {names[child.name]}")
+                if names[child.name] in element and child.tag not in ("texture", "ref"):  # which counts, in any order
+                    element.children.remove(child)
+                    element.children.insert(0, child)
+                child.name = names[child.name]
         named = [it for it in element.children if it.name and self.resolved(it).tag in (*PROPERTIES, "rgb", "texture")]
         last = {it.name: it for it in sorted(named, key=lambda it: it.tag in ("texture", "ref"))}
         for extra in (it for it in named if it is not last[it.name]):
             element.children.remove(extra)
             self.dropped(extra, f"{extra.name} of {element.type}, which is given twice")
+        for child in last.values():
+            checks = colours(self.resolved(child))
+            if child.name in NUMBERS and len(checks) == 2:
+                # Mitsuba 3 swaps the two where it reads a checkerboard as a number, up to 3.9 at least.
+                swapped = self.resolved(child).copy(child.name)
+                for name, it in zip(("color1", "color0"), checks, strict=True):
+                    swapped.set(name, float(np.mean(it.numbers())))
+                element.children[element.children.index(child)] = swapped
 
     def _succeeded(self, element: Element) -> Element | None:
         """Return a plugin under its name in Mitsuba 3, or what is nearest to it."""
         kind, was = element.tag, element.type
-        new = SUCCESSORS.get(kind, {}).get(was, was)
-        if not new:
-            self.changed(element, f"the {kind} {was} is the one in it")
-            return next(iter(element.of(kind)), None) or Element(kind, {"type": NEAREST.get(kind, "constvolume")})
-        if new in KNOWN[kind]:
-            if new != was:
-                self.approximated(element, f"the {kind} {was} is {new}")
-            element.type = new
+        new = PLUGINS[kind].get(was) or PLUGINS[kind].get("")
+        if new and new.type == was:
             return element
-        if kind == "texture":
-            self.approximated(element, f"the texture {was} has no successor; it is a constant colour")
-            given = next(iter(element.of("rgb")), colour("", 0.5))
-            return Element("rgb", {"name": element.name, "value": given.value})
-        if kind not in NEAREST:
+        inner, text = next((it for it in element.children if self.resolved(it).tag == kind), None), "the one in it"
+        if inner is None and new is None and kind == "texture":
+            inner, text = next(iter(element.of("rgb")), prop("", [0.5])), "a constant colour; it has no successor"
+        if inner:
+            self.approximated(element, f"the {kind} {was} is {text}")
+            for child in element.children:
+                if child is not inner:
+                    self.dropped(child, f"{child.label} of {was}")
+            return inner
+        if new is None:
             self.dropped(element, f"the {kind} {was} has no successor")
             return None
-        nearest = "volpath" if kind == "integrator" and self.has_media else NEAREST[kind]
-        self.approximated(element, f"the {kind} {was} is {nearest}")
-        if kind == "bsdf":
-            return Element(kind, {"type": nearest}, [it for it in element.children if it.name == "reflectance"])
-        element.type = nearest
+        element.type = "volpath" if kind == "integrator" and self.has_media else new.type
+        self.approximated(element, f"the {kind} {was} is {element.type}")
         return element
 
-    def _cleaned(self, element: Element) -> Element:
-        """Return a plugin without the properties that it does not have in Mitsuba 3, all the way down."""
-        if element.tag not in OBJECTS or element.type not in KNOWN.get(element.tag, {}):
-            return element
-        known = KNOWN[element.tag][element.type].split()
-        kept = []
-        for child in element.children:
-            is_object = child.tag in OBJECTS or child.tag == "ref"
-            free = is_object and (
-                not child.name or child.tag in ("medium", "bsdf", "film", "sampler", "shape", "emitter")
-            )
-            inside = child.name in ("interior", "exterior") or (is_object and "*" in known)
-            if child.name in known or free or inside:
-                if child.scale and child.tag == "texture":
-                    self.approximated(child, "the texture scale of a bitmap has no successor; it is left out")
-                    child.scale = None
-                kept.append(child)
-            elif child.name != "ensure_energy_conservation":
-                self.dropped(child, f"{child.name or child.tag} of {element.type}, which Mitsuba 3 does not have")
-        element.children = [self._cleaned(child) for child in kept]
-        return element
+    def _clean(self, element: Element, was: str) -> None:
+        """Leave out the properties that a plugin does not have in Mitsuba 3."""
+        entry = PLUGINS.get(element.tag, {}).get(element.type)
+        for child in [*element.children] if entry else ():
+            if entry and not {child.name, f"<{self.resolved(child).tag}>"} & entry.known:
+                element.children.remove(child)
+                if child.name != "ensure_energy_conservation":
+                    self.dropped(child, f"{child.label} of {was}, which Mitsuba 3 does not have")
+            elif child.scale != [1.0]:
+                self.approximated(child, "the texture scale of a bitmap has no successor; it is left out")
+                element.children[element.children.index(child)] = replace(child, scale=[1.0])
 
-    # --- Files -------------------------------------------------------------------------------------------------------
-
-    def _without_files(self, element: Element) -> Element | None:
-        """Return a plugin with the names of its files as Mitsuba 3 finds them, or a stand-in where one is missing."""
+    def _is_missing(self, element: Element) -> bool:
+        """Write the name of a plugin's file as Mitsuba 3 finds it, or leave out what a stand-in has not."""
         given = element["filename"]
-        if not given or element.tag not in ("shape", "texture", "emitter", "volume"):
-            return element
-        name = given.value
-        found = self._file(name)
-        if found is not None:
-            given.attributes["value"] = os.path.relpath(found, self.folder) if not os.path.isabs(name) else str(found)
-            return element
-        where = f"{element.place}: there is no file {name}"
+        if given is None or element.tag not in STAND_INS:
+            return False
+        names = (given.value, given.value.replace("\\", "/"))  # which may have been written on Windows
+        if found := next((it for name in names if os.path.isfile(it := self.path.parent / name)), None):
+            given.value = str(found) if os.path.isabs(given.value) else os.path.relpath(found, self.folder)
+            return False
         if not self.lenient:
-            self.missing.append(where)
-        self.changed(element, f"{name} is missing", "replaced")
-        if element.tag == "texture":
-            return colour(element.name, 0.5)
-        if element.tag == "emitter":
-            return Element("emitter", {"type": "constant"}, place=element.place)
-        if element.tag == "volume":
-            return Element("volume", {"type": "constvolume"}, [number("float", "value", "1")], element.place)
-        kept = [
-            it for it in element.children if it.name == "to_world" or it.tag in ("bsdf", "emitter", "ref", "medium")
-        ]
-        return Element("shape", {"type": "cube"}, kept, element.place)
+            self.missing.append(f"{element.place}: there is no file {given.value}")
+        self.said("replaced", element, f"{given.value} is missing")
+        kept = "to_world" if element.tag == "shape" else ""
+        element.children = [it for it in element.children if it.tag not in PROPERTIES or it.name == kept]
+        return True
 
-    def _file(self, name: str) -> Path | None:
-        """Return the file of a name, which may have been written on Windows."""
-        return next(
-            (it for text in (name, name.replace("\\", "/")) if os.path.isfile(it := self.path.parent / text)), None
-        )
-
-    def maxima(self, texture: Element | None, default: float) -> list[float]:
+    def maxima(self, texture: Element) -> np.ndarray:
         """Return the largest value in each channel, as 0.6 knows it."""
-        if texture is None:
-            return [default]
-        texture = self.resolved(texture)
-        if texture.tag in ("rgb", "float"):
-            return channels(texture)
+        if constants := colours(texture):
+            return np.max([np.broadcast_to(it.numbers(1, 3), 3) for it in constants], axis=0)
+        most: Any = 1.0
         if texture.type == "bitmap" and (name := texture["filename"]):
             try:
                 bitmap = mi.Bitmap(str(self.folder / name.value))
             except RuntimeError as error:
-                raise ValueError(f"{name.value} cannot be read: {error}") from None
+                raise texture.error(f"{name.value} cannot be read: {error}") from None
             raw = texture.text("raw") == "true"
             linear = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=bitmap.srgb_gamma() and raw)
-            pixels = np.array(linear)[..., :3]
-            most = np.maximum(pixels.reshape(-1, pixels.shape[-1]).max(axis=0), 0).tolist()
-        elif texture.type == "checkerboard":
-            both = [self.maxima(texture[name], given) for name, given in CHECKS.items()]
-            most = [max(one[k % len(one)] for one in both) for k in range(3)]
-        else:
-            most = [1.0]
-        scale = texture.scale or [1.0]
-        return [most[k % len(most)] * scale[k % len(scale)] for k in range(max(len(most), len(scale)))]
+            most = np.maximum(np.array(linear)[..., :3].max(axis=(0, 1)), 0)
+        return np.broadcast_to(most * np.array(texture.scale), 3)
 
 
 def _normalize(transform: Element) -> None:
     """Take the scale out of the transform of a sensor, in place, which Mitsuba 3 refuses."""
-    if not any(step.tag in ("scale", "matrix") for step in transform.children):
+    if not transform.of("scale", "matrix"):
         return
-    transforms = importlib.import_module("mitsuba.scalar_rgb").ScalarTransform4f  # which needs no variant
-    matrix = np.eye(4)
-    for step in transform.children:
-        matrix = np.array(_matrix(transforms(), step)) @ matrix
-    if not np.isfinite(matrix).all():
-        raise ValueError("its transform is not finite, or looks nowhere")
-    u, _, v = np.linalg.svd(matrix[:3, :3])
+    importlib.import_module("mitsuba.scalar_rgb")  # which knows what a transform is
+    text = Element("scene", {"version": "3.0.0"}, [plugin("shape", "sphere", transform)]).to_xml()
+    try:
+        parsed = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), text)
+        matrix = np.array(parsed.nodes[1].props["to_world"].matrix)
+        u, _, v = np.linalg.svd(matrix[:3, :3])
+    except (RuntimeError, np.linalg.LinAlgError):
+        raise transform.error("it is no transform, or looks nowhere") from None
     matrix[:3, :3] = u @ v
     transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in matrix.ravel())})]
-
-
-def _matrix(identity: Any, step: Element) -> Any:
-    """Return the matrix of one step of a transform."""
-    given = step.attributes
-    if step.tag == "matrix":
-        return np.reshape(channels(step), (4, 4))
-    if step.tag == "lookat":
-        points = {name: channels(Element("", {"value": given.get(name, "0, 1, 0")})) for name in LOOK_AT}
-        return identity.look_at(**points).matrix
-    default = (channels(step) if step.value else [1.0 if step.tag == "scale" else 0.0]) * 3
-    triple = [float(given.get(axis, default[k])) for k, axis in enumerate("xyz")]
-    if step.tag == "rotate":
-        return identity.rotate(triple, float(given.get("angle", 0))).matrix
-    return (identity.scale if step.tag == "scale" else identity.translate)(triple).matrix

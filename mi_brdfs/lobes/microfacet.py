@@ -7,7 +7,7 @@ import mitsuba as mi
 
 from ..math import EPSILON, Spectrum, safe_sqrt
 from ..microfacet.facet import Cosines, Facet
-from ..microfacet.sampling import Mixture
+from ..microfacet.sampling import MixedProposals
 from ..microfacet.shadowing import Shadowing
 from ..microfacet.terms import Directions, Distribution, Fresnel
 from .lobe import Lobe
@@ -99,7 +99,7 @@ class MicrofacetLobe(Lobe):
     def _sampler(self, wi: mi.Vector3f) -> Directions:
         sampler = self.shadowing.sampler(self.distribution, self.fresnel, wi, self._reflect)
         forward = self.fresnel.forward(self.distribution, wi)
-        return sampler if forward is None else Mixture(sampler, forward, forward.share)
+        return sampler if forward is None else MixedProposals(sampler, forward, forward.share)
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.colour * self.fresnel(wi.z)

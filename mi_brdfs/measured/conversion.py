@@ -18,14 +18,14 @@ from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
 from .arrays import NUMPY, components, stacked
-from .coordinates import spherical, turned_about_normal
+from .coordinates import turned_about_normal
 from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
 from .report.counts import census
 from .report.summary import ends
 from .scattered import as_grid
-from .source import Source, batches
+from .source import Source, batches, pairs
 
 PAIRS = 1 << 15
 BAKED_TO = 80
@@ -83,7 +83,20 @@ def convert(
     if path.exists() and not path.is_file():
         raise ValueError(f"{named(path)} is not a regular file; give the name of one")
     writer = _writer(path, format)
-    source, losses = _source(given)
+    losses: list[str] = []
+    if isinstance(given, Source):
+        source = given
+    elif isinstance(given, (str, Path, Measurement)):
+        measurement = given if isinstance(given, Measurement) else read(given)
+        source = _of_measurement(measurement)
+        losses += _not_measured(measurement)
+    else:
+        probe = _probe(given)
+        source = _baked(probe)
+        losses += _left_out(probe)
+    if source.wavelengths is not None and not np.isfinite(source.wavelengths).all():
+        source = source.rgb()
+        losses.append(GREY)
     with replacing(path) as part:
         writer.write(part, source)
         rms, largest, more = _compared(source, read(part))
@@ -122,35 +135,20 @@ def _baked(probe: BSDFProbe) -> Source:
         f = [probe.eval(probe.whole, wi[k], wo[k]) / np.maximum(wo[k, 2:], 1e-12) for k in parts]
         return usable(np.concatenate(f))
 
-    wi, wo = _pairs(PAIRS)
-    f, turned = evaluate(wi, wo), evaluate(_turned(wi), _turned(wo))
+    wi, wo = pairs(PAIRS)
+    # Each pair is turned by another angle.
+    turns = np.linspace(0, 2 * np.pi, PAIRS)
+    f, turned = evaluate(wi, wo), evaluate(*(stacked(turned_about_normal(components(w), turns)) for w in (wi, wo)))
     if not f.any():
         raise ValueError("the BSDF reflects nothing on its front side: there is no value to write")
     return Source(evaluate, anisotropic=not _alike(f, turned), material=name_of(probe.bsdf))
-
-
-def _source(given: Any) -> tuple[Source, list[str]]:
-    """Return what to write, and what is known to be lost."""
-    if isinstance(given, Source):
-        return given, []
-    if isinstance(given, (str, Path)):
-        given = read(given)
-    if isinstance(given, Measurement):
-        return _of_measurement(given), list(_not_measured(given))
-    probe = _probe(given)
-    return _baked(probe), list(_left_out(probe))
 
 
 def _of_measurement(measurement: Measurement) -> Source:
     grid = as_grid(measurement.data)
     if not grid.usable.any():
         raise ValueError(f"{named(measurement.path)} has no positive value: there is nothing to write")
-    source = Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
-    return source.rgb() if _is_unstated(measurement.wavelengths) else source
-
-
-def _is_unstated(wavelengths: Array | None) -> bool:
-    return wavelengths is not None and not np.isfinite(wavelengths).all()
+    return Source(grid.evaluate, measurement.wavelengths, grid.anisotropic, measurement.material)
 
 
 def _not_measured(measurement: Measurement) -> Iterator[str]:
@@ -167,8 +165,6 @@ def _not_measured(measurement: Measurement) -> Iterator[str]:
     told = [f"{name} {low:.4g} to {high:.4g}°" for name, low, high in ranges if low > NEAR_NORMAL or high < BAKED_TO]
     if told:
         yield f"It was measured for {' and '.join(told)}; what lies beyond has the values at the border."
-    if _is_unstated(measurement.wavelengths):
-        yield GREY
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
@@ -177,7 +173,7 @@ def _left_out(probe: BSDFProbe) -> Iterator[str]:
         yield "Its reflection or transmission in single directions (delta functions) is left out."
     if any(part.has(mi.BSDFFlags.Transmission) for part in probe.components):
         yield "The light that it transmits is left out."
-    wi, wo = (np.float32(w) for w in _pairs(PAIRS))
+    wi, wo = (np.float32(w) for w in pairs(PAIRS))
     elsewhere = np.random.default_rng(2).random((PAIRS, 2), np.float32)
     if not _alike(probe.eval(probe.whole, wi, wo), probe.eval(probe.whole, wi, wo, elsewhere)):
         yield f"It varies over the surface; this is how it is at texture coordinates {CENTRE}."
@@ -206,70 +202,34 @@ def _writer(path: Path, format: str | None) -> ModuleType:
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:
     """Return the root mean square error, the largest, and what was lost on the way."""
     grid = as_grid(written.data)
-    losses = []
+    other, losses = Source(grid.evaluate, written.wavelengths), []
     if source.wavelengths is not None and written.wavelengths is None:
         count = len(source.wavelengths)
         losses.append(f"Its {count} wavelengths became linear sRGB, as seen under D65." if count > 1 else GREY)
     if source.wavelengths is None or written.wavelengths is None:
-        source, written_as = source.rgb(), Source(grid.evaluate, written.wavelengths).rgb()
-    else:
-        written_as = Source(grid.evaluate)
-    wi, wo = _pairs(PAIRS)
-    found = [_differences(source, written_as, wi[k], wo[k]) for k in batches(PAIRS, grid.values.shape[-1])]
+        source, other = source.rgb(), other.rgb()
+    wi, wo = pairs(PAIRS)
+    # By how much f cosθo differs, what it is, and by how much that with the directions exchanged differs, where that is
+    # the most of all channels.
+    found = []
+    for k in batches(PAIRS, grid.values.shape[-1]):
+        cosine = wo[k, 2:]
+        f = source.evaluate(wi[k], wo[k]) * cosine
+        error, change = other.evaluate(wi[k], wo[k]) * cosine - f, source.evaluate(wo[k], wi[k]) * cosine - f
+        found.append([abs(error).max(axis=-1), f.max(axis=-1), abs(change).max(axis=-1)])
     error, brightest, changes = np.concatenate(found, axis=1)
     peak = brightest.max() or 1.0
-    if grid.coordinates.reciprocal:
-        change = changes.max() / peak
-        if change > ALIKE:
-            losses.append(
-                f"{written.format} is reciprocal: f is the mean over both orders of the directions, between which f "
-                f"cosθ differs by up to {_percent(change)} of its peak."
-            )
-    cells = _cells(grid, wi, wo)
+    if grid.coordinates.reciprocal and changes.max() > ALIKE * peak:
+        losses.append(
+            f"{written.format} is reciprocal: f is the mean over both orders of the directions, between which f "
+            f"cosθ differs by up to {_percent(changes.max() / peak)} of its peak."
+        )
+    places, _ = grid.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
+    cells = np.stack([np.interp(x, a.nodes, np.arange(len(a.nodes))) for a, x in zip(grid.axes, places, strict=True)])
     far = (abs(cells - cells[:, [brightest.argmax()]]) > 1).any(axis=0)
     return float(np.sqrt(np.mean(error**2)) / peak), float(error[far].max(initial=0) / peak), losses
-
-
-def _differences(source: Source, other: Source, wi: Array, wo: Array) -> Array:
-    """Return by how much f cosθo differs, what it is, and by how much it differs from that with the directions
-    exchanged, where that is the most of all channels: shape (3, N)."""
-    cosine = wo[:, 2:]
-    f = source.evaluate(wi, wo) * cosine
-    error, change = other.evaluate(wi, wo) * cosine - f, source.evaluate(wo, wi) * cosine - f
-    return np.stack([abs(error).max(axis=-1), f.max(axis=-1), abs(change).max(axis=-1)])
 
 
 def _percent(part: float) -> str:
     percent = 100 * part
     return "less than 0.001 %" if percent < 0.001 else f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
-
-
-def _cells(grid: Grid, wi: Array, wo: Array) -> Array:
-    """Return where directions lie on the axes of a grid, counted in cells, shape (axes, N)."""
-    places, _ = grid.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
-    return np.stack([np.interp(x, a.nodes, np.arange(len(a.nodes))) for a, x in zip(grid.axes, places, strict=True)])
-
-
-def _pairs(count: int) -> tuple[Array, Array]:
-    """Draw pairs of directions up to 80° from the normal, always the same: ``wi`` cosine-weighted, ``wo`` cosine-
-    weighted or around the mirror direction, by half vectors whose angles are log-uniform from 0.05° to 30°."""
-    rng = np.random.default_rng(1)
-    wi = _lambertian(rng, count)
-    tilt, azimuth = np.radians(np.exp(rng.uniform(np.log(0.05), np.log(30), count))), rng.uniform(0, 2 * np.pi, count)
-    h = stacked(spherical(tilt, azimuth))
-    mirrored = 2 * np.sum(wi * h, axis=-1, keepdims=True) * h - wi
-    wo = np.where((np.arange(count) % 2 == 0) & (mirrored[:, 2] > LOWEST), mirrored.T, _lambertian(rng, count).T).T
-    return wi, wo
-
-
-LOWEST = np.cos(np.radians(BAKED_TO))
-
-
-def _lambertian(rng: np.random.Generator, count: int) -> Array:
-    cosine, phi = np.sqrt(rng.uniform(LOWEST**2, 1, count)), rng.uniform(0, 2 * np.pi, count)
-    return stacked(spherical(np.arccos(cosine), phi))
-
-
-def _turned(w: Array) -> Array:
-    """Return directions turned about the normal, each by another angle."""
-    return stacked(turned_about_normal(components(w), np.linspace(0, 2 * np.pi, len(w))))

@@ -17,15 +17,14 @@ TWO_PI = 2 * np.pi
 
 
 class Coordinates:
-    """Where pairs of directions lie on the axes of a grid."""
+    """Where pairs of directions lie on the axes of a grid; by itself, for what depends on no direction."""
 
-    names: tuple[str, ...]
+    names: tuple[str, ...] = ()
     """The axes, in the order of the array's."""
     poles: tuple[tuple[int, int], ...] = ()
     """Pairs of axes, of a polar angle and of an azimuth that means nothing where that is 0."""
     reciprocal = False
     """Whether exchanging the two directions changes nothing."""
-
     anisotropic = False
     """Whether turning both directions about the normal changes the place."""
     mirrored = False
@@ -34,7 +33,7 @@ class Coordinates:
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
         """Return the value on each axis for directions by component, x, y and z, of NumPy arrays or Dr.Jit floats;
         ``xp`` has the functions of the one or the other (:mod:`mi_brdfs.measured.arrays`)."""
-        raise NotImplementedError
+        return ()
 
     def locate_scaled(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[tuple[Any, ...], Any]:
         """Return ``(places, scale)``: the values on the axes, and by what the grid's values are multiplied to be f,
@@ -88,23 +87,9 @@ class HalfDifference(Coordinates):
         root, theta_d, phi_d, *phi_h = places
         theta_h = np.square(root) * (np.pi / 2)
         d = spherical(theta_d, phi_d)
-
-        def at_h(x: Any, y: Any, z: Any) -> SimpleNamespace:
-            turned = vector(
-                x * np.cos(theta_h) + z * np.sin(theta_h), y + 0 * theta_h, z * np.cos(theta_h) - x * np.sin(theta_h)
-            )
-            return turned_about_normal(turned, phi_h[0]) if phi_h else turned
-
-        return at_h(d.x, d.y, d.z), at_h(-d.x, -d.y, d.z)
-
-
-class PolarAngle(Coordinates):
-    """The angle θi alone, for what depends on nothing else."""
-
-    names = ("theta_i",)
-
-    def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
-        return (polar_angle(wi, xp),)
+        pair = (tilted(vector(side * d.x, side * d.y, d.z), theta_h) for side in (1, -1))
+        wi, wo = (turned_about_normal(w, phi_h[0]) for w in pair) if phi_h else pair
+        return wi, wo
 
 
 class Spherical(Coordinates):
@@ -158,13 +143,7 @@ class SpecularPolar(Coordinates):
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         theta_i, azimuth, radial, *phi_i = places
-        about = spherical(radial, azimuth)
-        wo = vector(
-            about.x * np.cos(theta_i) - about.z * np.sin(theta_i),
-            about.y + 0 * theta_i,
-            about.x * np.sin(theta_i) + about.z * np.cos(theta_i),
-        )
-        phi = phi_i[0] if phi_i else np.zeros(())
+        wo, phi = tilted(spherical(radial, azimuth), -theta_i), phi_i[0] if phi_i else np.zeros(())
         return spherical(theta_i, phi), turned_about_normal(wo, phi)
 
 
@@ -190,6 +169,12 @@ def wrapped(angle: Any, period: float, xp: SimpleNamespace = NUMPY) -> Any:
 def spherical(theta: Any, phi: Any) -> SimpleNamespace:
     """Return the unit vectors of polar angles θ and azimuths φ, NumPy arrays."""
     return vector(np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta) + 0 * phi)
+
+
+def tilted(w: SimpleNamespace, theta: Any) -> SimpleNamespace:
+    """Return directions turned about y, by which the normal comes to the polar angle θ towards x."""
+    cos, sin = np.cos(theta), np.sin(theta)
+    return vector(w.x * cos + w.z * sin, w.y + 0 * theta, w.z * cos - w.x * sin)
 
 
 def turned_about_normal(w: SimpleNamespace, phi: Any) -> SimpleNamespace:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..parameters.messages import brief, printable
 from .arrays import NUMPY, components, stacked
-from .coordinates import Coordinates
+from .coordinates import Coordinates, polar_angle
 
 Interpolation = Literal["trilinear", "nearest"]
 Extrapolation = Literal["hold", "zero"]
@@ -96,10 +96,10 @@ def corners(
 
 
 MOST_CHANNELS = 4096
-AT_ONCE = 1 << 20
-"""The most values that are filled in together."""
 MARGIN = 1e-5
 """By how much a float32 angle may miss the end of an axis."""
+LEEWAY = 1e-3
+"""By how much an angle may miss the range of samples, whose angles are written with few digits."""
 
 
 @dataclass(frozen=True)
@@ -182,29 +182,18 @@ class Grid:
     def _filled(self) -> np.ndarray:
         """Return the values, with the mean of the measured neighbours along an axis in place of missing ones: one axis
         after the other, which also reaches the corners of cells."""
-        if not np.isnan(self.values).any():
-            return self.values
-        filled = self.values.copy()
-        channels = filled.shape[-1]
-        together = max(1, AT_ONCE * channels // filled.size)
-        for first in range(0, channels, together):
-            part = filled[..., first : first + together]
-            values, stride = part.flatten(), part.size
-            missing = np.flatnonzero(np.isnan(values))
-            for axis in self.axes:
-                count = len(axis.nodes)
-                stride //= count
-                k = missing // stride % count
-                near = []
-                for step in (-1, 1):
-                    other = (k + step) % count
-                    value = values[missing + (other - k) * stride]
-                    near.append(np.where((axis.period is not None) | (other == k + step), value, np.nan))
-                lower, upper = near
-                mean = np.where(np.isnan(upper), lower, lower / 2 + upper / 2)
-                values[missing] = np.where(np.isnan(lower), upper, mean)
-            part[...] = values.reshape(part.shape)
-        return filled
+        values, missing = self.values, np.isnan(self.values)
+        for k, axis in enumerate(self.axes if missing.any() else ()):
+            near = []
+            for step, end in ((1, 0), (-1, -1)):
+                other = np.roll(values, step, axis=k)
+                if axis.period is None:
+                    np.moveaxis(other, k, 0)[end] = np.nan
+                near.append(other)
+            lower, upper = near
+            mean = np.where(np.isnan(upper), lower, lower / 2 + upper / 2)
+            values = np.where(missing, np.where(np.isnan(lower), upper, mean), values)
+        return values
 
     def evaluate(
         self,
@@ -263,8 +252,31 @@ class Samples:
     values: np.ndarray
     anisotropic: bool
 
-    def pairs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.wi, self.wo, self.values
+    def pairs(self, chosen: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.wi[chosen], self.wo[chosen], self.values[chosen]
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """Which samples have values in all channels."""
+        return np.isfinite(self.values).all(axis=1)
+
+    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        """Return whether directions are above the horizon, and their polar angles, exchanged or not, within the ranges
+        of the samples' own. Shapes are those of :meth:`Grid.measured`."""
+        (low_i, high_i), (low_o, high_o) = self._ranges
+        theta_i, theta_o = polar_angle(components(wi)), polar_angle(components(wo))
+
+        def within(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+            return (low_i <= first) & (first <= high_i) & (low_o <= second) & (second <= high_o)
+
+        above = (theta_i < np.pi / 2) & (theta_o < np.pi / 2)
+        return above & (within(theta_i, theta_o) | within(theta_o, theta_i))
+
+    @cached_property
+    def _ranges(self) -> list[tuple[float, float]]:
+        """The ends of the polar angles of wi and of wo, and a little more."""
+        angles = [polar_angle(components(it[self.known])) for it in (self.wi, self.wo)]
+        return [(each.min() - LEEWAY, each.max() + LEEWAY) for each in angles]
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import NUMPY, components, stacked
-from .coordinates import HalfDifference, polar_angle
+from .coordinates import HalfDifference
 from .measurement import Axis, Extrapolation, Grid, Samples
 
 NEIGHBOURS = 10
@@ -44,7 +44,7 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     Raises:
         ValueError: if no sample has a value.
     """
-    known = np.all(np.isfinite(samples.values), axis=1)
+    known = samples.known
     if not np.any(known):
         raise ValueError("No sample has a value.")
     wi, wo, anisotropic = samples.wi[known], samples.wo[known], samples.anisotropic
@@ -57,10 +57,9 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     # Isotropic tables are symmetric about φd = π/2.
     counted = [axis.nodes if k != 2 or anisotropic else axis.nodes[:half] for k, axis in enumerate(axes)]
     light, view = coordinates.directions(*np.meshgrid(*counted, indexing="ij"))
-    asked = (light.z > 0) & (view.z > 0)
-    if extrapolate == "zero":
-        asked &= measured(wi, wo, polar_angle(light), polar_angle(view))
-    nodes = embedded(stacked(light)[asked], stacked(view)[asked], anisotropic)
+    pairs = stacked(light), stacked(view)
+    asked = samples.measured(*pairs) if extrapolate == "zero" else (light.z > 0) & (view.z > 0)
+    nodes = embedded(pairs[0][asked], pairs[1][asked], anisotropic)
     table = np.full((*asked.shape, values.shape[1]), np.nan)
     table[asked] = interpolated(points, values, nodes)
     if not anisotropic:
@@ -116,18 +115,6 @@ def spread(places: np.ndarray, brightness: np.ndarray, end: float, count: int) -
         share = share + below[np.searchsorted(places[order], x, side="right")] / below[-1]
     share[0], share[-1] = 0, 3
     return np.interp(np.linspace(0, 3, count), share, x)
-
-
-def measured(
-    wi: np.ndarray, wo: np.ndarray, theta_i: np.ndarray, theta_o: np.ndarray, margin: float = 1e-3
-) -> np.ndarray:
-    """Return which polar angles lie within those of samples, exchanged or not."""
-    ranges = [(angles.min() - margin, angles.max() + margin) for angles in map(polar_angle, map(components, (wi, wo)))]
-
-    def within(*angles: np.ndarray) -> np.ndarray:
-        return np.all([(low <= a) & (a <= high) for a, (low, high) in zip(angles, ranges, strict=True)], axis=0)
-
-    return within(theta_i, theta_o) | within(theta_o, theta_i)
 
 
 def interpolated(points: np.ndarray, values: np.ndarray, nodes: np.ndarray) -> np.ndarray:

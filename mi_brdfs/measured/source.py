@@ -8,7 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..observer import to_srgb
+from .arrays import stacked
+from .coordinates import spherical
 
+LOWEST = np.cos(np.radians(80))
+"""The cosine to the normal up to which BRDFs are compared."""
 AT_ONCE = 1 << 22
 """The most values that are evaluated together."""
 
@@ -21,7 +25,7 @@ class Source:
     """Returns f in 1/sr, float64 of shape (N, channels), for ``wi`` and ``wo`` of shape (N, 3); both are unit
     vectors above the horizon."""
     wavelengths: np.ndarray | None = None
-    """In nm, one a channel; None where the channels are linear sRGB."""
+    """In nm, one a channel; None where the channels are linear sRGB. Writers take no unknown ones (NaN)."""
     anisotropic: bool = False
     material: str = ""
 
@@ -48,6 +52,23 @@ class Source:
                 f"{len(self.wavelengths):,} wavelengths at {pairs:,} pairs of directions would be more values than the "
                 f"{most:,} that are written; keep at most {most // pairs:,} of them"
             )
+
+
+def pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw pairs of directions up to 80° from the normal, always the same: ``wi`` cosine-weighted, ``wo`` cosine-
+    weighted or around the mirror direction, by half vectors whose angles are log-uniform from 0.05° to 30°."""
+    rng = np.random.default_rng(1)
+
+    def lambertian() -> np.ndarray:
+        cosine, phi = np.sqrt(rng.uniform(LOWEST**2, 1, count)), rng.uniform(0, 2 * np.pi, count)
+        return stacked(spherical(np.arccos(cosine), phi))
+
+    wi = lambertian()
+    tilt, azimuth = np.radians(np.exp(rng.uniform(np.log(0.05), np.log(30), count))), rng.uniform(0, 2 * np.pi, count)
+    h = stacked(spherical(tilt, azimuth))
+    mirrored = 2 * np.sum(wi * h, axis=-1, keepdims=True) * h - wi
+    near = (np.arange(count) % 2 == 0) & (mirrored[:, 2] > LOWEST)
+    return wi, np.where(near[:, None], mirrored, lambertian())
 
 
 def batches(pairs: int, channels: int) -> Iterator[slice]:

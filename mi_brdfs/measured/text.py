@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -33,7 +34,7 @@ class TextFile:
     """Reads a text file line by line, in UTF-8, UTF-16 with its mark, or Latin-1, with any line ends."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.size, self.line = path, path.stat().st_size, 0
+        self.path, self.line = path, 0
         self.comments: list[str] = []
         self.row_lines = array("q")
         with path.open("rb") as file:
@@ -102,7 +103,6 @@ class TextFile:
         Raises:
             FileError: if there are fewer or more; ``what`` says in plural what they are, and ``each`` what one is.
         """
-        self.expect(count, what)
         found: list[float] = []
         for row in rows:
             found += self.numbers(row, each).tolist()
@@ -112,14 +112,14 @@ class TextFile:
                 return np.array(found)
         raise self.error(f"the file ends after {len(found)} of {count} {what}")
 
-    def expect(self, count: int, what: str) -> None:
-        """Refuse a count of numbers for which the file is too small: a digit and a separator each.
-
-        Raises:
-            FileError: if it is.
-        """
-        if 2 * count > self.size + 1:
-            raise self.error(f"{count:,} {what} are announced, but the file has {self.size:,} bytes")
+    def stated(self, *names: str) -> str:
+        """Return what a comment ``name: …`` or ``name = …`` says, of the first of the names, regular expressions, that
+        has one."""
+        for name in names:
+            for comment in self.comments:
+                if match := re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment):
+                    return match[1]
+        return ""
 
 
 def encoding(head: bytes) -> str:

@@ -87,14 +87,11 @@ class Map:
     """Values on a regular grid over the unit square, shape (rows, columns), interpolated between."""
 
     def __init__(self, values: np.ndarray) -> None:
-        self._values = values.astype(np.float64)
+        self._values = values.astype(np.float64).ravel()
+        self._axes = [Axis(np.linspace(0, 1, count)) for count in values.shape]
 
     def eval(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        height, width = self._values.shape
-        row, y = patch(y, height)
-        column, x = patch(x, width)
-        low, high = ((1 - x) * self._values[row + k, column] + x * self._values[row + k, column + 1] for k in (0, 1))
-        return (1 - y) * low + y * high
+        return sum(weight * self._values[k] for k, weight in corners(zip(self._axes, (y, x), strict=True)))
 
 
 class MitsubaMap:

@@ -176,7 +176,7 @@ class Conductor(Interface):
         return dr.select(steep, larger, smaller), dr.select(steep, smaller, larger)
 
     def brightness(self, cos: mi.Float) -> mi.Float:
-        # Of channels that differ much the mean index may reflect next to nothing where they do.
+        # Of channels that differ much the mean index may reflect almost nothing where they do.
         k2 = dr.square(self.k)
         normal = (dr.square(self.eta - 1) + k2) / (dr.square(self.eta + 1) + k2)
         return dr.maximum(Conductor(luminance(self.eta), luminance(self.k))(cos), 0.5 * luminance(normal))

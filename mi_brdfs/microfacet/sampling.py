@@ -4,7 +4,7 @@ side. docs/sampling.md derives them.
 * :class:`ClippedNormals` proposes half vectors by the distribution, in some :class:`Law`, and
   :class:`.visible.VisibleNormals` those that ``wi`` sees.
 * :class:`Pair` takes a half vector or its image, in proportion to what they reflect.
-* :class:`Mixture` draws from one proposal or another, by shares.
+* :class:`MixedProposals` draws from one proposal or another, by shares.
 
 Which proposals suit a lobe is said by its terms: :meth:`.shadowing.Shadowing.sampler`,
 :meth:`.distributions.Distribution.visible_normals` and :meth:`.fresnel.Fresnel.forward`.
@@ -69,7 +69,7 @@ class Pair:
         return dr.maximum(weight, EPSILON)
 
 
-class Mixture:
+class MixedProposals:
     """One proposal, or with probability ``share`` another."""
 
     def __init__(self, proposal: Any, other: Any, share: mi.Float) -> None:
@@ -223,5 +223,5 @@ def clipped_normals(distribution: Distribution, fresnel: Fresnel, wi: mi.Vector3
         seen = lean * dr.inv_pi * slope2 * dr.square(bright)
         share = dr.minimum(seen / (seen + dr.square(dr.maximum(wi.z, EPSILON))), MOST)
         u, v = stretch(distribution, wi)
-        law = Mixture(law, Leaning(*normalize_or(u * wi.x, v * wi.y, (1, 0))), share)
+        law = MixedProposals(law, Leaning(*normalize_or(u * wi.x, v * wi.y, (1, 0))), share)
     return ClippedNormals(distribution, wi, law)

@@ -13,7 +13,7 @@ import mitsuba as mi
 from ..math import TINY
 from ..parameters import Choice, Number
 from .facet import Cosines, Facet
-from .sampling import Mixture, Pair, UniformDirections, clipped_normals
+from .sampling import MixedProposals, Pair, UniformDirections, clipped_normals
 from .terms import Directions, Distribution, Fresnel, Term
 
 MULTISCATTER = Choice(("none", "walk", "kulla-conty", "turquin"), "what becomes of light that facets reflect again")
@@ -62,7 +62,7 @@ class Shadowing(Term):
         pair = Pair(visible or clipped_normals(distribution, fresnel, wi, self.lean), reflect)
         # Few steep facets may reflect more than all others: uniform directions bound their weights.
         if visible is None and (self.favours_steep or (self.lean and distribution.long_tailed)):
-            return Mixture(pair, UniformDirections(), self.UNIFORM * dr.square(dr.square(1 - wi.z)))
+            return MixedProposals(pair, UniformDirections(), self.UNIFORM * dr.square(dr.square(1 - wi.z)))
         return pair
 
 

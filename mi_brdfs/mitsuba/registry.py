@@ -182,7 +182,7 @@ def list_models() -> list[str]:
 
 
 def plugin_names() -> set[str]:
-    """Return the names of all plugins, of the pack, of guests, and of Mitsuba."""
+    """Return the names of all plugins, of the pack, of third-party models, and of Mitsuba."""
     return {*_own_plugins(), *_builtins()}
 
 

@@ -91,7 +91,7 @@ class ConductorName(Parameter):
         self.limits = limits
 
     @property
-    def tried(self) -> tuple[str, ...]:
+    def choices(self) -> tuple[str, ...]:
         return ("none", *conductors())
 
     def bind(self, reader: PropertyReader) -> ConductorName:

@@ -115,6 +115,11 @@ class Parameter:
         return tuple(self.words)
 
     @property
+    def choices(self) -> tuple[Any, ...]:
+        """All that it may be, where that is a choice: its words, or the names of a library."""
+        return tuple(self.words)
+
+    @property
     def tried(self) -> tuple[Any, ...]:
         """Values that show what it does; none if nobody needs a picture of them."""
         return ()

@@ -208,7 +208,6 @@ class Choice(Chosen[str]):
 
     def __init__(self, choices: tuple[str, ...], text: str):
         super().__init__(text)
-        self.choices = choices
         self.words = {word: {} for word in choices}
 
     @property

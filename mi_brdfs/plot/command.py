@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from ..mitsuba.registry import plugin_names
-from ..parameters.messages import listed
 from ..probe.sources import degrees_of, shared, split, value_of
 from ..writing import replacing
-from . import albedo, cartesian, hemisphere, page, polar, sphere
+from . import albedo, cartesian, hemisphere, polar
 
-KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo, sphere)}
+KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo)}
 """The functions by the value of ``--kind``."""
-PICTURES, PAGES = (".png", ".svg", ".pdf", ".jpg"), (".html",)
 DPI = 200
 
 
@@ -75,14 +73,10 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
         raise ValueError(f"--azimuth {azimuth}: give degrees")
     options = {"angles": numbers, **options}
     taken = inspect.signature(KINDS[kind]).parameters
-    if numbers and "angle" in taken:
-        if len(numbers) > 1:
-            raise ValueError(f"--angles {angles}: {kind} shows one angle of incidence")
-        options["angle"], options["angles"] = numbers[0], None
     options = {name: value for name, value in options.items() if value is not None}
     for name in options:
         if name not in taken:
-            raise ValueError(f"--{name} does not apply to {kind}")
+            raise ValueError(f"--{name.replace('_', '-')} does not apply to {kind}")
     return options
 
 
@@ -103,28 +97,15 @@ def size_of(text: str | None) -> tuple[float, float] | None:
     return width, height
 
 
-def output_file(path: Path | None, kind: str, targets: Sequence[str]) -> Path:
-    """Return the file to write, by default one in the working directory, named after its content.
-
-    Raises:
-        ValueError: if this kind of figure cannot be written in the format of the name.
-    """
-    suffixes = PAGES if kind == "sphere" else PICTURES
-    if path is None:
-        words = ["bsdf" if word.startswith("<") else Path(split(word)[0]).stem for word in targets]
-        words = list(dict.fromkeys(words))
-        return Path(re.sub(r"[^\w-]+", "_", "-".join([*words, kind]))[-100:] + suffixes[0])
-    if path.suffix.lower() not in suffixes:
-        raise ValueError(f"{path}: {kind} is written as {listed(suffixes)}")
-    return path
+def default_file(kind: str, targets: Sequence[str]) -> Path:
+    """Return the file to write where none is named: in the working directory, named after its content."""
+    words = dict.fromkeys("bsdf" if word.startswith("<") else Path(split(word)[0]).stem for word in targets)
+    return Path(re.sub(r"[^\w-]+", "_", "-".join([*words, kind]))[-100:] + ".png")
 
 
 def write(figure: Any, path: Path) -> None:
-    """Write a figure; a Plotly figure as a page, with the library in a file beside it."""
-    if path.suffix.lower() in PAGES:
-        page.write(figure, path)
-    else:
-        data = BytesIO()  # where a disk is full, writers of formats raise other errors than OSError
-        figure.savefig(data, format=path.suffix[1:].lower(), dpi=DPI)
-        with replacing(path) as part:
-            part.write_bytes(data.getvalue())
+    """Write a figure."""
+    data = BytesIO()  # where a disk is full, writers of formats raise other errors than OSError
+    figure.savefig(data, format=path.suffix[1:].lower(), dpi=DPI)
+    with replacing(path) as part:
+        part.write_bytes(data.getvalue())

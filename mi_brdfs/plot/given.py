@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike
 
+from ..measured import read
+from ..measured.measurement import Grid, Samples
 from ..parameters.messages import brief
-from ..probe.bsdf import BSDFProbe
+from ..probe.arrays import CENTRE, Array
+from ..probe.bsdf import BSDFProbe, Part
 from ..probe.sources import find_sources, name_of
 from ..variants import is_measurable
+from .style import plain
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 
@@ -20,6 +27,16 @@ class Named(NamedTuple):
 
     label: str
     probe: BSDFProbe
+
+
+@dataclass
+class MeasuredProbe(BSDFProbe):
+    """A probe of a measured file, whose values are NaN where nothing was measured."""
+
+    data: Grid | Samples = field(kw_only=True)
+
+    def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
+        return np.where(self.data.measured(wi, wo)[:, None], super().eval(part, wi, wo, uv), np.nan)
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
@@ -40,9 +57,9 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
     if labels is not None:
         if len(labels) != len(found):
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
-        found = [(label, bsdf) for label, (_, bsdf) in zip(labels, found, strict=True)]
+        found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
-    return [Named(label.lstrip("_"), BSDFProbe(bsdf)) for label, bsdf in found]
+    return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
 
 
 def check_angles(angles: Sequence[float]) -> None:
@@ -112,17 +129,24 @@ def _told(given: dict) -> dict[str, str]:
     return {name: _shown(value) for name, value in given.items() if name != "type"}
 
 
-def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, mi.BSDF]]:
+def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
     if isinstance(given, str):
         for source in find_sources(given):
-            bsdf = source.load()
-            yield source.name, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
-        return
+            yield source.name, _probe(source.load())
+    else:
+        probe = _probe(given)
+        yield labels.get(id(given)) or name_of(probe.bsdf), probe
+
+
+def _probe(given: Any) -> BSDFProbe:
     bsdf = mi.load_dict(given) if isinstance(given, dict) else given
     if not isinstance(bsdf, mi.BSDF):
         word = given.get("type") if isinstance(given, dict) else type(given).__name__
         raise ValueError(f"{word} is not a BSDF of {mi.variant()}")
-    yield labels.get(id(given)) or name_of(bsdf), bsdf
+    # Who says how to extrapolate wants to see that; and tables know nothing of a plugin's rotation.
+    if isinstance(given, dict) and given["type"] == "tabulated" and not given.keys() & {"extrapolate", "rotation"}:
+        return MeasuredProbe(bsdf, data=read(given["filename"], given.get("quantity", "stated")).data)
+    return BSDFProbe(bsdf)
 
 
 def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:

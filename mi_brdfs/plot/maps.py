@@ -67,7 +67,7 @@ def hemisphere(
     for ax, theta in zip(axes[0], angles, strict=True):
         ax.set_title(incidence(theta), fontsize=TEXT, color=INK)
     if title or len(rows) == 1:
-        style.set_title(figure, title or found[0].label)
+        style.set_title(figure, style.plain(title) if title else found[0].label)
     style.add_bar(ScalarMappable(norm, "viridis"), axes, quantity(QUANTITY), shrink=0.8)
     marks = [Line2D([], [], linestyle="", color=INK, **mark) for mark in (WI, MIRROR)]
     style.add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
@@ -88,7 +88,7 @@ def albedo(
     found = named(bsdfs, labels)
     figure = style.new_figure(6, 3.8, size)
     if title:
-        style.set_title(figure, title)
+        style.set_title(figure, style.plain(title))
     ax = figure.subplots()
     handles = []
     for k, it in enumerate(found):

@@ -21,14 +21,15 @@ from ..measured.coordinates import HalfDifference, polar_angle, spherical
 from ..measured.measurement import usable
 from ..measured.report.albedo import albedos
 from ..measured.report.counts import batches, census
-from ..measured.report.summary import azimuths, ends, table
+from ..measured.report.summary import azimuths, ends
+from ..measured.scattered import as_grid
 from ..observer import to_srgb
-from ..parameters.messages import brief, printable
+from ..parameters.messages import brief
 from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
 from .maps import frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
-from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, add_bar, calm, incidence, look, new_figure, set_title
+from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -64,16 +65,12 @@ def measured(*files: str | Path | Measurement) -> Figure:
     if not files:
         raise ValueError("there is no measured file to draw")
     found = [file if isinstance(file, Measurement) else read(file) for file in files]
-    figure = new_figure(9, 3.4 * len(found) + 0.2)
-    for measurement, row in zip(found, figure.subplots(len(found), 3, squeeze=False), strict=True):
+    figure = new_figure(9, 3.6 * len(found))
+    for measurement, row in zip(found, figure.subfigures(len(found), squeeze=False)[:, 0], strict=True):
         it = LitTable(measurement)
-        _draw_slice(row[0], it)
-        _draw_lobes(row[1], it)
-        _draw_albedo(row[2], it)
-        if len(found) > 1:
-            row[0].set_title(it.name, loc="left", fontsize=TEXT + 1, color=INK)
-    if len(found) == 1:
-        set_title(figure, it.name)
+        for ax, draw in zip(row.subplots(1, 3), (_draw_slice, _draw_lobes, _draw_albedo), strict=True):
+            draw(ax, it)
+        row.suptitle(it.name, fontsize=TEXT + 1, color=INK)
     return figure
 
 
@@ -82,7 +79,7 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     theta_h, theta_d = np.meshgrid(middles, middles)
     pair = HalfDifference().directions(np.sqrt(theta_h), theta_d * np.pi / 2, np.full_like(theta_h, np.pi / 2))
     wi, wo = map(stacked, pair)
-    f, seen = it.grid.evaluate(wi, wo), it.grid.measured(wi, wo)
+    f, seen = it.grid.evaluate(wi, wo), it.measurement.data.measured(wi, wo)
     lit, colour = it.luminance(f), it.colour(f)
     norm = _norm(lit[seen])
     brightness = norm(np.maximum(lit, norm.vmin)).filled(0)
@@ -118,9 +115,13 @@ def _norm(values: np.ndarray) -> LogNorm:
 
 
 def _draw_lobes(ax: Axes, it: LitTable) -> None:
-    curves = [LabelledCurve(incidence(float(f"{t:.3g}")), t, it.curve(t), look(k)) for k, t in enumerate(it.angles)]
+    names = [incidence(float(f"{theta:.3g}")) for theta in it.angles]
+    curves = [
+        LabelledCurve(name, theta, it.curve(theta), look(k) | UNBROKEN)
+        for k, (name, theta) in enumerate(zip(names, it.angles, strict=True))
+    ]
     calm(ax)
-    draw_cartesian(ax, curves, True, False, it.quantity)
+    draw_cartesian(ax, curves, True, False, it.quantity, curves)
     for line, nodes in zip(curves, it.nodes(it.angles), strict=True):
         ax.plot(*nodes, color=line.look["color"], **NODE)
         ax.set_ylim(top=max(ax.get_ylim()[1], 1.3 * largest([nodes.value])))
@@ -132,7 +133,7 @@ def _draw_albedo(ax: Axes, it: LitTable) -> None:
     low, high = it.incidence
     angles = np.unique(np.append(np.arange(0, 90, 3), [low, min(high, 89)]))
     angles = angles[(angles >= low) & (angles <= high)]
-    values = albedos(it.grid, np.radians(angles), it.phi, extrapolate="zero")
+    values = albedos(as_grid(it.measurement.data, "zero"), np.radians(angles), it.phi, extrapolate="zero")
     colour = it.colour(values)
     names = list(CHANNELS) if colour.shape[-1] == 3 else [""]
     handles = []
@@ -160,10 +161,10 @@ class LitTable:
 
     def __init__(self, measurement: Measurement, phi: float | None = None) -> None:
         measurement = in_colour(measurement)
-        self.measurement, self.grid = measurement, table(measurement.data)
-        name, material = printable(measurement.path.name), measurement.material
+        self.measurement, self.grid = measurement, as_grid(measurement.data)
+        name, material = measurement.path.name, measurement.material
         name = name if material in ("", brief(measurement.path.stem)) else f"{material} ({name})"
-        self.name = name.replace("$", r"\$")  # no formula, to Matplotlib
+        self.name = plain(name)
         self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
         self.phi = float(azimuths(self.grid)[0]) if phi is None else phi
         self.coloured = self.grid.values.shape[-1] > 1
@@ -199,7 +200,8 @@ class LitTable:
         peaks = [end + near * side for end in (-theta_i, theta_i) for side in (-1, 1)]
         theta = np.unique(np.concatenate([np.linspace(-90, 90, 361), *peaks]))
         curve = refined(lambda t: self.luminance(self.grid.evaluate(wi, toward(t))), theta[abs(theta) < 90])
-        return curve._replace(value=np.where(self.grid.measured(wi, toward(curve.theta)), curve.value, np.nan))
+        seen = self.measurement.data.measured(wi, toward(curve.theta))
+        return curve._replace(value=np.where(seen, curve.value, np.nan))
 
     def nodes(self, angles: Sequence[float] | np.ndarray) -> list[Curve]:
         """Return what the table has near the plane of incidence, for each of some angles of incidence."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -15,11 +16,23 @@ from matplotlib.ticker import MaxNLocator
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import channels_of, check_angles, constants, named, quantity, scales_of, with_smooth_part
-from .style import CHANNELS, FAINT, GRID, INK, QUANTITY, SMALL, TEXT, WIDTH, incidence, look
+from .given import (
+    MeasuredProbe,
+    Named,
+    channels_of,
+    check_angles,
+    constants,
+    named,
+    quantity,
+    scales_of,
+    with_smooth_part,
+)
+from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, incidence, look
 
 MIRROR = {"marker": "v", "markersize": 5}
 THIN = {"linewidth": 0.8}
+COLUMNS, NARROWEST = 4, 2.8
+"""The most panels side by side, and the least width of one, in inches."""
 
 
 def polar(
@@ -30,6 +43,7 @@ def polar(
     labels: Sequence[str] | None = None,
     normalize: bool = False,
     rgb: bool = False,
+    side_by_side: bool = False,
     title: str | None = None,
     size: tuple[float, float] | None = None,
 ) -> Figure:
@@ -49,6 +63,7 @@ def polar(
             id or class of a loaded BSDF; what the others have in common is above the legend.
         normalize: divide each curve by its maximum, to compare shapes.
         rgb: draw red, green and blue in place of the luminance, in a row for each angle.
+        side_by_side: draw each BSDF in a panel of its own, on the same scale, with a colour for each angle.
         title: above the figure; by default the name of the only BSDF, or the only angle.
         size: width and height in inches; by default what the panels need.
 
@@ -60,7 +75,8 @@ def polar(
             variant is scalar or polarized, or has no channels that ``rgb`` could draw.
         Exception: whatever Mitsuba raises if a BSDF cannot be loaded.
     """
-    return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, azimuth, scale, labels, normalize, rgb, title, size)
+    options = azimuth, scale, labels, normalize, rgb, side_by_side, title, size
+    return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, *options)
 
 
 def cartesian(
@@ -71,13 +87,15 @@ def cartesian(
     labels: Sequence[str] | None = None,
     normalize: bool = False,
     rgb: bool = False,
+    side_by_side: bool = False,
     title: str | None = None,
     size: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw the luminance of f cosθ_o in the plane of incidence over the signed angle θ_o, negative on the side of wi;
     transmission lies beyond ±90°. Triangles at the top are the mirror directions. Everything else is as in
     :func:`polar`."""
-    return _planar(draw_cartesian, (0.62, 0.62), bsdfs, angles, azimuth, scale, labels, normalize, rgb, title, size)
+    options = azimuth, scale, labels, normalize, rgb, side_by_side, title, size
+    return _planar(draw_cartesian, (0.62, 0.62), bsdfs, angles, *options)
 
 
 class LabelledCurve(NamedTuple):
@@ -99,50 +117,62 @@ def _planar(
     labels: Sequence[str] | None,
     normalize: bool,
     rgb: bool,
+    side_by_side: bool,
     title: str | None,
     size: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a row of panels for the BSDF or for each angle, and a column for each scale. ``heights`` are those of a
-    panel of width 1, without and with transmission."""
+    """Draw a row of panels for the BSDF or for each angle, and a column for each scale; side by side, a column for each
+    BSDF and a row for each scale. ``heights`` are those of a panel of width 1, without and with transmission."""
     check_angles(angles)
     scales = scales_of(scale)
     found = with_smooth_part(named(bsdfs, labels))
     channels = channels_of(rgb)
     whole = any(lobes.transmits(it.probe) for it in found)
-    by_angle = rgb or len(found) > 1
+    beside = side_by_side and len(found) > 1
+    measured = [k for k, it in enumerate(found) if isinstance(it.probe, MeasuredProbe)]
+    by_bsdf = beside or not (rgb or len(found) > 1)
 
-    def lines(theta: float, at: int) -> list[LabelledCurve]:
-        curves = []
-        for k, it in enumerate(found):
-            for channel, name in channels:
-                own = f"{it.label}, {name}" if name else it.label
-                curve = lobes.in_plane_of_incidence(it.probe, theta, azimuth, channel)
-                if normalize:
-                    curve = curve._replace(value=curve.value / largest([curve.value]))
-                own_look = look(k if by_angle else at, CHANNELS.get(name))
-                curves.append(LabelledCurve(own if by_angle else incidence(theta), theta, curve, own_look))
+    def lines(it: Named, k: int, theta: float, j: int) -> list[LabelledCurve]:
+        curves, own = [], incidence(theta) if by_bsdf else it.label
+        for channel, name in channels:
+            curve = lobes.in_plane_of_incidence(it.probe, theta, azimuth, channel)
+            if normalize:
+                curve = curve._replace(value=curve.value / largest([curve.value]))
+            own_look = look(j if by_bsdf else k, CHANNELS.get(name))
+            if k in measured or (beside and measured):
+                own_look |= UNBROKEN
+            curves.append(LabelledCurve(f"{own}, {name}" if name else own, theta, curve, own_look))
         return curves
 
-    each = [lines(theta, k) for k, theta in enumerate(angles)]
-    if by_angle:
-        panels = dict(zip(map(incidence, angles), each, strict=True))
-    else:
-        panels = {found[0].label: [only for (only,) in each]}
-    width = WIDTH if len(scales) > 1 else 0.6 * WIDTH
-    height = width / len(scales) * heights[whole]
-    figure = style.new_figure(width, height * len(panels) + 0.8, size)
-    axes = figure.subplots(len(panels), len(scales), squeeze=False)
+    each = [[lines(it, k, theta, j) for j, theta in enumerate(angles)] for k, it in enumerate(found)]
+    rows = each if by_bsdf else zip(*each, strict=True)
+    headings = [it.label for it in found] if by_bsdf else [incidence(theta) for theta in angles]
+    panels = [[curve for part in row for curve in part] for row in rows]
+    columns = -(-len(panels) // -(-len(panels) // COLUMNS)) if beside else len(scales)
+    width = max(WIDTH, NARROWEST * columns) if beside else WIDTH if len(scales) > 1 else 0.6 * WIDTH
+    blocks = -(-len(panels) // columns) * len(scales) if beside else len(panels)
+    height = width / columns * heights[whole] + (0.4 if beside else 0)
+    figure = style.new_figure(width, height * blocks + 0.8, size)
+    axes = figure.subplots(blocks, columns, squeeze=False)
     text = quantity(QUANTITY, normalize=normalize, rgb=rgb)
-    for k, (heading, curves) in enumerate(panels.items()):
-        for ax, name in zip(axes[k], scales, strict=True):
+    everything = [curve for curves in panels for curve in curves]
+    for k, (heading, curves) in enumerate(zip(headings, panels, strict=True)):
+        for s, name in enumerate(scales):
+            ax = axes[k // columns * len(scales) + s, k % columns] if beside else axes[k, s]
             style.calm(ax)
-            draw(ax, curves, name == "log", whole, text)
-            if len(panels) > 1:
-                ax.set_title(heading, fontsize=TEXT, color=INK, pad=10)
-            if k < len(panels) - 1:
+            draw(ax, curves, name == "log", whole, text, everything if beside else curves)
+            if len(panels) > 1 and not (beside and s):
+                ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=10)
+            if beside and k % columns:
+                ax.set_ylabel("")
+                ax.tick_params(labelleft=False)
+            if not beside and k < len(panels) - 1:
                 ax.set_xlabel("")
+    for ax in axes.flat:
+        if not ax.lines:
+            ax.remove()
     if title or len(panels) == 1:
-        style.set_title(figure, title or heading)
+        style.set_title(figure, style.plain(title) if title else headings[0])
     marks = {"mirror direction": Line2D([], [], linestyle="", **MIRROR, color=FAINT)}
     if draw is _draw_polar:
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
@@ -152,8 +182,10 @@ def _planar(
     return figure
 
 
-def _draw_polar(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str) -> None:
-    low, high = _range(lines) if log else (0, largest(line.curve.value for line in lines))
+def _draw_polar(
+    ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str, alike: list[LabelledCurve]
+) -> None:
+    low, high = _range(alike) if log else (0, largest(line.curve.value for line in alike))
     end = 1.06 * (high - low)
     if log:
         powers = range(low, int(np.floor(high)) + 1)
@@ -193,15 +225,17 @@ def _at(theta: Any, radius: Any) -> tuple[np.ndarray, np.ndarray]:
     return radius * np.sin(np.radians(theta)), radius * np.cos(np.radians(theta))
 
 
-def draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str) -> None:
-    """Draw curves over the signed angle, with ``text`` for what they show."""
+def draw_cartesian(
+    ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str, alike: list[LabelledCurve]
+) -> None:
+    """Draw curves over the signed angle, with ``text`` for what they show, on a scale for all that are ``alike``."""
     end = 180 if whole else 90
     if log:
-        low, high = _range(lines)
+        low, high = _range(alike)
         ax.set_yscale("log")
         ax.set_ylim(10.0**low, 10 ** (high + 0.05 * (high - low)))
     else:
-        ax.set_ylim(0, 1.05 * largest(line.curve.value for line in lines))
+        ax.set_ylim(0, 1.05 * largest(line.curve.value for line in alike))
     for line in lines:
         above = {"transform": ax.get_xaxis_transform(), "clip_on": False}
         ax.plot(line.theta_i, 1.025, color=_shade(line, lines), **MIRROR, **above)
@@ -214,8 +248,9 @@ def draw_cartesian(ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool,
 
 
 def _shade(line: LabelledCurve, lines: list[LabelledCurve]) -> str:
-    """Return the colour of the marks of an angle of incidence: the curve's, unless all curves share the angle."""
-    return FAINT if all(line.theta_i == other.theta_i for other in lines) else line.look["color"]
+    """Return the colour of the marks of an angle of incidence: the curve's, unless the angle has curves of several."""
+    colours = {other.look["color"] for other in lines if other.theta_i == line.theta_i}
+    return FAINT if len(colours) > 1 else line.look["color"]
 
 
 def _range(lines: list[LabelledCurve]) -> tuple[int, float]:

@@ -13,10 +13,14 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
+from ..parameters.messages import printable
+
 # Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow, too pale for lines.
 COLOURS = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"
 # Styles too, so that coinciding curves are both visible; their number is coprime to that of the colours.
 STYLES = "-", (0, (4, 2)), (0, (1.5, 1)), (0, (6, 1.5, 1.5, 1.5))
+UNBROKEN = {"linestyle": "-"}
+"""The look of what has gaps, which must not be taken for dashes."""
 CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}
 INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
 TEXT, SMALL = 9, 8
@@ -48,6 +52,11 @@ def calm(ax: Axes) -> None:
     ax.tick_params(which="both", labelsize=SMALL, labelcolor=INK, color=FAINT, length=0)
     for spine in ax.spines.values():
         spine.set(color=FAINT, linewidth=0.6)
+
+
+def plain(text: str) -> str:
+    """Return a text of the user's, in which Matplotlib is to see no formulas and SVG no control characters."""
+    return printable(text).replace("$", r"\$")
 
 
 def set_title(figure: Figure, text: str) -> None:

@@ -1,15 +1,23 @@
-"""The studio's environment, computed: softboxes, a window, strips and a horizon."""
+"""The studio: its lights, as an environment that is computed, and the backdrop of all stages."""
 
 from __future__ import annotations
 
 from functools import cache
 from typing import NamedTuple
 
+import mitsuba as mi
 import numpy as np
 
+from .body import mesh
+
 WIDTH, HEIGHT = 512, 256
-BAR, EDGE = 0.014, 0.02
-"""Half the width of a window's bars, and the width of all edges, as tangents."""
+EDGE = 0.02
+"""The width of the lights' edges, as a tangent."""
+
+DARK, GLOW = np.array([0.035, 0.042, 0.06]), np.array([0.06, 0.12, 0.25])
+"""The backdrop's reflectance, and what it has in addition behind the body."""
+REACH, BEND, TOP = 40.0, (5.0, 6.0), 6.5
+"""How far the floor extends, where it begins to curve and with which radius, and the height of the wall."""
 
 
 class Light(NamedTuple):
@@ -20,16 +28,15 @@ class Light(NamedTuple):
     half: tuple[float, float]
     """Half its width and height, as tangents."""
     radiance: tuple[float, float, float]
-    panes: tuple[int, int] = (1, 1)
-    """Columns and rows."""
 
 
 LIGHTS = [
-    Light((-0.76, -0.58, 0.64), (0.72, 0.62), (3.8, 3.45, 2.9)),
-    Light((0.88, -0.30, 0.38), (0.50, 0.32), (2.6, 2.5, 2.3), (4, 2)),
-    Light((0.222, 0.043, 0.975), (0.34, 0.34), (1.3, 1.25, 1.1)),
-    Light((0.74, 0.70, 0.30), (0.08, 0.50), (3.6, 3.8, 4.1)),
-    Light((-0.74, 0.74, 0.36), (0.05, 0.50), (3.2, 3.3, 3.6)),
+    # A softbox and a thin strip on the left, a strip on the right, a small panel above, a rim from behind.
+    Light((-0.80, -0.52, 0.42), (0.34, 0.80), (4.6, 4.1, 3.3)),
+    Light((-0.30, -0.80, 0.62), (0.05, 0.55), (4.2, 3.9, 3.4)),
+    Light((0.90, -0.34, 0.36), (0.13, 0.80), (4.4, 3.8, 3.0)),
+    Light((0.63, 0.24, 0.74), (0.24, 0.24), (1.7, 1.6, 1.4)),
+    Light((-0.10, 0.72, 0.70), (0.95, 0.13), (3.4, 3.7, 4.4)),
 ]
 
 
@@ -41,11 +48,8 @@ def environment() -> np.ndarray:
     directions = np.stack(
         np.broadcast_arrays(np.sin(azimuth) * np.sin(polar), np.cos(azimuth) * np.sin(polar), np.cos(polar)), axis=-1
     )
-    z = directions[..., 2:]
-    # The walls are brightest above the horizon; below it, the ground hides everything.
-    walls = np.where(z > 0, 0.1 + 0.3 * np.exp(-np.square((z - 0.08) / 0.12)), 0.1)
-    picture = walls * [1.06, 1.0, 0.88] + sum(_shine(light, directions) for light in LIGHTS)
-    return picture.astype(np.float32)
+    room = (0.09 + 0.08 * np.maximum(directions[..., 2:], 0)) * [0.95, 0.97, 1.05]
+    return (room + sum(_shine(light, directions) for light in LIGHTS)).astype(np.float32)
 
 
 def _shine(light: Light, directions: np.ndarray) -> np.ndarray:
@@ -54,9 +58,28 @@ def _shine(light: Light, directions: np.ndarray) -> np.ndarray:
     right /= np.linalg.norm(right)
     ahead = directions @ middle
     shine = (ahead > 0).astype(float)
-    for axis, half, panes in zip((right, np.cross(right, middle)), light.half, light.panes, strict=True):
+    for axis, half in zip((right, np.cross(right, middle)), light.half, strict=True):
         position = directions @ axis / np.maximum(ahead, 1e-3) / half
-        within_pane = abs((position + 1) / 2 * panes % 1 * 2 - 1)
-        inwards = half * np.minimum(1 - abs(position), (1 - within_pane) / panes)
-        shine *= np.clip((inwards - BAR) / EDGE, 0, 1) * (1 - 0.45 * np.minimum(position**2, 1))
+        inwards = half * (1 - abs(position))
+        shine *= np.clip(inwards / EDGE, 0, 1) * (1 - 0.45 * np.minimum(position**2, 1))
     return shine[..., None] * light.radiance
+
+
+def backdrop() -> mi.Mesh:
+    """Return a dark floor that curves into a wall without an edge, which glows behind the body."""
+    start, radius = BEND
+    turn = np.linspace(0, np.pi / 2, 49)
+    y = np.array([-REACH, *(start + radius * np.sin(turn)), start + radius])
+    z = np.array([0, *(radius * (1 - np.cos(turn))), TOP])
+    along = np.concatenate([[0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
+    slope = np.array([0, *turn, np.pi / 2])
+    u, v = np.meshgrid([0.0, 1.0], along / along[-1])
+    positions = np.stack([REACH * (2 * u - 1), y[:, None] + 0 * u, z[:, None] + 0 * u], axis=-1)
+    normals = np.stack([0 * u, -np.sin(slope)[:, None] + 0 * u, np.cos(slope)[:, None] + 0 * u], axis=-1)
+
+    v_of_pixels, x = (np.arange(256) + 0.5) / 256, ((np.arange(512) + 0.5) / 256 - 1) * REACH
+    depth, height = (np.interp(v_of_pixels * along[-1], along, each)[:, None] for each in (y, z))
+    glow = np.exp(-np.square(x / 2.4) - np.square((height - 1.3) / 1.9)) * np.clip(depth / 9, 0, 1)
+    reflectance = (DARK + glow[..., None] * GLOW).astype(np.float32)
+    bsdf = mi.load_dict({"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": mi.Bitmap(reflectance)}})
+    return mesh("ground", bsdf, (positions, normals, np.stack([u, v], axis=-1)))

@@ -181,6 +181,11 @@ class BSDFProbe:
         (u, v), count = sample_arguments(variates), len(variates)
         si = self._at(wi, uv, count)
         bs, weight = self.bsdf.sample(part.context, si, u, v, True)
+        for name in ("wo", "pdf", "eta", "sampled_type", "sampled_component"):
+            if not dr.width(getattr(bs, name)):
+                raise ValueError(
+                    f"sample leaves {name} empty: begin with dr.zeros(mi.BSDFSample3f), and set each field"
+                )
         drawn = bs.pdf > 0
         wo = dr.select(drawn, bs.wo, mi.Vector3f(0, 0, 1))
         value, pdf = self.bsdf.eval(part.context, si, wo, True), self.bsdf.pdf(part.context, si, wo, True)

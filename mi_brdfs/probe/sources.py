@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from .. import legacy
+from .. import loading
 from ..names import tabulated
 from ..parameters import published
 from ..srgb import decoded
@@ -56,10 +56,10 @@ class BSDFSource(NamedTuple):
         if self.material is not None and self.source.endswith(".json"):
             return _fits(Path(self.source))[self.material]["bsdf"] | values
         if self.source.endswith(".xml"):
-            loaded = legacy.load(Path(self.source), self.parameters)
+            loaded = loading.load(Path(self.source), self.parameters)
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
-            return mi.load_string(legacy.versioned(self.source), **self.parameters)
+            return mi.load_string(loading.versioned(self.source), **self.parameters)
         return {"type": self.source} | values
 
 

@@ -75,6 +75,11 @@ def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
     return mapped.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)
 
 
+def broken_pixels(picture: Picture) -> int:
+    """Return how many pixels have values that are infinite or no numbers."""
+    return int((~np.isfinite(np.array(picture.bitmap))).reshape(picture.bitmap.pixel_count(), -1).any(axis=1).sum())
+
+
 def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
     """Write ``bitmap`` in the format of the file name, all or nothing: ``path`` never holds half an image.
 

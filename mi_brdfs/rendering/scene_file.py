@@ -6,11 +6,15 @@ import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import indent
 from typing import Any
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
 import mitsuba as mi
 
-from ..legacy.upgrade import looking_in, parsed
+from ..legacy import upgrade
+from ..loading import looking_in, parsed, versioned
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
@@ -97,7 +101,8 @@ def _check_films(state: Any) -> None:
 
 
 def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
-    """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it.
+    """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it; on
+    both sides, in place of ``twosided``.
 
     Raises:
         ValueError: if there is none.
@@ -112,12 +117,79 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
         for name in node.props.keys():
             value = node.props[name]
             if isinstance(value, mi.Properties.ResolvedReference):
-                own = state.nodes[value.index()].type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]
-                if own:
-                    node.props[name] = bsdf
+                usual = state.nodes[value.index()]
+                if usual.type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]:
+                    wrapped = usual.props.plugin_name() == "twosided"
+                    node.props[name] = _on_both_sides(bsdf) if wrapped else bsdf
                     found = True
     if is_shape and not found:
         state.nodes[ids[id]].props["bsdf"] = bsdf
+
+
+def _on_both_sides(bsdf: mi.BSDF) -> mi.BSDF:
+    return bsdf if _is_seen_from_behind(bsdf) else mi.load_dict({"type": "twosided", "bsdf": bsdf})
+
+
+def _is_seen_from_behind(bsdf: mi.BSDF) -> bool:
+    return mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+
+
+def with_material(path: Path, id: str, xml: str) -> str:
+    """Return the text of a scene file with a ``<bsdf>`` in the place of the BSDF with an id, or of that of the shape
+    with it, on both sides in place of ``twosided``, and all else as it is; a scene of Mitsuba 0.6 is upgraded.
+
+    Raises:
+        ValueError: if the file itself has none, or is no scene.
+    """
+    data = upgrade(path).xml.encode()
+    found: list[_Written] = []
+    inside: list[_Written] = []
+    parser = expat.ParserCreate()
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        inside.append(_Written(tag, attributes, parser.CurrentByteIndex, parent=inside[-1] if inside else None))
+        found.append(inside[-1])
+
+    def end(tag: str) -> None:
+        element, at = inside.pop(), parser.CurrentByteIndex
+        is_empty = found[-1] is element and data[at - 2 : at] == b"/>"
+        element.end = at if is_empty else data.index(b">", at) + 1
+
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"{path}: {error}") from None
+    bsdfs = {it.attributes.get("id") for it in found if it.tag == "bsdf"}
+    own = [it for it in found if it.tag in ("bsdf", "shape") and id and it.attributes.get("id") == id]
+    if not own:
+        raise ValueError(f"{path} itself has no BSDF or shape with the id {id or 'of this material'}; give it one.")
+    if own[0].tag == "shape":
+        children = [it for it in found if it.parent is own[0]]
+        own = [it for it in children if it.tag == "bsdf" or (it.tag == "ref" and it.attributes.get("id") in bsdfs)]
+        if not own:
+            raise ValueError(f"{path}: the shape {id} has no BSDF to be replaced; give it one.")
+    place = own[0]
+    usual = [it for it in found if place.tag == "ref" and it.attributes.get("id") == place.attributes["id"]] or [place]
+    if usual[0].attributes.get("type") == "twosided" and not _is_seen_from_behind(mi.load_string(versioned(xml))):
+        xml = f'<bsdf type="twosided">\n{indent(xml, "    ")}\n</bsdf>'
+    kept = [name for name in ("name", "id") if name in place.attributes and (name, place.tag) != ("id", "ref")]
+    named = "".join(f" {name}={quoteattr(place.attributes[name])}" for name in kept)
+    before = data[data.rfind(b"\n", 0, place.start) + 1 : place.start].decode()
+    margin = before[: len(before) - len(before.lstrip())]
+    lines = xml.replace("<bsdf", f"<bsdf{named}", 1).replace("\n", "\n" + margin)
+    return (data[: place.start] + lines.encode() + data[place.end :]).decode()
+
+
+@dataclass(eq=False)
+class _Written:
+    """An element of a file, and where its text is."""
+
+    tag: str
+    attributes: dict[str, str]
+    start: int
+    end: int = 0
+    parent: _Written | None = None
 
 
 def _rootless(path: str) -> str:

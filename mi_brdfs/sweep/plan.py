@@ -36,8 +36,8 @@ class Sweep:
     """All fits of some models to some files, and a folder for them.
 
     A fit is known by the content of its file, the model, the metric, the seed and the settings, the variant, and the
-    versions of mi_brdfs and Mitsuba, for a guest by the source of its module: if any of them changes, it is made anew.
-    Its result depends on nothing else, not on the other fits nor on the workers.
+    versions of mi_brdfs and Mitsuba, for a third-party model by the source of its module: if any of them changes, it
+    is made anew. Its result depends on nothing else, neither on the other fits nor on the workers.
 
     Args:
         files: measured BRDFs; of two with the same content, the first counts.
@@ -180,7 +180,7 @@ def digest(data: Any) -> str:
 
 
 def versions(model: type[Model] | None = None) -> str:
-    """Return all versions that a result depends on, with a guest's, which is the source of its module."""
+    """Return all versions that a result depends on, with a third-party model's, which is the source of its module."""
     found = f"mi_brdfs {__version__}, Mitsuba {mi.__version__}"
     if model is None or is_own(model):
         return found

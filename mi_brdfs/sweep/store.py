@@ -79,6 +79,8 @@ class Store:
         """Yield the rows of all files, one file at a time; warn of each that holds no such rows."""
         for path in sorted(self.folder.glob("*.parquet")):
             try:
+                if not path.is_file():  # opening a pipe would wait for ever
+                    raise ValueError("it is no regular file")
                 with path.open("rb") as opened, parquet.ParquetFile(opened) as file:
                     if missing := set(SCHEMA.names) - set(file.schema_arrow.names):
                         raise ValueError(f"it has no column {min(missing)}")

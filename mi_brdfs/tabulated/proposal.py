@@ -100,19 +100,3 @@ def half_vectors(theta: float, phi: float, u: np.ndarray, v: np.ndarray) -> tupl
     # dωo = 4 (wi·h) sinθh dθh dφh, with dθh = π u du and dφh = 2π dv.
     solid_angle = 4 * np.maximum(cos, 0) * np.hypot(h.x, h.y) * 2 * np.pi**2 * u
     return stacked(wi), wo, solid_angle
-
-
-def estimated_albedos(
-    grid: Grid, thetas: np.ndarray, interpolation: Interpolation, extrapolate: Extrapolation
-) -> np.ndarray:
-    """Return estimates of ∫ f cosθo dωo for each channel at angles θi, by 1,024 half vectors each, and the mean over φi
-    where the table is anisotropic: shape (angles, channels)."""
-    u, v = np.meshgrid((np.arange(64) + 0.5) / 64, (np.arange(16) + 0.5) / 16, indexing="ij")
-    azimuths = AZIMUTHS_I[:-1:3] if grid.anisotropic else [0.0]
-    result = np.zeros((len(thetas), grid.values.shape[-1]))
-    for k, theta in enumerate(thetas):
-        for phi in azimuths:
-            wi, wo, solid_angle = half_vectors(theta, phi, u, v)
-            f = grid.evaluate(wi, wo, interpolation, extrapolate)
-            result[k] += np.mean(f * (np.maximum(wo[..., 2], 0) * solid_angle)[..., None], axis=(0, 1))
-    return result / len(azimuths)

@@ -13,20 +13,22 @@ import mitsuba as mi
 import numpy as np
 
 from ..measured.arrays import DRJIT
-from ..measured.coordinates import PolarAngle
+from ..measured.coordinates import Coordinates
 from ..measured.files import checked, content_hash
 from ..measured.formats import read
 from ..measured.measurement import Axis, Extrapolation, Grid, Interpolation, Measurement, Quantity, corners
+from ..measured.report.albedo import albedos
 from ..measured.scattered import as_grid
 from ..observer import to_srgb
 from ..probe.arrays import luminance
 from ..variants import is_scalar
 from .basis import BASIS, WAVELENGTHS
-from .proposal import NODES_I, Proposal, estimated_albedos
+from .proposal import Proposal
 
 
 class Tables:
-    """f, the albedo over θi, and the density that directions are drawn from. ``captured`` is all that kernels read."""
+    """f, the albedo at normal incidence, and the density that directions are drawn from; ``captured`` is all of them
+    that kernels read."""
 
     _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
 
@@ -58,9 +60,8 @@ class Tables:
         self.signed = converted.signed
         self.f = Table(converted, self.channels.spectrum, interpolation, extrapolate)
         self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
-        albedos = estimated_albedos(converted, NODES_I, interpolation, extrapolate)
-        albedo = Grid(PolarAngle(), (Axis(NODES_I),), albedos)
-        self.albedo = Table(albedo, self.channels.spectrum, "trilinear", "hold")
+        (albedo,) = albedos(converted, np.zeros(1), extrapolate=extrapolate)
+        self.albedo = Table(Grid(Coordinates(), (), albedo), self.channels.spectrum, "trilinear", "hold")
         self.captured = [*self.f.captured, *self.albedo.captured, *self.channels.basis, self.proposal.warp]
 
 

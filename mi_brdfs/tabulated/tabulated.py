@@ -106,6 +106,7 @@ class TabulatedLobe(Lobe):
         self.anisotropic, self.reciprocal = tables.anisotropic, tables.reciprocal
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
+        """Return that at normal incidence: no other is asked for, as this is the only lobe."""
         return self.colour * self.tables.channels.colour(self.tables.albedo, wi, wi, self.wavelengths)
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:

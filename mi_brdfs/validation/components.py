@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import Array, context, interaction, numbers, vectors
-from ..probe.bsdf import Part, Samples
+from ..probe.bsdf import BSDFProbe, Part, Samples
 from ..probe.directions import angles_of, direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
@@ -19,8 +19,9 @@ COUNT = 4000
 def components(run: Run) -> Findings:
     """Check that the components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
     ``sampled_type`` lie within what was asked for and drawn, the density of a delta function's sample is how often it
-    is drawn, ``eta`` is 1 for light that stays on its side, what a context excludes is black, and a type mask of one
-    bit or several lets through the components of these types."""
+    is drawn, and its weight what it is alone over that, ``eta`` is 1 for light that stays on its side, what a context
+    excludes is black, and a type mask of one bit or several lets through the components of these types, drawn as
+    ``pdf`` says."""
     probe = run.probe
     for part in probe.parts:
         outcome = Outcome("components", part.name)
@@ -31,6 +32,10 @@ def components(run: Run) -> Findings:
             _check_sum(run, outcome)
             _check_there_and_back(run, outcome, part)
         yield outcome.finding("Sums, sampled components and types are as asked for.")
+    for part in (_delta(probe, k) for k in probe.deltas):
+        outcome = Outcome("components", part.name)
+        _check_alone(run, outcome, part)
+        yield outcome.finding("It carries as much light as where it is drawn alone.")
     for part in probe.components:
         outcome = Outcome("components", f"{part.name} masked out")
         _check_masks(run, outcome, part)
@@ -107,6 +112,30 @@ def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
                 )
 
 
+def _check_alone(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that samples of a delta function carry as much light among others as if it were drawn alone."""
+    for incident in run.incidents(run.probe.whole):
+        samples = run.samples(run.probe.whole, incident)
+        together = samples.weight * (samples.component == part.component)[:, None]
+        alone = run.probe.sample(part, incident.wi, random(SCATTERED, SEED)).weight
+        (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
+        error = abs(got - expected)
+        # Six standard errors: a false alarm once in 1e8.
+        if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
+            channel = int(np.argmax(error))
+            outcome.fault(
+                f"for light from {incident.name} its samples carry {got[channel]:.4g} of the light among those of "
+                f"others, but {expected[channel]:.4g} where only these are drawn",
+                float(error.max()),
+                wi=incident.wi,
+                seed=SEED,
+            )
+
+
+def _delta(probe: BSDFProbe, k: int) -> Part:
+    return Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
+
+
 def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
     """Check that the relative index of refraction is the reciprocal of that of the other way."""
     if len(part.sides) < 2 or not part.has(mi.BSDFFlags.Transmission):
@@ -175,11 +204,17 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
     for mask in (kind, kind | int(absent), every & ~kind):
         if any(it & mask not in (0, it) for it in kinds):
             continue  # of a component in part
-        value = probe.eval(part._replace(context=context(mask=mask)), wi, wo)
+        chosen = part._replace(context=context(mask=mask))
+        value = probe.eval(chosen, wi, wo)
         expected = sum((of for it, of in alone if it & mask), np.zeros(value.shape))
         error = relative(value, expected, 1)
         name, why = f"with the type mask {mask:#x} eval", "is what the components of these types make"
         outcome.wrong(error * (error > 10 * run.rounding(probe.whole)), name, value, why, wi, wo, expected=expected)
+        samples = probe.sample(chosen, wi, random(COUNT, 13))
+        error = relative(samples.pdf, samples.density, unknown=0) * samples.lit
+        name, why = f"with the type mask {mask:#x} pdf", "is the density that sample states"
+        over = error * (error > 10 * run.rounding(probe.whole))
+        outcome.wrong(over, name, samples.pdf, why, wi, samples.wo, expected=samples.density, seed=13)
 
 
 def flags(run: Run) -> Findings:
@@ -215,7 +250,7 @@ def flags(run: Run) -> Findings:
             _check_differentials(run, outcome, part)
         yield outcome.finding("They fit what it does.")
     for k in probe.deltas:
-        part = Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
+        part = _delta(probe, k)
         outcome = Outcome("flags", part.name)
         if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
             _check_delta_turned(run, outcome, part)

@@ -80,6 +80,11 @@ def updates(run: Run) -> Findings:
             outcome.wrong(over, "once it is set back, eval", back, why, wi, wo, expected=before)
             set_value(params, key, value)
             ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
+            # What sample keeps of former values shows beside pdf, which has the new ones.
+            error, others = (relative(each.pdf, each.density, unknown=0) * each.lit for each in (ours, loaded))
+            over = error * (error > 10 * run.rounding(part)) * (np.quantile(others, 0.99) <= 10 * run.rounding(part))
+            why = "is the density that sample states"
+            outcome.wrong(over, f"{once}pdf", ours.pdf, why, wi, ours.wo, expected=ours.density, seed=92)
             turned = np.linalg.norm(ours.wo - loaded.wo, axis=1) * (ours.lit & loaded.lit)
             # A choice among lobes may fall otherwise where a rounding error decides it.
             if np.quantile(turned, 0.9) > 1e-3:

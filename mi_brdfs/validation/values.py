@@ -39,13 +39,16 @@ def _bad(values: Array, signed: bool = False) -> Array:
 
 
 def finite(run: Run) -> Findings:
-    """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing, at the
-    mirror direction, towards the light, and for samples with variates of 0 and just below 1. Channels of values and
-    weights may be negative where the page of a model says so, of colours outside sRGB."""
+    """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing and in the
+    horizon, at the mirror direction, towards the light, and for samples with variates of 0 and just below 1. Channels
+    of values and weights may be negative where the page of a model says so, of colours outside sRGB."""
     signed = any(model is not None and model.signed for model in run.probe.models)
     for part in run.probe.parts:
         outcome = Outcome("finite", part.name)
         wi, wo = _pairs(part)
+        # Rounding may put a direction into the horizon.
+        flat = np.resize(np.array([[1, 0, 0], [-0.6, 0.8, 0]], np.float32), wi.shape)
+        wi, wo = np.concatenate([wi, flat]), np.concatenate([wo, wo])
         for name, values in (("eval", run.probe.eval(part, wi, wo)), ("pdf", run.probe.pdf(part, wi, wo))):
             bad = _bad(values, signed and name == "eval")
             why = f"and {bad.mean():.1%} of the pairs tried are negative or not finite"
@@ -57,19 +60,19 @@ def finite(run: Run) -> Findings:
             for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
                 w = on_side(direction(theta, 30), side)
                 samples = run.probe.sample(part, w, u)
-                length = abs(np.linalg.norm(samples.wo.astype(np.float64), axis=1) - 1)
-                bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(length < 1e-3))
+                length = np.linalg.norm(samples.wo.astype(np.float64), axis=1)
+                bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(abs(length - 1) < 1e-3))
                 if bad.any():
                     k = int(np.argmax(bad))
                     outcome.fault(
                         f"for light from {theta:g}° a sample has the weight {_shown(samples.weight[k])}, the density "
-                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}, for the variates "
-                        f"{u[k].tolist()}",
+                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}, of length "
+                        f"{length[k]:.4g}, for the variates {u[k].tolist()}",
                         bad.sum(),
                         wi=w,
                     )
         remark = "Channels may be negative, as its page says." if signed else ""
-        yield outcome.finding(f"{len(wi)} pairs of directions, to 0.0001° above the horizon.", remark)
+        yield outcome.finding(f"{len(wi)} pairs of directions, down to the horizon.", remark)
 
 
 def _shown(values: Array) -> str:

@@ -4,7 +4,7 @@ import { LIMITS, VIEWS, WORDS, change, clean, emit, fragment, goTo, on, readFrag
 import { connect, post, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
 import { colourOf } from "./drawing.js";
-import { drawAlbedo, drawCartesian, drawPolar, table } from "./plots.js";
+import { AXES, drawAlbedo, drawCartesian, drawPolar, table } from "./plots.js";
 import { drawSampler } from "./sampler.js";
 import { drawMaps, mapsImage } from "./maps.js";
 import { drawLobe, startLobe } from "./lobe.js";
@@ -20,7 +20,7 @@ const TITLES = {
   cartesian: ["Plane of incidence", "", ["SVG", "CSV"]],
   albedo: ["Albedo", "over the angle of incidence", ["SVG", "CSV"]],
   slice: ["Slice", "f over half and difference angle, φd = 90°", ["PNG"]],
-  hemisphere: ["Hemisphere", "f cosθo from above", ["PNG"]],
+  hemisphere: ["Hemisphere", "", ["PNG"]],
   sampler: ["Sampler", "", ["SVG", "CSV"]],
 };
 const DRAW = {
@@ -79,8 +79,13 @@ const asFlag = (field) => field.checked;
 const showFlag = (field, value) => (field.checked = value);
 
 function startBars() {
-  for (const name of ["theta", "phi", "exposure"]) {
-    for (const id of [`${name}-slider`, `${name}-field`]) {
+  for (const [name, ...ids] of [
+    ["theta", "theta-slider", "theta-field"],
+    ["phi", "phi-slider", "phi-field"],
+    ["exposure", "exposure-slider", "exposure-field"],
+    ["turn", "turn"],
+  ]) {
+    for (const id of ids) {
       const [low, high] = LIMITS[name];
       byId(id).min ||= low;
       byId(id).max ||= high;
@@ -88,7 +93,12 @@ function startBars() {
     }
   }
   for (const name of ["channel", "scale", "compare"]) setWords(name, WORDS[name], { side: "side by side" });
-  for (const name of ["channel", "stage", "shape", "scale", "compare"]) tie(name, name);
+  setOptions(
+    byId("axis"),
+    WORDS.axis.map((word) => [word, AXES[word].symbol]),
+  );
+  for (const name of ["channel", "scale", "compare", "axis"]) tie(name, name);
+  for (const name of ["stage", "shape"]) tie(name, name, ({ value }) => value || chooseFile(name));
   tie(
     "component",
     "component",
@@ -96,6 +106,7 @@ function startBars() {
     (field, value) => (field.value = value ?? ""),
   );
   tie("normalise", "normalise", asFlag, showFlag);
+  tie("cosine", "cosine", asFlag, showFlag);
   tie(
     "side",
     "lobes",
@@ -131,6 +142,12 @@ function startBars() {
   );
 }
 
+/** Ask for a file in place of a word, and meanwhile return the word that holds. */
+function chooseFile(name) {
+  byId("file").click();
+  return (byId(name).value = session.state[name]);
+}
+
 /** Return views without one, or with it: in its usual place, or last where a tour has put them in another order. */
 function withOrWithout(views, view) {
   if (views.includes(view)) return views.filter((each) => each !== view);
@@ -147,16 +164,16 @@ const setOptions = (field, pairs) => {
   field.replaceChildren(...pairs.map(([value, text]) => element("option", { value }, text)));
 };
 
-const setWords = (id, words, told = {}) =>
-  setOptions(
-    byId(id),
-    words.map((word) => [word, told[word] ?? word]),
-  );
+const setWords = (id, words, told = {}, ...more) =>
+  setOptions(byId(id), [...words.map((word) => [word, told[word] ?? word]), ...more]);
 
 function drawBars() {
   const { state, hello, info } = session;
-  setWords("stage", hello?.stages ?? [state.stage]);
-  setWords("shape", hello?.shapes ?? [state.shape], { scene: hello?.scene });
+  const own = session.exported ? [] : [["", "file …"]];
+  setWords("stage", hello?.stages ?? [state.stage], { incidence: "from ωi" }, ...own);
+  setWords("shape", hello?.shapes ?? [state.shape], { scene: hello?.scene }, ...own);
+  byId("stage").parentElement.hidden = state.shape === "scene";
+  byId("turn-row").hidden = !hello?.turned.includes(state.shape === "scene" ? "scene" : state.stage);
   setOptions(byId("component"), [
     ["", "all components"],
     ...(info[session.selected]?.components ?? []).map((name, k) => [k, name]),
@@ -279,7 +296,7 @@ function start() {
     drawLobe();
     cards.lobe.figure.querySelector("canvas")?.toBlob(done);
   };
-  for (const view of ["picture", "lobe"]) cards[view].tools.before(byId(`${view}-bar`));
+  for (const view of ["picture", "lobe", "cartesian"]) cards[view].tools.before(byId(`${view}-bar`));
   startPicture();
   startLobe();
   startSubjects();
@@ -311,14 +328,16 @@ function start() {
     redrawAll();
   });
   on("hello", () => {
-    if (!session.state.subjects.length) session.state = readFragment(location.hash) ?? clean(session.hello.state);
+    session.state = session.state.subjects.length
+      ? clean(session.state)
+      : (readFragment(location.hash) ?? clean(session.hello.state));
     if (!session.exported) emit("state", false);
     for (const id of ["tours", "share", "add"]) byId(id).disabled = false;
     byId("tours").hidden = !session.hello.tours?.length;
     byId("version").textContent = `${session.hello.version} · ${session.hello.variant}`;
   });
   // What is under a moving hand is drawn coarsely, and anew when the hand lets go.
-  addEventListener("pointerdown", ({ target }) => (session.dragged = target.matches("input[type=range], canvas")));
+  addEventListener("pointerdown", ({ target }) => (session.dragged = target.matches("input[type=range], .lobe canvas")));
   for (const end of ["pointerup", "pointercancel"]) {
     addEventListener(end, () => {
       if (session.dragged) sendState();

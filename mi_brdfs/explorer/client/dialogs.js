@@ -1,6 +1,6 @@
 // Data out, and fits: "Share" and "Fit this".
-import { byId, element } from "./util.js";
-import { addSubject, fragment, hasRoom, on, session, tellFull } from "./session.js";
+import { byId, element, format } from "./util.js";
+import { addSubject, change, changeSubject, fragment, hasRoom, on, session, tellFull } from "./session.js";
 import { post } from "./link.js";
 import { cards } from "./card.js";
 
@@ -25,6 +25,10 @@ export function startDialogs() {
   byId("save-png").onclick = () => cards.picture.tools.querySelector("button")?.click();
   byId("save-exr").onclick = () => ask({ type: "save", what: "exr", subject: session.selected });
   byId("save-page").onclick = () => ask({ type: "save", what: "page", state: session.state });
+  byId("write-scene").onclick = () => ask({ type: "save", what: "scene", subject: session.selected });
+  on("hello", () => (byId("scene-row").hidden = !session.hello.scene));
+  for (const event of ["written", "error"])
+    on(event, (told) => byId("share-dialog").open && (byId("shared").textContent = told.text ?? told));
   on("saved", () => (byId("shared").textContent = "Saved."));
   startFit();
   for (const button of document.querySelectorAll("dialog .close"))
@@ -56,44 +60,92 @@ async function copy(text, what, warning = "") {
 
 // --- Fits -----------------------------------------------------------------------------------------------------------
 
+/** The measured file that models are fitted to, and the fits, the best first. */
 let fitted = null;
+let ranking = [];
 
 function startFit() {
-  const [dialog, start] = [byId("fit-dialog"), byId("fit-start")];
+  const dialog = byId("fit-dialog");
   const running = (yes) => {
-    start.hidden = yes;
+    byId("fit-start").hidden = yes;
     byId("fit-cancel").hidden = byId("fit-progress").hidden = !yes;
+    byId("fit").textContent = "Fit this …";
   };
-  byId("fit").onclick = () => {
-    fitted = session.selected;
-    byId("fit-of").textContent = session.state.subjects[fitted].name;
-    const options = (words) => words.map((word) => element("option", { value: word }, word));
-    byId("fit-model").replaceChildren(...options(session.hello.models));
-    byId("fit-metric").replaceChildren(...options(session.hello.metrics));
-    byId("fit-told").textContent = "";
-    running(false);
-    dialog.showModal();
+  const begin = (told = "") => {
+    ranking = [];
+    byId("fit-told").textContent = told;
+    drawRanking();
   };
-  start.onclick = () => {
-    byId("fit-told").textContent = "";
-    byId("fit-progress").removeAttribute("value");
-    running(post({ type: "fit", subject: fitted, model: byId("fit-model").value, metric: byId("fit-metric").value }));
-  };
-  byId("fit-cancel").onclick = () => {
+  const cancel = (told) => {
     post({ type: "cancel" });
     running(false);
-    byId("fit-told").textContent = "Cancelled.";
+    byId("fit-told").textContent = told;
   };
-  dialog.addEventListener("close", () => !byId("fit-cancel").hidden && byId("fit-cancel").onclick());
+  byId("fit").onclick = () => {
+    const { bsdf, name } = session.state.subjects[session.selected];
+    if (fitted !== bsdf.file) {
+      cancel("");
+      begin();
+      fitted = bsdf.file;
+      const options = (words, told = {}) => words.map((word) => element("option", { value: word }, told[word] ?? word));
+      byId("fit-model").replaceChildren(...options(["all", ...session.hello.models], { all: "all, and rank them" }));
+      byId("fit-metric").replaceChildren(...options(session.hello.metrics));
+    }
+    byId("fit-of").textContent = name;
+    dialog.showModal();
+  };
+  byId("fit-start").onclick = () => {
+    begin();
+    byId("fit-progress").removeAttribute("value");
+    const [model, metric] = [byId("fit-model").value, byId("fit-metric").value];
+    running(post({ type: "fit", subject: session.selected, model, metric }));
+  };
+  byId("fit-cancel").onclick = () => cancel("Cancelled.");
   on("connection", () => running(false));
-  on("fit", ({ done, total, bsdf, text, error }) => {
+  on("fit", ({ done, total, ...fit }) => {
     if (byId("fit-cancel").hidden) return;
-    if (total) Object.assign(byId("fit-progress"), { max: total, value: done });
-    if (!bsdf && !error) return void (byId("fit-told").textContent = total ? `${done} of ${total}` : "");
-    running(false);
-    byId("fit-told").textContent = error ?? text ?? "";
-    if (!bsdf) return;
-    if (hasRoom()) addSubject(bsdf, `${bsdf.type}, fitted`);
-    else tellFull("and fit again");
+    Object.assign(byId("fit-progress"), { max: total, value: done });
+    byId("fit").textContent = byId("fit-told").textContent = `Fitting ${Math.floor(done) + 1} of ${total} …`;
+    if (!fit.bsdf) return;
+    ranking = [...ranking, fit].sort((a, b) => (a.error ?? Infinity) - (b.error ?? Infinity));
+    drawRanking();
   });
+  on("fitted", ({ error }) => {
+    running(false);
+    byId("fit-told").textContent = error ?? "The error is that on directions that were not fitted.";
+  });
+}
+
+function drawRanking() {
+  byId("fit-ranking").hidden = !ranking.length;
+  byId("fit-ranking").tBodies[0].replaceChildren(
+    ...ranking.map((fit) =>
+      element(
+        "tr",
+        { title: fit.text },
+        element("td", {}, fit.model),
+        element("td", {}, format(fit.error)),
+        element("td", {}, element("button", { class: "small", onclick: () => showFit(fit) }, "Show")),
+      ),
+    ),
+  );
+  byId("fit-remarks").textContent = ranking.length && ranking[0].text ? `${ranking[0].model}: ${ranking[0].text}` : "";
+}
+
+/** Wipe a fit over what was measured; it takes the place of another fit. */
+function showFit({ bsdf, model }) {
+  const told = (it) => JSON.stringify(it.bsdf);
+  const known = ranking.map(told);
+  const subject = { bsdf, name: `${model}, fitted`, hidden: false };
+  let at = session.state.subjects.findIndex((it) => known.includes(told(it)));
+  if (at < 0) {
+    if (!hasRoom()) return tellFull();
+    addSubject(bsdf, subject.name);
+    at = session.state.subjects.length - 1;
+  } else {
+    changeSubject(at, subject);
+  }
+  const measured = session.state.subjects.findIndex((it) => it.bsdf.file === fitted);
+  if (measured >= 0) change({ compare: "wipe", pair: [measured, at] });
+  byId("fit-dialog").close();
 }

@@ -87,7 +87,7 @@ function showBaked(concerned) {
     if (!concerned(at) || !at.every((place, k) => place === null || place === session.scrubbers[k].at)) continue;
     if (header) receivePayload(header, buffer, offset);
     else receive(structuredClone(message));
-    if (message?.view === "polar") receive({ ...message, view: "cartesian" });
+    if (message?.view === "polar" && session.state.axis === "theta_o") receive({ ...message, view: "cartesian" });
   }
 }
 

@@ -5,6 +5,7 @@ import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { aimAt, belowOf } from "./link.js";
 import { colourOf } from "./drawing.js";
+import { quantity } from "./plots.js";
 
 const VERTEX = `#version 300 es
 in vec3 position, normal; uniform mat4 view; out vec3 facing;
@@ -164,12 +165,12 @@ export function drawLobe() {
   render(found);
   canvas.setAttribute(
     "aria-label",
-    `Lobes of f cosθo at θi ${format(state.theta)}°: ${found
+    `Lobes of ${quantity()} at θi ${format(state.theta)}°: ${found
       .map(({ subject }, k) => `${state.subjects[subject].name}, at most ${format(peaks[k])} per steradian`)
       .join("; ")}. Arrow keys turn it.`,
   );
   card.note.textContent =
-    "f cosθo as radius" +
+    `${quantity()} as radius` +
     (log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "") +
     (state.normalise ? ", over their peaks" : `, at most ${format(common)}`);
 }

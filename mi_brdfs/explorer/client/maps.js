@@ -3,6 +3,7 @@ import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, power } 
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { belowOf } from "./link.js";
+import { quantity } from "./plots.js";
 
 /** Draw the maps of a view beside each other, on one logarithmic scale of colours. */
 export function drawMaps(view) {
@@ -20,7 +21,8 @@ export function drawMaps(view) {
   const boxes = [...card.maps.children];
   found.forEach((map, k) => paint(boxes[k] ?? addBox(card, view), view, map, low, high));
   boxes.slice(found.length).forEach((box) => box.remove());
-  bar(card, low, high, view === "slice" ? "f, 1/sr" : "f cosθo, 1/sr");
+  if (view === "hemisphere") card.note.textContent = `${quantity()} from above`;
+  bar(card, low, high, `${view === "slice" ? "f" : quantity()}, 1/sr`);
 }
 
 function addBox(card, view) {
@@ -74,7 +76,7 @@ function where(view, map, x, y) {
   const theta = 90 * Math.hypot(along, across);
   if (theta > 90) return `${name}: outside the hemisphere`;
   const azimuth = ((degrees(Math.atan2(-across, -along)) + session.state.phi + 540) % 360) - 180;
-  return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: f cosθo ${format(value, 4)}`;
+  return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: ${quantity()} ${format(value, 4)}`;
 }
 
 function paint(box, view, map, low, high) {

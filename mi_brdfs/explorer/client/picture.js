@@ -32,6 +32,8 @@ export function startPicture() {
     event.preventDefault();
     slideTo(session.state.wipe + step);
   });
+  if (!session.exported) card.legend = [[null, "Drag to go around; arrow keys do, too; a double click goes back"]];
+  tell(card, []);
   card.image = (done) => stack.querySelector("canvas") && flat().toBlob(done);
 }
 
@@ -69,7 +71,7 @@ export function drawPicture() {
     canvas.closest(".frame").classList.toggle("dimmed", Boolean(session.info[k]?.error));
     canvas.setAttribute(
       "aria-label",
-      `${session.state.subjects[k].name}, rendered in the stage ${session.state.stage}`,
+      `${session.state.subjects[k].name}, rendered in the light ${session.state.stage}`,
     );
     const caption = stack.querySelector(`[data-subject="${k}"]`);
     caption.querySelector("b").textContent = session.state.subjects[k].name;
@@ -120,9 +122,28 @@ function build(mode, shown, layout) {
 
 function watched(k) {
   const canvas = canvases.get(k);
-  canvas.onpointermove = (event) => point(canvas, k, event);
+  canvas.onpointermove = (event) => {
+    if (canvas.hasPointerCapture(event.pointerId)) goAround(event.movementX, event.movementY);
+    point(canvas, k, event);
+  };
   canvas.onpointerleave = () => tell(cards.picture, []);
+  if (session.exported) return canvas;
+  canvas.tabIndex = 0;
+  canvas.onpointerdown = (event) => canvas.setPointerCapture(event.pointerId);
+  canvas.ondblclick = () => change({ yaw: 0, pitch: 0 });
+  canvas.onkeydown = (event) => {
+    const way = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    goAround(...way);
+  };
   return canvas;
+}
+
+/** Let the camera go around, so that what is shown follows the hand, half a degree a pixel. */
+function goAround(right, down) {
+  const { yaw, pitch } = session.state;
+  change({ yaw: ((yaw - right / 2 + 540) % 360) - 180, pitch: pitch + down / 2 });
 }
 
 function point(canvas, k, event) {

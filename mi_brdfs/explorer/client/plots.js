@@ -43,12 +43,30 @@ function replaceFigure(card, ...nodes) {
 }
 
 /** Put the legend and the unit of curves of f cosθ into their card. */
-function describe(card, curves) {
+function describe(card, curves, axis = AXES.theta_o) {
   card.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
-  card.note.textContent = `${unitOf()}, at θi = ${format(session.state.theta)}°`;
+  card.note.textContent = `${unitOf()}, ${axis.held()}`;
 }
 
-const unitOf = () => (session.state.normalise ? "f cosθo / maximum" : "f cosθo, 1/sr");
+export const quantity = () => (session.state.cosine ? "f cosθo" : "f");
+const unitOf = () => quantity() + (session.state.normalise ? " / maximum" : ", 1/sr");
+
+const quarter = { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] };
+const thetaI = () => `${format(session.state.theta)}°`;
+/** What the cartesian plot goes along: its symbol, where that is, and what is held. */
+export const AXES = {
+  theta_o: { symbol: "θo", title: "Plane of incidence", held: () => `at θi = ${thetaI()}` },
+  theta_h: { symbol: "θh", title: "Along θh", held: () => `at θd = θi = ${thetaI()}, φd = 90°`, ...quarter },
+  theta_d: { symbol: "θd", title: "Along θd", held: () => "at θh = 0, in mirror directions", ...quarter },
+  phi: {
+    symbol: "φo − φi",
+    title: "Around the normal",
+    held: () => `at θo = θi = ${thetaI()}`,
+    low: 0,
+    high: 360,
+    marks: [0, 60, 120, 180, 240, 300, 360],
+  },
+};
 
 // --- Polar ----------------------------------------------------------------------------------------------------------
 
@@ -196,17 +214,24 @@ function cursorAt(angle, act) {
 
 export function drawCartesian() {
   const curves = lobesOf("cartesian");
-  describe(cards.cartesian, curves);
+  const axis = AXES[session.state.axis];
+  const inPlane = axis === AXES.theta_o;
+  describe(cards.cartesian, curves, axis);
+  cards.cartesian.node.querySelector("h2").textContent = axis.title;
   const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
-  const across = whole
+  const across = !inPlane
+    ? axis
+    : whole
     ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] }
     : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
+  // At grazing angles, f may be without end.
   const scale = valueScale(
-    curves.map(({ y }) => y),
+    curves.map(({ x, y }) => (axis.high === 90 ? y.filter((value, k) => x[k] <= 85) : y)),
     session.state.scale === "log",
   );
   const { theta } = session.state;
   const mark = ({ svg, x, top, bottom }) => {
+    if (!inPlane) return;
     svg.append(
       line(x(-theta), top, x(-theta), bottom, "incident"),
       label(x(-theta) + 5, top + 10, "ωi", "start", "direction"),
@@ -218,11 +243,11 @@ export function drawCartesian() {
     curves,
     across,
     scale,
-    summary(curves, `Plot of ${unitOf()} over the angle in the plane of incidence`, ""),
+    summary(curves, `Plot of ${unitOf()} over ${axis.symbol}`, ""),
     mark,
-    pointAt,
+    inPlane ? pointAt : (angle, cross) => cross(angle, axis.symbol),
   );
-  crosses.cartesian = () => cross(cursor, "θo");
+  crosses.cartesian = () => cross(inPlane ? cursor : null, axis.symbol);
   crosses.cartesian();
 }
 
@@ -245,7 +270,7 @@ export function drawAlbedo() {
   graph(
     cards.albedo,
     curves,
-    { low: 0, high: 90, marks: [0, 15, 30, 45, 60, 75, 90] },
+    quarter,
     scale,
     summary(curves, "Albedo over the angle of incidence, with a line at 1", ""),
     mark,
@@ -261,8 +286,8 @@ export function table(view) {
     [
       "material",
       "channel",
-      view === "albedo" ? "theta_i_degrees" : "theta_o_degrees",
-      view === "albedo" ? "albedo" : "f_cos_theta_o",
+      `${view === "albedo" ? "theta_i" : view === "cartesian" ? session.state.axis : "theta_o"}_degrees`,
+      view === "albedo" ? "albedo" : session.state.cosine ? "f_cos_theta_o" : "f",
     ],
     ...visible().flatMap((k) =>
       (session.shown[view][k]?.curves ?? []).flatMap((curve) =>

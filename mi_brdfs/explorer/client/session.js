@@ -145,6 +145,8 @@ export function clean(given) {
       hidden: hidden === true,
       colour: Number.isInteger(colour) && colour in PALETTE ? colour : k,
     }));
+  for (const name of ["stage", "shape"])
+    if (session.hello && !session.hello[`${name}s`].includes(state[name])) state[name] = DEFAULTS[name];
   if (!Number.isInteger(state.component)) state.component = null;
   for (const [name, limits] of Object.entries(LIMITS))
     if (state[name] !== null) state[name] = clamp(state[name], ...limits);
@@ -175,7 +177,7 @@ export function fragment() {
   return "#" + letters.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
 
-function decoded(letters) {
+function fromBase64url(letters) {
   const bytes = atob(letters.replaceAll("-", "+").replaceAll("_", "/"));
   return new TextDecoder().decode(Uint8Array.from(bytes, (letter) => letter.charCodeAt(0)));
 }
@@ -184,7 +186,7 @@ function decoded(letters) {
 export function readFragment(text) {
   try {
     const plain = decodeURIComponent(text.replace(/^#/, ""));
-    const found = JSON.parse(plain.startsWith("{") ? plain : decoded(plain));
+    const found = JSON.parse(plain.startsWith("{") ? plain : fromBase64url(plain));
     return Array.isArray(found.subjects) ? clean(found) : null;
   } catch {
     return null;

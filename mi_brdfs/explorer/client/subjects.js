@@ -107,14 +107,18 @@ function showFound() {
     if (fits(name, title, group)) (kinds[group] ??= []).push([name, title === name ? "" : title, { type: name }]);
   }
   const files = hello.files.filter(({ name }) => fits(name, "file measured"));
-  const presets = hello.presets.filter((name) => fits(name, "preset"));
+  const presets = {};
+  hello.presets.forEach((name, at) => {
+    const [material] = name.split("/").slice(-1);
+    if (fits(name, material.replaceAll("-", " "), "preset")) (presets[material] ??= []).push([name, at]);
+  });
   const groups = [
     ...Object.entries(kinds),
     [
       "Files",
       files.map(({ file, name, kind }) => [name, "", { type: kind === "material" ? "given" : "tabulated", file }]),
     ],
-    ["Presets", presets.map((name) => [name, "", { type: "preset", name }])],
+    ["Presets", Object.entries(presets).sort(([a], [b]) => (a < b ? -1 : 1))],
   ];
   let room = words.length ? MOST_FOUND : 400;
   const nodes = [];
@@ -129,7 +133,7 @@ function showFound() {
         "ul",
         {},
         ...shown.map(([name, text, bsdf]) =>
-          element(
+          Array.isArray(text) ? ballsOf(name, text) : element(
             "li",
             {},
             element(
@@ -145,6 +149,24 @@ function showFound() {
     if (more) nodes.push(element("p", { class: "note" }, `and ${more} more: type to search`));
   }
   byId("found").replaceChildren(...(nodes.length ? nodes : [element("p", {}, "Nothing has this name.")]));
+}
+
+/** Return a published material, with a ball for each model that it was fitted with. */
+function ballsOf(material, members) {
+  const { presets, across } = session.hello;
+  const last = Math.ceil(presets.length / across) - 1;
+  const ball = ([name, at]) =>
+    element(
+      "button",
+      { class: "ball", "aria-label": name, onclick: () => choose({ type: "preset", name }, name) },
+      element("i", {
+        style:
+          `background:url(client/published.jpg) ${(100 * (at % across)) / (across - 1)}% ` +
+          `${(100 * Math.floor(at / across)) / last}% / ${100 * across}%`,
+      }),
+      name.slice(0, -material.length - 1),
+    );
+  return element("li", { class: "preset" }, element("b", {}, material.replaceAll("-", " ")), ...members.map(ball));
 }
 
 function choose(bsdf, name) {
@@ -186,7 +208,6 @@ function startDrop() {
 async function uploadAll(files) {
   byId("add-dialog").close();
   for (const file of files) {
-    if (!hasRoom()) return tellFull();
     emit("busy", { text: `Uploading ${file.name} …` });
     try {
       const response = await fetch(`upload?${new URLSearchParams({ name: file.name })}`, {
@@ -198,8 +219,16 @@ async function uploadAll(files) {
         .json()
         .catch(() => ({ error: `The server refused ${file.name} (${response.status}).` }));
       if (answer.error) throw new Error(answer.error);
-      session.hello.files = [...session.hello.files, answer];
-      addSubject({ type: "tabulated", file: answer.file }, answer.name);
+      if (answer.file) {
+        session.hello.files = [...session.hello.files, answer];
+        addSubject({ type: "tabulated", file: answer.file }, answer.name);
+      } else if (answer.stage) {
+        for (const words of ["stages", "turned"]) session.hello[words] = [...session.hello[words], answer.stage];
+        change(answer);
+      } else {
+        session.hello.shapes = [...session.hello.shapes, answer.shape];
+        change(answer);
+      }
     } catch (error) {
       emit(
         "error",

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import vector
-from ..coordinates import HalfDifference, polar_angle, spherical
+from ..coordinates import HalfDifference, SpecularPolar, polar_angle, spherical
 from ..measurement import FileError, Measurement, Quantity
 from ..rows import arranged, checked_angles, without_cosine
 from ..text import TextFile, opening, shortened, whole
@@ -21,7 +21,7 @@ NAME = "ALTA"
 DESCRIPTION = "text with the lines #DIM, #PARAM_IN and #PARAM_OUT"
 OUTPUTS: dict[str, Literal["f", "f cos"] | None] = {
     "INV_STERADIAN": "f", "INV_STERADIAN_COSINE_FACTOR": "f cos", "RGB_COLOR": None, "XYZ_COLOR": None,
-    "UNKNOWN_OUTPUT": None,
+    "UNKNOWN": None, "UNKNOWN_OUTPUT": None,
 }  # fmt: skip
 """ALTA's names of what a BRDF's columns can hold, None where they leave the cosine open."""
 KEYWORDS = ("DIM", "PARAM_IN", "PARAM_OUT", "VS", "TYPE", "FORMAT")
@@ -55,29 +55,37 @@ def read(path: Path, quantity: Quantity) -> Measurement:
             notes[name.lower()] = " ".join(words).strip('"')
     if settings.get("TYPE", ["data"])[0].lower() == "function" or settings.get("FORMAT", ["text"])[0].lower() != "text":
         raise FileError(f"{path} holds a fitted function or binary data of ALTA; only its text data can be read.")
-    inputs, outputs = dimensions(path, settings)
-    directions, anisotropic = parametrisation(path, settings, inputs)
-    output = (settings.get("PARAM_OUT") or ["UNKNOWN_OUTPUT"])[0].upper()
+    name, output = ((settings.get(key) or ["UNKNOWN"])[0].upper() for key in ("PARAM_IN", "PARAM_OUT"))
+    if name not in PARAMETRISATIONS:
+        known = ", ".join(PARAMETRISATIONS)
+        raise FileError(f"{path}: {shortened(name)} is not known; known are {known}.")
     if output not in OUTPUTS:
         raise FileError(f"{path}: its output {shortened(output)} is no BRDF (#PARAM_OUT INV_STERADIAN or RGB_COLOR).")
-    if output == "UNKNOWN_OUTPUT" and quantity == "stated":
+    if output.startswith("UNKNOWN") and quantity == "stated":
         raise FileError(
             f'{path} does not say what it holds: give the quantity, "f" or "f cos", or add a line #PARAM_OUT with '
             "INV_STERADIAN or INV_STERADIAN_COSINE_FACTOR."
         )
-    if outputs not in (1, 3) or (outputs == 1 and "COLOR" in output):
-        raise FileError(f"{path}: its #DIM has {outputs} outputs, but wavelengths are not known; 1 or 3 can be read.")
+    needed, directions, anisotropic = PARAMETRISATIONS[name]
+    inputs, outputs = (whole(word) for word in (*settings.get("DIM", []), "", "")[:2])
+    if inputs != needed or outputs not in ((3,) if "COLOR" in output else (1, 3)):
+        raise FileError(
+            f"{path}: its line #DIM has {inputs} and {outputs} columns; of {name} {needed} can be read, and of values "
+            "3 in rgb or XYZ, or a single one, as their wavelengths are not known."
+        )
     uncertain = any(word not in ("0", "0.0") for word in settings.get("VS", []))
     what = f"{inputs} of #PARAM_IN and {outputs} of #PARAM_OUT"
     table = file.table(itertools.chain([first], rows), inputs + outputs, what, more=uncertain)
-    known = np.all(np.isfinite(table[:, :inputs]), axis=1)
-    if not np.all(known):
-        raise file.error("a coordinate is infinite or missing", file.row_lines[int(np.argmin(known))])
     with np.errstate(invalid="ignore"):
         light, view = directions(*table[:, :inputs].T)
-    if np.any(zero := np.isnan(light.z + view.z)):
-        raise file.error("a direction is the zero vector", file.row_lines[int(np.argmax(zero))])
-    theta_i, theta_o, phi_i, phi_o = (angle(w) for angle in (polar_angle, azimuth) for w in (light, view))
+    unknown = np.isnan(sum(w.x + w.y + w.z for w in (light, view)))
+    if np.any(unknown):
+        raise file.error(
+            "a coordinate is infinite or missing, or a direction is the zero vector",
+            file.row_lines[int(np.argmax(unknown))],
+        )
+    theta_i, theta_o = polar_angle(light), polar_angle(view)
+    phi_i, phi_o = (np.arctan2(w.y, w.x) for w in (light, view))
     if not anisotropic:
         phi_i, phi_o = 0 * phi_i, phi_o - phi_i
     checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
@@ -86,12 +94,10 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     held = OUTPUTS[output] or ("f" if quantity == "stated" else quantity)
     if held == "f cos":
         values = without_cosine(values, np.cos(theta_o))
-    if output == "XYZ_COLOR":
-        values = srgb_of(values)
     return Measurement(
         path,
         NAME,
-        arranged(theta_i, phi_i, theta_o, phi_o, values),
+        arranged(theta_i, phi_i, theta_o, phi_o, srgb_of(values) if output == "XYZ_COLOR" else values),
         np.array([np.nan]) if outputs == 1 else None,
         material=notes.get("sample", path.stem),
         quantity=held,
@@ -99,42 +105,15 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     )
 
 
-def dimensions(path: Path, settings: dict[str, list[str]]) -> tuple[int, int]:
-    words = settings.get("DIM", [])
-    inputs, outputs = (whole(word) for word in (*words, "", "")[:2])
-    if not 0 < inputs < 1000 or not 0 < outputs < 1000:
-        raise FileError(f"{path}: its line #DIM should have the numbers of input and of output columns.")
-    return inputs, outputs
-
-
-def parametrisation(path: Path, settings: dict[str, list[str]], inputs: int) -> tuple[Callable[..., Pair], bool]:
-    """Return the function of the input columns that gives ``(L, V)``, and whether its BRDFs are anisotropic."""
-    name = (settings.get("PARAM_IN") or ["UNKNOWN_INPUT"])[0].upper()
-    if name not in PARAMETRISATIONS:
-        if inputs < 3:
-            raise FileError(
-                f"{path}: {shortened(name)} has {inputs} of the at least 3 coordinates of a BRDF: its values are a cut."
-            )
-        raise FileError(f"{path}: {shortened(name)} is not known; known are {', '.join(PARAMETRISATIONS)}.")
-    needed, directions, anisotropic = PARAMETRISATIONS[name]
-    if inputs != needed:
-        raise FileError(f"{path}: {name} has {needed} columns, but #DIM says {inputs}.")
-    return directions, anisotropic
-
-
 def projected(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Pair:
     return spherical(theta_l, 0 * x), spherical(np.hypot(x, y), np.arctan2(y, x))
 
 
 def retro(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Pair:
-    """V in polar coordinates about L, whose azimuth is 0 towards the normal."""
-    about = spherical(np.hypot(x, y), np.arctan2(y, x))
-    cos, sin = np.cos(theta_l), np.sin(theta_l)
-    return spherical(theta_l, 0 * x), vector(about.z * sin - about.x * cos, about.y, about.z * cos + about.x * sin)
-
-
-def azimuth(w: SimpleNamespace) -> np.ndarray:
-    return np.arctan2(w.y, w.x)
+    """V in polar coordinates about L, whose azimuth is 0 towards the normal: the mirror image of those about the mirror
+    direction."""
+    light, about = SpecularPolar(mirrored=False).directions(theta_l, np.arctan2(y, x), np.hypot(x, y))
+    return light, vector(-about.x, about.y, about.z)
 
 
 def half(theta_h: np.ndarray, phi_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray) -> Pair:

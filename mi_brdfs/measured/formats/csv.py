@@ -77,7 +77,7 @@ def read(path: Path, quantity: Quantity) -> Measurement:
         NAME,
         arranged(theta_i, phi_i, theta_o, phi_o, values),
         columns.wavelengths,
-        material=columns.stated("material") or path.stem,
+        material=file.stated("material") or path.stem,
         quantity=columns.quantity,
     )
 
@@ -98,8 +98,7 @@ def write(path: Path, source: Source) -> None:
         fine = np.append(np.arange(0, 90, 2.5), 89)
         angles = theta, fine, np.append(np.arange(0, 140, 10.0), np.arange(140, 181, 2.5)), np.zeros(1)
     source.check_size(math.prod(map(len, angles)), MOST_VALUES)
-    known = source.wavelengths is None or np.all(np.isfinite(source.wavelengths))
-    names = ["f"] if not known else "rgb" if source.wavelengths is None else [f"{w:.10g}nm" for w in source.wavelengths]
+    names = "rgb" if source.wavelengths is None else [f"{w:.10g}nm" for w in source.wavelengths]
     with path.open("w", encoding="utf-8") as file:
         file.write("# quantity: f\n")
         if source.material:
@@ -121,16 +120,21 @@ class Columns:
         self.angles: dict[str, tuple[int, float]] = {}
         """The column of an angle, and its unit in radians, by ``theta_i``, ``phi_i``, ``theta_o``, ``phi_o`` or
         ``delta_phi``."""
-        found: list[tuple[str, int, bool]] = []
+        found: dict[str, int] = {}
+        cosines = set()
         for k, name in enumerate(names):
             word = name.strip().lower() if len(name) < LONGEST_NAME else ""
             if match := ANGLE.fullmatch(word):
                 self._add_angle(k, name, *match.groups())
             elif match := VALUE.fullmatch(word):
                 colour, grey, wavelength, cos = match.groups()
+                kind = (colour or "")[:1] or (grey and "f") or f"{float(wavelength):.17g}"
                 if wavelength and not 0 < float(wavelength) < np.inf:
                     raise file.error(f"the wavelength {shortened(wavelength)} is none")
-                found.append(((colour or "")[:1] or (grey and "f") or wavelength, k, bool(cos)))
+                if kind in found:
+                    raise file.error(f"the header has two columns of the same values, {shortened(name)} the second")
+                found[kind] = k
+                cosines.add(bool(cos))
             else:
                 raise file.error(f"the column {shortened(name)} is no angle, no wavelength, and none of f, r, g, b")
         for name in ("theta_i", "theta_o"):
@@ -138,27 +142,24 @@ class Columns:
                 raise file.error(f"the header has no column {name}, as theta_i_deg, theta_o_deg, phi_o_deg, f")
         if ("phi_o" in self.angles) == ("delta_phi" in self.angles):
             raise file.error("the header should have just one of the columns phi_o and delta_phi")
-        kinds = [kind for kind, _, _ in found]
-        if len(set(kinds)) < len(kinds) or not kinds:
-            raise file.error(
-                f"the header has {'no column of values' if not kinds else 'two columns of the same values'}"
-            )
         self.wavelengths: np.ndarray | None = None
-        if set(kinds) == set("rgb"):
-            found.sort(key=lambda each: "rgb".index(each[0]))
-        elif kinds == ["f"]:
-            stated = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", self.stated("wavelength"))
-            self.wavelengths = np.array([float(stated.group(1)) if stated else np.nan])
-        elif not set(kinds) & set("rgbf"):
-            found.sort(key=lambda each: float(each[0]))
-            self.wavelengths = np.array([float(kind) for kind, _, _ in found])
+        if found.keys() == set("rgb"):
+            self.values = [found[kind] for kind in "rgb"]
+        elif found.keys() == {"f"}:
+            stated = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", file.stated("wavelength"))
+            self.values, self.wavelengths = [found["f"]], np.array([float(stated[1]) if stated else np.nan])
+        elif found and not found.keys() & set("rgbf"):
+            kinds = sorted(found, key=float)
+            self.values, self.wavelengths = [found[kind] for kind in kinds], np.array(kinds, dtype=np.float64)
         else:
-            raise file.error(f"the values {brief(', '.join(kinds))} should be f, or r, g and b, or wavelengths in nm")
-        self.values = [k for _, k, _ in found]
-        self.quantity = self._quantity({cos for _, _, cos in found}, quantity)
+            raise file.error(
+                f"the columns of values, {brief(', '.join(found) or 'none')}, should be f, or r, g and b, or "
+                "wavelengths in nm"
+            )
+        self.quantity = self._quantity(cosines, quantity)
 
     def _add_angle(self, k: int, name: str, kind: str, of: str | None, unit: str | None) -> None:
-        unit = unit or self.stated("angles") or self.stated("units")
+        unit = unit or self.file.stated("angles", "units")
         if not unit or unit[0].lower() not in UNITS:
             raise self.file.error(f"the column {shortened(name)} has no unit: call it {name.strip()}_deg or _rad")
         key = f"{kind}_{'i' if of in INCIDENT else 'o'}" if kind in ("theta", "phi") else "delta_phi"
@@ -168,13 +169,8 @@ class Columns:
             )
         self.angles[key] = k, UNITS[unit[0].lower()]
 
-    def stated(self, name: str) -> str:
-        """Return what a comment ``# name: …`` says."""
-        matches = (re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment) for comment in self.file.comments)
-        return next((match.group(1) for match in matches if match), "")
-
     def _quantity(self, cosines: set[bool], unstated: Quantity) -> Literal["f", "f cos"]:
-        stated = re.sub(r"[\s_*·]+", " ", self.stated("quantity").lower())
+        stated = re.sub(r"[\s_*·]+", " ", self.file.stated("quantity").lower())
         if stated not in ("", "f", "brdf", "f cos", "brdf cos"):
             raise self.file.error(f"the quantity {shortened(stated)} is neither f nor f cos")
         if len(cosines) > 1 or (True in cosines and stated in ("f", "brdf")):

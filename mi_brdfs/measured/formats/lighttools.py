@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ..coordinates import Spherical
 from ..measurement import FileError, Grid, Measurement
-from ..text import TextFile, is_number, opening, shortened
-from .zemax import Header, has_incidence_lines, is_table, ordered, srgb_of, turning
+from ..text import TextFile, opening, shortened
+from .zemax import Header, blocks, has_incidence_lines, is_table, srgb_of
 
 NAME = "LightTools"
 DESCRIPTION = "as Zemax, with the lines AOI, POI, Side above each block of data"
 TRISTIMULUS = ("trisx", "trisy", "trisz")
+Channel = tuple[int, float]
+"""The tristimulus value, 0 to 2, and the wavelength in nm, 0 where there is none."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -35,109 +35,58 @@ def read(path: Path) -> Measurement:
     """
     file = TextFile(path)
     rows = file.rows()
-    header = Header.read(file, rows)
+    header = Header(file, rows)
     content = header.content()
-    symmetry = header.symmetry(("PlaneSymmetrical", "Asymmetric", "Asymmetrical"))
-    radials, azimuths = (header.require(file, name) for name in ("ScatterRadial", "ScatterAzimuth"))
-    found = list(blocks(file, rows, len(radials) * len(azimuths)))
-    front = [block for block in found if block.side == "front" and block.scatter == "brdf"]
-    if not front:
+    symmetry = header.symmetry("PlaneSymmetrical", "Asymmetric", "Asymmetrical")
+    radials, azimuths = (header.require(name) for name in ("ScatterRadial", "ScatterAzimuth"))
+    table: dict[tuple[float, Channel], tuple[np.ndarray, float]] = {}
+    planes = set()
+    for head, values in blocks(file, rows, len(radials) * len(azimuths)):
+        if head.get("side", "front") != "front" or head.get("scattertype", "brdf") != "brdf":
+            continue
+        tristimulus = head.get("tristimulusvalue", TRISTIMULUS[0])
+        if tristimulus not in TRISTIMULUS:
+            raise file.error(f"TristimulusValue {shortened(tristimulus)} is none of TrisX, TrisY and TrisZ")
+        incidence, plane, wavelength = (
+            float(file.numbers([head.get(name, "0")], f"the number of {name.upper()}")[0])
+            for name in ("aoi", "poi", "wavelength")
+        )
+        planes.add(plane)
+        key = incidence, (TRISTIMULUS.index(tristimulus), wavelength)
+        if key in table:
+            raise file.error(f"a second block has the AOI {incidence:g} and the same wavelength or tristimulus value")
+        table[key] = values, head["tis"]
+    if not table:
         raise FileError(f"{path} has no block with Side Front and ScatterType BRDF.")
-    if len({block.plane for block in front}) > 1:
+    if len(planes) > 1:
         raise FileError(f"{path} has several planes of incidence (POI); only tables of one can be read.")
-    channels = sorted({block.channel for block in front})
+    channels = sorted({channel for _, channel in table})
     if content != "Monochrome" and [tristimulus for tristimulus, _ in channels] != [0, 1, 2]:
         raise FileError(f"{path}: its SpectralContent needs the blocks TrisX, TrisY and TrisZ.")
-    header.angles["AOI"] = np.unique([block.incidence for block in front])
-    table = {(block.incidence, block.channel): block for block in front}
-    if len(table) < len(front) or len(table) < len(header.angles["AOI"]) * len(channels):
-        raise FileError(f"{path}: not every AOI has just one block for each wavelength or tristimulus value.")
-    (theta_i, i), (theta_o, o) = ordered(header, "AOI", most=90), ordered(header, "ScatterRadial", most=90)
+    incidences = header.angles["AOI"] = np.unique([incidence for incidence, _ in table])
+    if len(table) < len(incidences) * len(channels):
+        raise FileError(f"{path}: not every AOI has a block for each wavelength or tristimulus value.")
+    (theta_i, i), (theta_o, o) = header.ordered("AOI", most=90), header.ordered("ScatterRadial", most=90)
 
     turned = (azimuths + 90) % 360 - 180  # Δφ in [-180°, 180°)
     one_side = np.all(turned <= 0) or np.all((turned >= 0) | (turned == -180))
     mirrored = bool(one_side) and symmetry == "PlaneSymmetrical"
     header.angles["ScatterAzimuth"] = abs(turned) if mirrored else turned
-    delta, d = ordered(header, "ScatterAzimuth", most=180) if mirrored else turning(header, "ScatterAzimuth")
+    delta, d = header.ordered("ScatterAzimuth", most=180) if mirrored else header.turning("ScatterAzimuth")
 
-    each = [[table[incidence, channel].values for channel in channels] for incidence in header.angles["AOI"]]
-    values = np.array(each).reshape(len(each), len(channels), len(azimuths), len(radials)).transpose(0, 3, 2, 1)
-    values = values[np.ix_(i, o, d)]
+    found = np.array([[table[incidence, channel][0] for channel in channels] for incidence in incidences])
+    found = found.reshape(*found.shape[:2], len(azimuths), len(radials)).transpose(0, 3, 2, 1)[np.ix_(i, o, d)]
     luminance = channels[1 if content == "XYZ" else 0]
-    stated = [table[incidence, luminance].tis for incidence in header.angles["AOI"]]
+    stated = [table[incidence, luminance][1] for incidence in incidences]
     wavelengths = np.array([wavelength or np.nan for _, wavelength in channels])
-    if content == "XYZ":
-        values = srgb_of(values)
     return Measurement(
         path,
         NAME,
-        Grid(Spherical(mirrored), (theta_i, theta_o, delta), values),
+        Grid(Spherical(mirrored), (theta_i, theta_o, delta), srgb_of(found) if content == "XYZ" else found),
         None if content == "XYZ" else np.where(np.isnan(wavelengths), header.wavelength, wavelengths),
-        material=header.comment("sample", "model.*", "material"),
+        material=header.material,
         stated_albedos={
             float(theta): [tis] for theta, tis in zip(theta_i.nodes, stated, strict=True) if np.isfinite(tis)
         },
         notes=header.notes,
     )
-
-
-@dataclass(frozen=True)
-class Block:
-    """The values for one angle of incidence and channel."""
-
-    incidence: float
-    plane: float
-    side: str
-    scatter: str
-    channel: tuple[int, float]
-    """The tristimulus value, 0 to 2, and the wavelength in nm, 0 where there is none."""
-    tis: float
-    values: np.ndarray
-
-
-KEYWORDS = ("aoi", "poi", "side", "scattertype", "tristimulusvalue", "wavelength", "tis")
-
-
-def blocks(file: TextFile, rows: Iterator[list[str]], size: int) -> Iterator[Block]:
-    """Read the blocks: lines ``keyword value``, of which a block repeats what has changed, and ``size`` values."""
-    file.expect(size, "values in a block")
-    head: dict[str, str] = {}
-    values, filled = np.empty(size), 0
-    for words in rows:
-        word = words[0].lower()
-        if word in ("databegin", "dataend", "monochrome"):
-            continue
-        if word[0].isalpha() and not is_number(word):
-            if filled:
-                raise file.error(f"{shortened(words[0])} stands after {filled} values of a block, which has {size}")
-            if word not in KEYWORDS or len(words) < 2:
-                raise file.error(f"{shortened(' '.join(words))} is no keyword of a block with its value")
-            head[word] = words[1].lower()
-            continue
-        row = file.numbers(words, "a value")
-        if filled + len(row) > size:
-            raise file.error(f"there are more than the {size} values of a block")
-        values[filled : filled + len(row)] = row
-        filled += len(row)
-        if filled == size:
-            incidence, plane, wavelength = (number(file, head, name, "0") for name in ("aoi", "poi", "wavelength"))
-            tristimulus = head.get("tristimulusvalue", TRISTIMULUS[0])
-            if tristimulus not in TRISTIMULUS:
-                raise file.error(f"TristimulusValue {shortened(tristimulus)} is none of TrisX, TrisY and TrisZ")
-            yield Block(
-                incidence,
-                plane,
-                head.get("side", "front"),
-                head.get("scattertype", "brdf"),
-                (TRISTIMULUS.index(tristimulus), wavelength),
-                number(file, head, "tis", "nan"),
-                values,
-            )
-            head.pop("tis", None)
-            values, filled = np.empty(size), 0
-    if filled:
-        raise file.error(f"the file ends after {filled} of {size} values of a block")
-
-
-def number(file: TextFile, head: dict[str, str], name: str, default: str) -> float:
-    return float(file.numbers([head.get(name, default)], f"the number of {name.upper()}")[0])

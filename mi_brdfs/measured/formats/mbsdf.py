@@ -27,8 +27,12 @@ from .merl import centres
 NAME = "MBSDF"
 MAGIC = "NVIDIA ARC MBSDF V1"
 DESCRIPTION = f'the line "{MAGIC}"'
-REFLECTION = "MBSDF_DATA=", "MBSDF_DATA_REFLECTION="
-TRANSMISSION = "MBSDF_DATA_TRANSMISSION="
+BLOCKS = {
+    "MBSDF_DATA=": "reflection",
+    "MBSDF_DATA_REFLECTION=": "reflection",
+    "MBSDF_DATA_TRANSMISSION=": "transmission",
+}
+"""The lines above blocks of data, and what these are of."""
 CHANNELS = 1, 3
 """Of the types of blocks."""
 LONGEST, LINES = 1 << 12, 10_000
@@ -44,31 +48,26 @@ def read(path: Path) -> Measurement:
     if _line(file) != MAGIC:
         raise file.error(f'the first line must be "{MAGIC}"', 0)
     metadata: dict[str, str] = {}
-    values: np.ndarray | None = None
-    blocks = lines = 0
+    found: dict[str, np.ndarray] = {}
+    lines = 0
     while file.left:
-        start, line = file.offset, _line(file)
-        lines += 1
+        start, line, lines = file.offset, _line(file), lines + 1
+        key, equals, text = line.partition("=")
         if lines > LINES:
             raise file.error(f"there are more than {LINES:,} lines of text", start)
-        if line == TRANSMISSION:
-            _block(file)
-            metadata["transmission"] = "in the file, but not read"
-        elif line in REFLECTION:
-            if values is not None:
-                raise file.error("a second block of reflection follows", start)
-            values = _block(file)
-        elif blocks and line.strip():
+        if line in BLOCKS:
+            if BLOCKS[line] in found:
+                raise file.error(f"a second block of {BLOCKS[line]} follows", start)
+            found[BLOCKS[line]] = _block(file)
+        elif found and line.strip():
             raise file.error("another block of data or the end of the file should follow", start)
-        else:
-            key, equals, text = line.partition("=")
-            if equals:
-                metadata[key.strip()] = _unquoted(text)
-            continue
-        blocks += 1
-    if values is None:
-        what = "data of transmission, but not of reflection" if blocks else "no block of data"
-        raise file.error(f"the file ends, and it has {what}")
+        elif equals:
+            metadata[key.strip()] = _unquoted(text)
+    if "reflection" not in found:
+        raise file.error("the file ends, and it has no data of reflection")
+    if "transmission" in found:
+        metadata["transmission"] = "in the file, but not read"
+    values = found["reflection"]
     theta, _, phi, _ = values.shape
     polar = Axis(centres(theta, np.pi / 2), low=0, high=np.pi / 2)
     azimuth = Axis(centres(phi, np.pi), low=0, high=np.pi)

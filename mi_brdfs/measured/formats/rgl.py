@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,8 +31,8 @@ MOST_VALUES = 1 << 27
 MAGIC = b"tensor_file\0"
 VERSION = 1, 0
 TYPES = dict(enumerate(("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8"), start=1))
-MOST_DIMENSIONS = 16
-MOST_FIELDS = 1024
+HEAD = [("dimensions", "<u2"), ("type", "u1"), ("offset", "<u8")]
+"""What follows a field's name, before its shape."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -38,23 +40,43 @@ def recognizes(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path) -> Measurement:
-    return _File(path).measurement()
+    file = TensorFile(path)
+    phi_i, theta_i = file.nodes("phi_i"), file.nodes("theta_i", 0, np.pi / 2)
+    wavelengths = file.nodes("wavelengths", 0, np.inf) if "wavelengths" in file.fields else None
+    name, channels = ("rgb", 3) if wavelengths is None else ("spectra", len(wavelengths))
+    slices = len(phi_i), len(theta_i)
+    ndf, sigma, vndf = file.density("ndf"), file.density("sigma"), file.density("vndf", *slices)
+    values = file.on_square(name, *slices, channels).transpose(0, 1, 4, 3, 2)
+    if len(phi_i) == 2 and _equal(vndf) and _equal(values):
+        phi_i, vndf, values = phi_i[:1], vndf[:1], values[:1]
+    coordinates = Adaptive(phi_i, theta_i, ndf, sigma, vndf, bool(file.array("jacobian", "u1", 1)[0]))
+    axes = [Axis(phi_i), Axis(theta_i), *(Axis(np.linspace(0, 1, n)) for n in values.shape[2:4])]
+    if not coordinates.anisotropic:
+        axes, values = axes[1:], values[0]
+    description, field = "", file.fields.get("description")
+    if field and (field.dtype, len(field.shape)) == ("u1", 1) and field.count:
+        description = decoded(file.array("description", "u1", None).tobytes()).replace("\0", " ").strip()
+    return Measurement(
+        path,
+        NAME,
+        Grid(coordinates, tuple(axes), values, signed=wavelengths is None),
+        wavelengths=wavelengths,
+        material=description or path.stem,
+        quantity="f cos",
+    )
 
 
 def write(path: Path, source: Source, resolution: int | None = None) -> None:
     """Write ``resolution`` x ``resolution`` values for each of 32 angles θi, by default 64, and 48 for each of the φi
     too if the source is anisotropic: 3 MB and more in rgb.
 
-    Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones. What is of one
-    wavelength that nobody stated is written as grey. Where anisotropic files have a symmetry, ``measured`` looks the
-    wrong slice up for a wi with exactly y = 0; ``tabulated`` does not.
+    Mitsuba's ``measured`` renders rgb files in its rgb variants, and others in its spectral ones. Where anisotropic
+    files have a symmetry, ``measured`` looks the wrong slice up for a wi with exactly y = 0; ``tabulated`` does not.
 
     Raises:
         ValueError: if there are more than 512 MiB.
         OSError: if the file cannot be written.
     """
-    if source.wavelengths is not None and np.isnan(source.wavelengths).any():
-        source = source.rgb()
     span = turned(source)
     resolution = resolution or (RESOLUTION_ANISOTROPIC if span else RESOLUTION)
     # As Mitsuba has it, the whole turn, the lower half and the third quadrant.
@@ -63,13 +85,12 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     ndf, sigma, vndf = adapted(source, phi_i, THETA_I, resolution)
     coordinates = Adaptive(phi_i, THETA_I, ndf, sigma, vndf)
     u = np.linspace(0, 1, resolution)
-    slices: list[tuple[np.ndarray, ...]] = []
-    for azimuth in phi_i:
-        for theta in np.minimum(THETA_I, LAST):
-            places = np.meshgrid(*([azimuth, theta, u, u] if span else [theta, u, u]), indexing="ij")
-            slices.append(_slices(source, coordinates, [place.reshape(1, *place.shape[-2:]) for place in places]))
+    slices = []
+    for azimuth, theta in itertools.product(phi_i, np.minimum(THETA_I, LAST)):
+        places = *([azimuth] if span else []), theta, *np.meshgrid(u, u, indexing="ij")
+        slices.append(_slice(source, coordinates, np.broadcast_arrays(*places)))
     values, luminance, valid = (
-        np.concatenate(fields).reshape(len(phi_i), -1, *fields[0].shape[1:]) for fields in zip(*slices, strict=True)
+        np.array(each).reshape(len(phi_i), len(THETA_I), *each[0].shape) for each in zip(*slices, strict=True)
     )
     dark = ~luminance.any(axis=(-2, -1), keepdims=True)
     channels = {"rgb": values}
@@ -91,9 +112,9 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
     write_tensors(path, fields)
 
 
-def _slices(source: Source, coordinates: Adaptive, places: list[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Return ``(values, density, valid)`` at places, shapes (θi, channels, u2, u1), and (θi, u2, u1) twice: the table's
-    values, what directions are to be drawn in proportion to, and which of them are above the horizon."""
+def _slice(source: Source, coordinates: Adaptive, places: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Return ``(values, density, valid)`` at places, shapes (channels, u2, u1), and (u2, u1) twice: the table's values,
+    what directions are to be drawn in proportion to, and which of them are above the horizon."""
     wi, wo = coordinates.directions(*places)
     above = wo.z > 1e-6
     given, taken = stacked(wi)[above], stacked(wo)[above]
@@ -104,113 +125,18 @@ def _slices(source: Source, coordinates: Adaptive, places: list[np.ndarray]) -> 
     values[above] = f / scale[:, None]
     density = np.zeros(above.shape)
     density[above] = brightness(f) * wo.z[above] * coordinates.solid_angle(*places)[above]
-    return values.transpose(0, 3, 2, 1), density.transpose(0, 2, 1), above.transpose(0, 2, 1)
+    return values.transpose(2, 1, 0), density.T, above.T
 
 
-class _File:
-    """A tensor file whose fields are those of a material."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.file = BinaryFile(path)
-        self.tensors = contents(self.file)
-
-    def measurement(self) -> Measurement:
-        spectral = "wavelengths" in self.tensors
-        name = "spectra" if spectral else "rgb"
-        phi_i, theta_i = self.nodes("phi_i"), self.nodes("theta_i", 0, np.pi / 2)
-        wavelengths = self.nodes("wavelengths", 0, np.inf) if spectral else None
-        channels = 3 if wavelengths is None else len(wavelengths)
-        given = self.fitting(name, {0: len(phi_i), 1: len(theta_i), 2: channels}, 5)
-        jacobian = self.field("jacobian", "u1", 1)
-        if jacobian.count != 1:
-            raise self.problem("jacobian", f"has {jacobian.count} values; it is one")
-        ndf, sigma = self.density("ndf", {}, 2), self.density("sigma", {}, 2)
-        vndf = self.density("vndf", {0: len(phi_i), 1: len(theta_i)}, 4)
-        values = array(self.file, given, name).transpose(0, 1, 4, 3, 2)
-        if len(phi_i) == 2 and all(np.array_equal(a[0], a[1], equal_nan=True) for a in (vndf, values)):
-            phi_i, vndf, values = phi_i[:1], vndf[:1], values[:1]
-        coordinates = Adaptive(phi_i, theta_i, ndf, sigma, vndf, bool(array(self.file, jacobian, "jacobian")[0]))
-        axes = [Axis(phi_i), Axis(theta_i), *(Axis(np.linspace(0, 1, n)) for n in values.shape[2:4])]
-        if not coordinates.anisotropic:
-            axes, values = axes[1:], values[0]
-        return Measurement(
-            self.path,
-            NAME,
-            Grid(coordinates, tuple(axes), values, signed=not spectral),
-            wavelengths=wavelengths,
-            material=self.description() or self.path.stem,
-            quantity="f cos",
-        )
-
-    def problem(self, name: str, problem: str, index: int = 0) -> FileError:
-        """Return an error at a value of a field."""
-        tensor = self.tensors[name]
-        return self.file.error(f"{name!r} {problem}", tensor.offset + index * np.dtype(tensor.dtype).itemsize)
-
-    def field(self, name: str, dtype: str, dimensions: int) -> Tensor:
-        """Return a field that must be there, with so many dimensions."""
-        if name not in self.tensors:
-            raise self.file.error(
-                f"the table of contents ends without {name!r}; it has {brief(', '.join(self.tensors))}"
-            )
-        tensor = self.tensors[name]
-        if tensor.dtype != dtype:
-            raise self.problem(name, f"is of type {np.dtype(tensor.dtype)}; it must be {np.dtype(dtype)}")
-        if len(tensor.shape) != dimensions or not tensor.count:
-            raise self.problem(
-                name, f"is of shape {tensor.shape}; it must have {dimensions} dimensions, none of them 0"
-            )
-        return tensor
-
-    def fitting(self, name: str, sizes: dict[int, int], dimensions: int) -> Tensor:
-        """Return a field whose last two axes are those of the unit square, and whose others have these sizes."""
-        tensor = self.field(name, "f4", dimensions)
-        if any(tensor.shape[axis] != size for axis, size in sizes.items()):
-            raise self.problem(
-                name, f"is of shape {tensor.shape}; by the other fields it must start with {tuple(sizes.values())}"
-            )
-        if min(tensor.shape[-2:]) < 2:
-            raise self.problem(name, f"is of shape {tensor.shape}; its last two dimensions must be at least 2")
-        return tensor
-
-    def nodes(self, name: str, low: float = -np.inf, high: float = np.inf) -> np.ndarray:
-        """Return increasing numbers."""
-        with np.errstate(invalid="ignore"):
-            nodes = array(self.file, self.field(name, "f4", 1), name).astype(np.float64)
-        for k, wrong in enumerate(~((nodes >= low - 1e-4) & (nodes <= high + 1e-4) & np.isfinite(nodes))):
-            if wrong:
-                raise self.problem(name, f"has the value {nodes[k]:g}", k)
-        for index in np.flatnonzero(np.diff(nodes) <= 0):
-            raise self.problem(
-                name, f"must increase, but {nodes[index + 1]:g} follows {nodes[index]:g}", int(index) + 1
-            )
-        return nodes
-
-    def density(self, name: str, sizes: dict[int, int], dimensions: int) -> np.ndarray:
-        """Return maps on the unit square that are nowhere negative, and not 0 everywhere."""
-        values = array(self.file, self.fitting(name, sizes, dimensions), name)
-        wrong = np.flatnonzero(~((values >= 0) & (values < np.inf)))
-        if len(wrong):
-            raise self.problem(name, f"has the value {values.flat[wrong[0]]:g}", int(wrong[0]))
-        empty = np.flatnonzero(~np.any(values, axis=(-2, -1)))
-        if len(empty):
-            raise self.problem(name, "is 0 everywhere", int(empty[0]) * values.shape[-2] * values.shape[-1])
-        return values
-
-    def description(self) -> str:
-        """Return what the file says it is, if anything."""
-        tensor = self.tensors.get("description")
-        if tensor is None or tensor.dtype != "u1":
-            return ""
-        return decoded(array(self.file, tensor, "description").tobytes()).replace("\0", " ").strip()
+def _equal(array: np.ndarray) -> bool:
+    return bool(np.array_equal(array[0], array[1], equal_nan=True))
 
 
 # --- Mitsuba's tensor files: named arrays behind a table of contents -------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Tensor:
+class Field:
     """An array of a file: numpy's name of the type, the first byte, and the shape."""
 
     dtype: str
@@ -226,55 +152,88 @@ class Tensor:
         return self.offset + self.count * np.dtype(self.dtype).itemsize
 
 
-def contents(file: BinaryFile) -> dict[str, Tensor]:
-    """Return which arrays a file has, by name.
+class TensorFile:
+    """A file of named arrays.
 
     Raises:
         FileError: if it is none, or an array is not in it as a whole, or shares bytes with another.
     """
-    if file.take("u1", len(MAGIC), "the words 'tensor_file'").tobytes() != MAGIC:
-        raise file.error("the words 'tensor_file' should stand", 0)
-    version = tuple(int(n) for n in file.take("u1", 2, "version numbers"))
-    if version != VERSION:
-        raise file.error(f"the version is {version[0]}.{version[1]}; only 1.0 is known", file.offset - 2)
-    count = int(file.take("u4", 1, "the number of fields")[0])
-    if count > MOST_FIELDS:
-        raise file.error(f"{count:,} fields are announced", file.offset - 4)
-    tensors: dict[str, Tensor] = {}
-    for _ in range(count):
-        start = file.offset
-        length = int(file.take("u2", 1, "the length of a field's name")[0])
-        name = decoded(file.take("u1", length, "a field's name").tobytes())
-        shown = shortened(name)
-        dimensions = int(file.take("u2", 1, f"the number of dimensions of {shown}")[0])
-        type = int(file.take("u1", 1, f"the type of {shown}")[0])
-        offset = int(file.take("u8", 1, f"the offset of {shown}")[0])
-        if name in tensors:
-            raise file.error(f"a second field {shown} follows", start)
-        if type not in TYPES:
-            raise file.error(f"field {shown} is of the unknown type {type}", start)
-        if dimensions > MOST_DIMENSIONS:
-            raise file.error(f"field {shown} has {dimensions:,} dimensions", start)
-        shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {shown}"))
-        tensor = tensors[name] = Tensor(TYPES[type], offset, shape)
-        if tensor.end > file.size:
-            raise file.error(
-                f"field {shown} should lie from byte {offset:,} to {tensor.end:,}, but the file ends at {file.size:,}",
-                start,
+
+    def __init__(self, path: Path) -> None:
+        self.file = file = BinaryFile(path)
+        self.fields: dict[str, Field] = {}
+        file.take("u1", len(MAGIC), "the words 'tensor_file'")
+        version = tuple(int(n) for n in file.take("u1", 2, "version numbers"))
+        if version != VERSION:
+            raise file.error(f"the version is {version[0]}.{version[1]}; only 1.0 is known", file.offset - 2)
+        for _ in range(int(file.take("u4", 1, "the number of fields")[0])):
+            start = file.offset
+            length = int(file.take("u2", 1, "the length of a field's name")[0])
+            name = decoded(file.take("u1", length, "a field's name").tobytes())
+            (head,) = file.take(np.dtype(HEAD), 1, f"the type and place of {shortened(name)}")
+            dimensions, type, offset = (int(n) for n in head)
+            if name in self.fields or type not in TYPES:
+                wrong = f"of the unknown type {type}" if type not in TYPES else "there twice"
+                raise file.error(f"field {shortened(name)} is {wrong}", start)
+            shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {shortened(name)}"))
+            field = self.fields[name] = Field(TYPES[type], offset, shape)
+            if field.end > file.size:
+                raise file.error(
+                    f"field {shortened(name)} should have {field.count:,} values from byte {offset:,} on, but the file "
+                    f"ends at {file.size:,}",
+                    start,
+                )
+        end, before = file.offset, "the table of contents"
+        for name, field in sorted(self.fields.items(), key=lambda item: item[1].offset):
+            if field.count and field.offset < end:
+                raise file.error(f"field {shortened(name)} starts, but {before} reaches to byte {end:,}", field.offset)
+            end, before = max(end, field.end), f"field {shortened(name)}"
+
+    def error(self, name: str, problem: str, index: int = 0) -> FileError:
+        """Return an error at a value of a field."""
+        field = self.fields[name]
+        return self.file.error(f"{name!r} {problem}", field.offset + index * np.dtype(field.dtype).itemsize)
+
+    def array(self, name: str, dtype: str, *shape: int | None) -> np.ndarray:
+        """Return a field that must be there, of a type and a shape, in which None stands for any number but 0."""
+        if name not in self.fields:
+            raise self.file.error(
+                f"the table of contents ends without {name!r}; it has {brief(', '.join(self.fields))}"
             )
-    by_place = sorted((tensor.offset, tensor.end, shortened(name)) for name, tensor in tensors.items() if tensor.count)
-    end, before = file.offset, "the table of contents"
-    for start, stop, name in by_place:
-        if start < end:
-            raise file.error(f"field {name} starts, but {before} reaches to byte {end:,}", start)
-        end, before = stop, f"field {name}"
-    return tensors
+        field = self.fields[name]
+        if field.dtype != dtype:
+            raise self.error(name, f"is of type {np.dtype(field.dtype)}; it must be {np.dtype(dtype)}")
+        wanted = [n or given for n, given in zip(shape, field.shape, strict=False)]
+        if len(field.shape) != len(shape) or list(field.shape) != wanted or not field.count:
+            words = " × ".join("n" if n is None else str(n) for n in shape)
+            raise self.error(name, f"is of shape {field.shape}; by the other fields it must be {words}")
+        self.file.offset = field.offset
+        return self.file.take(dtype, field.count, f"{name!r}").reshape(field.shape)
 
+    def on_square(self, name: str, *shape: int | None) -> np.ndarray:
+        """Return a field whose last two axes are those of the unit square."""
+        values = self.array(name, "f4", *shape, None, None)
+        if min(values.shape[-2:]) < 2:
+            raise self.error(name, f"is of shape {values.shape}; its last two dimensions must be at least 2")
+        return values
 
-def array(file: BinaryFile, tensor: Tensor, name: str) -> np.ndarray:
-    """Return an array of a file."""
-    file.offset = tensor.offset
-    return file.take(tensor.dtype, tensor.count, f"{name!r}").reshape(tensor.shape)
+    def density(self, name: str, *shape: int | None) -> np.ndarray:
+        """Return maps on the unit square that are nowhere negative, and not 0 everywhere."""
+        values = self.on_square(name, *shape)
+        for k in np.flatnonzero(~((values >= 0) & (values < np.inf))):
+            raise self.error(name, f"has the value {values.flat[k]:g}", int(k))
+        for k in np.flatnonzero(~np.any(values, axis=(-2, -1))):
+            raise self.error(name, "is 0 everywhere", int(k) * values.shape[-2] * values.shape[-1])
+        return values
+
+    def nodes(self, name: str, low: float = -np.inf, high: float = np.inf) -> np.ndarray:
+        """Return increasing numbers."""
+        nodes = self.array(name, "f4", None).astype(np.float64)
+        for k in np.flatnonzero(~((nodes >= low - 1e-4) & (nodes <= high + 1e-4) & np.isfinite(nodes))):
+            raise self.error(name, f"has the value {nodes[k]:g}", int(k))
+        for k in np.flatnonzero(np.diff(nodes) <= 0):
+            raise self.error(name, f"must increase, but {nodes[k + 1]:g} follows {nodes[k]:g}", int(k) + 1)
+        return nodes
 
 
 def write_tensors(path: Path, fields: dict[str, np.ndarray]) -> None:

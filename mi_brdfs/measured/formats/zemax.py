@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..arrays import stacked
-from ..coordinates import Coordinates, SpecularPolar, wrapped
+from ..coordinates import SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
 from ..report.albedo import hemisphere
 from ..rows import around
@@ -32,9 +32,10 @@ XYZ_TO_SRGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
 """Linear sRGB of CIE XYZ (IEC 61966-2-1)."""
-QUARTER = np.pi / 2
-MOST_ANGLES = 4096
-"""The most angles of a kind that a header is believed to mean."""
+CHANNEL_NAMES = {name.lower() for names in CHANNELS.values() for name in names}
+KEYWORDS = {"aoi", "poi", "side", "scattertype", "tristimulusvalue", "wavelength", "tis"}
+"""What can stand above a block of data, in LightTools' files; in Zemax's only the last."""
+LIGHT = re.compile(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ")
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -72,26 +73,38 @@ def read(path: Path) -> Measurement:
     """
     file = TextFile(path)
     rows = file.rows()
-    header = Header.read(file, rows)
-    angles = header.angles
-    angles.setdefault("SampleRotation", np.zeros(1))
-    content, symmetry = header.content(), header.symmetry(("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"))
-    values, stated = blocks(file, rows, CHANNELS[content], tuple(len(header.require(file, name)) for name in ANGLES))
+    header = Header(file, rows)
+    header.angles.setdefault("SampleRotation", np.zeros(1))
+    content, symmetry = header.content(), header.symmetry("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D")
+    shape = [len(header.require(name)) for name in ANGLES]
+    count, channels = shape[0] * shape[1], [name.lower() for name in CHANNELS[content]]
+    found: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in channels}
+    for head, block in blocks(file, rows, shape[2] * shape[3]):
+        of = found[head["channel"] if head.get("channel") in found else channels[0]]
+        of.append((block, head["tis"]))
+        if len(of) > count:
+            raise file.error(f"there are more than the {count} blocks of values that the header announces")
+    for name, of in zip(CHANNELS[content], found.values(), strict=True):
+        if len(of) < count:
+            raise file.error(f"the file ends after {len(of)} of {count} blocks of {name}")
+    values = np.array([[block for block, _ in found[name]] for name in channels]).reshape(-1, *shape)
+    stated = np.array([tis for _, tis in found[channels[content == "XYZ"]]]).reshape(shape[:2])
 
-    theta_i, i = ordered(header, "AngleOfIncidence", most=90)
-    radial, r = ordered(header, "ScatterRadial", most=180)
-    half = np.all((angles["ScatterAzimuth"] >= 0) & (angles["ScatterAzimuth"] <= 180))
+    theta_i, i = header.ordered("AngleOfIncidence", most=90)
+    radial, r = header.ordered("ScatterRadial", most=180)
+    half = np.all((header.angles["ScatterAzimuth"] >= 0) & (header.angles["ScatterAzimuth"] <= 180))
     mirrored = bool(half) and not symmetry.startswith("ASym")
-    azimuth, a = ordered(header, "ScatterAzimuth", most=180) if mirrored else turning(header, "ScatterAzimuth")
-    phi_i, k = turning(header, "SampleRotation", start=90, sense=-1)
+    azimuth, a = header.ordered("ScatterAzimuth", most=180) if mirrored else header.turning("ScatterAzimuth")
+    phi_i, k = header.turning("SampleRotation", start=90, sense=-1)
     axes: tuple[Axis, ...] = (theta_i, azimuth, radial, phi_i)
-    values = np.moveaxis(values, (1, 2, 3, 0), (0, 1, 2, 3))[np.ix_(i, a, r, k)]
-    stated = stated[np.ix_(k, i)][..., {"Monochrome": 0, "XYZ": 1, "RGB": 0}[content]]
+    values = values.transpose(2, 3, 4, 1, 0)[np.ix_(i, a, r, k)]
     anisotropic = len(k) > 1
     if not anisotropic:
         axes, values = axes[:3], values[..., 0, :]
     coordinates = SpecularPolar(mirrored, anisotropic)
-    values[unseen(coordinates, axes) & np.all(values == 0, axis=-1)] = np.nan
+    # What lies below the horizon or on it.
+    _, wo = coordinates.directions(*np.meshgrid(*(axis.nodes for axis in axes), indexing="ij"))
+    values[(wo.z < 1e-9) & np.all(values == 0, axis=-1)] = np.nan
     if content == "XYZ":
         values = srgb_of(values)
     states = np.all(np.isfinite(stated)) and content != "RGB"
@@ -100,8 +113,10 @@ def read(path: Path) -> Measurement:
         NAME,
         Grid(coordinates, axes, values),
         np.array([header.wavelength]) if content == "Monochrome" else None,
-        material=header.comment("sample", "model.*", "material"),
-        stated_albedos=dict(zip(theta_i.nodes.tolist(), stated.T.tolist(), strict=True)) if states else {},
+        material=header.material,
+        stated_albedos=dict(zip(theta_i.nodes.tolist(), stated[np.ix_(k, i)].T.tolist(), strict=True))
+        if states
+        else {},
         notes=header.notes,
     )
 
@@ -110,12 +125,6 @@ def srgb_of(xyz: np.ndarray) -> np.ndarray:
     """Return linear sRGB, in which what is infinite or missing in XYZ is so, too."""
     with np.errstate(invalid="ignore", over="ignore"):
         return xyz @ XYZ_TO_SRGB.T
-
-
-def unseen(coordinates: Coordinates, axes: tuple[Axis, ...]) -> np.ndarray:
-    """Return which nodes of a grid lie below the horizon, or on it."""
-    _, wo = coordinates.directions(*np.meshgrid(*(axis.nodes for axis in axes), indexing="ij"))
-    return np.asarray(wo.z < 1e-9)
 
 
 def write(path: Path, source: Source) -> None:
@@ -138,19 +147,17 @@ def write(path: Path, source: Source) -> None:
     )
     rotations, theta_i, azimuths, radials = (np.radians(each) for each in angles)
     coordinates = SpecularPolar(mirrored=False, anisotropic=True)
+    channels = 3 if source.wavelengths is None else 1
     tables, stated = [], []
-    for rotation in rotations:
-        for theta in theta_i:
-            phi_i = QUARTER - rotation
-            wi, wo = map(stacked, coordinates.directions(theta, *np.meshgrid(azimuths, radials, indexing="ij"), phi_i))
-            seen = wo[..., 2] > 1e-9
-            around, solid_angle = hemisphere(theta, phi_i)
-            each = np.concatenate([wo[seen], around])
-            f = source.evaluate(np.broadcast_to(wi, each.shape), each)
-            table = np.zeros((*seen.shape, f.shape[-1]))
-            table[seen] = f[: -len(around)]
-            tables.append(table)
-            stated.append((solid_angle * around[:, 2]) @ f[-len(around) :])
+    for rotation, theta in itertools.product(rotations, theta_i):
+        phi_i = np.pi / 2 - rotation
+        wi, wo = map(stacked, coordinates.directions(theta, *np.meshgrid(azimuths, radials, indexing="ij"), phi_i))
+        seen = wo[..., 2] > 1e-9
+        every, solid_angle = hemisphere(theta, phi_i)
+        table = np.zeros((*seen.shape, channels))
+        table[seen] = source.evaluate(np.broadcast_to(wi, wo[seen].shape), wo[seen])
+        tables.append(table)
+        stated.append((solid_angle * every[:, 2]) @ source.evaluate(np.broadcast_to(wi, every.shape), every))
     values, albedos = np.array(tables), np.array(stated)
     content = "XYZ" if np.any(np.ptp(values, axis=-1)) else "Monochrome"
     if content == "XYZ":
@@ -158,7 +165,7 @@ def write(path: Path, source: Source) -> None:
     with path.open("w", encoding="utf-8") as file:
         if source.material:
             file.write(f"# Material: {' '.join(source.material.split())}\n")
-        if source.wavelengths is not None and np.isfinite(source.wavelengths[0]):
+        if source.wavelengths is not None:
             file.write(f"# Wavelength: {source.wavelengths[0]:g} nm\n")
         file.write(f"Source\tMeasured\nSymmetry\t{'ASymmetrical4D' if source.anisotropic else 'PlaneSymmetrical'}\n")
         file.write(f"SpectralContent\t{content}\nScatterType\tBRDF\n")
@@ -172,132 +179,119 @@ def write(path: Path, source: Source) -> None:
             file.write("DataEnd\n")
 
 
-@dataclass
 class Header:
-    """What stands above the data."""
+    """What stands above the data, up to the line DataBegin: settings, angles in degrees as in the file, and comments.
 
-    path: Path
-    settings: dict[str, str] = field(default_factory=dict)
-    angles: dict[str, np.ndarray] = field(default_factory=dict)
-    """In degrees, as in the file."""
-    comments: list[str] = field(default_factory=list)
+    Raises:
+        FileError: if there is something else.
+    """
 
-    @classmethod
-    def read(cls, file: TextFile, rows: Iterator[list[str]]) -> Header:
-        """Read up to the line DataBegin."""
-        header = cls(file.path, comments=file.comments)
+    def __init__(self, file: TextFile, rows: Iterator[list[str]]) -> None:
+        self.file = file
+        self.settings: dict[str, str] = {}
+        self.angles: dict[str, np.ndarray] = {}
         for words in rows:
             word = next((name for name in (*WORDS, *ANGLES) if name.lower() == words[0].lower()), words[0])
             if word.lower() == "databegin":
-                return header
+                return
             if word in ANGLES:
-                header.angles[word] = announced(file, rows, words)
+                self.angles[word] = self._announced(rows, word, words[1:])
             elif word.isalpha():
-                header.settings[word] = " ".join(words[1:])
+                self.settings[word] = " ".join(words[1:])
             else:
                 raise file.error(f"{shortened(words[0])} is no keyword of the header")
         raise file.error("the file ends before the line DataBegin")
 
-    def require(self, file: TextFile, name: str) -> np.ndarray:
+    def _announced(self, rows: Iterator[list[str]], name: str, words: list[str]) -> np.ndarray:
+        """Read ``count`` and as many angles, from this line and those that follow."""
+        count = whole(words[0]) if words else 0
+        if not count:
+            raise self.file.error(f"{name} must be followed by the number of its angles")
+        each = f"an angle: {count} of {name} were announced in line {self.file.line}"
+        return self.file.list_of(itertools.chain([words[1:]], rows), count, f"angles of {name}", each)
+
+    def require(self, name: str) -> np.ndarray:
         if name not in self.angles:
-            raise file.error(f"the data begin, but no {name} was given")
+            raise self.file.error(f"the data begin, but no {name} was given")
         return self.angles[name]
 
-    def symmetry(self, known: tuple[str, ...]) -> str:
-        return self._setting("Symmetry", known)
+    def symmetry(self, *known: str) -> str:
+        return self._setting("Symmetry", *known)
 
     def content(self) -> str:
         """Return the SpectralContent, having refused what is no BRDF."""
-        self._setting("ScatterType", ("BRDF",))
-        return self._setting("SpectralContent", tuple(CHANNELS))
+        self._setting("ScatterType", "BRDF")
+        return self._setting("SpectralContent", *CHANNELS)
 
-    def _setting(self, name: str, known: tuple[str, ...]) -> str:
+    def _setting(self, name: str, *known: str) -> str:
         given = self.settings.get(name, known[0])
         for word in known:
             if word.lower() == given.lower():
                 return word
-        raise FileError(f"{self.path}: its {name} is {shortened(given)}; only {', '.join(known)} can be read.")
+        raise FileError(f"{self.file.path}: its {name} is {shortened(given)}; only {', '.join(known)} can be read.")
+
+    def ordered(self, name: str, most: float) -> tuple[Axis, np.ndarray]:
+        """Return angles as an increasing axis in radians, and where its nodes are in the file."""
+        angles = self.angles[name]
+        if not np.all((angles >= 0) & (angles <= most)):
+            raise FileError(f"{self.file.path}: {name} must lie between 0 and {most} degrees.")
+        if len(np.unique(angles)) < len(angles):
+            raise FileError(f"{self.file.path}: {name} lists an angle twice.")
+        order = np.argsort(angles)
+        return Axis(np.radians(angles[order])), order
+
+    def turning(self, name: str, start: float = 0, sense: int = 1) -> tuple[Axis, np.ndarray]:
+        """Return the same as an axis that goes round, if the angles do. Of angles that a turn makes equal, as 0 and
+        360, the first counts."""
+        angles = self.angles[name]
+        if not np.all(np.isfinite(angles)):
+            raise FileError(f"{self.file.path}: {name} must be numbers.")
+        nodes, order = np.unique(np.round(wrapped(start + sense * angles, 360.0), 6), return_index=True)
+        return around(np.radians(nodes)), order
 
     @property
     def wavelength(self) -> float:
         """The wavelength in nm that the comments on the light state, NaN if there is not just one."""
-        lights = [text for text in self.comments if re.search(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ", text)]
+        lights = [text for text in self.file.comments if LIGHT.search(text)]
         found = set()
         for number, unit in re.findall(r"(?<!\d)(\d{1,9}(?:\.\d{1,9})?)\s?(nm|µm|μm|um)\b", "\n".join(lights)):
             found.add(round(float(number) * (1 if unit == "nm" else 1000), 6))
         return found.pop() if len(found) == 1 else np.nan
 
-    def comment(self, *names: str) -> str:
-        """Return what a comment ``name: …`` says, of the first of the names that has one."""
-        for name in names:
-            for text in self.comments:
-                if match := re.match(rf"(?i){name}\s*:\s*(\S.*)", text):
-                    return match.group(1)
-        return ""
+    @property
+    def material(self) -> str:
+        return self.file.stated("sample", "model[^:]*", "material")
 
     @property
     def notes(self) -> dict[str, str]:
-        pairs = [(name.rstrip(), said.strip()) for name, _, said in (text.partition(":") for text in self.comments)]
+        pairs = [
+            (name.rstrip(), said.strip()) for name, _, said in (text.partition(":") for text in self.file.comments)
+        ]
         return {name: said for name, said in pairs if said and re.fullmatch(r"[A-Z][\w ()#']*", name)}
 
 
-def ordered(header: Header, name: str, most: float) -> tuple[Axis, np.ndarray]:
-    """Return angles of a header, which are in degrees, as an increasing axis, and where its nodes are in the file."""
-    angles = header.angles[name]
-    if not np.all((angles >= 0) & (angles <= most)):
-        raise FileError(f"{header.path}: {name} must lie between 0 and {most} degrees.")
-    if len(np.unique(angles)) < len(angles):
-        raise FileError(f"{header.path}: {name} lists an angle twice.")
-    order = np.argsort(angles)
-    return Axis(np.radians(angles[order])), order
-
-
-def turning(header: Header, name: str, start: float = 0, sense: int = 1) -> tuple[Axis, np.ndarray]:
-    """Return the same as an axis that goes round, if the angles do. Of angles that a turn makes equal, as 0 and 360,
-    the first counts."""
-    angles = header.angles[name]
-    if not np.all(np.isfinite(angles)):
-        raise FileError(f"{header.path}: {name} must be numbers.")
-    nodes, order = np.unique(np.round(wrapped(start + sense * angles, 360.0), 6), return_index=True)
-    return around(np.radians(nodes)), order
-
-
-def announced(file: TextFile, rows: Iterator[list[str]], words: list[str]) -> np.ndarray:
-    """Read ``name count`` and as many angles, from this line and those that follow."""
-    name, line = words[0], file.line
-    count = whole(words[1]) if len(words) > 1 else 0
-    if not 0 < count <= MOST_ANGLES:
-        raise file.error(f"{name} must be followed by the number of its angles, from 1 to {MOST_ANGLES}")
-    rows = itertools.chain([words[2:]], rows)
-    return file.list_of(rows, count, f"angles of {name}", f"an angle: {count} of {name} were announced in line {line}")
-
-
-def blocks(
-    file: TextFile, rows: Iterator[list[str]], channels: list[str], shape: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Read the data: for each channel, rotation and incidence a line ``TIS number``, which may be missing, and values.
-    Return these, shape (\\*shape, channels), and the stated TIS, shape (rotations, incidences, channels)."""
-    size, block = int(np.prod(shape)), int(np.prod(shape[2:]))
-    file.expect(size * len(channels), "values")
-    values, stated = np.empty((len(channels), size)), np.full((len(channels), size // block), np.nan)
-    filled, channel, names = [0] * len(channels), 0, [name.lower() for name in channels]
+def blocks(file: TextFile, rows: Iterator[list[str]], size: int) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+    """Read the data: blocks of ``size`` values, above which lines ``keyword value`` say what has changed. Yield what is
+    said of a block, by keywords in small letters, with its number ``tis``, NaN if there is none, and its values."""
+    head: dict[str, Any] = {"tis": np.nan}
+    values: list[float] = []
     for words in rows:
         word = words[0].lower()
-        if word in names:
-            channel = names.index(word)
-        elif word == "tis":
-            index, rest = divmod(filled[channel], block)
-            if rest or index == stated.shape[1]:
-                raise file.error(f"TIS stands after {rest} values of a block, which has {block}")
-            stated[channel, index] = float(words[1]) if len(words) > 1 and is_number(words[1]) else np.nan
+        if word in CHANNEL_NAMES or word in KEYWORDS:
+            if values:
+                raise file.error(
+                    f"{shortened(words[0])} stands after {len(values)} values of a block, which has {size}"
+                )
+            said = " ".join(words[1:2]).lower()
+            head |= {"channel": word} if word in CHANNEL_NAMES else {word: said}
+            if word == "tis":
+                head["tis"] = float(said) if is_number(said) else np.nan
         elif word not in ("databegin", "dataend"):
-            row = file.numbers(words, "a value")
-            end = filled[channel] + len(row)
-            if end > size:
-                raise file.error(f"there are more than the {size} values that the header announces")
-            values[channel, filled[channel] : end] = row
-            filled[channel] = end
-    for name, count in zip(channels, filled, strict=True):
-        if count < size:
-            raise file.error(f"the file ends after {count} of {size} values of {name}")
-    return np.moveaxis(values.reshape(-1, *shape), 0, -1), np.moveaxis(stated.reshape(-1, *shape[:2]), 0, -1)
+            values += file.numbers(words, "a value, or a keyword of a block").tolist()
+            whole_blocks = len(values) // size * size
+            for start in range(0, whole_blocks, size):
+                yield dict(head), np.array(values[start : start + size])
+                head["tis"] = np.nan
+            del values[:whole_blocks]
+    if values:
+        raise file.error(f"the file ends after {len(values)} of {size} values of a block")

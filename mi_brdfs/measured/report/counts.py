@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,14 +29,6 @@ class Counts:
     """Not a number, or infinite."""
     zero: int = 0
 
-    @classmethod
-    def of(cls, values: np.ndarray) -> Counts:
-        finite = np.isfinite(values)
-        return cls(values.size, int((finite & (values < 0)).sum()), int((~finite).sum()), int((values == 0).sum()))
-
-    def __add__(self, other: Counts) -> Counts:
-        return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
-
 
 @dataclass(frozen=True)
 class Census:
@@ -56,26 +48,26 @@ class Census:
 
 def census(data: Grid | Samples) -> Census:
     """Count the values of a measurement. Where none is finite, the least is above the largest."""
-    upper = lower = Counts()
+    counts = np.zeros((2, 4), dtype=int)
     ranges = [(math.inf, -math.inf)] * 3
     for wi, wo, values in batches(data):
         # A node in the horizon is a rounding error above or below it.
         above = (wi[:, 2] > HORIZON) & (wo[:, 2] > HORIZON)
-        upper, lower = upper + Counts.of(values[above]), lower + Counts.of(values[~above])
-        known = above & np.isfinite(values).any(axis=1)
+        finite = np.isfinite(values)
+        kinds = np.stack([np.ones_like(finite), finite & (values < 0), ~finite, values == 0])
+        counts += [kinds[:, side].sum(axis=(1, 2)) for side in (above, ~above)]
+        known = above & finite.any(axis=1)
         numbers, angles = values[known], [np.degrees(polar_angle(components(w[known]))) for w in (wi, wo)]
         ranges = [
             (float(found.min(initial=low)), float(found.max(initial=high)))
             for (low, high), found in zip(ranges, (numbers[np.isfinite(numbers)], *angles), strict=True)
         ]
+    upper, lower = (Counts(*of.tolist()) for of in counts)
     (least, most), theta_i, theta_o = ranges
     return Census(upper, lower, least, most, theta_i, theta_o)
 
 
 def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    if isinstance(data, Samples):
-        yield data.pairs()
-        return
-    count = math.prod(data.values.shape[:-1])
+    count = data.values[..., 0].size
     for start in range(0, count, AT_ONCE):
         yield data.pairs(slice(start, start + AT_ONCE))

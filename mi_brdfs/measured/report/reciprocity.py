@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..coordinates import TWO_PI
+from ..arrays import NUMPY, components
+from ..coordinates import Spherical
 from ..measurement import Grid, Samples, usable
 
 PAIRS = 1 << 17
@@ -60,15 +61,10 @@ def _exchanged(samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray, np
     """Return ``(wi, wo, f, reverse)`` of the samples for which there is one with the directions exchanged; isotropic
     ones may also be turned and mirrored."""
     wi, wo, f = samples.pairs()
-    theta_i, theta_o = (np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (wi, wo))
-    phi_i, phi_o = (np.arctan2(w[:, 1], w[:, 0]) for w in (wi, wo))
-    if not samples.anisotropic:
-        delta = np.mod(phi_o - phi_i, TWO_PI)
-        phi_i, phi_o = np.zeros_like(delta), np.minimum(delta, TWO_PI - delta)
-        there, back = (theta_i, phi_i, theta_o, phi_o), (theta_o, phi_i, theta_i, phi_o)
-    else:
-        there, back = (theta_i, phi_i, theta_o, phi_o), (theta_o, phi_o, theta_i, phi_i)
-    steps = np.round(np.concatenate([np.stack(there, axis=1), np.stack(back, axis=1)]) / SAME).astype(np.int64)
+    coordinates = Spherical(mirrored=not samples.anisotropic, anisotropic=samples.anisotropic)
+    pair = components(wi), components(wo)
+    places = [np.stack(coordinates.locate(*each, NUMPY), axis=1) for each in (pair, pair[::-1])]
+    steps = np.round(np.concatenate(places) / SAME).astype(np.int64)
     _, group = np.unique(steps, axis=0, return_inverse=True)
     one, other = np.split(group.ravel(), 2)
     _, here, exchanged = np.intersect1d(one, other, return_indices=True)

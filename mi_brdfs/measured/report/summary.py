@@ -159,7 +159,7 @@ def summarize(measurement: Measurement) -> Summary:
     data, found = measurement.data, census(measurement.data)
     if found.least > found.most:
         raise FileError(f"{measurement.path}: no value above the horizon is a number.")
-    grid = table(data)
+    grid = as_grid(data, "zero")
     theta_i, theta_o = (ends(data, name, seen) for name, seen in
                         (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
     angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
@@ -186,11 +186,6 @@ def summarize(measurement: Measurement) -> Summary:
         scatter=_stated(measurement, grid),
         notes=dict(measurement.notes),
     )
-
-
-def table(data: Grid | Samples) -> Grid:
-    """Return a measurement's values on a grid, without any beyond the measured range."""
-    return as_grid(data, "zero")
 
 
 def channel_names(measurement: Measurement) -> list[str]:

@@ -1,0 +1,79 @@
+"""Scenes of any version of Mitsuba, loaded."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+
+from .legacy import is_new, root_of, upgrade
+from .names import check_name
+
+
+def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters: Any) -> Any:
+    """Load a scene file of Mitsuba 0.2 to 0.6 as :func:`upgrade` changes it, or one of Mitsuba 3 as it is. A warning
+    counts the changes, if there are any.
+
+    Raises:
+        ValueError: as :func:`upgrade`.
+        RuntimeError: what Mitsuba says where it cannot load the scene.
+    """
+    return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient)
+
+
+def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> Any:
+    """Load a scene file, old or new."""
+    with looking_in(path.parent):
+        config = mi.parser.ParserConfig(mi.variant())
+        state, upgraded = parsed(config, path, lenient, parameters)
+        try:
+            mi.parser.transform_all(config, state)
+            return mi.parser.instantiate(config, state)
+        except RuntimeError as error:  # of a file that was given a version
+            place = "string" if upgraded else str(path)
+            raise RuntimeError(
+                str(error).replace("loading string (line", f"loading {place} (line")
+            ) from error.__cause__
+
+
+def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
+    """Return a scene file as Mitsuba's parser has it, and the text of an upgraded one."""
+    check_name(str(path))
+    if is_new(path):
+        tag, attributes = root_of(path)
+        if not tag or "version" in attributes:
+            return mi.parser.parse_file(config, str(path), **parameters), None
+        return mi.parser.parse_string(config, versioned(path.read_text(encoding="utf-8-sig")), **parameters), None
+    new = upgrade(path, lenient=lenient, **parameters)
+    warnings.warn(
+        f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade says what.", stacklevel=3
+    )
+    return mi.parser.parse_string(config, new.xml), new.xml
+
+
+def versioned(text: str) -> str:
+    """Return XML with a version in its root, as Mitsuba 3 demands; as it is if it has one."""
+    root = re.match(r"\s*(<[?!].*?>\s*)*<[\w:]+", text, re.DOTALL)
+    if not root or "version=" in text[root.end() :].partition(">")[0]:
+        return text
+    return f'{text[: root.end()]} version="3.0.0"{text[root.end() :]}'
+
+
+@contextmanager
+def looking_in(*folders: Path) -> Iterator[None]:
+    """Look for files in these folders first, and forget these and those that a scene adds."""
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    for folder in reversed(folders):
+        resolver.prepend("" if folder == Path(".") else str(folder))  # messages show it in front of names
+    mi.set_file_resolver(resolver)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
