@@ -3,9 +3,8 @@ quadrature in float64, and what becomes of the rest, by random walks, of setting
 
     python tests/calibration/escape.py [--check]
 
-Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if polynomials made anew, of fewer settings, differ
-from it by more than their noise. The walks of Beckmann's facets serve for Blinn's, too, which have about the same
-shapes.
+Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if polynomials made anew, of fewer settings, differ from
+it by more than their noise. The walks of Beckmann's facets serve for Blinn's, too, which have about the same shapes.
 """
 
 from __future__ import annotations
@@ -373,8 +372,7 @@ def means(k: dict[str, np.ndarray], shape: str) -> dict[str, np.ndarray]:
     at, result = variables_of_means(*pairs), {}
     for name in found[0]:
         values = np.array([each[name] for each in found])
-        counts = np.where((pairs[1] > 0.02) & (pairs[0] < 1.5) & (pairs[0] < 9 * pairs[1]), 4, 1)
-        weight = counts / np.maximum(abs(values), 0.01)
+        weight = np.where((pairs[1] > 0.02) & (pairs[0] < 1.5) & (pairs[0] < 9 * pairs[1]), 4, 1) / np.maximum(abs(values), 0.01)
         result[f"mean-{name}"] = fitted("mean", at, values, weight, isotropic, 24)
     return result
 
