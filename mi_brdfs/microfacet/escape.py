@@ -6,7 +6,7 @@ model, ACM Transactions on Graphics 35(4), 2016, doi:10.1145/2897824.2925943. Wh
 cosine c in the space stretched by α, in which grazing angles of smooth surfaces take as much of the axis as those of
 rough ones, and by the roughness along it, α∥² = (αu cosφ)² + (αv sinφ)². The polynomials are in
 
-    1 - c,  x(α∥),  (x(αu) + x(αv))/2,  (x(αu) - x(αv))²,  where x(α) = α/(1 + α);
+    1 - c,  x(α∥),  (x(αu) + x(αv))/2,  (x(αu) - x(αv))²,  where x(α) = α/√(1 + α²);
 
 the last two are the same for all directions, and facets are the same after both axes are exchanged.
 """
@@ -72,10 +72,9 @@ class Walks:
     def of(self, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
         slope2, sin2 = self.smith.slope2(v), dr.maximum(v.x * v.x + v.y * v.y, EPSILON)
-        slope = dr.sqrt(dr.maximum(slope2, EPSILON))
         at = (
             1 - v.z * dr.rsqrt(dr.maximum(v.z * v.z + slope2, EPSILON)),
-            slope / (dr.sqrt(sin2) + slope),
+            dr.sqrt(dr.maximum(slope2, EPSILON) / (sin2 + slope2)),
         )
         lost, second, schlick, dip = (polynomial(k, *at) for k in self.towards)
         # Fits err where next to nothing is lost: there the lobe must not vanish.
@@ -114,4 +113,4 @@ def coefficients(name: str, isotropic: bool) -> dict[str, np.ndarray]:
 
 
 def _compressed(alpha: Any) -> Any:
-    return alpha / (1 + alpha)
+    return alpha * dr.rsqrt(1 + alpha * alpha)

@@ -3,7 +3,7 @@ quadrature in float64, and what becomes of the rest, by random walks, of setting
 
     python tests/calibration/escape.py [--check]
 
-Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if polynomials made anew, of fewer settings, differ from
+Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if polynomials made anew, of fewer walks, differ from
 it by more than their noise. The walks of Beckmann's facets serve for Blinn's, too, which have about the same shapes.
 """
 
@@ -27,15 +27,13 @@ WALKS = 1 << 12
 REFLECTIONS = 10
 TYPICAL = 0.85
 """What facets reflect where paths are averaged: as metals do, of which most light is lost at the first reflections."""
-SMOOTHEST, ROUGHEST = 2e-3, {"ggx": 3.2, "beckmann": 2.0, "blinn": 1.0}
-"""The range of α. Beyond 2 there are Burley's facets alone, with αu αv < 1."""
+SMOOTHEST, ROUGHEST = 2e-3, 3.2
+"""The range of α, of which the upper end is that of Burley's most anisotropic facets."""
 PRECISE = 0.045, 1.05
 """That in which the fit counts most, up to 9:1 and 86°."""
-DARKER = 0.0035
-"""By how much 1 - E is fitted too low, for each time that an error counts less: errors there must not brighten."""
 DEGREES = {
-    "ggx": (12, (1.15, 1.9, 1.1, 2.6)),
-    "beckmann": (15, (1.25, 2.1, 1.15, 3)),
+    "ggx": (11, (1.15, 1.9, 1, 3)),
+    "beckmann": (14, (1.25, 2.2, 1.1, 3.4)),
     "blinn": (11, (1, 1, 1, 1)),
     "second": (5, (1.1, 1.6, 1, 2)),
     "schlick": (5, (1.1, 1.6, 1, 2)),
@@ -45,16 +43,14 @@ DEGREES = {
 """Of each polynomial, and what the exponents of its variables count; those for facets are of 1 - E."""
 
 
-def settings(count: int, shape: str) -> tuple[np.ndarray, ...]:
+def settings(count: int, isotropic: bool = False) -> tuple[np.ndarray, ...]:
     """Return ``(cosθ, φ, αu, αv)``, well spread; half of the directions are even in θ and half in the stretched
     cosine."""
     u = qmc.Sobol(6, seed=1).random(count).T
-    roughest = ROUGHEST[shape]
-    low, high = np.where(u[4] < 0.6, 0.04, SMOOTHEST), np.where(u[4] < 0.6, min(1.4, roughest), roughest)
-    alpha = np.where(u[4] < 0.8, low * (high / low) ** u[0], 0.6 + (roughest - 0.6) * u[0])
-    ratio = np.where(u[5] < 0.25, 1, np.where(u[5] < 0.75, 10, 300.0) ** u[1])
-    other = alpha if shape == "blinn" else np.maximum(alpha / ratio, SMOOTHEST / 20)
-    other = np.where(alpha > 2, np.minimum(other, 1 / alpha), other)
+    low, high = np.where(u[4] < 0.7, 0.04, SMOOTHEST), np.where(u[4] < 0.7, 1.4, ROUGHEST)
+    alpha = np.minimum(low * (high / low) ** u[0], 1.0 if isotropic else ROUGHEST)
+    ratio = np.where(u[5] < 0.3, 1, np.where(u[5] < 0.8, 10, 40.0) ** u[1])
+    other = alpha if isotropic else np.maximum(alpha / ratio, SMOOTHEST / 2)
     swapped = (u[5] * 64) % 1 < 0.5
     alpha_u, alpha_v, phi = np.where(swapped, other, alpha), np.where(swapped, alpha, other), np.pi / 2 * u[2]
     along = np.hypot(alpha_u * np.cos(phi), alpha_v * np.sin(phi))
@@ -68,14 +64,14 @@ def importance(cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alpha_v: n
     """Return how much an error counts."""
     low, high = np.minimum(alpha_u, alpha_v), np.maximum(alpha_u, alpha_v)
     precise = (low >= PRECISE[0]) & (high <= PRECISE[1]) & (high <= 9 * low) & (cos >= np.cos(np.radians(86)))
-    return np.where(precise, 1, np.where((high <= 2) & (high <= 16 * low), 0.4, 0.3))
+    return np.where(precise, 16, np.where((high < 2) & (high <= 16 * low), 3, 1.0))
 
 
 # --- The polynomials ------------------------------------------------------------------------------------------------
 
 
 def compressed(alpha: np.ndarray) -> np.ndarray:
-    return alpha / (1 + alpha)
+    return alpha / np.sqrt(1 + alpha * alpha)
 
 
 def variables(cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alpha_v: np.ndarray) -> list[np.ndarray]:
@@ -316,14 +312,14 @@ def _means(values: mi.Float, count: int) -> np.ndarray:
 # --- What becomes of light ------------------------------------------------------------------------------------------
 
 
-def walked(shape: str, count: int) -> dict[str, np.ndarray]:
+def walked(shape: str, count: int, isotropic: bool) -> dict[str, np.ndarray]:
     """Return the polynomials of what :func:`walks` finds."""
-    at = settings(WALKED, shape)
+    at = settings(WALKED)
     parts = [walks(shape, *(each[k : k + 256] for each in at), count) for k in range(0, WALKED, 256)]
     found = {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
     found |= {"schlick between": found["between"][0], "dip between": found.pop("between")[1]}
     # Weigh by what light there is: its standard deviation falls with the root of that, and less counts less.
-    weight = np.sqrt(found.pop("lost"))
+    weight = np.minimum(importance(*at), 1.2) * np.sqrt(found.pop("lost"))
     polynomials = {}
     for name, values in found.items():
         seen = np.isfinite(values) & (weight > 1e-2)
@@ -333,27 +329,23 @@ def walked(shape: str, count: int) -> dict[str, np.ndarray]:
     return polynomials
 
 
-def first(shape: str, correlated: bool, count: int) -> np.ndarray:
+def first(shape: str, correlated: bool) -> np.ndarray:
     """Return the polynomial of 1 - E."""
     isotropic = shape == "blinn"
-    at = settings(count, shape)
+    at = settings(SETTINGS, isotropic)
     if isotropic:
         values = np.array([blinn_lost(correlated, float(c), float(a)) for c, a in zip(at[0], at[2], strict=True)])
     else:
         values = np.array([lost(shape, correlated, *map(float, each)) for each in zip(*at, strict=True)])
     # Where Blinn's facets reflect more than they get, nothing is added. Turquin's scale divides by what is not lost.
-    counts, scale = importance(*at), np.maximum(1 - values, 0.05) ** 0.75
-    values = np.maximum(values, -1) - DARKER * (1 / counts - 1) * scale * np.clip(20 * values, 0, 1)
-    weight = np.where(values < -0.02, 0.1, 1) * counts / scale
-    return fitted(shape, variables(*at), values, weight, isotropic, 24)
+    weight = np.where(values < -0.02, 0.1, 1) * importance(*at) / np.sqrt(np.maximum(1 - values, 0.05))
+    return fitted(shape, variables(*at), np.maximum(values, -1), weight, isotropic, 24)
 
 
-def means(k: dict[str, np.ndarray], shape: str) -> dict[str, np.ndarray]:
+def means(k: dict[str, np.ndarray], isotropic: bool) -> dict[str, np.ndarray]:
     """Return polynomials of means over the hemisphere: of 1 - E, over (x(αu)² + x(αv)²)/2."""
-    isotropic, phi = shape == "blinn", np.pi / 2 * (np.arange(8) + 0.5) / 8
-    alpha = np.geomspace(SMOOTHEST, ROUGHEST[shape], 24)
-    pairs = [(a, b) for a in alpha for b in (SMOOTHEST / 20, *alpha) if (a == b if isotropic else b <= a)]
-    pairs = np.array([(a, b) for a, b in pairs if a <= 2 or a * b <= 1]).T
+    alpha, phi = np.geomspace(SMOOTHEST, 1 if isotropic else ROUGHEST, 24), np.pi / 2 * (np.arange(8) + 0.5) / 8
+    pairs = np.array([(a, b) for a in alpha for b in alpha if (a == b if isotropic else b <= a <= 50 * b)]).T
     found = []
     for a, b in pairs.T:
         at = [x.ravel() for x in np.broadcast_arrays(NODES[:, None], phi, a, b)]
@@ -372,19 +364,20 @@ def means(k: dict[str, np.ndarray], shape: str) -> dict[str, np.ndarray]:
     at, result = variables_of_means(*pairs), {}
     for name in found[0]:
         values = np.array([each[name] for each in found])
-        weight = np.where((pairs[1] > 0.02) & (pairs[0] < 1.5) & (pairs[0] < 9 * pairs[1]), 4, 1) / np.maximum(abs(values), 0.01)
+        weight = np.where((pairs[1] > 0.02) & (pairs[0] < 1.5) & (pairs[0] < 9 * pairs[1]), 8, 1) / abs(values)
         result[f"mean-{name}"] = fitted("mean", at, values, weight, isotropic, 24)
     return result
 
 
-def made(fewer: int) -> dict[str, np.ndarray]:
-    """Return all polynomials, of a half as many settings and walks, a quarter, and so on."""
+def made(count: int) -> dict[str, np.ndarray]:
+    """Return all polynomials, of ``count`` walks for each setting."""
     arrays = {}
-    walk = {shape: walked(shape, WALKS >> fewer) for shape in SHAPES}
+    walk = {shape: walked(shape, count, False) for shape in SHAPES}
     for shape in (*SHAPES, "blinn"):
         for correlated in (False, True):
-            k = {**walk["beckmann" if shape == "blinn" else shape], "lost": first(shape, correlated, SETTINGS >> fewer)}
-            k |= means(k, shape)
+            isotropic = shape == "blinn"
+            k = {**walk["beckmann" if isotropic else shape], "lost": first(shape, correlated)}
+            k |= means(k, isotropic)
             name = f"{shape}-{'correlated' if correlated else 'separable'}"
             arrays |= {f"{name}:{key}": k[key] for key in k if " " not in key and key not in ("left", "third")}
     return {name: values.astype(np.float32) for name, values in arrays.items()}
@@ -393,13 +386,13 @@ def made(fewer: int) -> dict[str, np.ndarray]:
 if __name__ == "__main__":
     checked = parser(__doc__).parse_args().check
     mi.set_variant("llvm_ad_rgb")
-    polynomials = made(3 if checked else 0)
+    polynomials = made(WALKS >> 4 if checked else WALKS)
     if not checked:
         np.savez_compressed(FILE, **polynomials)
         print(f"{FILE}: {FILE.stat().st_size} bytes")
         sys.exit()
     # By their values at the settings, as coefficients may differ where the sum does not.
-    at, errors = variables(*settings(WALKED, "beckmann")), {}
+    at, errors = variables(*settings(WALKED)), {}
     with np.load(FILE) as kept:
         for name, k in polynomials.items():
             here = at if k.ndim == 4 else at[2:]
