@@ -561,6 +561,8 @@ def test_each_kind_of_control_changes_the_picture(tab, address):
     moved(lambda: (tab.locator("#theta-field").fill("70"), tab.locator("#theta-field").press("Enter")))
     number.fill("-1"), number.press("Enter")
     tab.wait_for_function("() => document.querySelector('#editor').innerText.includes('alpha = -1 is not allowed')")
+    letters = "location.hash.slice(1).replaceAll('-', '+').replaceAll('_', '/')"
+    tab.wait_for_function(f"""() => atob({letters}).includes('"alpha":-1')""")  # the address follows
     letters = tab.evaluate("() => location.hash")[1:]
     kept = json.loads(base64.urlsafe_b64decode(letters + "=" * (-len(letters) % 4)))
     assert kept["subjects"][0]["bsdf"]["alpha"] == -1

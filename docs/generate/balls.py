@@ -16,8 +16,9 @@ from mi_brdfs.preview import studio
 
 from .made import Picture, code
 
-FRAME, BALL, SAMPLES = 64, 42, 64
-"""The side of a picture and of the part that the ball fills, in pixels, and the samples of each."""
+FRAME, BALL, RISE, SAMPLES = 58, 42, 4, 64
+"""The side of a picture and of the part around the ball, how much that lies above the middle, in pixels, and the
+samples of each."""
 
 
 def pictures() -> list[Picture]:
@@ -26,7 +27,7 @@ def pictures() -> list[Picture]:
 
 def _sources() -> list[str | bytes]:
     data = Path(published.__file__).with_name("published.json").read_bytes()
-    return [data, repr((FRAME, BALL, SAMPLES, BALLS_ACROSS)), *map(code, (preview, studio, srgb))]
+    return [data, repr((FRAME, BALL, RISE, SAMPLES, BALLS_ACROSS)), *map(code, (preview, studio, srgb))]
 
 
 def _draw(path: Path) -> None:
@@ -41,6 +42,6 @@ def _draw(path: Path) -> None:
                 ball.advance(bsdf)
         pixels = np.frombuffer(rgba(ball.pixels(), 0), np.uint8).reshape(FRAME, FRAME, 4)[..., :3]
         row, column = divmod(k, BALLS_ACROSS)
-        part = Image.fromarray(pixels[margin : margin + BALL, margin : margin + BALL])
+        part = Image.fromarray(pixels[margin - RISE : margin - RISE + BALL, margin : margin + BALL])
         sheet.paste(part, (column * BALL, row * BALL))
     sheet.save(path, quality=80, optimize=True)

@@ -35,10 +35,9 @@ def main() -> None:
     warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
     if sys.stdout is None:  # a daemon may have closed it
         sys.stdout = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
-    for stream in filter(None, (sys.stdout, sys.stderr)):
-        # Names of files need not be UTF-8, nor need what output goes to, as on Windows.
-        is_utf8 = stream.encoding.lower().replace("-", "") == "utf8"
-        cast(TextIOWrapper, stream).reconfigure(errors="surrogateescape" if is_utf8 else "replace")
+    # Names of files need not be UTF-8, nor need what output goes to, as on Windows.
+    is_utf8 = sys.stdout.encoding.lower().replace("-", "") == "utf8"
+    cast(TextIOWrapper, sys.stdout).reconfigure(errors="surrogateescape" if is_utf8 else "replace")
     exit_on_sigterm()
     try:
         app(prog_name="mi-brdfs")
