@@ -20,10 +20,13 @@ COLOURS, WIDTH = 256, 900
 SECONDS = 900
 ALONE = """\
 import importlib.metadata as metadata
+import os
+
+os.environ.pop("MI_BRDFS_DATA", None)
 found = metadata.entry_points
 metadata.entry_points = lambda **which: () if which.get("group") == "mi_brdfs.models" else found(**which)
 """
-"""A first cell that hides the models of other packages."""
+"""A first cell that hides the models of other packages, and the measured materials of whoever runs it."""
 
 
 def pictures() -> list[Picture]:
@@ -87,5 +90,5 @@ def _reduced(encoded: str) -> str:
     if image.width > WIDTH:
         image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
     buffer = io.BytesIO()
-    image.quantize(COLOURS, dither=Image.Dither.FLOYDSTEINBERG).save(buffer, "png", optimize=True)
+    image.quantize(COLOURS, kmeans=1).save(buffer, "png", optimize=True)
     return base64.b64encode(buffer.getvalue()).decode()
