@@ -224,6 +224,38 @@ def test_processes_of_the_bench_know_an_imported_file(guest, monkeypatch):
     assert in_new_process(first_picture, [{"type": "chalk"}]) > 0
 
 
+PLAIN = """
+import drjit as dr
+import mitsuba as mi
+
+
+class Plain(mi.BSDF):
+    def __init__(self, props):
+        mi.BSDF.__init__(self, props)
+        self.m_flags = int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)
+        self.m_components = [self.m_flags]
+
+    def eval(self, ctx, si, wo, active=True):
+        return mi.Spectrum(-1)
+
+    def pdf(self, ctx, si, wo, active=True):
+        return mi.Float(1)
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        return dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
+
+
+mi.register_bsdf("plain", Plain)
+"""
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_check_takes_a_bsdf_that_is_no_model(guest, jobs):
+    (guest / "plain.py").write_text(PLAIN)
+    done = command("check", "plain", "diffuse", "--import", "plain.py", "--only", "finite", "-j", jobs)
+    assert done.exit_code == 1 and "finite, whole: eval is -1" in done.stdout, done.stderr
+
+
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     right = command("check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
@@ -236,7 +268,7 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     "text, message",
     [
         (None, "--import guest.py: no such file"),
-        ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model, nor a term"),
+        ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model or mi.BSDF, nor a term"),
         ("import sys\nsys.exit(7)", "--import guest.py: line 2: SystemExit: 7"),
         ("\n1 / 0", "--import guest.py: line 2: ZeroDivisionError: division by zero"),
         ("def f(:", "--import guest.py: line 1: invalid syntax"),

@@ -156,7 +156,7 @@ def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs
                 reports.append(_check_one(source, settings, partial(bar.advance, task)))
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
-        known = variant, guests.sources()
+        known = variant, list(dict.fromkeys([*guests.sources(), *imported]))
         with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
             try:
                 for future in [pool.submit(_check_one, source, settings) for source in sources]:
@@ -186,9 +186,9 @@ def _start_job(variant: str, sources: list[str]) -> None:
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as for a shell's background job
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # on Ctrl-C, end without a traceback
     warnings.simplefilter("ignore", EnergyWarning)
+    mi.set_variant(variant)
     for source in sources:
         guests.import_models(source)
-    mi.set_variant(variant)
 
 
 def _end_with_parent() -> None:

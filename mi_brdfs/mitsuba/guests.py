@@ -12,9 +12,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import mitsuba as mi
+
 from ..microfacet.terms import Term
 from ..model import Model
 from ..starting import Terminated
+from .fastest import fastest
 from .registry import all_models, brought_terms, is_own, models_in, register, terms_in
 
 ENTRY_POINTS = "mi_brdfs.models"
@@ -38,30 +41,48 @@ def register_installed() -> None:
 
 def import_models(target: str) -> None:
     """Import a file, ``FILE.py``, or a module by its dotted name, and register the models and the terms of the kit that
-    it defines.
+    it defines. A subclass of ``mi.BSDF`` it registers itself, in the active variant; without one, the fastest is
+    activated where the file needs it.
 
     Raises:
         ImportError: if it cannot be imported, or fails.
-        ValueError: if it defines no model or term, or one that cannot be registered.
+        ValueError: if it defines no model, term or BSDF, or one that cannot be registered.
     """
     path = Path(target) if target.endswith(".py") else None
     if path and not path.is_file():
         raise ImportError("no such file")
+
+    def imported() -> ModuleType:
+        return _of_file(path) if path else importlib.import_module(target)
+
     try:
-        module = _of_file(path) if path else importlib.import_module(target)
+        try:
+            module = imported()
+        except AttributeError:
+            if mi.variant() or not (variant := fastest()):
+                raise
+            mi.set_variant(variant)
+            module = imported()
     except Terminated:
         raise
     except (Exception, SystemExit) as error:
         raise ImportError(_sentence(error, path)) from None
     found = _brought_by(module)
-    if not found:
-        raise ValueError("it defines no subclass of mi_brdfs.Model, nor a term of the kit with a word")
+    if not found and not _defines_bsdf(module):
+        raise ValueError("it defines no subclass of mi_brdfs.Model or mi.BSDF, nor a term of the kit with a word")
     for each in found:
         register(each)
 
 
 def _brought_by(module: ModuleType) -> list[type[Model] | type[Term]]:
     return [*terms_in(module), *models_in(module)]
+
+
+def _defines_bsdf(module: ModuleType) -> bool:
+    return mi.variant() is not None and any(
+        isinstance(it, type) and issubclass(it, mi.BSDF) and it.__module__ == module.__name__
+        for it in vars(module).values()
+    )
 
 
 def source(brought: type[Model] | type[Term]) -> str | None:
