@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mi_brdfs.cli import app
+from mi_brdfs.rendering.output import denoise
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -140,6 +141,15 @@ def test_denoising(folder):
     assert np.diff(clean, axis=1).std() < 0.5 * np.diff(few, axis=1).std()
     np.testing.assert_allclose(clean.mean(), few.mean(), rtol=0.03)
     assert run(*words, "--sensor", "away", "--denoise", "--spp", 4).exit_code == 0
+
+
+def test_denoised_edges_have_no_lines():
+    """Of pictures whose sides are no multiples of what the denoiser works in."""
+    pytest.importorskip("mitsuba_oidn")
+    noise = np.random.default_rng(1).normal(1, 0.02, (45, 90, 3)).astype(np.float32)
+    clean = denoise(noise).mean(axis=2)
+    assert clean.shape == (45, 90)
+    np.testing.assert_allclose([clean[-1].mean(), clean[:, -1].mean()], 1, atol=0.005)
 
 
 def test_the_name_of_the_package_is_the_command():

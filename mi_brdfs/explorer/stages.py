@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib.util import find_spec
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
-from ..rendering.output import tonemap
+from ..rendering.output import denoise, tonemap
 from ..rendering.passes import pass_source
 from ..srgb import encoded_8bit
 from .state import INCIDENCE, SHAPES, Bsdf, State
@@ -392,8 +393,4 @@ class Stages:
 
 
 def _denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
-    try:
-        import mitsuba_oidn
-    except ImportError:
-        return None
-    return lambda rgb: mitsuba_oidn.denoise(np.ascontiguousarray(rgb), hdr=True)
+    return denoise if find_spec("mitsuba_oidn") else None

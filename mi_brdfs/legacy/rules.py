@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..math import gauss_legendre
 from .document import Element, plugin, prop, written
 from .tables import PLUGINS
 
@@ -219,8 +221,10 @@ def _coating(work: Work, element: Element) -> Element | None:
             element.put(reflectance.copy("diffuse_reflectance"))
         rough_alpha(work, element)
         return None
-    index = element.number("int_ior", 1.5) / (element.number("ext_ior", 1.0) or 1.0)
-    share = min(max(0.5 * ((index - 1) / (index + 1)) ** 2 + 0.05, 0.02), 0.5)
+    index = element.number("int_ior", 1.5046) / (element.number("ext_ior", 1.000277) or 1.0)  # glass in air, as in 0.6
+    element.pop(*(it.name for it in element.of("float") if it.name in ("int_ior", "ext_ior")))
+    fresnel = importlib.import_module("mitsuba.scalar_rgb").fresnel
+    share = sum(2 * weight * cos * fresnel(cos, index)[0] for cos, weight in gauss_legendre(8))
     work.approximated(element, f"{was} is a mixture with a mirror, of the coat's mean reflectance, at all angles")
     element.type = f"{rough}conductor"
     element.set("material", "none")

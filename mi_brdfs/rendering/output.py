@@ -19,23 +19,35 @@ IMAGES = {
 """Mitsuba's formats by the endings of file names."""
 
 
-def denoised(picture: Picture) -> Picture:
-    """Return a picture whose colours are denoised by Intel's Open Image Denoise; alpha and AOVs are as before. Films
-    with a box filter give the best result, as pixels then share no samples.
+def denoise(colours: np.ndarray) -> np.ndarray:
+    """Return linear RGB, shape (height, width, 3), denoised by Intel's Open Image Denoise.
 
     Raises:
         ImportError: without the extra that brings it.
-        ValueError: if the film has no RGB channels.
     """
     try:
         import mitsuba_oidn
     except ImportError as error:
         raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
+    height, width = colours.shape[:2]
+    # It leaves lines along the edges where sides are no multiples of 16.
+    padded = np.pad(colours, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
+    return mitsuba_oidn.denoise(np.ascontiguousarray(padded, np.float32), hdr=True)[:height, :width]
+
+
+def denoised(picture: Picture) -> Picture:
+    """Return a picture whose colours are denoised (:func:`denoise`); alpha and AOVs are as before. Films with a box
+    filter give the best result, as pixels then share no samples.
+
+    Raises:
+        ImportError: without the extra that brings the denoiser.
+        ValueError: if the film has no RGB channels.
+    """
     names = [field.name for field in picture.bitmap.struct_()]
     if names[:3] != ["R", "G", "B"]:
         raise ValueError("only films with the pixel format rgb or rgba can be denoised")
     pixels = np.array(picture.bitmap, np.float32).reshape(*reversed(picture.bitmap.size()), -1)
-    pixels[..., :3] = mitsuba_oidn.denoise(np.ascontiguousarray(pixels[..., :3]), hdr=True)
+    pixels[..., :3] = denoise(pixels[..., :3])
     bitmap = mi.Bitmap(pixels, picture.bitmap.pixel_format(), names)
     return dataclasses.replace(picture, image=mi.TensorXf(pixels), bitmap=bitmap)
 
