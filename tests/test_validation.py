@@ -448,7 +448,7 @@ def test_one_fault_is_one_sentence():
     report = check(Mutant("low", (), lambert(low), given=(("reflectance", 0.95),)).register(), only=["pdf", "albedo"])
     assert {finding.check for finding in report.failures} == {"pdf"}
     (skipped,) = (it for it in report.findings if it.check == "albedo")
-    assert skipped.verdict == "skip" and skipped.message.startswith("Not judged: mend pdf first")
+    assert skipped.verdict == "skip" and skipped.message.startswith("Not judged: mend pdf and chi2 first")
 
 
 @pytest.mark.usefixtures("llvm_rgb")
