@@ -469,6 +469,7 @@ def test_fits_wait_for_edits_go_on_and_are_cancelled(with_file, monkeypatch):
     def edit(frame):
         with_file.session.send = send
         with_file.send(subject, views=["polar"])
+        with_file.session._edited = -1.0  # another time, but long ago: fits wait for a pause
 
     with_file.session.send = edit
     assert not of(with_file.work(1), "fit")

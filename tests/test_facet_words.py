@@ -10,6 +10,7 @@ from mi_brdfs.fit import fit
 from mi_brdfs.fit.unknowns import configurations
 from mi_brdfs.models.walter import Walter
 from mi_brdfs.testing import assert_bsdf
+from mi_brdfs.validation import CHECKS
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -106,7 +107,9 @@ def test_haze_is_a_second_lobe_of_rougher_facets(given, wide):
                  marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_a_checker_finds_nothing(given):
-    assert_bsdf(given)
+    """Derivatives of what multiple reflections add take minutes to compile: test_multiscatter has them."""
+    left_out = {"gradients"} if "multiscatter" in given else set()
+    assert_bsdf(given, only=[name for name in CHECKS if name not in left_out])
 
 
 @pytest.mark.parametrize(("given", "sentence"), [
