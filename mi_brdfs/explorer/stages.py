@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib.util import find_spec
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -393,4 +392,8 @@ class Stages:
 
 
 def _denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
-    return denoise if find_spec("mitsuba_oidn") else None
+    try:
+        import mitsuba_oidn  # noqa: F401
+    except ImportError:
+        return None
+    return denoise
