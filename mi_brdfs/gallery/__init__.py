@@ -22,7 +22,7 @@ import numpy as np
 
 try:
     import jinja2  # noqa: F401
-    import mitsuba_oidn
+    import mitsuba_oidn  # noqa: F401
     from PIL import Image
 except ImportError:
     raise ImportError("the gallery needs Jinja2, Pillow and mitsuba-oidn: pip install 'mi_brdfs[gallery]'") from None
@@ -33,7 +33,7 @@ from ..pages import environment
 from ..parameters.published import preset
 from ..preview import preview_scene
 from ..probe.arrays import luminance
-from ..rendering.output import display_image, write
+from ..rendering.output import denoise, display_image, write
 from ..rendering.passes import ctrl_c
 from ..writing import write_text
 from .families import by_family, portrait, stage_of, year
@@ -119,7 +119,7 @@ def shot(bsdf: dict, stage: str = "studio", size: int = SIZE, spp: int = SPP, se
     image = np.array(mi.render(mi.load_dict(scene), seed=seed))
     middle = slice((size - ACROSS) // 2, (size + ACROSS) // 2)
     profile = luminance(image[middle].mean(axis=0))
-    return Shot(Image.fromarray(np.array(display_image(mi.Bitmap(mitsuba_oidn.denoise(image, hdr=True))))), profile)
+    return Shot(Image.fromarray(np.array(display_image(mi.Bitmap(denoise(image))))), profile)
 
 
 def power_of_4(spp: int) -> int:
