@@ -70,6 +70,7 @@ def measured(*files: str | Path | Measurement) -> Figure:
         it = LitTable(measurement)
         for ax, draw in zip(row.subplots(1, 3), (_draw_slice, _draw_lobes, _draw_albedo), strict=True):
             draw(ax, it)
+            ax.set_box_aspect(1)
         row.suptitle(it.name, fontsize=TEXT + 1, color=INK)
     return figure
 
@@ -92,7 +93,7 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     patch = Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1)
     ax.add_patch(patch)
     ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
-    add_bar(ScalarMappable(norm, palette), ax, it.quantity, shrink=0.75, extend="both")
+    add_bar(ScalarMappable(norm, palette), ax, it.quantity, location="top", extend="both")
     calm(ax)
     ax.grid(False)
     turns = range(0, 91, 30)
