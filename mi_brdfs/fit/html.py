@@ -11,6 +11,8 @@ import numpy as np
 from ..measured import Measurement, read
 from ..pages import environment
 from ..pages.figures import DIFFERENCE, data_uri, svg
+from ..rendering.output import denoiser
+from ..srgb import decoded, encoded
 from .appearance import MOST, Appearance, lightness
 from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
@@ -56,7 +58,7 @@ class Section:
     """The picture of the data."""
     lightness: int = 0
     """The end of the scale of differences."""
-    stops: int = 0
+    stops: float = 0
     """By how many stops pictures are brightened."""
     quantity: str = ""
     """What residuals are of."""
@@ -131,12 +133,12 @@ def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
     cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
-    section.data = data_uri(shown.data)
-    at = lightness(shown.data)
-    differences = [lightness(picture) - at for picture in shown.fits[:MOST]]
+    data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
+    section.data = data_uri(data)
+    differences = [lightness(picture) - lightness(data) for picture in pictures]
     largest = np.quantile(abs(differences[0]), 0.99)
     section.lightness = next((end for end in SCALES if end >= largest), SCALES[-1])
-    for card, picture, difference in zip(cards, shown.fits, differences, strict=False):
+    for card, picture, difference in zip(cards, pictures, differences, strict=False):
         card.picture = data_uri(picture)
         card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference / section.lightness)[..., :3])
     with rgb_variant():
@@ -149,6 +151,12 @@ def _draw(section: Section, shown: Appearance) -> None:
     limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
     for card, each in zip(cards, residuals, strict=True):
         card.residuals = svg(each.draw(limit))
+
+
+def _smooth(picture: np.ndarray) -> np.ndarray:
+    """Return a picture in sRGB, denoised where the denoiser loads."""
+    denoise = denoiser()
+    return encoded(denoise(decoded(picture))) if denoise else picture
 
 
 def _error(fit: Fit) -> float:
