@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from mi_brdfs import preview, srgb
-from mi_brdfs.explorer.materials import BALLS, BALLS_ACROSS, MODEL_BALLS, Materials
+from mi_brdfs.explorer.materials import BALLS, BALLS_ACROSS, Materials
 from mi_brdfs.explorer.stages import Setting, Stages, UserScene, rgba
 from mi_brdfs.explorer.state import PRESET
 from mi_brdfs.mitsuba.registry import own_models
@@ -29,9 +29,10 @@ def pictures() -> list[Picture]:
     models = [{"type": model.plugins[0]} for model in own_models()]
     data = Path(published.__file__).with_name("published.json").read_bytes()
     examples = repr([model.example() for model in own_models()])
+    row = BALLS.with_name("models.jpg")
     return [
         Picture(BALLS, partial(_sources, data, BALLS_ACROSS), partial(_draw, published_ones, BALLS_ACROSS)),
-        Picture(MODEL_BALLS, partial(_sources, examples, len(models)), partial(_draw, models, len(models))),
+        Picture(row, partial(_sources, examples, len(models)), partial(_draw, models, len(models))),
     ]
 
 

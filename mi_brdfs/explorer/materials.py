@@ -36,8 +36,6 @@ BUILT_IN = (
 
 BALLS, BALLS_ACROSS = Path(__file__).parent / "client" / "published.jpg", 38
 """The sheet with a ball of each published material, and how many are beside each other."""
-MODEL_BALLS = BALLS.with_name("models.jpg")
-"""The row with a ball of each model of the pack, in their order."""
 
 
 @dataclass

@@ -18,7 +18,7 @@ from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import Fit, Median, medians, notes, values
+from .result import Fit, Median, medians, notes, number, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
@@ -164,11 +164,6 @@ def _error(fit: Fit) -> float:
     return fit.held_out if fit.flip is None else fit.flip
 
 
-def _number(value: float | None) -> str:
-    """Return a number as the command prints it."""
-    return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
-
-
 def _told(measurement: Measurement) -> str:
     channels = measurement.data.values.shape[-1]
     kind = "anisotropic" if measurement.data.anisotropic else "isotropic"
@@ -176,4 +171,4 @@ def _told(measurement: Measurement) -> str:
     return ", ".join(word for word in words if word)
 
 
-environment.filters |= {"number": _number, "error": _error, "name": lambda file: Path(file).name}
+environment.filters |= {"number": number, "error": _error, "name": lambda file: Path(file).name}

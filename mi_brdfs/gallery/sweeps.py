@@ -7,7 +7,7 @@ from typing import Any
 
 from ..mitsuba.registry import is_own
 from ..model import Model
-from .families import BLUE, CLAY, GREEN, RED, rgb
+from .families import BLUE, CLAY, GREEN, LACQUER, RED, rgb
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,8 @@ GOLD, INDIGO = rgb(0.9, 0.6, 0.25), rgb(0.02, 0.03, 0.1)
 
 SWEEPS: dict[str, list[Sweep]] = {
     "ashikhminshirley": [
-        sweep("exponent", 10, 50, 200, 1000, 10000, diffuse_reflectance=BLUE, specular_reflectance=0.2),
-        sweep(
-            "exponent_u", 10, 50, 200, 1000, 5000, exponent_v=200, diffuse_reflectance=BLUE, specular_reflectance=0.2
-        ),
+        sweep("exponent", 10, 50, 200, 1000, 10000, **LACQUER),
+        sweep("exponent_u", 10, 50, 200, 1000, 5000, exponent_v=200, **LACQUER),
         sweep("specular_reflectance", 0.0, 0.05, 0.2, 0.5, 1.0, diffuse_reflectance=BLUE),
     ],
     "blinnphong": [

@@ -34,8 +34,6 @@ MIRROR = {"marker": "v", "markersize": 5}
 THIN = {"linewidth": 0.8}
 COLUMNS, NARROWEST = 4, 2.8
 """The most panels side by side, and the least width of one, in inches."""
-FAR = 100
-"""The ratio of maxima from which on a linear scale shows nothing of the lowest curve."""
 
 
 def polar(
@@ -149,7 +147,7 @@ def _planar(
 
     each = [[lines(it, k, theta, j) for j, theta in enumerate(angles)] for k, it in enumerate(found)]
     peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
-    if "linear" in scales and (ratio := max(peaks) / min(peaks)) > FAR:
+    if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 100:  # the lowest curve cannot be seen
         warnings.warn(f"the maxima differ by a factor of {ratio:.0f}; --normalize compares shapes", stacklevel=3)
     rows = each if by_bsdf else zip(*each, strict=True)
     headings = [it.label for it in found] if by_bsdf else [incidence(theta) for theta in angles]
