@@ -1,5 +1,5 @@
-"""The order of the models in the gallery, and the material that stands for each: in a family, the same colour and
-about the same roughness."""
+"""The order of the models in the gallery, and the material that stands for each: in a family, the same colour, with
+what a model is known for."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ LACQUER = {"diffuse_reflectance": BLUE, "specular_reflectance": 0.2}
 ENAMEL = {"diffuse_reflectance": GREEN, "f0": 0.2}
 
 PORTRAITS: dict[str, dict[str, Any]] = {
-    # A roughness of 0.5, or what comes near.
     "lambert": {"reflectance": CLAY},
     "minnaert": {"reflectance": CLAY},
-    "orennayar": {"reflectance": CLAY, "sigma": 0.5},
+    "orennayar": {"reflectance": CLAY, "sigma": 0.8},
     "roughdiffuse": {"reflectance": CLAY, "alpha": 0.7},
     "wrap": {"reflectance": CLAY},
-    "eon": {"reflectance": CLAY, "roughness": 0.5},
-    # α = 0.2
-    "microfacet": {"f0": COPPER, "alpha": 0.2},
+    "eon": {"reflectance": CLAY, "roughness": 1.0},
+    # About α = 0.2
+    "microfacet": {"f0": COPPER, "alpha": 0.2, "distribution": "gtr", "gamma": 1.2, "shadowing": "vcavity"},
     "cooktorrance": {"f0": COPPER, "alpha": 0.2},
-    "ward": {"diffuse_reflectance": 0.0, "specular_reflectance": COPPER, "alpha": 0.2},
+    "ward": {"diffuse_reflectance": 0.0, "specular_reflectance": COPPER, "alpha_u": 0.05, "alpha_v": 0.3},
     "schlick": {"specular_reflectance": COPPER, "roughness": 0.04},
     "walter": {"f0": COPPER, "alpha": 0.2},
     "kurt": {"diffuse_reflectance": 0.0, "f0": COPPER, "alpha": 0.2},
@@ -39,13 +38,13 @@ PORTRAITS: dict[str, dict[str, Any]] = {
     "phong": {**LACQUER, "exponent": 20},
     "blinnphong": {**LACQUER, "exponent": 80},
     "lafortune": {**LACQUER, "exponent": 20},
-    "ashikhminshirley": {**LACQUER, "exponent": 80},
-    "burley": {"base_color": RED, "roughness": 0.3},
-    "metallicroughness": {"base_color": RED, "roughness": 0.3},
+    "ashikhminshirley": {**LACQUER, "exponent_u": 1000, "exponent_v": 10},
+    "burley": {"base_color": RED, "roughness": 0.3, "clearcoat": 1.0},
+    "metallicroughness": {"base_color": RED, "metallic": 1.0, "roughness": 0.3},
     # Lobes as wide as those of α = 0.15
     "nishino": {**ENAMEL, "kappa": -5.0, "gamma": 100},
-    "low": {"diffuse_reflectance": GREEN, "normalization": "unit", "b": 90, "c": 2.0, "int_ior": 2.6},
     "brady": {**ENAMEL, "beta": 0.4, "exponent": 2.0},
+    "low": {"diffuse_reflectance": GREEN, "normalization": "unit", "b": 2000, "c": 1.2, "int_ior": 2.6},
     "toon": {"diffuse_reflectance": RED, "diffuse_shadow": 0.3},
 }
 STAGES = {"diffuse": "point", "cartoon": "point"}
