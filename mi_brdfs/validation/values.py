@@ -135,7 +135,7 @@ def support(run: Run) -> Findings:
             pdf = run.probe.pdf(part, wi, wo)
             missed = np.where((value > 1e-9 * value.max()) & ~(pdf > 0), value, 0)
             tried += len(wo)
-            outcome.wrong(missed, "eval", value, "but pdf is 0: this light is never sampled", wi, wo)
+            outcome.wrong(missed, "eval", value, "but pdf is not above 0: this light is never sampled", wi, wo)
         yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
 
 
