@@ -81,7 +81,8 @@ def _check_paths(run: Run, outcome: Outcome, part: Part) -> None:
     """Check where samples go, and that light goes back the same way."""
     kinds, wi, u = mi.BSDFFlags, scattered(SCATTERED, 81, part.sides), random(SCATTERED, 82)
     there = run.probe.sample(part, wi, u)
-    wo, lit, weight = there.wo, there.weight.any(axis=1), there.weight
+    wo, weight = there.wo, there.weight
+    lit = np.logical_or.reduce(weight != 0, axis=1)
     steep = np.minimum(abs(wi[:, 2]), abs(wo[:, 2])) > 0.1
 
     unknown = ~(np.isfinite(weight) & (weight >= 0))

@@ -105,7 +105,8 @@ def gradients(run: Run) -> Findings:
                     derivative, _ = _derivatives(run, params, key, wi, wo)
                 # Float32 must know the values to far less than a step.
                 known = np.spacing(np.abs(np.array(original + shift, np.float32)).max()) < 0.01 * part_of * step
-                tried = _differences(_shifted(run, params, key, wi, wo), part_of * step, known)
+                # Plugins other than ours may clip: look beside such ends.
+                tried = _differences(_shifted(run, params, key, wi, wo), part_of * step, known, probe.is_ours)
                 if tried.trusted.mean() > trusted.mean():
                     low, high, trusted, noise = tried
                     compared = derivative
@@ -358,13 +359,13 @@ def _shifted(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: Arra
     return at
 
 
-def _differences(at: Callable[[float], Array], step: float, known: bool = True) -> Differences:
+def _differences(at: Callable[[float], Array], step: float, known: bool = True, leads_back: bool = True) -> Differences:
     """Return the derivatives of some values for a parameter, by differences of two steps, extrapolated, where ``at``
     returns the values for a shift of the parameter; none are trusted unless it is ``known`` well enough for that.
 
     The bounds are the same, except where the differences to the two sides do not approach each other: at a kink any
     derivative between them will do. Where one side changes nothing, the other counts, if that is so of most, as at the
-    end of a range: where it is so of some, they may be reflected totally.
+    end of a range, where the derivative ``leads_back``: where it is so of some, they may be reflected totally.
     """
     centre = at(0)
 
@@ -394,7 +395,7 @@ def _differences(at: Callable[[float], Array], step: float, known: bool = True) 
     change = np.where(lone, up - np.where(above == 0, below, above), first - second)
     # Across a peak far narrower than the steps the two sides cancel, but each grows as the step shrinks.
     grows = nearer_gap > 1.5 * gap + 4 * noise
-    trusted = (kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)) & (lone | ~grows)
+    trusted = (kink | (abs(change) <= 0.05 * abs(smooth) + 4 * noise)) & np.where(lone, leads_back, ~grows)
     noise = noise + np.where(kink, 0, 0.5 * abs(change))
     low, high = (np.where(kink, choose(up, down), smooth) for choose in (np.minimum, np.maximum))
     return Differences(low, high, known & trusted & np.isfinite(low) & np.isfinite(high), noise)
