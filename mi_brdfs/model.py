@@ -17,10 +17,14 @@ import mitsuba as mi
 from .lobes import Lobe
 from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
+from .parameters.xml import to_xml
 
 ENERGY_NOTE = """\
 At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
 others is 0; parameters not named take all values in their range."""
+
+EXAMPLE = "Example\n-------\n"
+"""The heading of the plugin dict at the end of a docstring."""
 
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
@@ -148,9 +152,15 @@ class Plugin:
 
     @classmethod
     def example(cls) -> dict[str, Any]:
-        """Return the plugin dict at the end of the manual page, or else the defaults."""
-        last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2]
+        """Return the plugin dict at the end of the docstring, or else the defaults."""
+        last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2].removeprefix(EXAMPLE)
         return ast.literal_eval(last) if last.startswith("{") else {"type": cls.plugins[0]}
+
+    @classmethod
+    def page(cls) -> str:
+        """Return the docstring, with the plugin dict of its section "Example" in XML, too."""
+        text, heading, last = inspect.cleandoc(cls.__doc__ or "").rpartition(EXAMPLE)
+        return text + heading + (f"{to_xml(cls.example())}\n\n" if heading and last.startswith("{") else "") + last
 
     @classmethod
     def parameter_rows(cls) -> list[ParameterRow]:
@@ -160,9 +170,9 @@ class Plugin:
 
     @classmethod
     def manual(cls) -> str:
-        """Return the manual page: the docstring and the table of parameters."""
+        """Return the manual page: that of the docstring, and the table of parameters."""
         rows = [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]
-        return "\n".join([inspect.cleandoc(cls.__doc__ or ""), "", *_section("Parameters", rows), ""])
+        return "\n".join([cls.page(), "", *_section("Parameters", rows), ""])
 
 
 class Model(Plugin):

@@ -39,12 +39,6 @@ class Brady(Model):
 
     Example
     -------
-    <bsdf type="brady">
-        <float name="f0" value="0.6"/>
-        <float name="exponent" value="0.8"/>
-        <float name="diffuse_reflectance" value="0.1"/>
-    </bsdf>
-
     {"type": "brady", "f0": 0.6, "exponent": 0.8, "diffuse_reflectance": 0.1}
     """
 

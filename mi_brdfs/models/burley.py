@@ -61,12 +61,6 @@ class Burley(Model):
 
     Example
     -------
-    <bsdf type="burley">
-        <rgb name="base_color" value="0.6, 0.1, 0.05"/>
-        <float name="roughness" value="0.4"/>
-        <float name="clearcoat" value="1"/>
-    </bsdf>
-
     {"type": "burley", "base_color": {"type": "rgb", "value": [0.6, 0.1, 0.05]}, "roughness": 0.4, "clearcoat": 1.0}
     """
 

@@ -47,11 +47,6 @@ class CookTorrance(Model):
 
     Example
     -------
-    <bsdf type="cooktorrance">
-        <string name="material" value="Cu"/>
-        <float name="alpha" value="0.25"/>
-    </bsdf>
-
     {"type": "cooktorrance", "material": "Cu", "alpha": 0.25}
     """
 

@@ -32,12 +32,6 @@ class Kurt(Model):
 
     Example
     -------
-    <bsdf type="kurt">
-        <rgb name="diffuse_reflectance" value="0.03, 0.2, 0.2"/>
-        <float name="alpha_1" value="0.05"/>
-        <float name="alpha_2" value="0.3"/>
-    </bsdf>
-
     {"type": "kurt", "diffuse_reflectance": {"type": "rgb", "value": [0.03, 0.2, 0.2]}, "alpha_1": 0.05, "alpha_2": 0.3}
     """
 

@@ -36,14 +36,6 @@ class Lafortune(Model):
 
     Example
     -------
-    <bsdf type="lafortune">
-        <float name="exponent_1" value="20"/>
-        <float name="cx_2" value="0.9"/>
-        <float name="cy_2" value="0.9"/>
-        <float name="cz_2" value="0.7"/>
-        <float name="exponent_2" value="9"/>
-    </bsdf>
-
     {"type": "lafortune", "exponent_1": 20, "cx_2": 0.9, "cy_2": 0.9, "cz_2": 0.7, "exponent_2": 9}
     """
 

@@ -48,13 +48,6 @@ class Low(Model):
 
     Example
     -------
-    <bsdf type="low">
-        <rgb name="diffuse_reflectance" value="0.1, 0.3, 0.2"/>
-        <float name="a" value="50"/>
-        <float name="b" value="2000"/>
-        <float name="c" value="1.2"/>
-    </bsdf>
-
     {"type": "low", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.2]}, "a": 50.0, "b": 2000, "c": 1.2}
     """
 

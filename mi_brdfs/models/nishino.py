@@ -42,12 +42,6 @@ class Nishino(Model):
 
     Example
     -------
-    <bsdf type="nishino">
-        <float name="kappa" value="-8"/>
-        <float name="gamma" value="40"/>
-        <string name="material" value="Cu"/>
-    </bsdf>
-
     {"type": "nishino", "kappa": -8, "gamma": 40, "material": "Cu"}
     """
 

@@ -51,12 +51,6 @@ class Schlick94(Model):
 
     Example
     -------
-    <bsdf type="schlick">
-        <rgb name="specular_reflectance" value="0.95, 0.7, 0.55"/>
-        <float name="roughness" value="0.05"/>
-        <float name="isotropy" value="0.2"/>
-    </bsdf>
-
     {"type": "schlick", "specular_reflectance": {"type": "rgb", "value": [0.95, 0.7, 0.55]}, "roughness": 0.05,
      "isotropy": 0.2}
     """

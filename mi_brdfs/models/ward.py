@@ -46,11 +46,6 @@ class Ward(Model):
 
     Example
     -------
-    <bsdf type="ward">
-        <float name="alpha_u" value="0.05"/>
-        <float name="alpha_v" value="0.3"/>
-    </bsdf>
-
     {"type": "ward", "alpha_u": 0.05, "alpha_v": 0.3}
     """
 

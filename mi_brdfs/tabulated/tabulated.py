@@ -55,10 +55,6 @@ class Tabulated(Model):
 
     Example
     -------
-    <bsdf type="tabulated">
-        <string name="filename" value="alum-bronze.binary"/>
-    </bsdf>
-
     {"type": "tabulated", "filename": "alum-bronze.binary"}
     """
 
