@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..given import load_described
 from ..measured import read
 from ..measured.measurement import Grid, Samples
 from ..parameters.messages import brief
@@ -139,10 +140,7 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe
 
 
 def _probe(given: Any) -> BSDFProbe:
-    bsdf = mi.load_dict(given) if isinstance(given, dict) else given
-    if not isinstance(bsdf, mi.BSDF):
-        word = given.get("type") if isinstance(given, dict) else type(given).__name__
-        raise ValueError(f"{word} is not a BSDF of {mi.variant()}")
+    bsdf = load_described(given)
     # Who says how to extrapolate wants to see that; and tables know nothing of a plugin's rotation.
     if isinstance(given, dict) and given["type"] == "tabulated" and not given.keys() & {"extrapolate", "rotation"}:
         return MeasuredProbe(bsdf, data=read(given["filename"], given.get("quantity", "stated")).data)
