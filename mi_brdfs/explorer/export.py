@@ -51,11 +51,8 @@ def page(
     state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any], vary: Varied | None = None
 ) -> str:
     """Return the page with all views of a state, at several angles of incidence and values of parameters;
-    ``page_state`` is what the page itself said of it.
-
-    Raises:
-        StateError: if a subject cannot be shown, none has such a parameter, or the page would be too large.
-    """
+    ``page_state`` is what the page itself said of it. Raise a StateError if a subject cannot be shown, none has such a
+    parameter, or the page would be too large."""
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
     baked = _Baked(state, materials, scenes, vary)

@@ -229,11 +229,7 @@ class PortError(ValueError):
 
 
 def listening(host: str, port: int | None) -> socket.socket:
-    """Return a socket that listens.
-
-    Raises:
-        PortError: if the address cannot be had, and why, in a sentence.
-    """
+    """Return a socket that listens, or raise a PortError that says in a sentence why there is none."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for wanted in [port] if port is not None else [PORT, 0]:
         found = socket.socket(family)

@@ -100,11 +100,7 @@ class Session:
             self._latest, self._edited = (state, serial), time.perf_counter()
 
     def ask(self, request: Mapping[str, Any]) -> None:
-        """Take a request, or cancel the one at work.
-
-        Raises:
-            StateError: if the page has not said what it shows.
-        """
+        """Take a request, or cancel the one at work. Raise a StateError if the page has not said what it shows."""
         with self._lock:
             if request["type"] == "cancel":
                 self._fits = None

@@ -211,11 +211,8 @@ def load(setting: Setting, user: UserScene) -> Stage:
 
 
 def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
-    """Return what puts a shape, whose y is up, on the floor, no larger than the ball.
-
-    Raises:
-        ValueError: if it has no size.
-    """
+    """Return what puts a shape, whose y is up, on the floor, no larger than the ball. Raise a ValueError if it has no
+    size."""
     box, reach = shape.bbox(), 1.0
     if isinstance(shape, mi.Mesh):
         vertices = np.array(shape.vertex_positions_buffer()).reshape(-1, 3) - np.array(box.center())
@@ -340,11 +337,7 @@ class Stages:
         return ["body", "sphere", *self.user.meshes, *(["scene"] if self.user.scene else [])]
 
     def stage(self, setting: Setting) -> Stage:
-        """Return the scene of a setting, in whatever pose.
-
-        Raises:
-            ValueError, RuntimeError: as :func:`load`.
-        """
+        """Return the scene of a setting, in whatever pose; raise as :func:`load` does."""
         setting = setting.scene()
         if setting not in self._loaded:
             self._loaded[setting] = load(setting, self.user)
@@ -354,11 +347,8 @@ class Stages:
         return self._loaded[setting]
 
     def add(self, path: Path, name: str) -> dict[str, str]:
-        """Take a mesh or an environment map that can be loaded, and return which member of a state it is a word for.
-
-        Raises:
-            ValueError, RuntimeError: as :func:`load`.
-        """
+        """Take a mesh or an environment map that can be loaded, and return which member of a state it is a word for;
+        raise as :func:`load` does."""
         kind, word = self.user.add(path, name)
         try:
             self.stage(Setting("studio", word, QUICK) if kind == "shape" else Setting(word, "body", QUICK))

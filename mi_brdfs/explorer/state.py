@@ -102,11 +102,8 @@ def declared() -> dict[str, Any]:
 
 
 def decoded(data: str | bytes) -> dict[str, Any]:
-    """Return a message: an object with a type, and with no numbers but finite ones.
-
-    Raises:
-        StateError: if it is none.
-    """
+    """Return a message: an object with a type, and with no numbers but finite ones. Raise a StateError if it is
+    none."""
     if len(data) > LONGEST:
         raise StateError(f"A message has {LONGEST} letters at most.")
     try:
@@ -120,11 +117,7 @@ def decoded(data: str | bytes) -> dict[str, Any]:
 
 
 def checked_request(message: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a message that asks for something.
-
-    Raises:
-        StateError: if nothing can be asked for like this.
-    """
+    """Return a message that asks for something, or raise a StateError."""
     kind, subject = message["type"], message.get("subject", 0)
     if kind not in REQUESTS:
         raise StateError(f"There is no message {brief(kind)!r}.")
@@ -140,11 +133,7 @@ def checked_request(message: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> State:
-    """Return the state that a page sent, with the defaults for what it does not say.
-
-    Raises:
-        StateError: if it is not a state.
-    """
+    """Return the state that a page sent, with the defaults for what it does not say, or raise a StateError."""
     if not isinstance(data, Mapping):
         raise StateError("The state of a page is an object.")
     subjects = data.get("subjects")
@@ -178,11 +167,8 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
 
 
 def checked(bsdf: Any) -> Bsdf:
-    """Return a plugin dict of plain values.
-
-    Raises:
-        StateError: if it is none, or names a file: those are known by names of their own.
-    """
+    """Return a plugin dict of plain values. Raise a StateError if it is none, or names a file: those are known by names
+    of their own."""
     if not isinstance(bsdf, Mapping) or not isinstance(bsdf.get("type"), str):
         raise StateError("A material needs a bsdf with a type.")
     if len(bsdf) > PARAMETERS:

@@ -194,11 +194,8 @@ def configurations(
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
     with the default of those that are not given. Names that it does not have are left out. Numbers and colours that are
-    ``FREE`` are sought even if fits leave them as they are.
-
-    Raises:
-        FitError: if there is no such word, or nothing is left to fit.
-    """
+    ``FREE`` are sought even if fits leave them as they are. Raise a FitError if there is no such word, or nothing is
+    left to fit."""
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
     tied = {key: value for key, value in tied.items() if {key, value} <= known}

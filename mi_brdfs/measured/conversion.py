@@ -184,11 +184,7 @@ def _alike(f: Array, other: Array) -> bool:
 
 
 def _writer(path: Path, format: str | None) -> ModuleType:
-    """Return the module of the format to write.
-
-    Raises:
-        ValueError: if there is none.
-    """
+    """Return the module of the format to write, or raise a ValueError."""
     writable = {it.NAME: it for it in FORMATS if hasattr(it, "write")}
     fitting = [name for name in ENDINGS.get(path.suffix.lower(), []) if name in writable]
     chosen = [name for name in fitting if format is None or name.lower() == format.lower()]

@@ -51,11 +51,7 @@ def preset(name: str) -> dict[str, Any]:
 
 
 def provenance(name: str) -> Provenance:
-    """Return where a published material comes from.
-
-    Raises:
-        ValueError: as :func:`preset`.
-    """
+    """Return where a published material comes from; raise as :func:`preset`."""
     entry, _ = _find(name)
     return Provenance(*(entry[field] for field in Provenance._fields))
 

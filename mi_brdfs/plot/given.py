@@ -41,11 +41,8 @@ class MeasuredProbe(BSDFProbe):
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
-    """Return the BSDFs loaded, with the labels given or found.
-
-    Raises:
-        ValueError: if there are none, one is not a BSDF, or the active variant cannot evaluate arrays of directions.
-    """
+    """Return the BSDFs loaded, with the labels given or found. Raise a ValueError if there are none, one is not a BSDF,
+    or the active variant cannot evaluate arrays of directions."""
     if not is_measurable(mi.variant()):
         raise ValueError(
             f"plots need a vectorized and unpolarized variant, not {mi.variant() or 'none'}: call "
@@ -80,11 +77,8 @@ def scales_of(scale: str) -> tuple[str, ...]:
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:
-    """Return the BSDFs, with a label that mentions delta lobes left out, if any.
-
-    Raises:
-        ValueError: if one has delta functions only.
-    """
+    """Return the BSDFs, with a label that mentions delta lobes left out, if any. Raise a ValueError if one has no
+    other."""
     for it in found:
         if not it.probe.components:
             raise ValueError(f"{it.label} reflects and transmits in single directions only: there is no lobe to draw")
@@ -92,11 +86,8 @@ def with_smooth_part(found: list[Named]) -> list[Named]:
 
 
 def channels_of(rgb: bool) -> list[tuple[int | None, str]]:
-    """Return the index and the name of each channel to draw, or (None, "") for the luminance.
-
-    Raises:
-        ValueError: if the active variant has no channels.
-    """
+    """Return the index and the name of each channel to draw, or (None, "") for the luminance. Raise a ValueError if the
+    active variant has none."""
     if not rgb:
         return [(None, "")]
     if not mi.is_rgb:

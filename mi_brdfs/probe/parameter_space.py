@@ -113,12 +113,8 @@ def _words(parameter: Parameter, given: Mapping[str, Any]) -> list[dict[str, Any
 
 
 def accepted(model: type[Model], given: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return what is ``given``, with every combination of words that it leaves open and that the plugin accepts.
-
-    Raises:
-        ValueError: if there is none.
-        Exception: what Mitsuba raises where the plugin fails for another reason.
-    """
+    """Return what is ``given``, with every combination of words that it leaves open and that the plugin accepts. Raise
+    a ValueError if there is none, or what Mitsuba raises where the plugin fails for another reason."""
     found, refusal = [], "there are no such choices"
     named = {name for name, value in given.items() if isinstance(value, (str, bool, tuple))}
     for words in choices(model.declared(), given):

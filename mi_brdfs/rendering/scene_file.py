@@ -102,11 +102,7 @@ def _check_films(state: Any) -> None:
 
 def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
     """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it; on
-    both sides, in place of ``twosided``.
-
-    Raises:
-        ValueError: if there is none.
-    """
+    both sides, in place of ``twosided``. Raise a ValueError if there is none."""
     kinds = mi.ObjectType.BSDF, mi.ObjectType.Shape
     ids = {node.props.id(): k for k, node in enumerate(state.nodes) if node.type in kinds and node.props.id()}
     if id not in ids:
@@ -136,11 +132,8 @@ def _is_seen_from_behind(bsdf: mi.BSDF) -> bool:
 
 def with_material(path: Path, id: str, xml: str) -> str:
     """Return the text of a scene file with a ``<bsdf>`` in the place of the BSDF with an id, or of that of the shape
-    with it, on both sides in place of ``twosided``, and all else as it is; a scene of Mitsuba 0.6 is upgraded.
-
-    Raises:
-        ValueError: if the file itself has none, or is no scene.
-    """
+    with it, on both sides in place of ``twosided``, and all else as it is; a scene of Mitsuba 0.6 is upgraded. Raise a
+    ValueError if the file itself has none, or is no scene."""
     data = upgrade(path).xml.encode()
     found: list[_Written] = []
     inside: list[_Written] = []
