@@ -115,9 +115,6 @@ class ConductorName(Parameter):
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Any, ...] | None:
         return tuple(clamp(it.eval(si, active), *self.ranges[name]) for name, it in self.textures.items()) or None
 
-    def placeholder(self) -> None:
-        return None
-
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "string", "none", "Mitsuba's conductors | none", self.text)]
 

@@ -145,7 +145,7 @@ class Parameter:
 
     def placeholder(self) -> Any:
         """Return a value that a bound parameter may have, to build a model's lobes before there is a surface point."""
-        raise NotImplementedError(f"{type(self).__name__} does not define placeholder.")
+        return None
 
     def rows(self) -> list[ParameterRow]:
         """Return its lines in the table of the manual page."""

@@ -128,8 +128,5 @@ class Preset(Parameter):
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> None:
         return None
 
-    def placeholder(self) -> None:
-        return None
-
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "string", "none", "see mi-brdfs presets", self.text)]

@@ -196,9 +196,6 @@ class Rotation(Parameter):
         sin, cos = dr.sincos(dr.two_pi * (turns - dr.round(turns)))  # whole turns would take the digits
         return cos, sin
 
-    def placeholder(self) -> None:
-        return None
-
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "number", "none", "any", self.text)]
 
