@@ -9,7 +9,9 @@ import typer
 from rich.console import Console
 from rich.markdown import Markdown
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Column, Table
+from rich.text import Text
 
 from ..mitsuba.registry import DATA, all_models, find_plugin
 from ..mitsuba.registry import info as plain_page
@@ -66,10 +68,13 @@ def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or ali
     terminal.print(Markdown(f"{text}{heading}\n```\n{example}\n```" if example else text, "ansi_dark"))
     for title, rows, note in plugin.sections():
         terminal.print(f"\n[bold]{title}")
-        if rows:
-            name, *others = rows[0]
-            table = Table(Column(name, no_wrap=True), *others, box=None, pad_edge=False)
-            for row in rows[1:]:
-                table.add_row(*map(escape, row))
-            terminal.print(table)
-        terminal.print(Markdown(note))
+        names = rows[0] if rows else ()
+        table = Table(*(Column(name, overflow="fold") for name in names), box=None, pad_edge=False)
+        for first, *cells, last in rows[1:]:
+            if len(names) > 3:  # too many columns for a narrow terminal
+                said = ", ".join(f"{name} {cell}" for name, cell in zip(names[1:], cells, strict=False))
+                terminal.print(Text.assemble((first, "cyan"), ": ", said))
+                terminal.print(Padding(Text(last), (0, 0, 0, 4)))
+            else:
+                table.add_row(escape(first), *cells, last)
+        terminal.print(*[table] * bool(table.row_count), Markdown(note), sep="\n")
