@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -22,8 +23,10 @@ from ..measured.scattered import as_grid
 from ..observer import to_srgb
 from ..probe.arrays import luminance
 from ..variants import is_scalar
-from .basis import BASIS, WAVELENGTHS
 from .proposal import Proposal
+
+WAVELENGTHS, *BASIS = np.loadtxt(Path(__file__).with_name("basis.txt")).T
+"""In nm, and three spectra for linear sRGB values, linear between these."""
 
 
 class Tables:
