@@ -8,8 +8,8 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -33,7 +33,7 @@ LARGEST = 3e6
 Varied = Mapping[str, Sequence[float]]
 """The values of scrubbers, by the names of parameters; ``theta`` is the angle of incidence."""
 At = tuple[int | None, ...]
-CLIENT = files(__package__) / "client"
+CLIENT = Path(__file__).parent / "client"
 
 
 def client_file(name: str) -> str:

@@ -97,7 +97,8 @@ class Materials:
                         self._loaded[source.word] = mi.load_dict(found) if isinstance(found, dict) else found
                     yield _with_values(self._loaded[source.word], values)
                 elif kind == MEASURED:
-                    yield mi.load_dict({**_source_dict(self._source(bsdf)), **properties(values)})
+                    measured: Any = self._source(bsdf).load()
+                    yield mi.load_dict({**measured, **properties(values)})
                 elif kind in MODELS:
                     yield mi.load_dict(properties(controls.with_defaults(MODELS[kind], bsdf)))
                 else:
@@ -197,12 +198,6 @@ def _option(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else f"{value:.7g}"
-
-
-def _source_dict(source: BSDFSource) -> dict[str, Any]:
-    found = source.load()
-    assert isinstance(found, dict)  # a measured file
-    return found
 
 
 def _built_in(kind: str, values: Bsdf) -> mi.BSDF:

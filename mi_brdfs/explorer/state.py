@@ -144,22 +144,16 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
     views = data.get("views", State.views)
     if not isinstance(views, (list, tuple)) or any(it not in VIEWS for it in views):
         raise StateError(f"views are {listed(VIEWS)}.")
-    component = data.get("component")
+    known = {"channel": WORDS["channel"], "axis": WORDS["axis"], "stage": stages, "shape": shapes}
+    words: dict[str, Any] = {name: _word(data, name, of_it) for name, of_it in known.items()}
+    numbers: dict[str, Any] = {it: _number(data, it) for it in ("theta", "phi", "exposure", "turn", "yaw", "pitch")}
     return State(
         subjects=tuple(checked(it.get("bsdf")) for it in subjects),
         hidden=tuple(bool(it.get("hidden")) for it in subjects),
-        theta=_number(data, "theta"),
-        phi=_number(data, "phi"),
-        channel=_word(data, "channel", WORDS["channel"]),
-        component=None if component is None else int(_number(data, "component")),
+        **words,
+        **numbers,
+        component=None if data.get("component") is None else int(_number(data, "component")),
         cosine=data.get("cosine") is not False,
-        axis=_word(data, "axis", WORDS["axis"]),
-        stage=_word(data, "stage", stages),
-        shape=_word(data, "shape", shapes),
-        exposure=_number(data, "exposure"),
-        turn=_number(data, "turn"),
-        yaw=_number(data, "yaw"),
-        pitch=_number(data, "pitch"),
         size=int(_number(data, "size")),
         views=tuple(view for view in VIEWS if view in views),
         dragged=data.get("dragged") is True,
