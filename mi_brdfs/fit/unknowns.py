@@ -64,6 +64,8 @@ class Unknown:
     default: float | None = None
     limits: tuple[float, float] = (-math.inf, math.inf)
     """The ends of the parameter's own range, of which a share is sought up to ``EDGE``."""
+    isotropic_as: str | None = None
+    """As :class:`~mi_brdfs.parameters.Quantity` has it."""
 
     @property
     def label(self) -> str:
@@ -116,7 +118,8 @@ def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
     else:
         low, scale = max(low, SMALLEST * min(high, 1)), "log"
     default = None if quantity.colour else quantity.default
-    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default, quantity.limits)
+    kept = quantity.limits, quantity.isotropic_as
+    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default, *kept)
 
 
 @dataclass(frozen=True)
@@ -164,12 +167,12 @@ class Configuration:
             values[name] = numbers[0] if len(numbers) == 1 else {"type": "rgb", "value": numbers}
         return {"type": self.plugin, **self.given, **values}
 
-    def without(self, names: Iterable[str], tied: Mapping[str, str]) -> Configuration:
-        """Return it without some unknowns, and with others tied."""
-        dropped = {*names, *tied}
-        return replace(
-            self, unknowns=tuple(u for u in self.unknowns if u.name not in dropped), tied={**self.tied, **tied}
-        )
+    def isotropic(self) -> Configuration:
+        """Return it for isotropic materials, without the unknowns that have nothing to say of them."""
+        names = {u.name for u in self.unknowns}
+        tied = {u.name: u.isotropic_as for u in self.unknowns if u.isotropic_as and u.isotropic_as in names}
+        kept = tuple(u for u in self.unknowns if u.isotropic_as != "" and u.name not in tied)
+        return replace(self, unknowns=kept, tied={**self.tied, **tied})
 
 
 def default_words(model: type[Model]) -> dict[str, Any]:

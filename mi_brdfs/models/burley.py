@@ -73,7 +73,7 @@ class Burley(Model):
     specular = Number(0.5, (0, 1), "reflectance of the dielectric at normal incidence, in units of 0.08")
     spec_tint = Number(0, (0, 1), "tint of the dielectric's reflection towards the hue of C")
     roughness = Number(0.5, (0, 1), "roughness of the base and the specular lobe; its square is the facets' α")
-    anisotropic = Number(0, (0, 1), "how far the highlight is stretched along dp_du")
+    anisotropic = Number(0, (0, 1), "how far the highlight is stretched along dp_du", isotropic_as="")
     sheen = Number(None, (0, 1), "scale of the sheen; omitted by default")
     sheen_tint = Number(0.5, (0, 1), "tint of the sheen towards the hue of C")
     clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; omitted by default")

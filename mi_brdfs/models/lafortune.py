@@ -46,7 +46,7 @@ class Lafortune(Model):
         8,
         specular_reflectance=Reflectance(0.2, "scale ρ of lobe i", role="specular"),
         cx=Number(-1, (-1.5, 1.5), "factor Cx of lobe i"),
-        cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i"),
+        cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i", isotropic_as="cx"),
         cz=Number(1, (-1.5, 1.5), "factor Cz of lobe i"),
         exponent=Number(30, (0, 1e6), "exponent n of lobe i"),
     )

@@ -63,7 +63,7 @@ class Schlick94(Model):
         None, "reflectance C' of a diffuse layer below; omitted by default", role="diffuse"
     )
     roughness = Number(0.05, (1e-6, 1), "roughness r, the square of GGX's α")
-    isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed")
+    isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed", isotropic_as="")
     variant = Choice(("shadowed", "interreflection", "plain"), "treatment of the shadowed light")
     rotation = Rotation()
 
