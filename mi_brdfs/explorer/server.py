@@ -103,8 +103,7 @@ class Explorer:
         return web.FileResponse(CLIENT / name)
 
     async def _upload(self, request: web.Request) -> web.Response:
-        """Keep a measured file, a mesh or an environment map that can be read: its bytes are the body, its name is in
-        the address."""
+        """Keep a measured file, a mesh or an environment map that can be read: the body, named in the address."""
         name = Path(request.query.get("name", "")).name or "unnamed"
         ending = re.search(r"\.(?!xml$)[a-z]{1,9}$", name, re.IGNORECASE)
         try:

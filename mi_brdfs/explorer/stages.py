@@ -303,8 +303,7 @@ def rgba(linear: np.ndarray, exposure: float) -> bytes:
 def shown(
     progress: Progress, exposure: float, denoise: Callable[[np.ndarray], np.ndarray] | None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Return the payload of a picture's frame, denoised if there is a function for it, and what its header says of
-    it."""
+    """Return the payload of a picture's frame, denoised if there is a function for it, and its header."""
     linear = progress.pixels()
     height, width = linear.shape[:2]
     header = {"width": width, "height": height, "spp": progress.spp, "denoised": denoise is not None}

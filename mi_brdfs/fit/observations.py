@@ -35,7 +35,7 @@ class FitError(ValueError):
 
 @dataclass(frozen=True)
 class Observations:
-    """Usable pairs of directions of one material, in random order: the first ``fitted`` are fitted, the others held
+    """Usable pairs of directions of a material, in random order: the first ``fitted`` are fitted, the others held
     out."""
 
     name: str

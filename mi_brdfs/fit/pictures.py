@@ -41,8 +41,7 @@ class ImageFit:
     """The standard deviations of numbers and channels, as far as noise of the pictures and of the last renderings goes;
     None at the end of a range, where the pictures tell nothing, and for bitmaps."""
     bsdfs: dict[str, dict[str, Any]]
-    """The materials they belong to, as plugin dicts for ``mi.load_dict``, by their paths. Textures are those of the
-    scene."""
+    """Their materials, by path, as plugin dicts for ``mi.load_dict`` with the scene's own textures."""
     bounds: list[str]
     """Numbers that ended at an end of their range."""
     losses: list[float]

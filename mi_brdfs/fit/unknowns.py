@@ -88,8 +88,7 @@ class Unknown:
         return SCALES[self.scale].slope(x, self.high + self.low)
 
     def shown(self, x: float) -> float:
-        """Return a value as a plugin dict has it: half turns change nothing, and what is at an end of the range is that
-        end itself."""
+        """Return a value as a plugin dict has it, without half turns, and at an end of the range that end itself."""
         if self.scale == "turns":
             return x - round(2 * x) / 2
         if not self.at_end(x):
@@ -188,12 +187,7 @@ def _choices(declared: Iterable[Parameter]) -> Iterator[tuple[str, tuple[Any, ..
 
 
 def configurations(
-    model: type[Model],
-    given: Mapping[str, Any],
-    tied: Mapping[str, str],
-    lobes: int,
-    channels: int,
-    anisotropic: bool,
+    model: type[Model], given: Mapping[str, Any], tied: Mapping[str, str], lobes: int, channels: int, anisotropic: bool
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
     with the default of those that are not given. Names that it does not have are left out. Numbers and colours that are
@@ -282,8 +276,7 @@ def _free(declared: Iterable[Parameter], words: Mapping[str, Any], lobes: int) -
 def _unknowns_of(
     parameter: Parameter, fixed: Mapping[str, Any], freed: set[str], channels: int, anisotropic: bool
 ) -> Iterator[Unknown]:
-    """Yield the unknowns of a parameter: none if it is given under one of its names, and both of a pair where the data
-    are anisotropic."""
+    """Yield the unknowns of a parameter: none if it is given under any name, both of a pair for anisotropic data."""
     if any(name in fixed for name in parameter.names):
         return
     for quantity in parameter.quantities(pairs=anisotropic):

@@ -11,8 +11,7 @@ from .families import coloured, of_own
 
 @dataclass(frozen=True)
 class Sweep:
-    """A parameter at several values, with the others as ``given``. Several parameters, separated by commas, share each
-    value."""
+    """A parameter at several values, with others ``given``; several, separated by commas, share each value."""
 
     parameter: str
     values: tuple

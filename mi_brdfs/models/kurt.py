@@ -50,10 +50,7 @@ class Kurt(Model):
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         glossy = [
             MicrofacetLobe(
-                lobe.specular_reflectance,
-                Beckmann(*lobe.alpha),
-                KurtShadowing(lobe.kurt_exponent),
-                Schlick(lobe.f0),
+                lobe.specular_reflectance, Beckmann(*lobe.alpha), KurtShadowing(lobe.kurt_exponent), Schlick(lobe.f0)
             )
             for lobe in p.specular
         ]

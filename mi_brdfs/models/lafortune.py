@@ -77,8 +77,7 @@ class LafortuneLobe(PowerLobe):
         self.c, self.unit = c, unit
 
     def _stretched(self, wi: mi.Vector3f) -> tuple[mi.Vector3f, mi.Float]:
-        """Return ``(C∘wi, its length)``, the length relative to that of wi, which may differ from one by a rounding
-        error."""
+        """Return ``(C∘wi, its length)``, relative to that of wi, which may differ from one by a rounding error."""
         v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
         # At less than SMALL, the derivatives of its power leave the range of float32.
         return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), SMALL * SMALL))

@@ -123,8 +123,7 @@ class SmoothLobe(Lobe):
         return dr.maximum(luminance(self._reflectance(wi, x, y)), SMALL)
 
     def _end(self, wi: mi.Vector3f, x: mi.Float, y: mi.Float, u: mi.Float) -> tuple[Any, mi.Float]:
-        """Return ``(point, W)``: the point at the fraction ``u`` of the mass on one side of a chord, and that mass
-        times F."""
+        """Return the point at the fraction ``u`` of the mass on one side of a chord, and that mass times F."""
         mass = self._mass(wi, x, y)
         d = safe_sqrt(self.law.inverse(u * mass))
         point = (d * x - wi.x, d * y - wi.y)

@@ -52,8 +52,7 @@ class Nishino(Model):
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")
     gamma = Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe")
     variant = OneOf(
-        {"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}},
-        "distribution of the facets, or of f itself",
+        {"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}}, "distribution of the facets, or of f itself"
     )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:

@@ -14,8 +14,7 @@ from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance, Rotation
 
 TYPICAL = 0.58
-"""The cosine that albedo estimates use for u, for directions that are not mirror images; fitted by
-tests/calibration/schlick.py."""
+"""The cosine u of albedo estimates, for other than mirror directions; fitted by tests/calibration/schlick.py."""
 
 
 class Schlick94(Model):

@@ -105,8 +105,8 @@ class Parameter:
         return []
 
     def quantities(self, pairs: bool) -> tuple[Quantity, ...]:
-        """Return what it is usually given as, or the pair for both tangent directions if it may be and ``pairs`` are
-        wanted."""
+        """Return what it is usually given as, or if ``pairs`` are wanted and there is one, the pair along the
+        tangents."""
         ways = self.spellings
         paired = [way for way in ways if len(way) > 1] if pairs else []
         return (paired or ways or [()])[0]

@@ -92,8 +92,7 @@ class Preset(Parameter):
         super().__init__("a published material, as mi-brdfs presets lists them; other parameters replace its values")
 
     def fill_in(self, reader: PropertyReader, declared: Iterable[Parameter]) -> None:
-        """Give the properties the values of the named material: those of parameters that are not given, nor replaced
-        by others that are."""
+        """Give the properties the values of the named material, unless they, or others that replace them, are given."""
         if self.name not in reader:
             return
         values = self._values(reader)

@@ -37,8 +37,7 @@ SEEDS = range(100, 108)
 
 
 class Maximum(NamedTuple):
-    """An albedo, its standard error, and where it was found: the direction of view, the free numbers by name, and what
-    was given."""
+    """An albedo, its standard error, and where it was found: direction of view, free numbers, and what was given."""
 
     albedo: float
     noise: float

@@ -74,8 +74,7 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
 
 
 def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
-    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None if it has no
-    colours."""
+    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours."""
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
     colours = next((it for it in formats if names.startswith(it.name)), None)

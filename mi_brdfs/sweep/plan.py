@@ -168,8 +168,7 @@ def fit_material(model: str, jobs: list[tuple[Observations | str, str, int]], st
 
 
 def check_content(file: str, expected: str) -> None:
-    """Raise a FileError if a file that was read has another content than when the sweep began, under which its results
-    would be kept."""
+    """Raise a FileError if a file has another content than when the sweep began, under which its results are kept."""
     if content_hash(file) != expected:
         raise FileError(f"{file} has changed since the sweep began; give the same command again.")
 

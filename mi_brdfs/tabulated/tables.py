@@ -30,19 +30,13 @@ WAVELENGTHS, *BASIS = np.loadtxt(Path(__file__).with_name("basis.txt")).T
 
 
 class Tables:
-    """f, the albedo at normal incidence, and the density that directions are drawn from; ``captured`` is all of them
-    that kernels read."""
+    """f, the albedo at normal incidence, and the density of directions; ``captured`` is what of them kernels read."""
 
     _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
 
     @classmethod
     def of(
-        cls,
-        filename: str,
-        interpolation: Interpolation,
-        extrapolate: Extrapolation,
-        quantity: Quantity,
-        shared: bool,
+        cls, filename: str, interpolation: Interpolation, extrapolate: Extrapolation, quantity: Quantity, shared: bool
     ) -> Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
         path = checked(filename)

@@ -234,8 +234,7 @@ def ends(data: Grid | Samples, name: str, seen: Range) -> Range:
 
 
 def azimuths(grid: Grid) -> np.ndarray:
-    """Return the azimuths of incidence at which an anisotropic material was measured, in radians; 0 for an isotropic
-    one."""
+    """Return the azimuths of incidence, in radians, at which a material was measured; 0 for an isotropic one."""
     if not grid.anisotropic:
         return np.zeros(1)
     if "phi_i" in grid.coordinates.names:
