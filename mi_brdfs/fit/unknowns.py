@@ -15,7 +15,7 @@ from ..parameters import Parameter, PerLobe, Quantity, nested
 from ..parameters.messages import listed
 from ..parameters.vocabulary import hint
 from ..probe.arrays import Array
-from ..probe.parameter_space import choices
+from ..probe.parameter_space import choices, present
 from .observations import FitError
 
 SMALLEST, LARGEST = 1e-3, 1e6
@@ -206,9 +206,12 @@ def configurations(
     freed = {key for key, value in given.items() if isinstance(value, str) and value == FREE and key not in words}
     fixed = {key: value for key, value in given.items() if key not in {*words, *freed}}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
+    for parameter in model.declared():
+        if isinstance(parameter, PerLobe) and lobes >= len(parameter.numbers):
+            raise FitError(f"There can be {len(parameter.numbers) - 1} lobes at most, not {lobes}.")
     found = []
     for combination in _combinations(model.declared(), words, fixed):
-        free = _free(model.declared(), combination, lobes)
+        free = (it for it in present(model.declared(), combination, lobes) if not it.words)
         unknowns = [u for parameter in free for u in _unknowns_of(parameter, fixed, freed, channels, anisotropic)]
         usable = {u.name for u in unknowns}
         if missing := {*tied, *tied.values()} - usable:
@@ -257,20 +260,6 @@ def _combinations(
             allowed = words[parameter.name] if own is None else (own,)
             combinations = [one | {parameter.name: word} for one in combinations for word in allowed]
     return combinations
-
-
-def _free(declared: Iterable[Parameter], words: Mapping[str, Any], lobes: int) -> Iterator[Parameter]:
-    """Yield the parameters without words that exist with some words, with those of each lobe."""
-    for parameter in declared:
-        if isinstance(parameter, PerLobe):
-            if lobes >= len(parameter.numbers):
-                raise FitError(f"There can be {len(parameter.numbers) - 1} lobes at most, not {lobes}.")
-            for number in [""] if lobes == 1 else [f"_{k + 1}" for k in range(lobes)]:
-                yield from _free(parameter.lobe(number), words, lobes)
-        elif parameter.words:
-            yield from _free(parameter.words[words[parameter.name]].values(), words, lobes)
-        else:
-            yield parameter
 
 
 def _unknowns_of(

@@ -143,7 +143,7 @@ class Number(Parameter):
 
 
 class Index(Number):
-    """An index of refraction: a number, a texture or a substance that Mitsuba knows by name, by default ``substance``."""
+    """An index of refraction: a number, a texture or a substance that Mitsuba knows, by default ``substance``."""
 
     LIMITS = (0.01, 100)
 
