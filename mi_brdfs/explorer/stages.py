@@ -211,8 +211,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
 
 
 def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
-    """Return what puts a shape, whose y is up, on the floor, no larger than the ball. Raise a ValueError if it has no
-    size."""
+    """Return what puts a shape, whose y is up, on the floor, as large as the ball. Without size, raise a ValueError."""
     box, reach = shape.bbox(), 1.0
     if isinstance(shape, mi.Mesh):
         vertices = np.array(shape.vertex_positions_buffer()).reshape(-1, 3) - np.array(box.center())

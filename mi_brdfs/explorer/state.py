@@ -102,8 +102,7 @@ def declared() -> dict[str, Any]:
 
 
 def decoded(data: str | bytes) -> dict[str, Any]:
-    """Return a message: an object with a type, and with no numbers but finite ones. Raise a StateError if it is
-    none."""
+    """Return a message: an object with a type, and with finite numbers only. Raise a StateError if it is none."""
     if len(data) > LONGEST:
         raise StateError(f"A message has {LONGEST} letters at most.")
     try:
@@ -161,8 +160,7 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
 
 
 def checked(bsdf: Any) -> Bsdf:
-    """Return a plugin dict of plain values. Raise a StateError if it is none, or names a file: those are known by names
-    of their own."""
+    """Return a plugin dict of plain values. Raise a StateError if it is none, or names a file other than by its key."""
     if not isinstance(bsdf, Mapping) or not isinstance(bsdf.get("type"), str):
         raise StateError("A material needs a bsdf with a type.")
     if len(bsdf) > PARAMETERS:

@@ -1,5 +1,4 @@
-"""A model's values and derivatives for many settings at once: one kernel, with a lane for each pair of directions of
-each setting."""
+"""A model's values and derivatives for many settings at once: a kernel with a lane for each of their pairs."""
 
 from __future__ import annotations
 

@@ -102,8 +102,7 @@ class TextFile:
         raise self.error(f"the file ends after {len(found)} of {count} {what}")
 
     def stated(self, *names: str) -> str:
-        """Return what a comment ``name: …`` or ``name = …`` says, of the first of the patterns of names that has
-        one."""
+        """Return what a comment ``name: …`` or ``name = …`` says, of the first pattern of names that has one."""
         for name in names:
             for comment in self.comments:
                 if match := re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment):

@@ -202,8 +202,7 @@ def own_models() -> list[type[Model]]:
 
 
 def find_models(names: Iterable[str] | None) -> list[type[Model]]:
-    """Return the models of some plugin names, each once, or all models if there are no names; raise as
-    :func:`find_model`."""
+    """Return the models of some plugin names, each once, or all if there are none; raise as :func:`find_model`."""
     return list(dict.fromkeys(map(find_model, names or []))) or all_models()
 
 
@@ -223,8 +222,7 @@ def info(name: str) -> str:
 
 
 def find_plugin(name: str) -> type[Plugin]:
-    """Return the class of a plugin name, of a model or of another plugin, or raise a ValueError with the closest
-    name."""
+    """Return the class of a plugin name, of a model or not, or raise a ValueError with the closest name."""
     return _find(name, _own_plugins())
 
 

@@ -81,8 +81,7 @@ class FresnelSet(OneTerm):
 
 
 class ConductorName(Parameter):
-    """The indices of one of Mitsuba's conductors, by name, or "none" for no Fresnel term. Evaluated, η and k, or
-    None."""
+    """The indices of a conductor of Mitsuba's, by name, or "none" for no Fresnel term. Evaluated, η and k, or None."""
 
     role = "fresnel"
 

@@ -105,8 +105,7 @@ class Parameter:
         return []
 
     def quantities(self, pairs: bool) -> tuple[Quantity, ...]:
-        """Return what it is usually given as, or if ``pairs`` are wanted and there is one, the pair along the
-        tangents."""
+        """Return what it is usually given as, or if ``pairs`` are wanted, the pair along the tangents if any."""
         ways = self.spellings
         paired = [way for way in ways if len(way) > 1] if pairs else []
         return (paired or ways or [()])[0]

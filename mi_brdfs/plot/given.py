@@ -77,8 +77,7 @@ def scales_of(scale: str) -> tuple[str, ...]:
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:
-    """Return the BSDFs, with a label that mentions delta lobes left out, if any. Raise a ValueError if one has no
-    other."""
+    """Return the BSDFs, labelled if delta lobes are left out. Raise a ValueError if one has no other."""
     for it in found:
         if not it.probe.components:
             raise ValueError(f"{it.label} reflects and transmits in single directions only: there is no lobe to draw")

@@ -153,8 +153,7 @@ class Field:
 
 
 class TensorFile:
-    """A file of named arrays; a FileError says that it is none, or that an array is not in it as a whole, or shares
-    bytes with another."""
+    """A file of named arrays, or a FileError if one is not in it as a whole, or shares bytes with another."""
 
     def __init__(self, path: Path) -> None:
         self.file = file = BinaryFile(path)
