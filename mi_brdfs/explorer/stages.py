@@ -154,14 +154,15 @@ class Stage:
             up = np.eye(3)[axis] * np.sign(own_up[axis])
             centre = np.mean([it.bbox().center() for it in self.shapes], axis=0)
             pivot = place + ahead * ((centre - place) @ ahead)
-            around = _translated(pivot) @ _turned(up, pose.yaw) @ _turned(right, pose.pitch) @ _translated(-pivot)
-            _put(sensor, around @ usual)
+            around = mi.ScalarTransform4f().translate(pivot).rotate(up, pose.yaw).rotate(right, pose.pitch)
+            _put(sensor, around.translate(-pivot), usual)
         for sky, usual in self._skies:
-            _put(sky, _turned(up, pose.turn) @ usual)
+            _put(sky, mi.ScalarTransform4f().rotate(up, pose.turn), usual)
         if self.light is not None:
             theta, phi = pose.incidence
             # The usual camera looks along y, and that of lobes against it.
-            _put(mi.traverse(self.light), _turned([0, 0, 1], phi + 180) @ _turned([0, 1, 0], theta + 180))
+            turned = mi.ScalarTransform4f().rotate([0, 0, 1], phi + 180).rotate([0, 1, 0], theta + 180)
+            _put(mi.traverse(self.light), turned, np.eye(4))
         self.pose = pose
 
 
@@ -169,17 +170,9 @@ def _matrix(params: Any) -> np.ndarray:
     return np.array(params["to_world"].matrix, np.float64).reshape(4, 4)
 
 
-def _put(params: Any, matrix: np.ndarray) -> None:
-    params["to_world"] = mi.Transform4f(mi.Matrix4f(matrix.tolist()))
+def _put(params: Any, moved: mi.ScalarTransform4f, usual: np.ndarray) -> None:
+    params["to_world"] = mi.Transform4f(mi.Matrix4f((np.array(moved.matrix) @ usual).tolist()))
     params.update()
-
-
-def _turned(axis: Any, angle: float) -> np.ndarray:
-    return np.array(mi.ScalarTransform4f().rotate(axis, angle).matrix)
-
-
-def _translated(by: Any) -> np.ndarray:
-    return np.array(mi.ScalarTransform4f().translate(by).matrix)
 
 
 def load(setting: Setting, user: UserScene) -> Stage:
