@@ -143,7 +143,7 @@ def in_new_process(function: Callable, *arguments: Any) -> Any:
 def answer() -> None:
     """Carry out the call given as the argument of the new process."""
     sources, variant, module, name, arguments = json.loads(sys.argv[1])
+    mi.set_variant(variant)
     for source in sources:
         guests.import_models(source)
-    mi.set_variant(variant)
     print(json.dumps(getattr(importlib.import_module(module), name)(*arguments)))

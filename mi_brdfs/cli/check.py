@@ -153,7 +153,7 @@ def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs
                 reports.append(_check_one(source, settings, partial(bar.advance, task)))
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
-        known = variant, list(dict.fromkeys([*guests.sources(), *imported]))
+        known = variant, guests.sources()
         with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
             try:
                 for future in [pool.submit(_check_one, source, settings) for source in sources]:
