@@ -4,7 +4,6 @@ before anything is done. The members of a state are declared here, and the page 
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -102,11 +101,11 @@ def declared() -> dict[str, Any]:
 
 
 def decoded(data: str | bytes) -> dict[str, Any]:
-    """Return a message: an object with a type, and with finite numbers only. Raise a StateError if it is none."""
+    """Return a message: an object with a type. Raise a StateError if it is none."""
     if len(data) > LONGEST:
         raise StateError(f"A message has {LONGEST} letters at most.")
     try:
-        found = json.loads(data, parse_int=_integer, parse_float=_finite, parse_constant=_finite)
+        found = json.loads(data)
     except (ValueError, RecursionError):
         found = None
     is_message = isinstance(data, str) and isinstance(found, dict) and isinstance(found.get("type"), str)
@@ -187,17 +186,6 @@ def _is_plain(value: Any) -> bool:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
-
-
-def _integer(text: str) -> float:
-    return int(text) if len(text) < 16 else _finite(text)
-
-
-def _finite(text: str) -> float:
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(text)
-    return number
 
 
 def _number(data: Mapping[str, Any], name: str) -> float:
