@@ -79,8 +79,8 @@ MALFORMED = [
     ("{}", "This is no message"),
     ('{"type": "shell"}', "There is no message 'shell'"),
     ('{"type": "state", "serial": "x", "state": {"subjects": [{"bsdf": {"type": "ward"}}]}}', "This is no message"),
-    *((json.dumps({"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward"}}], "theta": it}}), "theta is a number")
-      for it in (10**400, np.nan, np.inf)),
+    *((json.dumps({"type": "state", "state": {"subjects": [{"bsdf": {"type": "ward"}}], "theta": it}}),
+       "theta is a number") for it in (10**400, np.nan, np.inf)),
     ("[" * 60_000, "This is no message"),
     (f'{{"type": {"[" * 900}{"]" * 900}}}', "This is no message"),
     (b'{"type": "cancel"}', "This is no message"),

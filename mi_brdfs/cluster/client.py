@@ -48,11 +48,7 @@ DETACHED: dict[str, Any] = (
 
 
 def run_on_workers(
-    function: Callable,
-    tasks: Iterator[tuple[str, tuple]],
-    workers: int | None,
-    scheduler: str | None,
-    shared: tuple,
+    function: Callable, tasks: Iterator[tuple[str, tuple]], workers: int | None, scheduler: str | None, shared: tuple
 ) -> Iterator[tuple[str, Any]]:
     """See :func:`mi_brdfs.cluster.run`."""
     with ExitStack() as stack:

@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..parameters.messages import listed
+from ..rendering.output import encoded
 from . import stages
 from .controls import LOBES, with_value
 from .materials import Materials
@@ -144,7 +145,8 @@ class _Baked:
             with self.materials.loaded(bsdf) as loaded:
                 progress.advance(loaded)
         pixels, header = stages.shown(progress, self.state.exposure, self.scenes.denoise)
-        payload = _jpeg(np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3])
+        rgb = np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3]
+        payload = encoded(mi.Bitmap(np.ascontiguousarray(rgb)), "JPEG", 92)
         header |= {"type": "picture", "serial": 0, "subject": k, "final": True, "mime": "image/jpeg"}
         yield at(None), packed(payload, **header)
 
@@ -163,12 +165,6 @@ def _rounded(frame: bytes) -> bytes:
     end = 4 + int.from_bytes(frame[:4], "little")
     bits = np.frombuffer(frame[end:], np.uint32)
     return frame[:end] + ((bits + np.uint32(0x400)) & np.uint32(0xFFFFF800)).tobytes()
-
-
-def _jpeg(pixels: np.ndarray) -> bytes:
-    stream = mi.MemoryStream()
-    mi.Bitmap(np.ascontiguousarray(pixels)).write(stream, mi.Bitmap.FileFormat.JPEG, 92)
-    return bytes(stream.raw_buffer())
 
 
 def _inlined(data: str) -> str:

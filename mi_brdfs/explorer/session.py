@@ -26,6 +26,7 @@ import mitsuba as mi
 from ..mitsuba.errors import one_line
 from ..mitsuba.guests import import_models
 from ..mitsuba.registry import find_models
+from ..rendering.output import encoded
 from ..rendering.scene_file import with_material
 from . import stages
 from .export import page
@@ -324,10 +325,8 @@ class Session:
     def _save_exr(self, k: int, state: State) -> None:
         if k not in self._pictures:
             raise StateError("There is no picture yet.")
-        stream = mi.MemoryStream()  # no file, for which the disk may have no room
-        self._pictures[k][1].bitmap().write(stream, mi.Bitmap.FileFormat.OpenEXR)
-        name = f"{state.subjects[k]['type']}.exr"
-        self.send(packed(stream.raw_buffer(), type="file", name=name, mime="image/x-exr"))
+        payload = encoded(self._pictures[k][1].bitmap(), "OpenEXR")
+        self.send(packed(payload, type="file", name=f"{state.subjects[k]['type']}.exr", mime="image/x-exr"))
 
     def _save_scene(self, k: int, state: State) -> None:
         """Write the user's scene with a material in it, beside the scene and never over a file."""

@@ -183,13 +183,8 @@ def _found(rendered: Rendered, point: Array, sigma: Array, losses: Sequence[floa
         sigmas[slot.key] = deviations[0] if single else deviations
         bounds += [slot.key if single else f"{slot.key}.{channel}" for number, channel in zip(own, "rgb", strict=False)
                    if slot.unknown.at_end(float(number))]  # fmt: skip
-    return ImageFit(values, sigmas, _bsdfs(rendered.params, list(values)), bounds, list(losses), converged)
-
-
-def _bsdfs(params: mi.SceneParameters, keys: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return the plugin dicts of the BSDFs that keys belong to."""
-    owners = {path: bsdf for key, bsdf, path, _ in declared(params) if key in keys}
-    return {path: _plugin_dict(bsdf) for path, bsdf in owners.items()}
+    bsdfs = {path: _plugin_dict(bsdf) for key, bsdf, path, _ in declared(rendered.params) if key in values}
+    return ImageFit(values, sigmas, bsdfs, bounds, list(losses), converged)
 
 
 def _plugin_dict(bsdf: Any) -> dict[str, Any]:

@@ -34,8 +34,7 @@ class Brady(Model):
     Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: for F = 1 the albedo is at most ρs, and that of narrow
     lobes falls like cosθ_i towards grazing angles. One-sided. Depolarises.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------

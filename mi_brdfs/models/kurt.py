@@ -27,8 +27,7 @@ class Kurt(Model):
     1.05 at 88° and 3.7 at 89.9°. The power 4 of the cosine in D was not checked against the paper. One-sided.
     Depolarises.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------

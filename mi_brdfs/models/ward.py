@@ -41,8 +41,7 @@ class Ward(Model):
     Reciprocal. Energy-conserving for ``balanced`` with ρd + ρs <= 1. Same parameters as ``ward`` of Mitsuba 0.6.
     One-sided. Depolarises.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------

@@ -102,7 +102,12 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
     if suffix not in IMAGES:
         raise ValueError(f"{path}: unknown image format; use {', '.join(IMAGES)}")
     # Mitsuba takes only file names in UTF-8, and does not notice if the last 8 KB find no room on the disk.
-    stream = mi.MemoryStream()
-    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, IMAGES[suffix]))
     with replacing(path) as part:
-        part.write_bytes(stream.raw_buffer())
+        part.write_bytes(encoded(bitmap, IMAGES[suffix]))
+
+
+def encoded(bitmap: mi.Bitmap, format: str, quality: int = -1) -> bytes:
+    """Return what a file of a format holds, by its name in ``mitsuba.Bitmap.FileFormat``."""
+    stream = mi.MemoryStream()
+    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, format), quality)
+    return stream.raw_buffer()
