@@ -67,14 +67,8 @@ class Fits:
 
 
 class Session:
-    """The engine's thread calls :meth:`step`, the server's all others.
-
-    Args:
-        materials: what may be loaded.
-        scenes: where it is shown.
-        send: takes frames to the page.
-        waiting: tells how many of these have not arrived.
-    """
+    """What ``materials`` has, shown in ``scenes``: ``send`` takes frames to the page, and ``waiting`` tells how many of
+    them have not arrived. The engine's thread calls :meth:`step`, the server's all others."""
 
     def __init__(
         self, materials: Materials, scenes: stages.Stages, send: Callable[[Frame], None], waiting: Callable[[], int]

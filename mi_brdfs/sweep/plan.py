@@ -107,9 +107,7 @@ class Sweep:
 
     def fit(self, workers: int | None = None, scheduler: str | None = None) -> Generator[Outcome, None, None]:
         """Make the fits that are not in the folder, and put them there, those of a model to a material together.
-
-        Args:
-            workers: as :func:`mi_brdfs.cluster.run` has it; ``scheduler``, too.
+        ``workers`` and ``scheduler`` are as :func:`mi_brdfs.cluster.run` has them.
 
         Raises:
             OSError: if the folder cannot be written to.
