@@ -139,7 +139,7 @@ def test_profiles_are_below_their_pictures_on_one_scale():
     heights = [np.argmin(panel, axis=0) for panel in panels]
     assert abs(heights[0] - 15).max() < 3  # half of the largest
     assert heights[1][:40].min() > 26 and heights[1][50:].max() < 4
-    assert (panels[1][13:17, 5:40].min(axis=0) < 230).all()  # the first one, pale
+    assert (panels[1][13:17, 5:40].min(axis=0) < 230).all()  # the first one
 
 
 # --- What is rendered and written -----------------------------------------------------------------------------------

@@ -42,6 +42,7 @@ def explore(
     mesh: Annotated[
         Path | None, typer.Option(metavar="FILE.ply|obj", help="Show the pictures on this mesh, whose y axis is up.")
     ] = None,
+    exposure: Annotated[float, typer.Option(min=-10, max=10, help="Brighten the pictures, in stops.")] = 0,
     export: Annotated[
         Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
     ] = None,
@@ -81,7 +82,7 @@ def explore(
     if user.scene and not user.scene.is_file():
         fail(f"--scene {user.scene}: no such file", Exit.USAGE)
     sources, subjects = _subjects(targets or ["walter"], given)
-    state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body"}
+    state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body", "exposure": exposure}
     if mesh and mesh.suffix.lower() not in MESHES:
         fail(f"--mesh {mesh}: give a file whose name ends in {' or '.join(MESHES)}", Exit.USAGE)
     state |= dict(user.add(it, brief(it.name)) for it in (environment, mesh) if it)

@@ -88,6 +88,10 @@ TracingVariant = Annotated[
     str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
 ]
 """The option --variant of commands that measure."""
+Lenient = Annotated[
+    bool, typer.Option("--lenient", help="Put cubes and grey in the place of meshes and textures that old scenes lack.")
+]
+"""The option of commands that upgrade scenes."""
 MOST_PIXELS = 16384
 """The largest width and height of a picture."""
 KINDS = {

@@ -21,7 +21,7 @@ from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
-from ..rendering.output import denoise, tonemap
+from ..rendering.output import denoiser, tonemap
 from ..rendering.passes import pass_source
 from ..srgb import encoded_8bit
 from .state import INCIDENCE, SHAPES, Bsdf, State
@@ -307,7 +307,7 @@ class Stages:
 
     def __init__(self, user: UserScene) -> None:
         self.user = user
-        self.denoise = _denoiser()
+        self.denoise = denoiser()
         """A function of rgb, or None without the extra that brings it."""
         self._loaded: OrderedDict[Setting, Stage] = OrderedDict()
         self._known: set[Any] = set()
@@ -370,11 +370,3 @@ class Stages:
         known = (words, purpose, scenes) in self._known
         self._known.add((words, purpose, scenes))
         return not known
-
-
-def _denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
-    try:
-        import mitsuba_oidn  # noqa: F401
-    except ImportError:
-        return None
-    return denoise

@@ -181,13 +181,18 @@ def notes(fit: Fit) -> str:
     return ", ".join(words + ([f"at an end: {', '.join(fit.bounds)}"] if fit.bounds else []))
 
 
+def number(value: float | None) -> str:
+    """Return a number as text, empty if there is none."""
+    return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
+
+
 def values(fit: Fit) -> list[tuple[str, float, float | None]]:
     """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's, the first has the name."""
     found = []
     for name, sigma in fit.sigma.items():
         value = fit.bsdf[name]
-        for k, number in enumerate(value["value"] if isinstance(value, dict) else [value]):
-            found.append(("" if k else name, number, sigma[k] if isinstance(sigma, list) else sigma))
+        for k, own in enumerate(value["value"] if isinstance(value, dict) else [value]):
+            found.append(("" if k else name, own, sigma[k] if isinstance(sigma, list) else sigma))
     return found
 
 

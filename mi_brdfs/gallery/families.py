@@ -1,5 +1,5 @@
 """The order of the models in the gallery, and the materials that show each: those that stand for the models of a family
-have the same colour and about the same roughness."""
+have the same colour."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ MODELS = json.loads(Path(__file__).with_name("models.json").read_text(encoding="
 """The pack's models, each with its portrait and the sweeps that show it, the main one first: what is swept, its values,
 and what is given besides.
 
-Portraits have a roughness of 0.5 among the diffuse models, facets of α = 0.2 or what comes near (a power of the half
-vector's cosine is about four times that of the mirror direction's), and lobes as wide as those of α = 0.15 among the
-fits to measurements."""
+Portraits have facets of about α = 0.2 or what comes near (a power of the half vector's cosine is about four times that
+of the mirror direction's), lobes as wide as those of α = 0.15 among the fits to measurements, and what a model is known
+for."""
 STAGES = {"diffuse": "point", "cartoon": "point"}
 """The stages of families that are not shown in the studio."""
 

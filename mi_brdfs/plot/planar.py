@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -145,6 +146,9 @@ def _planar(
         return curves
 
     each = [[lines(it, k, theta, j) for j, theta in enumerate(angles)] for k, it in enumerate(found)]
+    peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
+    if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 100:  # the lowest curve cannot be seen
+        warnings.warn(f"the maxima differ by a factor of {ratio:.0f}; --normalize compares shapes", stacklevel=3)
     rows = each if by_bsdf else zip(*each, strict=True)
     headings = [it.label for it in found] if by_bsdf else [incidence(theta) for theta in angles]
     panels = [[curve for part in row for curve in part] for row in rows]

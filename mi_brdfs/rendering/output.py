@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import mitsuba as mi
@@ -33,6 +34,15 @@ def denoise(colours: np.ndarray) -> np.ndarray:
     # It leaves lines along the edges where sides are no multiples of 16.
     padded = np.pad(colours, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
     return mitsuba_oidn.denoise(np.ascontiguousarray(padded, np.float32), hdr=True)[:height, :width]
+
+
+def denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return :func:`denoise` if what it needs is installed and loads."""
+    try:
+        import mitsuba_oidn  # noqa: F401
+    except ImportError:
+        return None
+    return denoise
 
 
 def denoised(picture: Picture) -> Picture:

@@ -30,6 +30,8 @@ class SceneFile:
     """The values of its ``<default>`` parameters."""
     box_filter: bool = False
     """Whether films get box filters: a denoiser expects pixels that share no samples."""
+    lenient: bool = False
+    """Whether stand-ins take the place of files that a scene of Mitsuba 0.6 lacks."""
     replaced: dict[str, BSDFSource] = field(default_factory=dict)
     """What takes the place of BSDFs, or of those of shapes, by their ids."""
     contents: dict[str, bytes] | None = None
@@ -57,7 +59,7 @@ class SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
         with looking_in(Path(self.path).parent):
             config = mi.parser.ParserConfig(mi.variant())
-            state, text = parsed(config, Path(self.path), False, self.parameters)
+            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
             named = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in _file_names(state)}
         names = {name: _rootless(path) for name, path in named.items() if os.path.isfile(path)}
         paths = [self.path, *map(str, state.files), *(path for path in named.values() if os.path.isfile(path))]
@@ -66,12 +68,14 @@ class SceneFile:
         if text is not None:
             contents[_rootless(self.path)], parameters = text.encode(), {}
         path, folder = _rootless(self.path), _rootless(".")
-        return replace(self, path=path, parameters=parameters, contents=contents, names=names, folder=folder)
+        return replace(
+            self, path=path, parameters=parameters, lenient=False, contents=contents, names=names, folder=folder
+        )
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         config = mi.parser.ParserConfig(mi.variant())
         with looking_in(path.parent, *folders):
-            state, _ = parsed(config, path, False, self.parameters)
+            state, _ = parsed(config, path, self.lenient, self.parameters)
             for props, key in _file_names(state):
                 props[key] = names.get(props[key], props[key])
             mi.parser.transform_all(config, state)
