@@ -21,8 +21,8 @@ from typer.testing import CliRunner
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.gallery import Entry, Row, Shot, gallery, overview, page, sheet, shot
-from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
-from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, sweeps_of
+from mi_brdfs.gallery.families import MODELS, by_family, portrait, stage_of, year
+from mi_brdfs.gallery.sweeps import Sweep, sweeps_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import FAMILIES, Model
@@ -39,7 +39,7 @@ NAMES = [model.plugins[0] for model in own_models()]
 @pytest.mark.usefixtures("llvm_rgb")
 def test_every_model_has_a_portrait_and_sweeps():
     """Those in the table, in the order of the models, or what its declarations make; and all of them load."""
-    assert list(SWEEPS) == [name for name in NAMES if name in SWEEPS]
+    assert list(MODELS["models"]) == [name for name in NAMES if name in MODELS["models"]]
     for model in own_models():
         sweeps = sweeps_of(model)
         parameters = [sweep.parameter for sweep in sweeps]

@@ -49,10 +49,6 @@ class Chalk(Lambert):
 
     Example
     -------
-    <bsdf type="chalk">
-        <float name="reflectance" value="0.9"/>
-    </bsdf>
-
     {"type": "chalk", "reflectance": 0.9}
     """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +16,7 @@ from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
-from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
+from mi_brdfs.model import ENERGY_NOTE, EXAMPLE, Model, Plugin
 from mi_brdfs.preview import body, studio
 from mi_brdfs.tabulated.tabulated import Tabulated
 
@@ -165,7 +164,7 @@ def integrator_page() -> str:
 
 def _page(plugin: type[Plugin], picture: str, strip: str = "", *more: str) -> str:
     name, aliases = plugin.plugins[0], plugin.plugins[1:]
-    text, _, examples = inspect.cleandoc(plugin.__doc__).partition("\n\nExample\n-------\n")
+    text, _, examples = plugin.page().partition(f"\n\n{EXAMPLE}")
     xml, _, dictionary = examples.partition("\n\n")
     text = _code(text)
     return "\n\n".join(

@@ -66,8 +66,7 @@ def sphere(bsdf: Any, size: int, integrator: Scene = PATH) -> Scene:
 
 
 def render_in_turn(scenes: Sequence[Callable[[], Scene]]) -> Pictures:
-    """Render each scene with each seed. Only one of them is loaded at a time: a render's kernel contains the code of
-    every live BSDF."""
+    """Render each scene with each seed, one loaded at a time: a kernel contains the code of every live BSDF."""
     seconds = np.zeros((len(scenes), ROUNDS))
     pictures: list[list[Array]] = [[] for _ in scenes]
     for scene in scenes:

@@ -16,10 +16,10 @@ import typer
 
 from .app import command, imported
 from .options import (
-    MATERIAL,
     Parameters,
     TracingVariant,
     file_option,
+    material_argument,
     parameters_of,
     set_tracing_variant,
     source_of,
@@ -30,10 +30,7 @@ from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 @command("Look", "explore walter burley:roughness=.3", "explore paint.binary fit.json:walter --scene room.xml:wall")
 def explore(
-    targets: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="MATERIAL…", help=f"Up to six. {MATERIAL}"),
-    ] = None,
+    targets: Annotated[list[str] | None, material_argument("Up to six.")] = None,
     parameters: Parameters = None,
     scene: Annotated[
         str | None,

@@ -156,11 +156,8 @@ def _id(file: Path, *words: str) -> str:
 
 
 def _given(parameters: dict[str, str], models: list[type[Model]]) -> dict[str, Any]:
-    """Return what -D options fix, a tuple where they give several words of a choice.
-
-    Raises:
-        ValueError: if no model has such a parameter, or several values are given for what is no choice.
-    """
+    """Return what -D options fix, a tuple where they give several words of a choice. Raise a ValueError if no model has
+    such a parameter, or several values are given for what is no choice."""
     from ..fit.unknowns import check_names, default_words
 
     given: dict[str, Any] = {}

@@ -29,8 +29,8 @@ def upgrade(
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
     for line in [*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]:
-        err.print(line, markup=False, highlight=False, soft_wrap=True)
+        err.print(line)
     if output:
         write_text(output, new.xml)
     else:
-        out.print(new.xml, markup=False, highlight=False, soft_wrap=True, end="")
+        out.print(new.xml, end="")

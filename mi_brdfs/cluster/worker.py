@@ -31,8 +31,7 @@ class Setup(NamedTuple):
     variant: str | None
     threads: int | None
     guests: dict[str, str | None]
-    """The sources of models registered by others (:func:`mi_brdfs.mitsuba.guests.sources`), with the text of those that
-    are files."""
+    """The sources of others' models (:func:`mi_brdfs.mitsuba.guests.sources`), with the text of files."""
     versions: dict[str, str]
 
 

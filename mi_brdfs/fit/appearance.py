@@ -38,10 +38,7 @@ class Appearance(NamedTuple):
 
 def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> Appearance:
     """Render the data of fits to one material by ``tabulated``, and each fit, calling ``advance`` after each picture.
-
-    Raises:
-        FitError: if the data are arrays.
-    """
+    Raise a FitError if the data are arrays."""
     file = fits[0].file
     if not os.path.exists(file):
         raise FitError(f"Pictures need the file that was fitted; there is none of {file}.")
@@ -74,11 +71,7 @@ def by_flip(fits: Sequence[Fit], shown: Appearance) -> tuple[list[Fit], Appearan
 
 
 def evaluator() -> Callable[..., Any]:
-    """Return the function that computes FLIP.
-
-    Raises:
-        ImportError: if it is not installed.
-    """
+    """Return the function that computes FLIP, or raise an ImportError that says what brings it."""
     try:
         from flip_evaluator import evaluate
     except ImportError:

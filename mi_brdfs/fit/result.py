@@ -187,8 +187,7 @@ def number(value: float | None) -> str:
 
 
 def values(fit: Fit) -> list[tuple[str, float, float | None]]:
-    """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's numbers, the first has the
-    name."""
+    """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's, the first has the name."""
     found = []
     for name, sigma in fit.sigma.items():
         value = fit.bsdf[name]
@@ -198,8 +197,7 @@ def values(fit: Fit) -> list[tuple[str, float, float | None]]:
 
 
 def medians(ranked: Sequence[Sequence[Fit]]) -> list[Median]:
-    """Return the medians of each model's errors over materials, whose fits are each in the order of their rank; the
-    best first."""
+    """Return the medians of each model's errors over materials, whose fits are ordered by rank; the best first."""
     by_model: dict[str, list[Fit]] = {}
     for own in ranked:
         for it in own:

@@ -23,8 +23,7 @@ class Row(NamedTuple):
     captions: list[str]
     """A caption below each picture; its second line is fainter."""
     profiles: Sequence[np.ndarray] = ()
-    """If there are any, the brightness across each picture, to be drawn below it beside the first one, which is
-    orange."""
+    """If any, the brightness across each picture, drawn below it beside the first one, which is orange."""
 
 
 def sheet(rows: list[Row]) -> Image.Image:

@@ -74,7 +74,7 @@ def polar(
     Raises:
         ValueError: if something is not a BSDF or has delta functions only, if angles or scale are wrong, or if the
             variant is scalar or polarized, or has no channels that ``rgb`` could draw.
-        Exception: whatever Mitsuba raises if a BSDF cannot be loaded.
+        Exception: whatever Mitsuba raises if XML cannot be loaded.
     """
     options = azimuth, scale, labels, normalize, rgb, side_by_side, title, size
     return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, *options)

@@ -84,8 +84,7 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
 
 
 def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
-    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None if it has no
-    colours."""
+    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours."""
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
     colours = next((it for it in formats if names.startswith(it.name)), None)
@@ -113,7 +112,12 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
     if suffix not in IMAGES:
         raise ValueError(f"{path}: unknown image format; use {', '.join(IMAGES)}")
     # Mitsuba takes only file names in UTF-8, and does not notice if the last 8 KB find no room on the disk.
-    stream = mi.MemoryStream()
-    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, IMAGES[suffix]))
     with replacing(path) as part:
-        part.write_bytes(stream.raw_buffer())
+        part.write_bytes(encoded(bitmap, IMAGES[suffix]))
+
+
+def encoded(bitmap: mi.Bitmap, format: str, quality: int = -1) -> bytes:
+    """Return what a file of a format holds, by its name in ``mitsuba.Bitmap.FileFormat``."""
+    stream = mi.MemoryStream()
+    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, format), quality)
+    return stream.raw_buffer()
