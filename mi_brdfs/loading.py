@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -47,9 +47,13 @@ def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]
     check_name(str(path))
     if is_new(path):
         tag, attributes = root_of(path)
+        _refuse_pipes(re.findall(rb"<include[^>]*filename\s*=\s*[\"']([^\"']+)", path.read_bytes()))
         if not tag or "version" in attributes:
-            return mi.parser.parse_file(config, str(path), **parameters), None
-        return mi.parser.parse_string(config, versioned(path.read_text(encoding="utf-8-sig")), **parameters), None
+            state = mi.parser.parse_file(config, str(path), **parameters)
+        else:
+            state = mi.parser.parse_string(config, versioned(path.read_text(encoding="utf-8-sig")), **parameters)
+        _refuse_pipes([props[key] for props, key in file_names(state)])
+        return state, None
     new = upgrade(path, lenient=lenient, **parameters)
     warnings.warn(
         f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade says what.", stacklevel=3
@@ -57,9 +61,23 @@ def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]
     return mi.parser.parse_string(config, new.xml), new.xml
 
 
+def file_names(state: Any) -> list[tuple[mi.Properties, str]]:
+    """Return where a parsed scene names files: the strings of properties that are called so."""
+    properties = [(node.props, key) for node in state.nodes for key in node.props.keys() if "file" in key]
+    return [(props, key) for props, key in properties if isinstance(props[key], str)]
+
+
+def _refuse_pipes(names: Iterable[str | bytes]) -> None:
+    """Raise a ValueError for a named pipe or a device among files: Mitsuba would wait for it."""
+    for name in map(os.fsdecode, names):
+        path = str(mi.file_resolver().resolve(name))
+        if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+            raise ValueError(f"{path}: it is a pipe or a device; name a file.")
+
+
 def versioned(text: str) -> str:
     """Return XML with a version in its root, as Mitsuba 3 demands; as it is if it has one."""
-    root = re.match(r"\s*(<[?!].*?>\s*)*<[\w:]+", text, re.DOTALL)
+    root = re.match(r"\s*((<!--.*?-->|<[?!].*?>)\s*)*<[\w:]+", text, re.DOTALL)
     if not root or "version=" in text[root.end() :].partition(">")[0]:
         return text
     return f'{text[: root.end()]} version="3.0.0"{text[root.end() :]}'

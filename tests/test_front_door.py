@@ -256,6 +256,13 @@ def test_check_takes_a_bsdf_that_is_no_model(guest, jobs):
     assert done.exit_code == 1 and "finite, whole: eval is -1" in done.stdout, done.stderr
 
 
+def test_a_file_takes_the_place_of_no_module(guest):
+    (guest / "types.py").write_text((guest / "chalk.py").read_text())
+    before = sys.modules["types"]
+    done = command("check", "chalk", "--import", "types.py", "--only", "finite")
+    assert done.exit_code == 0 and sys.modules["types"] is before, done.stderr
+
+
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
     right = command("check", "chalk", "lambert", "--import", "chalk.py", "--only", "reciprocity", "-j", jobs)
@@ -271,6 +278,7 @@ def test_check_finds_what_is_wrong_with_a_guest(guest, jobs):
         ("x = 1", "--import guest.py: it defines no subclass of mi_brdfs.Model or mi.BSDF, nor a term"),
         ("import sys\nsys.exit(7)", "--import guest.py: line 2: SystemExit: 7"),
         ("\n1 / 0", "--import guest.py: line 2: ZeroDivisionError: division by zero"),
+        ("raise GeneratorExit", "--import guest.py: line 1: GeneratorExit"),
         ("def f(:", "--import guest.py: line 1: invalid syntax"),
         (GUEST.replace("Chalk(", "Ward("), 'the name "ward" belongs to mi_brdfs.models.ward.Ward'),
     ],

@@ -11,6 +11,7 @@ import os
 import random
 import re
 import sys
+import time
 from xml.etree import ElementTree
 
 import mitsuba as mi
@@ -363,6 +364,8 @@ HOSTILE = {
     "undefined entity": '<scene version="0.6.0">&nothing;</scene>',
     "parameters that multiply": '<scene version="0.6.0"><default name="a0" value="hahahahaha"/>'
     + "".join(f'<default name="a{k + 1}" value="{f"$a{k}" * 10}"/>' for k in range(9)) + "</scene>",
+    "a parameter of many letters, often": f'<scene version="0.6.0"><default name="a" value="{"x" * 90_000}"/>'
+    f'<string name="b" value="{"$a" * 40_000}"/></scene>',
     "parameter in itself": '<scene version="0.6.0"><default name="a" value="$a"/></scene>',
     "endless spectrum": '<scene version="0.6.0"><bsdf type="diffuse"><spectrum name="reflectance" '
     'filename="/dev/zero"/></bsdf></scene>',
@@ -434,6 +437,16 @@ def test_files_that_include_others_twice_end(folder):
         (folder / f"{k + 1}.xml").write_text(f"<scene version='0.6.0'>{twice}</scene>")
     with pytest.raises(ValueError, match="includes more than 1000 files"):
         upgrade(folder / "20.xml")
+
+
+def test_many_parameters_are_looked_up_once_for_each_use(folder):
+    """A comparison of each use with each name takes seconds."""
+    names = "".join(f'<default name="p{k}" value="{k}"/>' for k in range(20_000))
+    uses = "".join(f'<float name="x{k}" value="$p{k}"/>' for k in range(20_000))
+    (folder / "scene.xml").write_text(f'<scene version="0.6.0">{names}<bsdf type="odd">{uses}</bsdf></scene>')
+    start = time.process_time()
+    assert "x19999" in upgrade(folder / "scene.xml").report()
+    assert time.process_time() - start < 20
 
 
 def test_what_is_no_number_is_refused(folder):

@@ -1,5 +1,6 @@
 """``mi-brdfs show``, and what ``render`` and ``show`` do with a picture besides."""
 
+import os
 import re
 import subprocess
 import sys
@@ -71,6 +72,39 @@ def test_pixels_that_are_not_finite_are_counted(folder):
     done = run("show", "diffuse:reflectance=nan", "--size", 16, "--spp", 2, "-o", "nan.exr")
     count = np.sum(~np.isfinite(image(folder / "nan.exr")).all(axis=-1))
     assert count and f"{count} pixels have values that are not finite" in done.stderr
+
+
+PICTURED = """<scene version="3.0.0"><sensor type="perspective"/><integrator type="direct"/>
+<shape type="sphere"><bsdf type="diffuse" id="ball"><texture type="bitmap" name="reflectance">
+<string name="filename" value="NAME"/></texture></bsdf></shape></scene>"""
+
+
+@pytest.mark.parametrize("command", ["render", "show"])
+def test_a_picture_takes_the_place_of_no_file_of_its_scene(folder, command):
+    """By default it has the name of the scene, as the scene's own textures may have."""
+    before = mi.Bitmap(np.ones((2, 2, 3), np.float32))
+    before.write(str(folder / "photo.exr"))
+    (folder / "photo.xml").write_text(PICTURED.replace("NAME", "photo.exr"))
+    done = run(command, "photo.xml", "--spp", 1)
+    assert done.exit_code == 2 and "photo.exr: the scene reads this file; name another picture with -o" in done.stderr
+    assert image(folder / "photo.exr").shape == (2, 2, 3) and not (folder / "photo.png").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes here")
+@pytest.mark.parametrize(
+    "text", [PICTURED.replace("NAME", "pipe"), '<scene version="3.0.0"><include filename="pipe"/></scene>']
+)
+def test_a_pipe_is_not_waited_for(folder, text):
+    os.mkfifo(folder / "pipe")
+    (folder / "waits.xml").write_text(text)
+    assert "pipe: it is a pipe or a device; name a file" in run("render", "waits.xml").stderr
+
+
+def test_a_comment_is_not_the_root(folder):
+    (folder / "ward.xml").write_text(
+        '<!-- <bsdf type="old"><float name="alpha" value="1"/></bsdf> -->\n<bsdf type="ward"/>'
+    )
+    assert run("show", "ward.xml", "--spp", 1, "--size", 16).exit_code == 0
 
 
 RENDER = "render", "scene.xml", "--variant", "scalar_rgb"

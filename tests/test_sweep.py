@@ -105,7 +105,7 @@ def test_what_is_finished_is_not_made_again(serial, tmp_path, monkeypatch):
         file.write_bytes(own.read_bytes())
     (own,) = {row["file"] for row in swept(serial, files[:1]).rows()}  # known by its content
     assert own == str(files[0])
-    folder, one = tmp_path / "made", {"models": ["lambert"], "metrics": ["log"]}
+    folder, one = tmp_path / "made", {"models": ["lambert"], "metrics": ["log", "log"]}
     assert fitted(swept(folder, files, **one)) == 2
     assert fitted(swept(folder, files, ["lambert"], ["log", "l2"])) == 2 and calls[-1] == ("lambert", "l2", 0)
     assert fitted(swept(folder, files[:1], **one, seeds=[0, 1])) == 1 and calls[-1] == ("lambert", "log", 1)

@@ -215,7 +215,7 @@ def test_assert_bsdf():
     report = eval(again, {"mi_brdfs": SimpleNamespace(validation=SimpleNamespace(check=check))})
     assert [f"finite, {finding.subject}: {finding.sentence}" for finding in report.failures] == lines[1:-1]
     with pytest.raises(AssertionError, match=r"conductor: not judged\nNothing was judged"):
-        assert_bsdf({"type": "conductor"})
+        assert_bsdf({"type": "conductor"}, only="pdf")
     with pytest.raises(ValueError, match=r"in \[0, 90\) degrees, not 95"):
         assert_bsdf({"type": "ward"}, angles=(5, 95))
     with pytest.raises(ValueError, match=r"in \(0, 1\), not 0"):
@@ -328,9 +328,11 @@ def test_materials_have_parameters_of_their_own(tmp_path):
     for word, text in ("ward:alpha=", "write alpha=value"), (f"{fits}:gold", "there are ward, phong"):
         with pytest.raises(ValueError, match=text):
             list(find_sources(word))
-    (tmp_path / "fit.json").write_text('[{"model": "ward"}]')
-    with pytest.raises(ValueError, match="it holds no fits, as mi-brdfs fit --json writes them"):
-        list(find_sources(fits))
+    for text in '[{"model": "ward"}]', '[{"bsdf": {"type": "ward"}, "model": "ward", "file": 1}]':
+        (tmp_path / "fit.json").write_text(text)
+        with pytest.raises(ValueError, match="it holds no fits, as mi-brdfs fit --json writes them"):
+            list(find_sources(fits))
+    assert list(shared(['<bsdf type="$(a"/>', "ward"], {"(a": "1"})[0]) == ["(a"]
 
 
 # --- The command ----------------------------------------------------------------------------------------------------
@@ -370,7 +372,7 @@ def test_command_on_a_file_of_others(tmp_path):
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_command_on_what_cannot_be_judged(tmp_path):
-    done = run("conductor", "--json", tmp_path / "x.json")
+    done = run("conductor", "--only", "pdf", "--json", tmp_path / "x.json")
     assert done.exit_code == 3 and done.stdout.startswith("conductor: not judged\n")
     assert "Nothing was judged" in done.stdout and "Check a rough BSDF in its place" in done.stdout
     (report,) = json.loads((tmp_path / "x.json").read_text())

@@ -14,6 +14,7 @@ from rich.table import Table
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from ..mitsuba.registry import all_models, find_models
 from ..model import Model
+from ..parameters.messages import printable
 from ..probe.sources import value_of
 from .app import command
 from .options import (
@@ -263,7 +264,7 @@ def print_ranking(fits: list[Fit]) -> None:
     from ..fit.result import notes, number, values
 
     best = fits[0]
-    out.print(best.file, style="bold")
+    out.print(printable(best.file), style="bold")
     seen = best.flip is not None
     table = Table("model", *["FLIP"] * seen, "held out", "fitted", "ΔBIC", "albedo", "agree", "notes", box=None,
                   pad_edge=False)  # fmt: skip

@@ -7,7 +7,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -42,6 +42,13 @@ def output_files(output: Path) -> tuple[Path, Path]:
     for file in files:
         check_output("-o", file, (".exr", ".png", ".jpg", ".jpeg"))
     return files
+
+
+def refuse_to_overwrite(files: Iterable[Path], read: Iterable[str]) -> None:
+    """Fail if a picture would take the place of a file that its scene is read from."""
+    for file in files:
+        if file.exists() and any(os.path.samefile(file, path) for path in read):
+            fail(f"{file}: the scene reads this file; name another picture with -o", Exit.USAGE)
 
 
 def render_to(

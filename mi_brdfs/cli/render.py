@@ -11,7 +11,7 @@ import typer
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
 from .options import AnyVariant, Lenient, parameters_of, parameters_option, scheduler_option, set_variant, source_of
-from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
+from .picture import Denoise, Output, Seconds, Seed, output_files, refuse_to_overwrite, render_to
 from .terminal import Exit, fail, failing, stdout_to_stderr
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def render(
 
     def load() -> tuple[mi.Scene, int]:
         loaded = _load(file)
+        refuse_to_overwrite(files, file.files()[0])
         index = _index(loaded, sensor)
         if window:
             from ..rendering.passes import crop  # imports numpy

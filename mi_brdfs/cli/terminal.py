@@ -77,7 +77,11 @@ def stdout_to_stderr() -> Iterator[None]:
     Redirect file descriptors, as its log may write inside a signal handler, where no Python may run.
     """
     sys.stdout.flush()
-    stdout = os.dup(1)
+    try:
+        stdout = os.dup(1)
+    except OSError:  # it is closed
+        yield
+        return
     os.dup2(2, 1)
     try:
         yield

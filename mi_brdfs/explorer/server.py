@@ -37,6 +37,8 @@ PORT = 8490
 LARGEST_UPLOAD = 64 << 20
 LARGEST_FRAME = 128 << 20
 """The bytes of a message, too long or not, that are waited for: more end the connection."""
+MOST_WAITING = 200
+"""The most frames that wait for a page to read them; a page that reads none is let go."""
 UPLOADS = 16
 """The most files that a session may hold."""
 POLICY = (
@@ -145,9 +147,15 @@ class Explorer:
         await socket.prepare(request)
         loop, outbox = asyncio.get_running_loop(), asyncio.Queue[Frame]()
 
+        def put(frame: Frame) -> None:
+            if outbox.qsize() < MOST_WAITING:
+                outbox.put_nowait(frame)
+            elif request.transport:  # of a page that does not read
+                request.transport.abort()
+
         def send(frame: Frame) -> None:
             with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(outbox.put_nowait, frame)
+                loop.call_soon_threadsafe(put, frame)
 
         session = Session(Materials(ChainMap(self.uploads, self.named)), self.engine.stages, send, outbox.qsize)
         self.engine.sessions.append(session)

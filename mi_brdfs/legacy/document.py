@@ -162,6 +162,7 @@ class Reader:
 
     def __init__(self, scene: Path, values: Mapping[str, str], lenient: bool) -> None:
         self.scene, self.values, self.lenient = scene, dict(values), lenient
+        self.longest = max(map(len, values), default=0)
         self.missing: list[Element] = []
         """Includes whose files are missing, if ``lenient``."""
         self.used: set[str] = set()
@@ -202,6 +203,7 @@ class Reader:
             element = open_.pop()
             if tag == "default":
                 self.values.setdefault(element.name, element.value)
+                self.longest = max(self.longest, len(element.name))
             elif tag == "include" and (found := self._found(element, path)):
                 open_[-1].children += self.read(found).children
             if tag in ("default", "include"):
@@ -224,12 +226,19 @@ class Reader:
 
     def _substituted(self, value: str, place: str) -> str:
         """Return an attribute with the values of the parameters, the longest name first."""
-        for name in sorted(self.values, key=len, reverse=True) if "$" in value else ():
-            if f"${name}" in value:
-                self.used.add(name)
-                value = value.replace(f"${name}", self.values[name])
-        if len(value) > LONGEST:
+        first, *parts = value.split("$")
+        found, length = [first], len(first)
+        for part in parts:
+            lengths = range(min(len(part), self.longest), 0, -1)
+            name = next((part[:k] for k in lengths if part[:k] in self.values), None)
+            self.used |= {name} if name else set()
+            found.append(f"${part}" if name is None else self.values[name] + part[len(name) :])
+            length += len(found[-1])
+            if length > LONGEST:
+                break
+        if length > LONGEST:
             raise ValueError(f"{place}: an attribute has more than {LONGEST} letters.")
+        value = "".join(found)
         if (missing := re.search(r"\$(\w+)", value)) and "[" not in value:  # as labels of films have it
             raise ValueError(f"{place}: the parameter {missing[1]} has no value; give it one (-D {missing[1]}=VALUE).")
         return value

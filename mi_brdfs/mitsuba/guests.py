@@ -65,9 +65,9 @@ def import_models(target: str) -> None:
                 raise
             mi.set_variant(variant)
             module = imported()
-    except Terminated:
+    except (Terminated, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         raise ImportError(_sentence(error, path)) from None
     found = _brought_by(module)
     if _defines_bsdf(module):
@@ -106,11 +106,12 @@ def sources() -> list[str]:
 
 
 def _of_file(path: Path) -> ModuleType:
-    spec: Any = importlib.util.spec_from_file_location(path.stem, path)
+    name = f"{path.stem} (imported)"  # in the way of no module
+    spec: Any = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module  # where dataclasses and pickle look it up
+    sys.modules[name] = module  # where dataclasses and pickle look it up
     exec(spec.loader.source_to_code(path.read_bytes(), str(path)), module.__dict__)  # caches miss quick edits
-    _files[path.stem] = str(path.resolve())
+    _files[name] = str(path.resolve())
     return module
 
 

@@ -148,7 +148,8 @@ def _declares(word: str, name: str) -> bool:
         return any(_has(row["bsdf"], name) for own, row in rows if wanted in ("", own))
     if word.startswith("<") or ending:
         text = path.read_text(encoding="utf-8", errors="replace") if ending and path.is_file() else word
-        return bool(re.search(rf"""\$\{{?{name}\b|<include|<default[^>]+["']{name}["']""", text))
+        named = re.escape(name)
+        return bool(re.search(rf"""\$\{{?{named}\b|<include|<default[^>]+["']{named}["']""", text))
     return _has({"type": word}, name)
 
 
@@ -265,7 +266,8 @@ def _fits(path: Path) -> list[dict[str, Any]]:
     """Return the fits that ``mi-brdfs fit --json`` wrote, or raise a ValueError."""
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
-        if rows and all(isinstance(it["bsdf"]["type"], str) and it["model"] and it["file"] for it in rows):
+        words = [word for it in rows for word in (it["bsdf"]["type"], it["model"], it["file"])]
+        if words and all(isinstance(word, str) and word for word in words):
             return rows
     except (ValueError, TypeError, KeyError):
         pass

@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 import mitsuba as mi
 
 from ..legacy import upgrade
-from ..loading import looking_in, parsed, versioned
+from ..loading import file_names, looking_in, parsed, versioned
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
@@ -57,12 +57,8 @@ class SceneFile:
 
     def copied(self) -> SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
-        with looking_in(Path(self.path).parent):
-            config = mi.parser.ParserConfig(mi.variant())
-            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
-            named = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in _file_names(state)}
-        names = {name: _rootless(path) for name, path in named.items() if os.path.isfile(path)}
-        paths = [self.path, *map(str, state.files), *(path for path in named.values() if os.path.isfile(path))]
+        paths, named, text = self.files()
+        names = {name: _rootless(path) for name, path in named.items()}
         contents = {_rootless(path): Path(path).read_bytes() for path in paths}
         parameters = self.parameters
         if text is not None:
@@ -72,11 +68,21 @@ class SceneFile:
             self, path=path, parameters=parameters, lenient=False, contents=contents, names=names, folder=folder
         )
 
+    def files(self) -> tuple[list[str], dict[str, str], str | None]:
+        """Return the files that the scene is read from, those among them that it names by these names, and the text of
+        an upgraded one."""
+        with looking_in(Path(self.path).parent):
+            config = mi.parser.ParserConfig(mi.variant())
+            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
+            found = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in file_names(state)}
+        named = {name: path for name, path in found.items() if os.path.isfile(path)}
+        return [self.path, *map(str, state.files), *named.values()], named, text
+
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         config = mi.parser.ParserConfig(mi.variant())
         with looking_in(path.parent, *folders):
             state, _ = parsed(config, path, self.lenient, self.parameters)
-            for props, key in _file_names(state):
+            for props, key in file_names(state):
                 props[key] = names.get(props[key], props[key])
             mi.parser.transform_all(config, state)
             _check_films(state)
@@ -86,12 +92,6 @@ class SceneFile:
             if self.box_filter:
                 _set_box_filters(state)
             return mi.parser.instantiate(config, state)
-
-
-def _file_names(state: Any) -> list[tuple[mi.Properties, str]]:
-    """Return where a parsed scene names files: the strings of properties that are called so."""
-    properties = [(node.props, key) for node in state.nodes for key in node.props.keys() if "file" in key]
-    return [(props, key) for props, key in properties if isinstance(props[key], str)]
 
 
 def _check_films(state: Any) -> None:

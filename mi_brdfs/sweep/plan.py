@@ -70,7 +70,8 @@ class Sweep:
         self.folder = Path(folder)
         self.store = Store(self.folder / "results")
         self.models = [model.plugins[0] for model in found]
-        self.metrics, self.seeds, self.starts, self.cut = list(metrics), list(seeds), starts, cut
+        self.metrics, self.seeds = list(dict.fromkeys(metrics)), list(dict.fromkeys(seeds))
+        self.starts, self.cut = starts, cut
         self.files: dict[str, str] = {}
         """By the SHA-256 of their content."""
         for file in files:

@@ -151,5 +151,5 @@ def csv(rows: Iterable[dict[str, Any]]) -> Iterator[str]:
     yield ",".join(SCHEMA.names)
     for row in rows:
         text = io.StringIO()
-        DictWriter(text, SCHEMA.names, lineterminator="").writerow(row)
-        yield text.getvalue()
+        DictWriter(text, SCHEMA.names, lineterminator="\n").writerow(row)
+        yield text.getvalue().removesuffix("\n")

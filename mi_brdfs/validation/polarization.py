@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -31,8 +32,9 @@ def polarization(run: Run) -> Findings:
     """Check Mueller matrices: light of any polarization becomes light that is at most fully polarized; if directions
     are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
     NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
-    frames that turn, too. And values of ``eval_pdf`` and ``eval_pdf_sample`` and weights of samples polarize light as
-    ``eval`` does. For this the BSDF must be given as a dict."""
+    frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
+    ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does. Of delta functions alone, the weights of
+    samples are looked at, and not exchanged. For this the BSDF must be given as a dict."""
     part, name = run.probe.whole, "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if run.given is None:
         yield Finding("polarization", part.name, "skip", "To load it in a polarized variant, its dict is needed.")
@@ -48,14 +50,16 @@ def polarization(run: Run) -> Findings:
     with mi.variant_context(name):
         try:
             with unwrapped_ctrl_c():
-                bsdf = load(run.given)
-                matrix = _mueller(bsdf, wi, wo)
+                bsdf, mueller = load(run.given), _mueller if run.probe.parts else _weight
+                if not run.probe.parts:
+                    wo = _drawn(bsdf, wi)
+                matrix = mueller(bsdf, wi, wo)
                 if not isinstance(matrix, mi.Spectrum):
                     yield Finding("polarization", part.name, "skip", "It returns no Mueller matrices.")
                     return
-                matrices, turned = _of_f(matrix, wo), _of_f(_turned(bsdf, wi, wo), wo)
+                matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
                 back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
-                others = _others(run, bsdf, wi, wo, matrices)
+                others = _others(run, bsdf, wi, wo, matrices) if run.probe.parts else []
         except Exception as error:
             yield Finding("polarization", part.name, "skip", f"It does not work in {name}: {told(error)}.")
             return
@@ -67,9 +71,10 @@ def polarization(run: Run) -> Findings:
     why = "some light would be polarized more than fully"
     degree *= (degree > TOLERANCE) & (matrices[..., 0, 0] > 0)
     outcome.wrong(degree, "the excess of eval's Mueller matrix", degree, why, wi, wo)
-    same = np.quantile(abs(turned - matrices)[..., 0, 0] / intensity, 0.99) < TOLERANCE
+    same = not int(run.probe.bsdf.flags()) & int(mi.BSDFFlags.Null)
+    same = same and bool(np.quantile(abs(turned - matrices)[..., 0, 0] / intensity, 0.99) < TOLERANCE)
     for law, other, words in (
-        (not part.has(mi.BSDFFlags.NonSymmetric), back, "if its directions are exchanged"),
+        (bool(run.probe.parts) and not part.has(mi.BSDFFlags.NonSymmetric), back, "if its directions are exchanged"),
         (same, turned, "if its directions are turned about the normal"),
     ):
         difference = abs(other - matrices).max(axis=(-2, -1)) / np.maximum(intensity, other[..., 0, 0])
@@ -95,7 +100,7 @@ def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[
     bs, weight = bsdf.sample(context, si, *variates, True)
     weights = [dr.select(run.probe.is_smooth(each), it, 0) for each, it in ((bs, weight), triple[2:])]
     dr.eval(bs, pair, triple, weights)
-    drawn = numbers(dr.select(bs.pdf > 0, bs.wo, mi.Vector3f(0, 0, 1)), len(wi)).astype(np.float32)
+    drawn = _drawn(bsdf, wi)
     of_drawn = _of_f(_mueller(bsdf, wi, drawn), drawn)
     return [
         ("eval_pdf", wo, _of_f(pair[0], wo), matrices),
@@ -115,12 +120,23 @@ def _mueller(bsdf: Any, wi: Array, wo: Array) -> Any:
     return bsdf.eval(mi.BSDFContext(), interaction(wi), vectors(wo), True)
 
 
-def _turned(bsdf: Any, wi: Array, wo: Array) -> Any:
+def _weight(bsdf: Any, wi: Array, wo: Array) -> Any:
+    """Return that of a delta function's samples, which go to wo."""
+    return bsdf.sample(mi.BSDFContext(), interaction(wi), *sample_arguments(random(len(wi), SEED)), True)[1]
+
+
+def _drawn(bsdf: Any, wi: Array) -> Array:
+    """Return where samples go."""
+    bs, _ = bsdf.sample(mi.BSDFContext(), interaction(wi), *sample_arguments(random(len(wi), SEED)), True)
+    return numbers(dr.select(bs.pdf > 0, bs.wo, mi.Vector3f(0, 0, 1)), len(wi)).astype(np.float32)
+
+
+def _turned(mueller: Callable[..., Any], bsdf: Any, wi: Array, wo: Array) -> Any:
     """Return the same of directions that are turned about the normal, in frames that are turned with them."""
     turn, basis = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]], np.float32), mi.mueller.stokes_basis
     light, viewer = vectors(-wo @ turn.T), vectors(wi @ turn.T)
     frames = [vectors(numbers(basis(vectors(w)), len(w)).astype(np.float32) @ turn.T) for w in (-wo, wi)]
-    matrix = _mueller(bsdf, wi @ turn.T, wo @ turn.T)
+    matrix = mueller(bsdf, wi @ turn.T, wo @ turn.T)
     return mi.mueller.rotate_mueller_basis(matrix, light, basis(light), frames[0], viewer, basis(viewer), frames[1])
 
 

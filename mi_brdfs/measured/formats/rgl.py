@@ -31,6 +31,7 @@ MOST_VALUES = 1 << 27
 MAGIC = b"tensor_file\0"
 VERSION = 1, 0
 TYPES = dict(enumerate(("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8"), start=1))
+MOST_DIMENSIONS = 8
 HEAD = [("dimensions", "<u2"), ("type", "u1"), ("offset", "<u8")]
 """What follows a field's name, before its shape."""
 
@@ -171,6 +172,9 @@ class TensorFile:
             if name in self.fields or type not in TYPES:
                 wrong = f"of the unknown type {type}" if type not in TYPES else "there twice"
                 raise file.error(f"field {shortened(name)} is {wrong}", start)
+            if dimensions > MOST_DIMENSIONS:
+                told = f"field {shortened(name)} has {dimensions} dimensions; there are at most {MOST_DIMENSIONS}"
+                raise file.error(told, start)
             shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {shortened(name)}"))
             field = self.fields[name] = Field(TYPES[type], offset, shape)
             if field.end > file.size:
