@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
+from .lobes.uniform import Uniform
 from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
 
@@ -88,7 +89,8 @@ class Plugin:
     An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, and all their
     ``textures`` and ``ranges`` by property name, with the channels of the colours that it was given or has by default
     as ``constants``; choices are attributes under their declared names. ``arrays`` are what else ``mitsuba.traverse``
-    shows, with derivatives, and ``captured`` what else kernels read.
+    shows, with derivatives, ``captured`` what else kernels read, and ``uniform`` keeps what lobes compute of parameters
+    alone.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -108,6 +110,7 @@ class Plugin:
                     "constants",
                     "arrays",
                     "captured",
+                    "uniform",
                 ):
                     raise TypeError(
                         f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model."
@@ -124,6 +127,7 @@ class Plugin:
         self.constants = reader.constants
         self.arrays: dict[str, Any] = {}
         self.captured: list[Any] = []
+        self.uniform = Uniform()
         vars(self).update(self.parameters.chosen)
 
     @classmethod
