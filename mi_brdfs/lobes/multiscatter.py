@@ -26,14 +26,14 @@ class MultipleScattering(Lobe):
     """
 
     GRAZING = 5.5
-    """b over 1 - Ē."""
+    """b over (1 - Ē)^¾."""
 
     def __init__(self, lobe: MicrofacetLobe, walks: Walks, uniform: Callable[[str, Any], Any]) -> None:
         self.anisotropic, self.walks, self.mean = lobe.anisotropic, walks, walks.mean
         self.fresnel = uniform("fresnel", lobe.fresnel.combination())
         self.colours = uniform("colours", self.between(lobe.reflectance))
         lost = dr.maximum(self.mean.lost, EPSILON)
-        b, typical = self.GRAZING * lost, luminance(self.colour(self.mean, self.mean))
+        b, typical = self.GRAZING * dr.sqrt(lost * dr.sqrt(lost)), luminance(self.colour(self.mean, self.mean))
         self.b, self.norm, self.scale, self.typical = uniform(
             "lobe", (b, dr.inv_pi * b * (1 + b), dr.inv_pi / lost, typical)
         )

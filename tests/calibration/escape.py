@@ -23,7 +23,7 @@ import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # i
 import mitsuba as mi  # isort: skip
 import numpy as np  # isort: skip
 
-ALPHAS, RATIOS = 36, 16
+ALPHAS, RATIOS = 36, 14
 BRIGHTER = 0.008
 """What polynomials may add to E where they err most, on facets of extreme anisotropy."""
 WALK_COSINES, WALK_ALPHAS = 13, 9
@@ -34,7 +34,7 @@ TYPICAL = 0.85
 """What facets reflect where paths are averaged: as metals do, of which most light is lost at the first reflections."""
 BENDS = {"ggx": ((3, 4), (2.4, 8)), "beckmann": ((5, 4), (4, 2)), "blinn": ((5, 4), (4, 2))}
 """Numbers c and d of k = c/(1 + d (αu² + αv²)/2), for the separable and the correlated term, by which polynomials of
-the fifth degree do."""
+low degree do."""
 CORRELATIONS = 0, 0.5
 """The ρ² of nodes; what walks say is nearly linear in it."""
 
@@ -278,12 +278,14 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         for cos, angle in zip(places.cos, places.phi, strict=True)
     ])  # fmt: skip
     entries = []
-    for loss, (most, falling) in zip(np.clip(losses.T, 0, 1), BENDS[shape], strict=True):
+    for raw, (most, falling) in zip(losses.T, BENDS[shape], strict=True):
+        loss = np.clip(raw, 0, 1)
         bend = most / (1 + falling * (u * u + v * v) / 2)
-        nearer = ~stretched & (places.cos > 0.4)
-        polynomial = not_brighter(
-            places.terms("lost", bend), loss, np.where(nearer, np.maximum(0.1 / (0.02 + loss), 1), 1)
-        )
+        # What a lobe is scaled by errs as 1 - E over E. Where next to nothing is lost, and in most directions, the lobe
+        # must stay as it was.
+        scale = np.minimum(1 / (1 - loss), 3)
+        scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
+        polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
         weights = (0.02 + loss) * np.where(stretched, 0.1, 1)
         others = [
             np.linalg.lstsq(
@@ -304,7 +306,7 @@ def chebyshev(count: int) -> np.ndarray:
 
 def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Return the coefficients with the least largest error in some scale, lowered to where they add at most BRIGHTER
-    light."""
+    light, besides where the scale is below 1."""
     weights, best, least = np.ones(len(loss)), np.zeros(terms.shape[1]), np.inf
     for _ in range(25):
         k = np.linalg.lstsq(terms * (weights * scale)[:, None], loss * weights * scale, rcond=None)[0]
@@ -313,7 +315,7 @@ def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.n
             best, least = k, error.max()
         weights *= np.sqrt(0.3 + error / error.mean())
         weights /= weights.mean()
-    best[0] -= max((terms @ best - loss).max() - BRIGHTER, 0)
+    best[0] -= max((terms @ best - loss)[scale >= 1].max() - BRIGHTER, 0)
     return best
 
 
