@@ -15,11 +15,7 @@ BACKENDS = ("scalar", "llvm", "cuda", "metal")
 TIMEOUT = 180  # seconds; the first CUDA render on a machine compiles for a while
 
 MISSING = 3  # exit status of a probe whose backend is missing
-WHY_MISSING = {
-    "llvm": "no LLVM library found",
-    "cuda": "no NVIDIA GPU, or no driver for it",
-    "metal": "no Apple GPU",
-}
+WHY_MISSING = {"llvm": "no LLVM library found", "cuda": "no NVIDIA GPU, or no driver for it", "metal": "no Apple GPU"}
 
 PROBE = f"""
 import sys

@@ -24,11 +24,8 @@ def check_given(bsdf: Any) -> None:
 
 
 def described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF:
-    """Return the only BSDF that a word stands for, and anything else as it is.
-
-    Raises:
-        ValueError: if it stands for none or for several, or what Mitsuba says where it cannot be loaded.
-    """
+    """Return the only BSDF that a word stands for, and anything else as it is. Raise a ValueError if it stands for none
+    or for several, or with what Mitsuba says where it cannot be loaded."""
     if not isinstance(bsdf, str):
         return bsdf
     with _as_value_error():
@@ -39,11 +36,8 @@ def described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF:
 
 
 def load_described(bsdf: dict[str, Any] | mi.BSDF) -> mi.BSDF:
-    """Return a BSDF that is given as a dict, which may be loaded again, or loaded.
-
-    Raises:
-        ValueError: if it is none of the active variant, or what Mitsuba says where it cannot be loaded.
-    """
+    """Return a BSDF that is given as a dict, which may be loaded again, or loaded. Raise a ValueError if it is none of
+    the active variant, or with what Mitsuba says where it cannot be loaded."""
     if isinstance(bsdf, dict):
         with _as_value_error():
             loaded = load(bsdf)

@@ -150,8 +150,7 @@ def safe_sqrt(x: Any) -> Any:
 
 
 def sin_theta(w: mi.Vector3f) -> Any:
-    """Return sinθ of a direction, with the digits that 1 - cos²θ loses near the normal; at least EPSILON, where its
-    derivative is 0."""
+    """Return sinθ with the digits that 1 - cos²θ loses near the normal; at least EPSILON, with derivative 0 there."""
     return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, TINY))
 
 

@@ -18,13 +18,22 @@ from .lobes import Lobe
 from .lobes.uniform import Uniform
 from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
+from .parameters.xml import to_xml
 
 ENERGY_NOTE = """\
 At angles up to 89.9°. In white, every colour and the Fresnel reflectance are 1, except that a diffuse lobe beside
 others is 0; parameters not named take all values in their range."""
 
+EXAMPLE = "Example\n-------\n"
+"""The heading of the plugin dict at the end of a docstring."""
+
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
+
+MEMBERS = "parameters", "textures", "ranges", "constants", "arrays", "captured", "uniform"
+"""What an instance of a plugin holds, besides its choices."""
+
+Section = tuple[str, list[tuple[str, ...]], str]
 
 Values = SimpleNamespace
 """The values of the declared parameters at a surface point, by name."""
@@ -101,20 +110,9 @@ class Plugin:
         cls.plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
         if isinstance(cls.plugins, str):
             raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
-        for parameter in cls.declared():
-            for name in {parameter.name, *parameter.names}:
-                if hasattr(Model, name) or name in (
-                    "parameters",
-                    "textures",
-                    "ranges",
-                    "constants",
-                    "arrays",
-                    "captured",
-                    "uniform",
-                ):
-                    raise TypeError(
-                        f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model."
-                    )
+        for name in (name for parameter in cls.declared() for name in (parameter.name, *parameter.names)):
+            if hasattr(Model, name) or name in MEMBERS:
+                raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model.")
 
     def __init__(self, props: mi.Properties):
         reader = PropertyReader(self.plugins[0], props)
@@ -152,9 +150,15 @@ class Plugin:
 
     @classmethod
     def example(cls) -> dict[str, Any]:
-        """Return the plugin dict at the end of the manual page, or else the defaults."""
-        last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2]
+        """Return the plugin dict at the end of the docstring, or else the defaults."""
+        last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2].removeprefix(EXAMPLE)
         return ast.literal_eval(last) if last.startswith("{") else {"type": cls.plugins[0]}
+
+    @classmethod
+    def page(cls) -> str:
+        """Return the docstring, with the plugin dict of its section "Example" in XML, too."""
+        text, heading, last = inspect.cleandoc(cls.__doc__ or "").rpartition(EXAMPLE)
+        return text + heading + (f"{to_xml(cls.example())}\n\n" if heading and last.startswith("{") else "") + last
 
     @classmethod
     def parameter_rows(cls) -> list[ParameterRow]:
@@ -163,10 +167,15 @@ class Plugin:
         return [ParameterRow("parameter", "type", "default", "range", "meaning"), *rows]
 
     @classmethod
+    def sections(cls) -> list[Section]:
+        """Return the tables of the manual page: the title, rows below a heading, and what is said of them."""
+        short = ((*it[:3], it.range if len(it.range) <= 45 else "see above", it.text) for it in cls.parameter_rows())
+        return [("Parameters", list(short), "")]
+
+    @classmethod
     def manual(cls) -> str:
-        """Return the manual page: the docstring and the table of parameters."""
-        rows = [[*row[:3], _shortened(row.range), row.text] for row in cls.parameter_rows()]
-        return "\n".join([inspect.cleandoc(cls.__doc__ or ""), "", *_section("Parameters", rows), ""])
+        """Return the manual page: that of the docstring, and the tables."""
+        return "\n\n".join([cls.page(), *(_section(*it) for it in cls.sections())]) + "\n"
 
 
 class Model(Plugin):
@@ -232,25 +241,15 @@ class Model(Plugin):
         return Values(**self.parameters.placeholders())
 
     @classmethod
-    def manual(cls) -> str:
-        """Return the manual page, with the table of the largest albedos."""
-        if cls.energy is None:
-            text = f"Not measured. ``mi-brdfs energy {cls.plugins[0]}`` does it."
-            return "\n".join([super().manual(), *_heading("Largest albedo"), text, ""])
-        rows = [list(row) for row in cls.energy.rows()]
-        return "\n".join([super().manual(), *_section("Largest albedo", rows), "", ENERGY_NOTE, ""])
+    def sections(cls) -> list[Section]:
+        """Return them with that of the largest albedos."""
+        rows: list[tuple[str, ...]] = list(cls.energy.rows()) if cls.energy else []
+        note = ENERGY_NOTE if cls.energy else f"Not measured. ``mi-brdfs energy {cls.plugins[0]}`` does it."
+        return [*super().sections(), ("Largest albedo", rows, note)]
 
 
-def _section(title: str, table: list[list[str]]) -> list[str]:
-    """Return a table under a heading, with its columns aligned."""
-    widths = [max(len(row[column]) for row in table) for column in range(len(table[0]) - 1)]
-    rows = ("  ".join([*map(str.ljust, row, widths), row[-1]]).rstrip() for row in table)
-    return [*_heading(title), *rows]
-
-
-def _heading(title: str) -> list[str]:
-    return [title, "-" * len(title)]
-
-
-def _shortened(words: str) -> str:
-    return words if len(words) <= 45 else "see above"
+def _section(title: str, table: list[tuple[str, ...]], note: str) -> str:
+    """Return a table under a title, with its columns aligned, and a note."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)][:-1]
+    lines = ["  ".join([*map(str.ljust, row, widths), row[-1]]).rstrip() for row in table]
+    return "\n".join([title, "-" * len(title), *lines, *([""] if lines and note else []), *([note] if note else [])])

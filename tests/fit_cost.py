@@ -26,7 +26,6 @@ import numpy as np
 from fits import MODELS, measured
 
 from mi_brdfs.fit import METRICS, Observations, fit, observe
-from mi_brdfs.fit.lanes import isotropic
 from mi_brdfs.fit.problem import Problem
 from mi_brdfs.fit.unknowns import configurations
 from mi_brdfs.mitsuba.registry import find_model
@@ -53,7 +52,7 @@ def problem(model: str, directions: int, materials: int) -> Problem:
     (configuration,) = configurations(find_model(model), MODELS[model].given, {}, 1, 3, False)
     alike = [material(model, directions, seed) for seed in range(min(materials, 3))]
     own = [alike[k % len(alike)] for k in range(materials)]
-    return Problem(isotropic(configuration), own, METRICS["log"])
+    return Problem(configuration.isotropic(), own, METRICS["log"])
 
 
 def medians(calls: dict[str, Callable[[], object]], rounds: int = ROUNDS) -> dict[str, float]:

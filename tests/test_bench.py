@@ -26,6 +26,7 @@ from mi_brdfs.cli import app
 from mi_brdfs.lobes import LambertLobe, PowerLobe
 from mi_brdfs.mitsuba.bsdf import ModelBSDF
 from mi_brdfs.models.lambert import Lambert
+from mi_brdfs.probe.bsdf import BSDFProbe
 
 LAMBERT, WALTER = {"type": "lambert"}, {"type": "walter", "alpha": 0.5}
 ANISOTROPIC = {"type": "walter", "alpha_u": 0.1, "alpha_v": 0.4}
@@ -144,7 +145,7 @@ def test_the_time_of_calls_is_that_of_kernels(monkeypatch):
     """Four lobes take longer than one, and tracing does not count."""
     monkeypatch.setattr(comparison, "LANES", 1 << 18)
     bsdfs = [{"type": "burley", "sheen": 0.5, "clearcoat": 0.5}, LAMBERT]
-    slow, fast = np.median(comparison.call_times([comparison._probe(bsdf) for bsdf in bsdfs]), axis=1)
+    slow, fast = np.median(comparison.call_times([BSDFProbe(mi.load_dict(bsdf)) for bsdf in bsdfs]), axis=1)
     assert slow > 3 * fast > 0
 
 

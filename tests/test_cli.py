@@ -184,6 +184,18 @@ def test_the_output_option_names_either_file_and_the_seed_the_noise(folder):
     assert not np.allclose(pixels[0], pixels[2], rtol=1e-3)
 
 
+def test_a_mesh_that_an_old_scene_lacks_is_a_cube_if_asked_for(folder):
+    old = SCENE.replace("3.0.0", "0.6.0").replace("to_world", "toWorld").replace("sample_count", "sampleCount")
+    (folder / "old.xml").write_text(old.replace("triangle.obj", "gone.obj"))
+    words = "render", "old.xml", "--variant", "scalar_rgb"
+    done = invoke(*words, cwd=folder)
+    assert done.exit_code == 1 and "gone.obj" in done.stderr and "--lenient" in done.stderr
+    done = invoke(*words, "--lenient", cwd=folder)
+    assert done.exit_code == 0, done.stderr
+    seen = np.array(mi.Bitmap(str(folder / "old.exr")))[..., 0]
+    assert seen[12, 12] < 0.9 and seen[0, 0] == pytest.approx(1)  # a grey cube before the sky
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("processes", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_materials_of_a_scene_are_replaced(folder, processes):

@@ -61,6 +61,7 @@ def test_the_page_needs_nothing_else(written):
     assert "b" not in {tag for tag, _ in page.elements} and HOSTILE in page.text
     identifiers = page.attributes("id")
     assert len(set(identifiers)) == len(identifiers)
+    assert page.text.count(f"Fits to {HOSTILE}") == 2 and "0.0387 and 0.0507 at 10°" in page.text
     assert {link[1:] for link in links if link.startswith("#")} <= set(identifiers)
     assert len(written[2]) < 700_000
 
@@ -71,6 +72,7 @@ def test_its_pictures_show_something(written):
     for link in pictures:
         shown = np.array(Image.open(BytesIO(base64.b64decode(link.partition("base64,")[2])))) / 255.0
         assert shown.shape == (48, 48, 3) and 0.1 < shown.mean() < 0.97 and shown.std() > 0.01
+        assert (shown.max(axis=-1) == 1).mean() < 0.03 or link in pictures[2::2]  # differences are white
     drawings = Report(written[2]).pictures()
     assert sum(it.startswith("f over θo, θi = ") for it in drawings) == 4
     assert sum(it.startswith("Residuals of ") for it in drawings) == 3

@@ -21,8 +21,8 @@ from typer.testing import CliRunner
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.gallery import Entry, Row, Shot, gallery, overview, page, sheet, shot
-from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
-from mi_brdfs.gallery.sweeps import SWEEPS, Sweep, sweeps_of
+from mi_brdfs.gallery.families import MODELS, by_family, portrait, stage_of, year
+from mi_brdfs.gallery.sweeps import Sweep, sweeps_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import FAMILIES, Model
@@ -39,7 +39,7 @@ NAMES = [model.plugins[0] for model in own_models()]
 @pytest.mark.usefixtures("llvm_rgb")
 def test_every_model_has_a_portrait_and_sweeps():
     """Those in the table, in the order of the models, or what its declarations make; and all of them load."""
-    assert list(SWEEPS) == [name for name in NAMES if name in SWEEPS]
+    assert list(MODELS["models"]) == [name for name in NAMES if name in MODELS["models"]]
     for model in own_models():
         sweeps = sweeps_of(model)
         parameters = [sweep.parameter for sweep in sweeps]
@@ -139,7 +139,7 @@ def test_profiles_are_below_their_pictures_on_one_scale():
     heights = [np.argmin(panel, axis=0) for panel in panels]
     assert abs(heights[0] - 15).max() < 3  # half of the largest
     assert heights[1][:40].min() > 26 and heights[1][50:].max() < 4
-    assert (panels[1][13:17, 5:40].min(axis=0) < 230).all()  # the first one, pale
+    assert (panels[1][13:17, 5:40].min(axis=0) < 230).all()  # the first one
 
 
 # --- What is rendered and written -----------------------------------------------------------------------------------

@@ -49,10 +49,6 @@ class Chalk(Lambert):
 
     Example
     -------
-    <bsdf type="chalk">
-        <float name="reflectance" value="0.9"/>
-    </bsdf>
-
     {"type": "chalk", "reflectance": 0.9}
     """
 
@@ -67,6 +63,7 @@ def test_another_model_makes_its_own_pages_and_pictures_stale(monkeypatch, as_be
     assert {name(each) for each in everything() if each.is_stale()} == {
         "README.md", "mi_brdfs/models/README.md", "scenes/catalogue.xml",
         "docs/thumbnails/chalk.png", "docs/thumbnails/large/chalk.jpg", "docs/sweeps/chalk.jpg", "docs/gallery.jpg",
+        "mi_brdfs/explorer/client/models.jpg",
     }  # fmt: skip
     text = scenes.catalogue()
     assert text.count('<shape type="sphere" id=') == len(own_models())

@@ -423,7 +423,7 @@ def test_hostile_scenes_are_upgraded_or_refused_in_a_sentence(folder, opened, na
 @pytest.mark.parametrize("text", NO_SCENES)
 def test_what_is_no_scene_is_not_copied(folder, text):
     (folder / "scene.xml").write_text(text)
-    with pytest.raises(ValueError, match=r"scene\.xml: (no well-formed XML: |the file has a <\w+> of version)"):
+    with pytest.raises(ValueError, match=r"scene\.xml: (no well-formed XML in UTF|the file has a <\w+> of version)"):
         upgrade(folder / "scene.xml")
 
 
@@ -439,5 +439,5 @@ def test_files_that_include_others_twice_end(folder):
 def test_what_is_no_number_is_refused(folder):
     text = '<scene version="0.6.0"><bsdf type="phong"><float name="exponent" value="nan"/></bsdf></scene>'
     (folder / "scene.xml").write_text(text)
-    with pytest.raises(ValueError, match="float exponent: 'nan' is no number"):
+    with pytest.raises(ValueError, match="float exponent: 'nan' is not a number"):
         upgrade(folder / "scene.xml")

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from rich.cells import cell_len
 
 fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
 
@@ -71,7 +72,7 @@ def test_it_fits_the_terminal(commands, tmp_path):
         lines = [line for line in re.split(r"[\r\n]+", text) if line.strip()]
         assert len(lines) > 0 and "Traceback" not in text
         # What must not be folded: a formula, a name.
-        wide = [line for line in lines if len(line) > COLUMNS and not line.startswith("    ")]
+        wide = [line for line in lines if cell_len(line) > COLUMNS and not line.startswith("    ")]
         assert not [line for line in wide if "a_material_whose_name" not in line], (command, wide)
         progress = ("Checking", "Rendering", "Measuring")
         assert not [line for line in lines if re.search(r"…\s*│?$", line) and not line.startswith(progress)], command

@@ -145,7 +145,7 @@ def test_what_goes_straight_through(says, bends):
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
-    ("density", "mirrors", "fails"), [(0.5, (-1, -1), ""), (1, (-1, -1), "components"), (0.5, (-1, 1), "flags")]
+    ("density", "mirrors", "fails"), [(0.5, (-1, -1), ""), (1, (-1, -1), "deltas"), (0.5, (-1, 1), "deltas")]
 )
 def test_mirrors_are_drawn_as_they_say_and_turn_with_the_light(density, mirrors, fails):
     class Polish(mi.BSDF):
@@ -187,7 +187,7 @@ def test_mirrors_are_drawn_as_they_say_and_turn_with_the_light(density, mirrors,
             return dr.select(active & (si.wi.z > 0) & (wo.z > 0), share * wo.z, 0)
 
     mi.register_bsdf("polish", Polish)
-    report = check({"type": "polish"}, only=["components", "flags", "weight", "pdf"])
+    report = check({"type": "polish"}, only=["components", "deltas", "flags", "weight", "pdf"])
     assert {finding.check for finding in report.failures} == set(fails.split()), report
 
 
@@ -261,7 +261,7 @@ def test_what_is_right_passes(name):
     assert {finding.check for finding in report.findings} == set(CHECKS)
     judged = {finding.check for finding in report.findings if finding.verdict == "pass"}
     skipped = {"reciprocity", "albedo", "efficiency", "textures", "gradients", "recompiles", "reflectance", "spectral"}
-    skipped |= {"null"}
+    skipped |= {"null", "deltas"}
     skipped |= {"updates", "colours"}
     assert judged >= set(CHECKS) - skipped
 
@@ -531,7 +531,7 @@ def test_kinks_have_the_derivatives_of_both_sides():
 @pytest.mark.usefixtures("llvm_rgb")
 def test_delta_functions_are_skipped_with_a_reason():
     """Where there is nothing else, that is not a pass."""
-    report = check({"type": "dielectric"})
+    report = check({"type": "dielectric"}, only=["pdf", "chi2"])
     assert not report.passed and not report.failures and {finding.verdict for finding in report.findings} == {"skip"}
     assert "delta function" in report.findings[0].message and "Check a rough BSDF" in report.why_not_judged
     mixed = check({"type": "plastic"}, only=["chi2", "pdf", "weight"], angles=(30,))
@@ -540,9 +540,65 @@ def test_delta_functions_are_skipped_with_a_reason():
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_delta_functions_carry_what_they_carry_alone():
-    fault = check(half_of_the_mirror(), only=["components"], angles=(30,)).failures[0]
+    fault = check(half_of_the_mirror(), only=["deltas"], angles=(30,)).failures[0]
     assert fault.subject == "component 0 (delta reflection)" and "but 0.04017 where only" in fault.message, fault
-    assert not check({"type": "plastic"}, only=["components"], angles=(30,)).failures
+    assert not check({"type": "plastic"}, only=["components", "deltas"], angles=(30,)).failures
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ("", ""),
+        ("eta of the other way", "the sine of a sample's angle"),
+        ("bright", "it gains energy"),
+        ("darker at grazing", "the light of a sample back to wi"),
+        ("all reflected", "which goes to the other side"),
+        ("values", "but must be 0, as it is a delta function"),
+        ("no number", "but must be finite"),
+    ],
+)
+def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
+    class Glass(mi.BSDF):
+        """The smooth surface of glass."""
+
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+            kinds = mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.NonSymmetric
+            self.m_components = [int(kind | sides) for kind in kinds]
+            self.m_flags = self.m_components[0] | self.m_components[1]
+
+        def sample(self, ctx, si, u, v, active=True):
+            bs, kinds = dr.zeros(mi.BSDFSample3f), (mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission)
+            reflects, passes = (ctx.is_enabled(kind, k) for k, kind in enumerate(kinds))
+            r, cos, eta, inverse = mi.fresnel(si.wi.z, 1.5)
+            share = r if reflects and passes else mi.Float(1 if reflects else 0)
+            mirrored = mi.Bool(u < share)
+            bs.wo = dr.select(mirrored, mi.reflect(si.wi), mi.refract(si.wi, cos, inverse))
+            bs.eta = dr.select(mirrored, 1, inverse if fault == "eta of the other way" else eta)
+            bs.pdf = dr.select(mirrored, share, 1 - share) & (reflects or passes) & active
+            bs.sampled_component = dr.select(mirrored, mi.UInt32(0), 1)
+            types = [int(kinds[0]), int(kinds[0 if fault == "all reflected" else 1])]
+            bs.sampled_type = dr.select(mirrored, *map(mi.UInt32, types))
+            light = dr.select(mirrored, r, (1 - r) * inverse**2) / bs.pdf
+            light *= {"bright": 1.05, "no number": dr.nan}.get(fault, 1)
+            if fault == "darker at grazing":
+                light *= abs(si.wi.z)
+            return bs, dr.select(bs.pdf > 0, mi.Color3f(light), 0)
+
+        def eval(self, ctx, si, wo, active=True):
+            return mi.Color3f(0.1 if fault == "values" else 0)
+
+        def pdf(self, ctx, si, wo, active=True):
+            return mi.Float(0)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.eval(ctx, si, wo, active), mi.Float(0)
+
+    mi.register_bsdf("glass", Glass)
+    report = check({"type": "glass"}, only=["albedo", "deltas", "active", "calls"])
+    assert report.passed == (not fault) and told in str([it.data for it in report.failures]) + str(report), report
 
 
 @pytest.mark.slow

@@ -1,7 +1,9 @@
-"""Generate the balls that the explorer shows of published materials, on one sheet."""
+"""Generate the balls that the explorer shows of published materials and of models, on a sheet each."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from mi_brdfs import preview, srgb
 from mi_brdfs.explorer.materials import BALLS, BALLS_ACROSS, Materials
 from mi_brdfs.explorer.stages import Setting, Stages, UserScene, rgba
 from mi_brdfs.explorer.state import PRESET
+from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.parameters import published
 from mi_brdfs.preview import studio
 
@@ -22,26 +25,33 @@ samples of each."""
 
 
 def pictures() -> list[Picture]:
-    return [Picture(BALLS, _sources, _draw)]
-
-
-def _sources() -> list[str | bytes]:
+    published_ones = [{"type": PRESET, "name": name} for name in published.names()]
+    models = [{"type": model.plugins[0]} for model in own_models()]
     data = Path(published.__file__).with_name("published.json").read_bytes()
-    return [data, repr((FRAME, BALL, RISE, SAMPLES, BALLS_ACROSS)), *map(code, (preview, studio, srgb))]
+    examples = repr([model.example() for model in own_models()])
+    row = BALLS.with_name("models.jpg")
+    return [
+        Picture(BALLS, partial(_sources, data, BALLS_ACROSS), partial(_draw, published_ones, BALLS_ACROSS)),
+        Picture(row, partial(_sources, examples, len(models)), partial(_draw, models, len(models))),
+    ]
 
 
-def _draw(path: Path) -> None:
-    scenes, materials, names = Stages(UserScene()), Materials(), published.names()
-    sheet = Image.new("RGB", (BALLS_ACROSS * BALL, -(-len(names) // BALLS_ACROSS) * BALL))
+def _sources(data: str | bytes, across: int) -> list[str | bytes]:
+    return [data, repr((FRAME, BALL, RISE, SAMPLES, across)), *map(code, (preview, studio, srgb))]
+
+
+def _draw(bsdfs: Sequence[dict], across: int, path: Path) -> None:
+    scenes, materials = Stages(UserScene()), Materials()
+    sheet = Image.new("RGB", (across * BALL, -(-len(bsdfs) // across) * BALL))
     margin = (FRAME - BALL) // 2
-    for k, name in enumerate(names):
+    for k, bsdf in enumerate(bsdfs):
         ball = scenes.progress(Setting("studio", "sphere", FRAME))
-        with materials.loaded(materials.expanded({"type": PRESET, "name": name})) as bsdf:
+        with materials.loaded(materials.expanded(bsdf)) as loaded:
             while ball.spp < SAMPLES:
                 ball.next_pass = SAMPLES
-                ball.advance(bsdf)
+                ball.advance(loaded)
         pixels = np.frombuffer(rgba(ball.pixels(), 0), np.uint8).reshape(FRAME, FRAME, 4)[..., :3]
-        row, column = divmod(k, BALLS_ACROSS)
+        row, column = divmod(k, across)
         part = Image.fromarray(pixels[margin - RISE : margin - RISE + BALL, margin : margin + BALL])
         sheet.paste(part, (column * BALL, row * BALL))
     sheet.save(path, quality=80, optimize=True)

@@ -18,11 +18,14 @@ from mi_brdfs.fit.figures import lobes, probe_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.measured import read
 from mi_brdfs.models.lambert import Lambert
+from mi_brdfs.plot.style import SMALL
+from mi_brdfs.rendering.output import denoise, display_image
 from mi_brdfs.validation import check
 from mi_brdfs.validation.pictures import pictures as drawn
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
+import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -30,7 +33,8 @@ from .made import ROOT, Picture, code
 
 FOLDER = ROOT / "docs" / "pictures"
 SIZE = 640, 480
-GLOBE = ROOT / "docs" / "scenes" / "large" / "textured.jpg"
+GLOBE = ROOT / "scenes" / "textured.xml"
+SHOWN = "walter", "cooktorrance", "-Dmaterial=Al", "-Dalpha=0.2"
 MEASURED = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
 
 
@@ -52,10 +56,10 @@ def _save(draw: Callable[[], Image.Image], path: Path) -> None:
     draw().convert("RGB").save(path, quality=88, optimize=True)
 
 
-def _image(figure: Figure, dpi: float = 160) -> Image.Image:
+def _image(figure: Figure) -> Image.Image:
     """Return a figure, in the middle of a white picture of the common size."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=dpi, facecolor="white", bbox_inches="tight", pad_inches=0.05)
+    figure.savefig(stream, format="png", dpi=240, facecolor="white", bbox_inches="tight", pad_inches=0.05)
     image = Image.open(stream).convert("RGB")
     image.thumbnail(SIZE, Image.Resampling.LANCZOS)
     white = Image.new("RGB", SIZE, "white")
@@ -73,7 +77,8 @@ def _fits() -> Image.Image:
     """Two models beside a measurement."""
     fits = fit(MEASURED, ["ward", "walter"], starts=2)
     figure = lobes(read(MEASURED), [probe_of(it) for it in fits], 88)[-1][1]
-    _, data, *lines, _ = figure.axes[0].lines
+    interpolated, data, *lines, _ = figure.axes[0].lines
+    interpolated.remove()
     for k, (line, it) in enumerate(zip(lines, fits, strict=True)):
         line.set(label=it.bsdf["type"], color=f"C{k}")  # the report's colours are those of its style sheet
     data.set(label="measured", color="black")
@@ -100,22 +105,31 @@ def _checker() -> Image.Image:
     """What the sampler of a faulty model draws, what its density expects, and the difference."""
     Faulty.plugins = ("faulty",)
     mi_brdfs.register(Faulty)
-    (panels, *_) = drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0])
-    return _image(panels.drawing, dpi=240)
+    figure = next(drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0])).drawing
+    figure.set_layout_engine("none")
+    figure.set_size_inches(4, 3)
+    for ax, place in zip(
+        figure.axes, ((0, 0.58, 0.36, 0.36), (0, 0.06, 0.36, 0.36), (0.4, 0.1, 0.6, 0.8)), strict=True
+    ):
+        ax.set_position(place)
+    figure.axes[0].set_title("drawn", loc="left", fontsize=SMALL, pad=3)
+    return _image(figure)
 
 
 def _globe() -> Image.Image:
-    """The left of the scene with a texture for each parameter."""
-    image = Image.open(GLOBE)
-    box = 0, 0, round(image.height * SIZE[0] / SIZE[1]), image.height
-    return image.crop(box).resize(SIZE, Image.Resampling.LANCZOS)
+    """The globe of the scene with a texture for each parameter, without the cards beside it."""
+    look_at = mi.ScalarTransform4f().look_at(origin=[-2.5, -12, 3.2], target=[-2.5, 0, 1.75], up=[0, 0, 1])
+    film = {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1], "rfilter": {"type": "box"}}
+    sensor = mi.load_dict({"type": "perspective", "fov": 25.3, "to_world": look_at, "film": film})
+    image = mi.render(mi.load_file(str(GLOBE)), sensor=sensor, spp=128)
+    return Image.fromarray(np.array(display_image(mi.Bitmap(denoise(np.array(image)[..., :3])))))
 
 
 def _explorer() -> Image.Image:
-    """The page of ``mi-brdfs explore ward walter``, in Chromium."""
+    """The page of README's command, in Chromium."""
     from playwright.sync_api import sync_playwright
 
-    command = [sys.executable, "-m", "mi_brdfs", "explore", "ward", "walter", "--no-browser", "--port", "0"]
+    command = [sys.executable, "-m", "mi_brdfs", "explore", *SHOWN, "--no-browser", "--port", "0"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         address = server.stdout.readline().strip()

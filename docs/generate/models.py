@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +16,7 @@ from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
-from mi_brdfs.model import ENERGY_NOTE, Model, Plugin
+from mi_brdfs.model import ENERGY_NOTE, EXAMPLE, Model, Plugin
 from mi_brdfs.preview import body, studio
 from mi_brdfs.tabulated.tabulated import Tabulated
 
@@ -42,10 +41,10 @@ Directions are unit vectors away from the surface: wi is the given one (towards 
 (towards the light), n the normal, h the half vector; cosθ_i, cosθ_o and cosθ_h are their cosines to n. f is the BRDF.
 Every colour and every number is a texture slot; a literal outside its range is an error, and a textured or optimised
 value is clamped to the range where it is evaluated. In polarized variants a model that depolarises reflects light of
-any polarization as unpolarized light. Pictures show the models of a family in one colour and about
-equally rough, strips the effect of one parameter; they are larger behind their links, and `mi-brdfs gallery` renders
-all of them. Diffuse and cartoon models stand under a point light: the curve below a picture of a strip is the luminance
-across its middle, beside that of the first one.
+any polarization as unpolarized light. Pictures show the models of a family in one colour, each with what it is known
+for, strips the effect of one parameter; they are larger behind their links, and `mi-brdfs gallery` renders all of them.
+Diffuse and cartoon models stand under a point light: the curve below a picture of a strip is the luminance across its
+middle, beside that of the first one in orange.
 """
 
 
@@ -165,7 +164,7 @@ def integrator_page() -> str:
 
 def _page(plugin: type[Plugin], picture: str, strip: str = "", *more: str) -> str:
     name, aliases = plugin.plugins[0], plugin.plugins[1:]
-    text, _, examples = inspect.cleandoc(plugin.__doc__).partition("\n\nExample\n-------\n")
+    text, _, examples = plugin.page().partition(f"\n\n{EXAMPLE}")
     xml, _, dictionary = examples.partition("\n\n")
     text = _code(text)
     return "\n\n".join(

@@ -3,7 +3,6 @@ docs/scenes."""
 
 from __future__ import annotations
 
-import inspect
 import re
 import textwrap
 import xml.etree.ElementTree as ElementTree
@@ -14,6 +13,7 @@ from pathlib import Path
 from mi_brdfs.gallery.families import year
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
+from mi_brdfs.parameters.xml import to_xml
 from mi_brdfs.rendering.output import denoised, display_image
 from mi_brdfs.rendering.passes import render
 from mi_brdfs.rendering.scene_file import SceneFile
@@ -203,5 +203,4 @@ def _ball(name: str, x: float, y: float, z: float, radius: float, bsdf: str) -> 
 
 
 def _example(model: type[Model]) -> str:
-    found = re.search(r"<bsdf .*?</bsdf>", inspect.cleandoc(model.__doc__), re.DOTALL)
-    return textwrap.indent(found[0] if found else f'<bsdf type="{model.plugins[0]}"/>', " " * 8) + "\n"
+    return textwrap.indent(to_xml(model.example()), " " * 8) + "\n"

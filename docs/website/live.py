@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import gzip
 import io
+import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -20,15 +24,15 @@ PAGES: dict[str, tuple[str, list[str]]] = {
         "smooth and rough plaster",
         ["lambert", "orennayar", "-Dreflectance=#d8c8b0", "--vary", "sigma=0.1,0.3,0.5"],
     ),
-    "measured_paint": ("a measured black paint and its fit", [MEASURED.name, "fit.json:walter"]),
+    "measured_paint": ("a measured black paint and its fit", [MEASURED.name, "fit.json:walter", "--exposure", "2"]),
 }
 """What each page shows: in words, and as arguments of ``mi-brdfs explore``."""
 
 
 def links() -> str:
-    """Return a paragraph that leads to the pages."""
-    *most, last = (f'<a href="{name}.html">{words}</a>' for name, (words, _) in PAGES.items())
-    return f"Try it without an installation: {', '.join(most)}, or {last}."
+    """Return a paragraph that leads to the pages, with a picture of each."""
+    cells = (f'<a href="{name}.html"><img src="{name}.jpg" alt="">{words}</a>' for name, (words, _) in PAGES.items())
+    return f'Try it without an installation:\n\n<div class="live">{"".join(cells)}</div>'
 
 
 def write_pages(folder: Path) -> None:
@@ -42,10 +46,23 @@ def write_pages(folder: Path) -> None:
             _run("fit", MEASURED.name, "--model", "walter", "--starts", "1", "--json", "fit.json")
             for name, (_, words) in PAGES.items():
                 _run("explore", *words, "--export", f"{name}.html")
+                Path(f"{name}.jpg").write_bytes(_picture(Path(f"{name}.html").read_text(encoding="utf-8")))
         for file in ("fit.json", MEASURED.name):
             Path(file).unlink()
     finally:
         os.chdir(before)
+
+
+def _picture(page: str) -> bytes:
+    """Return the first picture of an exported page, a JPEG."""
+    content = json.loads(re.search(r'id="exported">(.*?)</script>', page, re.DOTALL)[1])
+    data, at = gzip.decompress(base64.b64decode(content["data"])), 0
+    for _, length, is_text in content["frames"]:
+        frame, at = data[at : at + length], at + length
+        end = 4 + int.from_bytes(frame[:4], "little")
+        if not is_text and json.loads(frame[4:end])["type"] == "picture":
+            return frame[end:]
+    raise ValueError("the page has no picture")
 
 
 def _run(*words: str) -> None:

@@ -6,15 +6,16 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from itertools import groupby
 from pathlib import Path, PurePosixPath
 
 from generate import models, scenes
 from generate.made import ROOT
 
-from mi_brdfs.gallery import by_family
+from mi_brdfs.gallery.families import by_family, year
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
-from mi_brdfs.model import Plugin
+from mi_brdfs.model import Model, Plugin
 from mi_brdfs.tabulated.tabulated import Tabulated
 
 from . import live, notebooks
@@ -146,7 +147,7 @@ def _scene(path: Path) -> str:
 
 
 def _gallery() -> str:
-    parts = ["# Gallery", "One picture per model, which leads to its page, and below the effect of its main parameter."]
+    parts = ["# Gallery", "Each picture leads to the page of its model; below is the effect of its main parameter."]
     parts.append(_thumbnails())
     for model in by_family(own_models()):
         parts += [f"## {model.plugins[0]}", models.strip_picture(model)]
@@ -154,10 +155,16 @@ def _gallery() -> str:
 
 
 def _thumbnails() -> str:
-    """Return the examples of all models, with links to their pages."""
-    names = [model.plugins[0] for model in by_family(own_models())]
-    cells = [f"[![{name}](../../docs/thumbnails/{name}.png)](#{name})\n[`{name}`](#{name})" for name in names]
-    return "::::{container} pictures\n" + "\n\n".join(cells) + "\n::::"
+    """Return the examples of all models by family, with their years and links to their pages."""
+
+    def cell(model: type[Model]) -> str:
+        name = model.plugins[0]
+        return f"[![{name}](../../docs/thumbnails/{name}.png)](#{name})\n[`{name}`](#{name})\\\n{year(model)}"
+
+    return "\n\n".join(
+        f"**{family}**\n\n::::{{container}} pictures\n" + "\n\n".join(map(cell, members)) + "\n::::"
+        for family, members in groupby(by_family(own_models()), key=lambda it: it.family)
+    )
 
 
 def _reference() -> str:

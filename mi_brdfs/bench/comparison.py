@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from rich.table import Column, Table
 
+from ..given import load_described
 from ..mitsuba import guests
 from ..probe.arrays import Array, interaction, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe
@@ -87,7 +88,7 @@ def compare(*bsdfs: str | dict | BSDFSource, on_progress: Callable[[str], None] 
         raise ValueError(f"name one BSDF or two to compare, not {len(found)}: {words}")
     efficiency, calls, pictures, first = STAGES
     on_progress(efficiency)
-    probes = [_probe(it) for it in found]
+    probes = [BSDFProbe(load_described(bsdf_of(it))) for it in found]
     etas = np.array([sampling(probe, probe.whole).least() for probe in probes])
     rows = [Measurement(f"η at {angle}°", list(each), "{:.3f}") for angle, each in zip(ANGLES, etas.T, strict=True)]
     on_progress(calls)
@@ -123,14 +124,6 @@ def call_times(probes: list[BSDFProbe]) -> Array:
                 kernels = dr.kernel_history([dr.KernelType.JIT])
                 times[k, each - 1] = 1e6 / LANES * sum(kernel["execution_time"] for kernel in kernels)
     return times
-
-
-def _probe(given: Any) -> BSDFProbe:
-    bsdf = bsdf_of(given)
-    loaded = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
-    if not isinstance(loaded, mi.BSDF):
-        raise ValueError(f"{bsdf['type']} is not a BSDF")
-    return BSDFProbe(loaded)
 
 
 def _scene(given: Any) -> dict[str, Any]:

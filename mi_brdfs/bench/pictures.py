@@ -66,8 +66,7 @@ def sphere(bsdf: Any, size: int, integrator: Scene = PATH) -> Scene:
 
 
 def render_in_turn(scenes: Sequence[Callable[[], Scene]]) -> Pictures:
-    """Render each scene with each seed. Only one of them is loaded at a time: a render's kernel contains the code of
-    every live BSDF."""
+    """Render each scene with each seed, one loaded at a time: a kernel contains the code of every live BSDF."""
     seconds = np.zeros((len(scenes), ROUNDS))
     pictures: list[list[Array]] = [[] for _ in scenes]
     for scene in scenes:
@@ -144,7 +143,7 @@ def in_new_process(function: Callable, *arguments: Any) -> Any:
 def answer() -> None:
     """Carry out the call given as the argument of the new process."""
     sources, variant, module, name, arguments = json.loads(sys.argv[1])
+    mi.set_variant(variant)
     for source in sources:
         guests.import_models(source)
-    mi.set_variant(variant)
     print(json.dumps(getattr(importlib.import_module(module), name)(*arguments)))

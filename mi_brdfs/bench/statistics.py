@@ -46,8 +46,7 @@ def deviations(pictures: Array) -> Array:
 
 
 def time_variance(slower: Array, noise: Array) -> tuple[float, Interval]:
-    """Return time × variance of the first over that of the second, and its 95 % confidence interval, a bootstrap over
-    the seeds."""
+    """Return time × variance of the first over that of the second, and its 95 % interval, by bootstrap over seeds."""
 
     def ratio(seeds: Array) -> Array:
         ours, theirs = noise[:, seeds].mean(axis=-1)

@@ -6,14 +6,12 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from .app import command
 from .options import (
-    MATERIAL,
     Parameters,
     TracingVariant,
     file_option,
+    material_argument,
     parameters_of,
     set_tracing_variant,
     sources_of,
@@ -24,10 +22,7 @@ from .terminal import Exit, err, failing, print_table, progress, stdout_to_stder
 
 @command("Validate", "bench ward phong:exponent=30", "bench walter roughconductor -D alpha=.3")
 def bench(
-    targets: Annotated[
-        list[str],
-        typer.Argument(metavar="MATERIAL…", help=f"One or two. {MATERIAL}"),
-    ],
+    targets: Annotated[list[str], material_argument("One or two.")],
     parameters: Parameters = None,
     json_file: Annotated[Path | None, file_option("--json", "Also write all figures to this file.")] = None,
     variant: TracingVariant = None,

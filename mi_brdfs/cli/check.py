@@ -24,10 +24,10 @@ from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
 from .options import (
-    MATERIAL,
     Parameters,
     TracingVariant,
     file_option,
+    material_argument,
     parameters_of,
     set_tracing_variant,
     source_of,
@@ -58,10 +58,7 @@ class Settings(NamedTuple):
     "check walter:alpha=.3,f0=.9 --against mine.xml",
 )
 def check(
-    targets: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="MATERIAL…", help=MATERIAL),
-    ] = None,
+    targets: Annotated[list[str] | None, material_argument()] = None,
     every: Annotated[bool, typer.Option("--all", help="Check every plugin of the pack.")] = False,
     parameters: Parameters = None,
     only: Annotated[
@@ -156,7 +153,7 @@ def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs
                 reports.append(_check_one(source, settings, partial(bar.advance, task)))
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
-        known = variant, list(dict.fromkeys([*guests.sources(), *imported]))
+        known = variant, guests.sources()
         with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
             try:
                 for future in [pool.submit(_check_one, source, settings) for source in sources]:

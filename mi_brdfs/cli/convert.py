@@ -9,10 +9,10 @@ import typer
 
 from .app import command
 from .options import (
-    MATERIAL,
     Parameters,
     TracingVariant,
     check_output,
+    material_argument,
     parameters_of,
     quantity_of,
     set_tracing_variant,
@@ -24,10 +24,7 @@ from .terminal import Exit, err, failing, print_paragraph, stdout_to_stderr
 
 @command("Measure", "convert paint.bsdf paint.binary", "convert fit.json:walter paint.csv")
 def convert(
-    given: Annotated[
-        str,
-        typer.Argument(metavar="MATERIAL", help=MATERIAL),
-    ],
+    given: Annotated[str, material_argument(metavar="MATERIAL")],
     output: Annotated[
         Path, typer.Argument(metavar="OUT", help="The file to write: .binary (MERL), .bsdf (RGL or Zemax), .csv.")
     ],

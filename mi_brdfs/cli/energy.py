@@ -14,7 +14,7 @@ from ..mitsuba.registry import ENERGY, find_models, is_own, own_models
 from ..model import Energy, Model
 from ..writing import write_text
 from .app import command
-from .options import TracingVariant, set_tracing_variant
+from .options import TracingVariant, Types, set_tracing_variant
 from .terminal import Exit, err, failing, out, print_table, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
@@ -34,9 +34,7 @@ class Measured(NamedTuple):
 
 @command("Develop", "energy walter --check", "energy --import my_brdf.py lommel")
 def energy(
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE…", help="Types, as `list` shows them. Default: all.")
-    ] = None,
+    names: Types = None,
     check: Annotated[
         bool, typer.Option("--check", help="Compare with what the classes state. Exit with 1 if any of it is wrong.")
     ] = False,

@@ -16,10 +16,10 @@ import typer
 
 from .app import command, imported
 from .options import (
-    MATERIAL,
     Parameters,
     TracingVariant,
     file_option,
+    material_argument,
     parameters_of,
     set_tracing_variant,
     source_of,
@@ -30,10 +30,7 @@ from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 @command("Look", "explore walter burley:roughness=.3", "explore paint.binary fit.json:walter --scene room.xml:wall")
 def explore(
-    targets: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="MATERIAL…", help=f"Up to six. {MATERIAL}"),
-    ] = None,
+    targets: Annotated[list[str] | None, material_argument("Up to six.")] = None,
     parameters: Parameters = None,
     scene: Annotated[
         str | None,
@@ -45,6 +42,7 @@ def explore(
     mesh: Annotated[
         Path | None, typer.Option(metavar="FILE.ply|obj", help="Show the pictures on this mesh, whose y axis is up.")
     ] = None,
+    exposure: Annotated[float, typer.Option(min=-10, max=10, help="Brighten the pictures, in stops.")] = 0,
     export: Annotated[
         Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
     ] = None,
@@ -84,7 +82,7 @@ def explore(
     if user.scene and not user.scene.is_file():
         fail(f"--scene {user.scene}: no such file", Exit.USAGE)
     sources, subjects = _subjects(targets or ["walter"], given)
-    state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body"}
+    state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body", "exposure": exposure}
     if mesh and mesh.suffix.lower() not in MESHES:
         fail(f"--mesh {mesh}: give a file whose name ends in {' or '.join(MESHES)}", Exit.USAGE)
     state |= dict(user.add(it, brief(it.name)) for it in (environment, mesh) if it)

@@ -156,11 +156,8 @@ def _id(file: Path, *words: str) -> str:
 
 
 def _given(parameters: dict[str, str], models: list[type[Model]]) -> dict[str, Any]:
-    """Return what -D options fix, a tuple where they give several words of a choice.
-
-    Raises:
-        ValueError: if no model has such a parameter, or several values are given for what is no choice.
-    """
+    """Return what -D options fix, a tuple where they give several words of a choice. Raise a ValueError if no model has
+    such a parameter, or several values are given for what is no choice."""
     from ..fit.unknowns import check_names, default_words
 
     given: dict[str, Any] = {}
@@ -263,7 +260,7 @@ def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: boo
 def print_ranking(fits: list[Fit]) -> None:
     """Print the models by their error, and the best one to paste."""
     from ..fit import METRICS
-    from ..fit.result import notes, values
+    from ..fit.result import notes, number, values
 
     best = fits[0]
     out.print(best.file, style="bold")
@@ -275,7 +272,7 @@ def print_ranking(fits: list[Fit]) -> None:
     lowest = min(it.bic for it in fits)
     for it in fits:
         table.add_row(
-            it.model, *[_shown(it.flip)] * seen, f"{it.held_out:.4g}",
+            it.model, *[number(it.flip)] * seen, f"{it.held_out:.4g}",
             f"{it.errors[it.metric]['fitted']:.4g}",
             f"{it.bic - lowest:.0f}", f"{it.albedo:.2f}", f"{it.starts.agree}/{it.starts.tried}", notes(it),
         )  # fmt: skip
@@ -296,7 +293,7 @@ def print_ranking(fits: list[Fit]) -> None:
 
 def print_medians(ranked: list[list[Fit]]) -> None:
     """Print the medians over the files."""
-    from ..fit.result import medians
+    from ..fit.result import medians, number
 
     out.print("Medians", style="bold")
     rows = medians(ranked)
@@ -306,11 +303,7 @@ def print_medians(ranked: list[list[Fit]]) -> None:
         column.justify = "right"
     for row in rows:
         table.add_row(
-            row.model, *[_shown(row.flip)] * seen, f"{row.held_out:.4g}", f"{row.fitted:.4g}",
+            row.model, *[number(row.flip)] * seen, f"{row.held_out:.4g}", f"{row.fitted:.4g}",
             str(row.files), str(row.best_in),
         )  # fmt: skip
     print_table(table)
-
-
-def _shown(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"

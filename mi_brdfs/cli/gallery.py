@@ -9,15 +9,13 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import MOST_PIXELS, AnyVariant, set_variant
+from .options import MOST_PIXELS, AnyVariant, Types, set_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
 @command("Look", "gallery ward walter --presets -o pictures")
 def gallery(
-    types: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases, as `list` shows them. Default: all.")
-    ] = None,
+    types: Types = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Created if it does not exist.")
     ] = Path("gallery"),

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
-import textwrap
-from collections.abc import Iterator
-from itertools import groupby
 from typing import Annotated
 
 import typer
-from rich.table import Table
+from rich.console import Console
+from rich.markdown import Markdown
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Column, Table
 from rich.text import Text
 
 from ..mitsuba.registry import DATA, all_models, find_plugin
-from ..model import Plugin
+from ..mitsuba.registry import info as plain_page
+from ..model import EXAMPLE, Plugin
 from ..parameters import nested
 from ..parameters.vocabulary import OTHERS, key
 from .app import command
@@ -57,78 +59,22 @@ def _options(model: type[Plugin], word: str) -> list[str] | None:
 def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or alias, as `list` shows it.")]) -> None:
     """Show the manual page of a BRDF."""
     with failing(Exit.ERROR):
-        page = find_plugin(type).manual()
-    page = re.sub(r":\w+:`([^`]+)`", r"\1", page)
-    out.print(_styled(folded(page, out.width) if out.is_terminal else page))
-
-
-def _styled(page: str) -> Text:
-    """Return a manual page for the terminal: literals and headings styled instead of in reStructuredText markup."""
-    lines = page.splitlines()
-    text = Text()
-    for line, following in zip(lines, [*lines[1:], ""], strict=True):
-        if is_underline(line):
-            continue
-        heading = bool(line.strip()) and is_underline(following)
-        for index, part in enumerate(line.split("``")):
-            text.append(part, "bold" if heading else "cyan" if index % 2 else "")
-        text.append("\n")
-    return text
-
-
-# --- In a terminal of any width --------------------------------------------------------------------------------------
-
-
-def folded(page: str, width: int) -> str:
-    """Return a manual page whose paragraphs, list items and tables are no wider than ``width``, if that is possible:
-    formulas and examples, which are indented, stay as they are. The wide table of parameters becomes a list."""
-    lines = page.splitlines()
-    blocks = [list(block) for filled, block in groupby(lines, key=lambda line: bool(line.strip())) if filled]
-    return "\n\n".join("\n".join(_block(block, width)) for block in blocks)
-
-
-def _block(lines: list[str], width: int) -> Iterator[str]:
-    if max(map(len, lines)) <= width or lines[0].startswith(" "):
-        yield from lines
-    elif len(lines) > 2 and is_underline(lines[1]):
-        yield from lines[:2]
-        yield from _table(lines[2:], width)
-    else:
-        for item in _items(lines):
-            hanging = "  " if item.startswith("* ") else ""
-            yield from _wrapped(item, width, others=hanging)
-
-
-def _wrapped(text: str, width: int, first: str = "", others: str = "") -> list[str]:
-    return textwrap.wrap(
-        text, width, initial_indent=first, subsequent_indent=others, break_long_words=False, break_on_hyphens=False
-    )
-
-
-def _items(lines: list[str]) -> Iterator[str]:
-    """Yield each item of a list, or the one paragraph, on a line of its own."""
-    item = ""
-    for line in lines:
-        if line.startswith("* ") and item:
-            yield item
-            item = ""
-        item = f"{item} {line.strip()}".strip()
-    yield item
-
-
-def _table(lines: list[str], width: int) -> Iterator[str]:
-    """Yield the rows of a table with aligned columns: the first cell, and below it, indented, the others, with their
-    titles except that of the last one."""
-    starts = [cell.start() for cell in re.finditer(r"\S+(?: \S+)*", lines[0])]
-    titles, *rows = ([line[start:end].strip() for start, end in zip(starts, [*starts[1:], None], strict=True)]
-                     for line in lines)  # fmt: skip
-    for first, *others, last in rows:
-        yield from _wrapped(first, width, others="  ")
-        said = ", ".join(f"{title} {cell}" for title, cell in zip(titles[1:], others, strict=False) if cell)
-        for text in (said, last):
-            yield from _wrapped(text, width, "    ", "    ")
-
-
-def is_underline(line: str) -> bool:
-    """Return whether a line marks the one above it as a heading."""
-    return re.fullmatch(r"(=|-|~){3,}", line.strip()) is not None
+        plugin = find_plugin(type)
+    if not out.is_terminal:
+        out.print(plain_page(type))
+        return
+    text, heading, example = re.sub(r":\w+:`([^`]+)`", r"\1", plugin.page()).partition(EXAMPLE)
+    terminal = Console(emoji=False, highlight=False)  # which folds lines, unlike the others
+    terminal.print(Markdown(f"{text}{heading}\n```\n{example}\n```" if example else text, "ansi_dark"))
+    for title, rows, note in plugin.sections():
+        terminal.print(f"\n[bold]{title}")
+        names = rows[0] if rows else ()
+        table = Table(*(Column(name, overflow="fold") for name in names), box=None, pad_edge=False)
+        for first, *cells, last in rows[1:]:
+            if len(names) > 3:  # too many columns for a narrow terminal
+                said = ", ".join(f"{name} {cell}" for name, cell in zip(names[1:], cells, strict=False))
+                terminal.print(Text.assemble((first, "cyan"), ": ", said))
+                terminal.print(Padding(Text(last), (0, 0, 0, 4)))
+            else:
+                table.add_row(escape(first), *cells, last)
+        terminal.print(*[table] * bool(table.row_count), Markdown(note), sep="\n")

@@ -25,8 +25,7 @@ def measured(
         file_option("--plot", "Also draw slices, lobes and albedos: .png, .svg, .pdf or .jpg.", endings=FIGURES),
     ] = None,
     parameters: Annotated[
-        list[str] | None,
-        parameters_option("What files hold that do not state it: f or f cos.", "quantity=NAME"),
+        list[str] | None, parameters_option("What files hold that do not state it: f or f cos.", "quantity=NAME")
     ] = None,
     json_file: Annotated[Path | None, file_option("--json", "Also write all findings to this file.")] = None,
 ) -> None:

@@ -63,11 +63,20 @@ Parameters = Annotated[
         "<default> of its XML; may be repeated."
     ),
 ]
-MATERIAL = (
-    "A plugin, a preset, a measured file, XML, FILE.xml:ID, fit.json:MODEL; each with its own parameters, as in "
-    "ward:alpha=.2,rotation=30."
-)
-"""What a material may be, as the help of each command says."""
+
+
+def material_argument(count: str = "", metavar: str = "MATERIAL…") -> Any:
+    """Return an argument for one material or for several, whose help says what these may be."""
+    help = (
+        "A plugin, a preset, a measured file, XML, FILE.xml:ID, fit.json:MODEL; each with its own parameters, as in "
+        "ward:alpha=.2,rotation=30."
+    )
+    return typer.Argument(metavar=metavar, help=f"{count} {help}".strip())
+
+
+Types = Annotated[
+    list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases, as `list` shows them. Default: all.")
+]
 
 AnyVariant = Annotated[
     str | None,
@@ -79,6 +88,10 @@ TracingVariant = Annotated[
     str | None, typer.Option(help="Vectorized and unpolarized. Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb.")
 ]
 """The option --variant of commands that measure."""
+Lenient = Annotated[
+    bool, typer.Option("--lenient", help="Put cubes and grey in the place of meshes and textures that old scenes lack.")
+]
+"""The option of commands that upgrade scenes."""
 MOST_PIXELS = 16384
 """The largest width and height of a picture."""
 KINDS = {

@@ -27,8 +27,7 @@ Output = Annotated[
     typer.Option("-o", "--output", help="An .exr, .png or .jpg; the EXR and a display image are always both written."),
 ]
 Seconds = Annotated[
-    float | None,
-    typer.Option("--time", metavar="SECONDS", min=0, help="End with the pass in which this time is over."),
+    float | None, typer.Option("--time", metavar="SECONDS", min=0, help="End with the pass in which this time is over.")
 ]
 Seed = Annotated[int, typer.Option(min=0, help="A different seed gives different noise.")]
 Denoise = Annotated[
@@ -91,8 +90,7 @@ def _render(scene: mi.Scene, sensor: int, options: dict[str, Any]) -> Picture:
 
 @contextmanager
 def _answering_ctrl_c() -> Iterator[None]:
-    """Answer as soon as Ctrl-C is pressed, where Python's own handlers wait for the pass to end; a second Ctrl-C ends
-    the process."""
+    """Answer Ctrl-C at once, where Python's own handlers wait for the pass to end; a second one ends the process."""
     ours, written_by_python = socket.socketpair()
     written_by_python.setblocking(False)
 

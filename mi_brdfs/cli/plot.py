@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import FIGURES, MATERIAL, TracingVariant, file_option, parameters_option, set_tracing_variant, writing_to
+from .options import (
+    FIGURES,
+    TracingVariant,
+    file_option,
+    material_argument,
+    parameters_option,
+    set_tracing_variant,
+    writing_to,
+)
 from .terminal import Exit, fail, failing, out, stdout_to_stderr
 
 
@@ -16,10 +24,7 @@ from .terminal import Exit, fail, failing, out, stdout_to_stderr
     "Look", "plot ward:alpha=.1,.2,.4 --kind cartesian", "plot paint.binary fit.json:walter --angles 30,60 -o fit.pdf"
 )
 def plot(
-    targets: Annotated[
-        list[str],
-        typer.Argument(metavar="MATERIAL…", help=MATERIAL),
-    ],
+    targets: Annotated[list[str], material_argument()],
     parameters: Annotated[
         list[str] | None,
         parameters_option(

@@ -10,7 +10,7 @@ import typer
 
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
-from .options import AnyVariant, parameters_of, parameters_option, scheduler_option, set_variant, source_of
+from .options import AnyVariant, Lenient, parameters_of, parameters_option, scheduler_option, set_variant, source_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing, stdout_to_stderr
 
@@ -42,6 +42,7 @@ def render(
         typer.Option(metavar="X,Y,WIDTH,HEIGHT", help="Render this part of the picture, in pixels from the top left."),
     ] = None,
     denoise: Denoise = False,
+    lenient: Lenient = False,
     seed: Seed = 0,
     workers: Annotated[
         int | None,
@@ -64,7 +65,7 @@ def render(
         replaced = _replaced(replacements or [])
     if scheduler and (file_of := next((it.word for it in replaced.values() if Path(it.source).exists()), None)):
         fail(f"--replace: the workers of a scheduler do not have {file_of}; give a plugin or a preset", Exit.USAGE)
-    file = SceneFile(str(scene), parameters, box_filter=denoise, replaced=replaced)
+    file = SceneFile(str(scene), parameters, box_filter=denoise, lenient=lenient, replaced=replaced)
 
     def load() -> tuple[mi.Scene, int]:
         loaded = _load(file)

@@ -11,17 +11,14 @@ import typer
 
 from ..preview import STAGES, preview_scene
 from .app import command
-from .options import MATERIAL, MOST_PIXELS, AnyVariant, Parameters, parameters_of, set_variant, source_of
+from .options import MOST_PIXELS, AnyVariant, Parameters, material_argument, parameters_of, set_variant, source_of
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing
 
 
 @command("Look", "show walter:material=Au,alpha=.2 --denoise", "show best.xml --stage lamp -o best.png")
 def show(
-    material: Annotated[
-        str,
-        typer.Argument(metavar="MATERIAL", help=MATERIAL),
-    ],
+    material: Annotated[str, material_argument(metavar="MATERIAL")],
     parameters: Parameters = None,
     stage: Annotated[str, typer.Option(metavar="STAGE", help=f"The light: {', '.join(STAGES)}.")] = "studio",
     output: Output = None,

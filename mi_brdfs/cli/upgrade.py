@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .app import command
-from .options import file_option, parameters_of, parameters_option, write_text
+from .options import Lenient, file_option, parameters_of, parameters_option, write_text
 from .terminal import Exit, err, fail, failing, out
 
 
@@ -18,9 +18,7 @@ def upgrade(
     output: Annotated[
         Path | None, file_option("-o", "The scene of Mitsuba 3 to write. Default: the standard output.", "NEW.xml")
     ] = None,
-    lenient: Annotated[
-        bool, typer.Option("--lenient", help="Put cubes and grey in the place of meshes and textures that are missing.")
-    ] = False,
+    lenient: Lenient = False,
     define: Annotated[list[str] | None, parameters_option("Set a <default> parameter of the scene.")] = None,
 ) -> None:
     """Write an old scene as one of Mitsuba 3, and say what changed, line by line."""
@@ -31,8 +29,8 @@ def upgrade(
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
     for line in [*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]:
-        err.print(line, markup=False, highlight=False, soft_wrap=True)
+        err.print(line)
     if output:
         write_text(output, new.xml)
     else:
-        out.print(new.xml, markup=False, highlight=False, soft_wrap=True, end="")
+        out.print(new.xml, end="")

@@ -26,7 +26,6 @@ def run(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    threads: int | None = None,
     shared: tuple = (),
 ) -> Iterator[tuple[str, Any]]:
     """Call ``function(*shared, *arguments)`` for each task, and yield its key and result, in the order in which they
@@ -42,11 +41,9 @@ def run(
             also the seed, and returns plain data: no arrays of Dr.Jit and no objects of Mitsuba.
         tasks: the arguments by key. An iterable of pairs is asked for as many as the workers need; so it may be
             endless, and depend on what came back.
-        workers: the number of processes to start on this machine.
+        workers: the number of processes to start on this machine, which share its cores.
         scheduler: the address of a Dask scheduler, ``tcp://host:8786``, whose workers have one thread for tasks
             (``--nthreads 1``), and the versions of mi_brdfs, Mitsuba, Dr.Jit and Python that there are here.
-        threads: of Dr.Jit in each worker. Default: its share of the cores, or what a scheduler's worker has. At least
-            two, as Mitsuba loads no bitmaps with one; see :func:`mi_brdfs.rendering.passes.one_thread`.
         shared: arguments that all calls have in common, sent to each worker once.
 
     Yields:
@@ -67,4 +64,4 @@ def run(
             raise ImportError('workers need the extra "cluster": pip install "mi_brdfs[cluster]"') from None
         from .client import run_on_workers
 
-    return run_on_workers(function, pairs, workers, scheduler, threads, shared)
+    return run_on_workers(function, pairs, workers, scheduler, shared)

@@ -48,12 +48,7 @@ DETACHED: dict[str, Any] = (
 
 
 def run_on_workers(
-    function: Callable,
-    tasks: Iterator[tuple[str, tuple]],
-    workers: int | None,
-    scheduler: str | None,
-    threads: int | None,
-    shared: tuple,
+    function: Callable, tasks: Iterator[tuple[str, tuple]], workers: int | None, scheduler: str | None, shared: tuple
 ) -> Iterator[tuple[str, Any]]:
     """See :func:`mi_brdfs.cluster.run`."""
     with ExitStack() as stack:
@@ -62,7 +57,7 @@ def run_on_workers(
         processes = None
         if scheduler:
             client = stack.enter_context(_connected(scheduler))
-            here = setup(threads)
+            here = setup(None)
             _check_workers(client, scheduler, here)
         else:
             assert workers
@@ -71,7 +66,7 @@ def run_on_workers(
             )
             disable_gc_diagnosis()  # what Python calls while it collects garbage swallows Ctrl-C
             client = stack.enter_context(Client(cluster, timeout=CONNECTING))
-            here = setup(threads or (os.cpu_count() or 1) // workers)
+            here = setup((os.cpu_count() or 1) // workers)
             processes = _Processes(cluster.scheduler_address, workers)
             stack.callback(processes.end)
             processes.start()

@@ -31,8 +31,7 @@ class Setup(NamedTuple):
     variant: str | None
     threads: int | None
     guests: dict[str, str | None]
-    """The sources of models registered by others (:func:`mi_brdfs.mitsuba.guests.sources`), with the text of those that
-    are files."""
+    """The sources of others' models (:func:`mi_brdfs.mitsuba.guests.sources`), with the text of files."""
     versions: dict[str, str]
 
 
@@ -85,10 +84,10 @@ def _prepare(wanted: Setup) -> None:
 
     if text := problem(versions(), wanted.versions, get_worker().state.nthreads):
         raise RuntimeError(f"The worker at {get_worker().address} {text}.")
-    for source, text in wanted.guests.items():
-        guests.import_models(source if text is None else _file(source, text))
     if wanted.variant and wanted.variant != mi.variant():
         mi.set_variant(wanted.variant)
+    for source, text in wanted.guests.items():
+        guests.import_models(source if text is None else _file(source, text))
     if wanted.threads is not None:
         dr.set_thread_count(max(wanted.threads, 2))  # with one, Mitsuba waits forever for its bitmaps
     _current = wanted

@@ -78,11 +78,7 @@ def explore(*subjects: str | Path | dict[str, Any]) -> Page:
 
 
 def _subject(given: str | Path | dict[str, Any]) -> dict[str, Any]:
-    """Return what a page knows a BSDF by.
-
-    Raises:
-        ValueError: if it cannot be shown.
-    """
+    """Return what a page knows a BSDF by, or raise a ValueError if it cannot be shown."""
     subject = str(given.absolute()) if isinstance(given, Path) else given
     if not (isinstance(subject, str) or (isinstance(subject, dict) and isinstance(subject.get("type"), str))):
         raise ValueError(

@@ -148,7 +148,8 @@ def traversed(bsdf: mi.BSDF, given: Mapping[str, Any]) -> list[Control]:
     """Return the controls of the numbers and colours that ``mitsuba.traverse`` shows."""
     found = []
     for key, value in mi.traverse(bsdf):
-        numbers = np.ravel(np.array(value, np.float64)) if _is_value(value) else np.zeros(0)
+        is_value = isinstance(value, (int, float, mi.Float, mi.Color3f)) and not isinstance(value, bool)
+        numbers = np.ravel(np.array(value, np.float64)) if is_value else np.zeros(0)
         name, short = key_to_name(key), key.rpartition(".")[2]
         if len(numbers) == 1 and np.isfinite(numbers).all():
             limits = _guess(short if short not in VALUES else name, float(numbers[0]))
@@ -165,10 +166,6 @@ def key_to_name(key: str) -> str:
     """Return the property that a key of ``mitsuba.traverse`` belongs to."""
     head, _, last = key.rpartition(".")
     return head if head and last in VALUES else key
-
-
-def _is_value(value: Any) -> bool:
-    return isinstance(value, (int, float, mi.Float, mi.Color3f)) and not isinstance(value, bool)
 
 
 def _guess(name: str, value: float) -> tuple[float, float]:

@@ -8,14 +8,15 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from ..parameters.messages import listed
+from ..rendering.output import encoded
 from . import stages
 from .controls import LOBES, with_value
 from .materials import Materials
@@ -33,7 +34,7 @@ LARGEST = 3e6
 Varied = Mapping[str, Sequence[float]]
 """The values of scrubbers, by the names of parameters; ``theta`` is the angle of incidence."""
 At = tuple[int | None, ...]
-CLIENT = files(__package__) / "client"
+CLIENT = Path(__file__).parent / "client"
 
 
 def client_file(name: str) -> str:
@@ -51,11 +52,8 @@ def page(
     state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any], vary: Varied | None = None
 ) -> str:
     """Return the page with all views of a state, at several angles of incidence and values of parameters;
-    ``page_state`` is what the page itself said of it.
-
-    Raises:
-        StateError: if a subject cannot be shown, none has such a parameter, or the page would be too large.
-    """
+    ``page_state`` is what the page itself said of it. Raise a StateError if a subject cannot be shown, none has such a
+    parameter, or the page would be too large."""
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
     baked = _Baked(state, materials, scenes, vary)
@@ -147,7 +145,8 @@ class _Baked:
             with self.materials.loaded(bsdf) as loaded:
                 progress.advance(loaded)
         pixels, header = stages.shown(progress, self.state.exposure, self.scenes.denoise)
-        payload = _jpeg(np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3])
+        rgb = np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3]
+        payload = encoded(mi.Bitmap(np.ascontiguousarray(rgb)), "JPEG", 92)
         header |= {"type": "picture", "serial": 0, "subject": k, "final": True, "mime": "image/jpeg"}
         yield at(None), packed(payload, **header)
 
@@ -166,12 +165,6 @@ def _rounded(frame: bytes) -> bytes:
     end = 4 + int.from_bytes(frame[:4], "little")
     bits = np.frombuffer(frame[end:], np.uint32)
     return frame[:end] + ((bits + np.uint32(0x400)) & np.uint32(0xFFFFF800)).tobytes()
-
-
-def _jpeg(pixels: np.ndarray) -> bytes:
-    stream = mi.MemoryStream()
-    mi.Bitmap(np.ascontiguousarray(pixels)).write(stream, mi.Bitmap.FileFormat.JPEG, 92)
-    return bytes(stream.raw_buffer())
 
 
 def _inlined(data: str) -> str:

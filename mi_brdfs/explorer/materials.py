@@ -52,11 +52,8 @@ class Materials:
 
     def expanded(self, bsdf: Bsdf) -> Bsdf:
         """Return a plugin dict with what its short forms stand for: a published material, beside which other members
-        replace its own, the example of a model of which only the type is given, another number of lobes.
-
-        Raises:
-            StateError: if there is no such type, file or material.
-        """
+        replace its own, the example of a model of which only the type is given, another number of lobes. Raise a
+        StateError if there is no such type, file or material."""
         kind = bsdf["type"]
         if kind == PRESET:
             try:
@@ -86,11 +83,8 @@ class Materials:
 
     @contextmanager
     def loaded(self, bsdf: Bsdf) -> Iterator[mi.BSDF]:
-        """Load an expanded plugin dict. Nothing should keep it: Dr.Jit compiles kernels for all BSDFs that live.
-
-        Raises:
-            StateError: with the plugin's sentence.
-        """
+        """Load an expanded plugin dict, or raise a StateError with the plugin's sentence. Nothing should keep it:
+        Dr.Jit compiles kernels for all BSDFs that live."""
         kind = bsdf["type"]
         values = {name: value for name, value in bsdf.items() if name not in ("type", "file")}
         try:
@@ -103,7 +97,8 @@ class Materials:
                         self._loaded[source.word] = mi.load_dict(found) if isinstance(found, dict) else found
                     yield _with_values(self._loaded[source.word], values)
                 elif kind == MEASURED:
-                    yield mi.load_dict({**_source_dict(self._source(bsdf)), **properties(values)})
+                    measured: Any = self._source(bsdf).load()
+                    yield mi.load_dict({**measured, **properties(values)})
                 elif kind in MODELS:
                     yield mi.load_dict(properties(controls.with_defaults(MODELS[kind], bsdf)))
                 else:
@@ -203,12 +198,6 @@ def _option(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else f"{value:.7g}"
-
-
-def _source_dict(source: BSDFSource) -> dict[str, Any]:
-    found = source.load()
-    assert isinstance(found, dict)  # a measured file
-    return found
 
 
 def _built_in(kind: str, values: Bsdf) -> mi.BSDF:

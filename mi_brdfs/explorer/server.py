@@ -39,7 +39,6 @@ LARGEST_FRAME = 128 << 20
 """The bytes of a message, too long or not, that are waited for: more end the connection."""
 UPLOADS = 16
 """The most files that a session may hold."""
-KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript", "jpg": "image/jpeg"}
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
     "frame-ancestors "
@@ -97,17 +96,14 @@ class Explorer:
     async def _index(self, request: web.Request) -> web.Response:
         return web.Response(text=index(), content_type="text/html")
 
-    async def _client(self, request: web.Request) -> web.Response:
+    async def _client(self, request: web.Request) -> web.FileResponse:
         name = request.match_info["name"]
         if name not in {it.name for it in CLIENT.iterdir()}:
             raise web.HTTPNotFound
-        return web.Response(
-            body=(CLIENT / name).read_bytes(), content_type=KINDS[name.rpartition(".")[2]], charset="utf-8"
-        )
+        return web.FileResponse(CLIENT / name)
 
     async def _upload(self, request: web.Request) -> web.Response:
-        """Keep a measured file, a mesh or an environment map that can be read: its bytes are the body, its name is in
-        the address."""
+        """Keep a measured file, a mesh or an environment map that can be read: the body, named in the address."""
         name = Path(request.query.get("name", "")).name or "unnamed"
         ending = re.search(r"\.(?!xml$)[a-z]{1,9}$", name, re.IGNORECASE)
         try:
@@ -229,11 +225,7 @@ class PortError(ValueError):
 
 
 def listening(host: str, port: int | None) -> socket.socket:
-    """Return a socket that listens.
-
-    Raises:
-        PortError: if the address cannot be had, and why, in a sentence.
-    """
+    """Return a socket that listens, or raise a PortError that says in a sentence why there is none."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for wanted in [port] if port is not None else [PORT, 0]:
         found = socket.socket(family)

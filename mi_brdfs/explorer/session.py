@@ -26,6 +26,7 @@ import mitsuba as mi
 from ..mitsuba.errors import one_line
 from ..mitsuba.guests import import_models
 from ..mitsuba.registry import find_models
+from ..rendering.output import encoded
 from ..rendering.scene_file import with_material
 from . import stages
 from .export import page
@@ -66,14 +67,8 @@ class Fits:
 
 
 class Session:
-    """The engine's thread calls :meth:`step`, the server's all others.
-
-    Args:
-        materials: what may be loaded.
-        scenes: where it is shown.
-        send: takes frames to the page.
-        waiting: tells how many of these have not arrived.
-    """
+    """What ``materials`` has, shown in ``scenes``: ``send`` takes frames to the page, and ``waiting`` tells how many of
+    them have not arrived. The engine's thread calls :meth:`step`, the server's all others."""
 
     def __init__(
         self, materials: Materials, scenes: stages.Stages, send: Callable[[Frame], None], waiting: Callable[[], int]
@@ -100,11 +95,7 @@ class Session:
             self._latest, self._edited = (state, serial), time.perf_counter()
 
     def ask(self, request: Mapping[str, Any]) -> None:
-        """Take a request, or cancel the one at work.
-
-        Raises:
-            StateError: if the page has not said what it shows.
-        """
+        """Take a request, or cancel the one at work. Raise a StateError if the page has not said what it shows."""
         with self._lock:
             if request["type"] == "cancel":
                 self._fits = None
@@ -328,10 +319,8 @@ class Session:
     def _save_exr(self, k: int, state: State) -> None:
         if k not in self._pictures:
             raise StateError("There is no picture yet.")
-        stream = mi.MemoryStream()  # no file, for which the disk may have no room
-        self._pictures[k][1].bitmap().write(stream, mi.Bitmap.FileFormat.OpenEXR)
-        name = f"{state.subjects[k]['type']}.exr"
-        self.send(packed(stream.raw_buffer(), type="file", name=name, mime="image/x-exr"))
+        payload = encoded(self._pictures[k][1].bitmap(), "OpenEXR")
+        self.send(packed(payload, type="file", name=f"{state.subjects[k]['type']}.exr", mime="image/x-exr"))
 
     def _save_scene(self, k: int, state: State) -> None:
         """Write the user's scene with a material in it, beside the scene and never over a file."""

@@ -21,7 +21,7 @@ from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
-from ..rendering.output import denoise, tonemap
+from ..rendering.output import denoiser, tonemap
 from ..rendering.passes import pass_source
 from ..srgb import encoded_8bit
 from .state import INCIDENCE, SHAPES, Bsdf, State
@@ -154,14 +154,15 @@ class Stage:
             up = np.eye(3)[axis] * np.sign(own_up[axis])
             centre = np.mean([it.bbox().center() for it in self.shapes], axis=0)
             pivot = place + ahead * ((centre - place) @ ahead)
-            around = _translated(pivot) @ _turned(up, pose.yaw) @ _turned(right, pose.pitch) @ _translated(-pivot)
-            _put(sensor, around @ usual)
+            around = mi.ScalarTransform4f().translate(pivot).rotate(up, pose.yaw).rotate(right, pose.pitch)
+            _put(sensor, around.translate(-pivot), usual)
         for sky, usual in self._skies:
-            _put(sky, _turned(up, pose.turn) @ usual)
+            _put(sky, mi.ScalarTransform4f().rotate(up, pose.turn), usual)
         if self.light is not None:
             theta, phi = pose.incidence
             # The usual camera looks along y, and that of lobes against it.
-            _put(mi.traverse(self.light), _turned([0, 0, 1], phi + 180) @ _turned([0, 1, 0], theta + 180))
+            turned = mi.ScalarTransform4f().rotate([0, 0, 1], phi + 180).rotate([0, 1, 0], theta + 180)
+            _put(mi.traverse(self.light), turned, np.eye(4))
         self.pose = pose
 
 
@@ -169,17 +170,9 @@ def _matrix(params: Any) -> np.ndarray:
     return np.array(params["to_world"].matrix, np.float64).reshape(4, 4)
 
 
-def _put(params: Any, matrix: np.ndarray) -> None:
-    params["to_world"] = mi.Transform4f(mi.Matrix4f(matrix.tolist()))
+def _put(params: Any, moved: mi.ScalarTransform4f, usual: np.ndarray) -> None:
+    params["to_world"] = mi.Transform4f(mi.Matrix4f((np.array(moved.matrix) @ usual).tolist()))
     params.update()
-
-
-def _turned(axis: Any, angle: float) -> np.ndarray:
-    return np.array(mi.ScalarTransform4f().rotate(axis, angle).matrix)
-
-
-def _translated(by: Any) -> np.ndarray:
-    return np.array(mi.ScalarTransform4f().translate(by).matrix)
 
 
 def load(setting: Setting, user: UserScene) -> Stage:
@@ -211,11 +204,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
 
 
 def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
-    """Return what puts a shape, whose y is up, on the floor, no larger than the ball.
-
-    Raises:
-        ValueError: if it has no size.
-    """
+    """Return what puts a shape, whose y is up, on the floor, as large as the ball. Without size, raise a ValueError."""
     box, reach = shape.bbox(), 1.0
     if isinstance(shape, mi.Mesh):
         vertices = np.array(shape.vertex_positions_buffer()).reshape(-1, 3) - np.array(box.center())
@@ -306,8 +295,7 @@ def rgba(linear: np.ndarray, exposure: float) -> bytes:
 def shown(
     progress: Progress, exposure: float, denoise: Callable[[np.ndarray], np.ndarray] | None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Return the payload of a picture's frame, denoised if there is a function for it, and what its header says of
-    it."""
+    """Return the payload of a picture's frame, denoised if there is a function for it, and its header."""
     linear = progress.pixels()
     height, width = linear.shape[:2]
     header = {"width": width, "height": height, "spp": progress.spp, "denoised": denoise is not None}
@@ -319,7 +307,7 @@ class Stages:
 
     def __init__(self, user: UserScene) -> None:
         self.user = user
-        self.denoise = _denoiser()
+        self.denoise = denoiser()
         """A function of rgb, or None without the extra that brings it."""
         self._loaded: OrderedDict[Setting, Stage] = OrderedDict()
         self._known: set[Any] = set()
@@ -340,11 +328,7 @@ class Stages:
         return ["body", "sphere", *self.user.meshes, *(["scene"] if self.user.scene else [])]
 
     def stage(self, setting: Setting) -> Stage:
-        """Return the scene of a setting, in whatever pose.
-
-        Raises:
-            ValueError, RuntimeError: as :func:`load`.
-        """
+        """Return the scene of a setting, in whatever pose; raise as :func:`load` does."""
         setting = setting.scene()
         if setting not in self._loaded:
             self._loaded[setting] = load(setting, self.user)
@@ -354,11 +338,8 @@ class Stages:
         return self._loaded[setting]
 
     def add(self, path: Path, name: str) -> dict[str, str]:
-        """Take a mesh or an environment map that can be loaded, and return which member of a state it is a word for.
-
-        Raises:
-            ValueError, RuntimeError: as :func:`load`.
-        """
+        """Take a mesh or an environment map that can be loaded, and return which member of a state it is a word for;
+        raise as :func:`load` does."""
         kind, word = self.user.add(path, name)
         try:
             self.stage(Setting("studio", word, QUICK) if kind == "shape" else Setting(word, "body", QUICK))
@@ -389,11 +370,3 @@ class Stages:
         known = (words, purpose, scenes) in self._known
         self._known.add((words, purpose, scenes))
         return not known
-
-
-def _denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
-    try:
-        import mitsuba_oidn  # noqa: F401
-    except ImportError:
-        return None
-    return denoise

@@ -4,7 +4,6 @@ before anything is done. The members of a state are declared here, and the page 
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -102,15 +101,11 @@ def declared() -> dict[str, Any]:
 
 
 def decoded(data: str | bytes) -> dict[str, Any]:
-    """Return a message: an object with a type, and with no numbers but finite ones.
-
-    Raises:
-        StateError: if it is none.
-    """
+    """Return a message: an object with a type. Raise a StateError if it is none."""
     if len(data) > LONGEST:
         raise StateError(f"A message has {LONGEST} letters at most.")
     try:
-        found = json.loads(data, parse_int=_integer, parse_float=_finite, parse_constant=_finite)
+        found = json.loads(data)
     except (ValueError, RecursionError):
         found = None
     is_message = isinstance(data, str) and isinstance(found, dict) and isinstance(found.get("type"), str)
@@ -120,11 +115,7 @@ def decoded(data: str | bytes) -> dict[str, Any]:
 
 
 def checked_request(message: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a message that asks for something.
-
-    Raises:
-        StateError: if nothing can be asked for like this.
-    """
+    """Return a message that asks for something, or raise a StateError."""
     kind, subject = message["type"], message.get("subject", 0)
     if kind not in REQUESTS:
         raise StateError(f"There is no message {brief(kind)!r}.")
@@ -140,11 +131,7 @@ def checked_request(message: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> State:
-    """Return the state that a page sent, with the defaults for what it does not say.
-
-    Raises:
-        StateError: if it is not a state.
-    """
+    """Return the state that a page sent, with the defaults for what it does not say, or raise a StateError."""
     if not isinstance(data, Mapping):
         raise StateError("The state of a page is an object.")
     subjects = data.get("subjects")
@@ -155,22 +142,16 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
     views = data.get("views", State.views)
     if not isinstance(views, (list, tuple)) or any(it not in VIEWS for it in views):
         raise StateError(f"views are {listed(VIEWS)}.")
-    component = data.get("component")
+    known = {"channel": WORDS["channel"], "axis": WORDS["axis"], "stage": stages, "shape": shapes}
+    words: dict[str, Any] = {name: _word(data, name, of_it) for name, of_it in known.items()}
+    numbers: dict[str, Any] = {it: _number(data, it) for it in ("theta", "phi", "exposure", "turn", "yaw", "pitch")}
     return State(
         subjects=tuple(checked(it.get("bsdf")) for it in subjects),
         hidden=tuple(bool(it.get("hidden")) for it in subjects),
-        theta=_number(data, "theta"),
-        phi=_number(data, "phi"),
-        channel=_word(data, "channel", WORDS["channel"]),
-        component=None if component is None else int(_number(data, "component")),
+        **words,
+        **numbers,
+        component=None if data.get("component") is None else int(_number(data, "component")),
         cosine=data.get("cosine") is not False,
-        axis=_word(data, "axis", WORDS["axis"]),
-        stage=_word(data, "stage", stages),
-        shape=_word(data, "shape", shapes),
-        exposure=_number(data, "exposure"),
-        turn=_number(data, "turn"),
-        yaw=_number(data, "yaw"),
-        pitch=_number(data, "pitch"),
         size=int(_number(data, "size")),
         views=tuple(view for view in VIEWS if view in views),
         dragged=data.get("dragged") is True,
@@ -178,11 +159,7 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
 
 
 def checked(bsdf: Any) -> Bsdf:
-    """Return a plugin dict of plain values.
-
-    Raises:
-        StateError: if it is none, or names a file: those are known by names of their own.
-    """
+    """Return a plugin dict of plain values. Raise a StateError if it is none, or names a file other than by its key."""
     if not isinstance(bsdf, Mapping) or not isinstance(bsdf.get("type"), str):
         raise StateError("A material needs a bsdf with a type.")
     if len(bsdf) > PARAMETERS:
@@ -209,17 +186,6 @@ def _is_plain(value: Any) -> bool:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
-
-
-def _integer(text: str) -> float:
-    return int(text) if len(text) < 16 else _finite(text)
-
-
-def _finite(text: str) -> float:
-    number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(text)
-    return number
 
 
 def _number(data: Mapping[str, Any], name: str) -> float:

@@ -14,11 +14,7 @@ STEP = re.compile(
 
 
 def parse(name: str, source: str) -> dict[str, Any]:
-    """Return a tour as the page takes it.
-
-    Raises:
-        ValueError: if the text is none.
-    """
+    """Return a tour as the page takes it, or raise a ValueError."""
     title = re.match(r"# (.+)\n", source)
     steps = [
         {"title": step["title"], "state": json.loads(step["state"]), "text": step["text"]}

@@ -62,8 +62,7 @@ def _plain(value: Any) -> Any:
 
 @dataclass
 class ComponentProbe(BSDFProbe):
-    """A probe whose whole is one component, where the BSDF has it, and whose values are f without the cosine if that is
-    asked for."""
+    """A probe whose whole is one component, where the BSDF has it, and whose values may lack the cosine."""
 
     component: int | None = None
     cosine: bool = True

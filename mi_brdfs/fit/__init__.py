@@ -10,7 +10,7 @@ from ..measured import FileError
 from ..mitsuba.registry import find_model
 from ..writing import write_text
 from .engine import fit_configuration
-from .lanes import isotropic, rgb_variant
+from .lanes import rgb_variant
 from .metrics import METRICS, Metric, find_metric
 from .observations import CUT, PAIRS, FitError, Observations, Source, observe
 from .pictures import ImageFit, images
@@ -58,11 +58,11 @@ def fit(
     Free are all numbers and colours that a model declares, within their ranges, a colour with a value for each channel
     of the data: also parameters without a default, as the diffuse lobe that a model may have; models without one, as
     the diffuse ones, get none. Anisotropic data have the values for both tangent directions and the rotation; numbers
-    that would make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the parameters of
-    ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none". Words that later papers added to
-    the models of facets (f82, f90, schlick_exponent, film_thickness, film_ior, haze, haze_spread, retroreflectivity)
-    and the index outside stay as they are, unless they are given as "free". A thickness takes 64 starts or more, as
-    each order of interference is a valley of its own.
+    that are declared to make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the
+    parameters of ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none". Words that later
+    papers added to the models of facets (f82, f90, schlick_exponent, film_thickness, film_ior, haze, haze_spread,
+    retroreflectivity) and the index outside stay as they are, unless they are given as "free". A thickness takes 64
+    starts or more, as each order of interference is a valley of its own.
 
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are
@@ -131,7 +131,7 @@ def fit(
 
         for configuration, alike in todo:
             own = [materials[k] for k in alike]
-            reduced = configuration if own[0].anisotropic else isotropic(configuration)
+            reduced = configuration if own[0].anisotropic else configuration.isotropic()
             names = {unknown.name for unknown in reduced.unknowns} | set(reduced.tied)
             fixed = list(dict.fromkeys(u.name for u in configuration.unknowns if u.name not in names))
             fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, advance, fixed)

@@ -25,8 +25,6 @@ SIZE, SAMPLES, DEPTH, SEED = 256, 36, 3, 1
 data and fits: their noise is then alike, and almost none of it is in their difference."""
 MOST = 8
 """The most fits to a material that a report shows, and does not only list."""
-BRIGHT, STOPS = 0.9, 3
-"""How bright the brightest twentieth of the data's ball may become, and by how many stops at most it is brightened."""
 
 
 class Appearance(NamedTuple):
@@ -34,16 +32,13 @@ class Appearance(NamedTuple):
 
     data: Array
     fits: list[Array]
-    stops: int
-    """By how many stops all are brighter than rendered: a dark material would show nothing."""
+    stops: float
+    """By how many stops all are brighter than rendered."""
 
 
 def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> Appearance:
     """Render the data of fits to one material by ``tabulated``, and each fit, calling ``advance`` after each picture.
-
-    Raises:
-        FitError: if the data are arrays.
-    """
+    Raise a FitError if the data are arrays."""
     file = fits[0].file
     if not os.path.exists(file):
         raise FitError(f"Pictures need the file that was fitted; there is none of {file}.")
@@ -76,11 +71,7 @@ def by_flip(fits: Sequence[Fit], shown: Appearance) -> tuple[list[Fit], Appearan
 
 
 def evaluator() -> Callable[..., Any]:
-    """Return the function that computes FLIP.
-
-    Raises:
-        ImportError: if it is not installed.
-    """
+    """Return the function that computes FLIP, or raise an ImportError that says what brings it."""
     try:
         from flip_evaluator import evaluate
     except ImportError:
@@ -98,14 +89,12 @@ def _picture(bsdf: dict) -> Array:
     """Return a picture of a material, linear."""
     scene = preview_scene(bsdf)
     scene["integrator"]["max_depth"] = DEPTH
-    scene["sensor"]["film"] |= {"width": SIZE, "height": SIZE}
+    scene["sensor"]["film"] |= {"width": SIZE, "height": SIZE, "rfilter": {"type": "box"}}  # for the denoiser
     scene["sensor"]["sampler"] = {"type": "multijitter", "sample_count": SAMPLES}
     loaded = mi.load_dict(scene)  # alive until the picture is
     return np.array(mi.render(loaded, seed=SEED))[..., :3]
 
 
-def _stops(picture: Array) -> int:
-    """Return by how many stops a picture can be brightened without the ball in its middle being clipped."""
-    at = np.linspace(-1, 1, SIZE)
-    ball = np.hypot(at, at[:, None]) < 0.55
-    return int(np.clip(np.floor(np.log2(BRIGHT / max(np.quantile(luminance(picture)[ball], 0.95), 1e-6))), 0, STOPS))
+def _stops(picture: Array) -> float:
+    """Return by how many stops, in halves, a picture can be brightened, or must be darkened, to be hardly clipped."""
+    return float(np.floor(-2 * np.log2(np.quantile(picture.max(axis=-1), 0.995))) / 2)

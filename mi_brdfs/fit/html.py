@@ -11,12 +11,14 @@ import numpy as np
 from ..measured import Measurement, read
 from ..pages import environment
 from ..pages.figures import DIFFERENCE, data_uri, svg
+from ..rendering.output import denoiser
+from ..srgb import decoded, encoded
 from .appearance import MOST, Appearance, lightness
 from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import Fit, Median, medians, notes, values
+from .result import Fit, Median, medians, notes, number, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
@@ -56,7 +58,7 @@ class Section:
     """The picture of the data."""
     lightness: int = 0
     """The end of the scale of differences."""
-    stops: int = 0
+    stops: float = 0
     """By how many stops pictures are brightened."""
     quantity: str = ""
     """What residuals are of."""
@@ -131,12 +133,12 @@ def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
     cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
-    section.data = data_uri(shown.data)
-    at = lightness(shown.data)
-    differences = [lightness(picture) - at for picture in shown.fits[:MOST]]
+    data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
+    section.data = data_uri(data)
+    differences = [lightness(picture) - lightness(data) for picture in pictures]
     largest = np.quantile(abs(differences[0]), 0.99)
     section.lightness = next((end for end in SCALES if end >= largest), SCALES[-1])
-    for card, picture, difference in zip(cards, shown.fits, differences, strict=False):
+    for card, picture, difference in zip(cards, pictures, differences, strict=False):
         card.picture = data_uri(picture)
         card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference / section.lightness)[..., :3])
     with rgb_variant():
@@ -151,14 +153,15 @@ def _draw(section: Section, shown: Appearance) -> None:
         card.residuals = svg(each.draw(limit))
 
 
+def _smooth(picture: np.ndarray) -> np.ndarray:
+    """Return a picture in sRGB, denoised where the denoiser loads."""
+    denoise = denoiser()
+    return encoded(denoise(decoded(picture))) if denoise else picture
+
+
 def _error(fit: Fit) -> float:
     """Return the error by which fits are ranked."""
     return fit.held_out if fit.flip is None else fit.flip
-
-
-def _number(value: float | None) -> str:
-    """Return a number as the command prints it."""
-    return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
 def _told(measurement: Measurement) -> str:
@@ -168,4 +171,4 @@ def _told(measurement: Measurement) -> str:
     return ", ".join(word for word in words if word)
 
 
-environment.filters |= {"number": _number, "error": _error, "name": lambda file: Path(file).name}
+environment.filters |= {"number": number, "error": _error, "name": lambda file: Path(file).name}

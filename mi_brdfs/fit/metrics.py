@@ -92,11 +92,7 @@ METRICS = {
 
 
 def find_metric(name: str) -> Metric:
-    """Return the metric of a name.
-
-    Raises:
-        ValueError: if there is none.
-    """
+    """Return the metric of a name, or raise a ValueError."""
     if name not in METRICS:
         near = meant(str(name), METRICS)
         hint = f"did you mean {near!r}? There" if near else "there"

@@ -35,8 +35,7 @@ class FitError(ValueError):
 
 @dataclass(frozen=True)
 class Observations:
-    """Usable pairs of directions of one material, in random order: the first ``fitted`` are fitted, the others held
-    out."""
+    """Usable pairs of directions of a material, at random: the first ``fitted`` are fitted, the others held out."""
 
     name: str
     wi: np.ndarray

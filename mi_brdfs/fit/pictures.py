@@ -41,8 +41,7 @@ class ImageFit:
     """The standard deviations of numbers and channels, as far as noise of the pictures and of the last renderings goes;
     None at the end of a range, where the pictures tell nothing, and for bitmaps."""
     bsdfs: dict[str, dict[str, Any]]
-    """The materials they belong to, as plugin dicts for ``mi.load_dict``, by their paths. Textures are those of the
-    scene."""
+    """Their materials, by path, as plugin dicts for ``mi.load_dict`` with the scene's own textures."""
     bounds: list[str]
     """Numbers that ended at an end of their range."""
     losses: list[float]
@@ -184,13 +183,8 @@ def _found(rendered: Rendered, point: Array, sigma: Array, losses: Sequence[floa
         sigmas[slot.key] = deviations[0] if single else deviations
         bounds += [slot.key if single else f"{slot.key}.{channel}" for number, channel in zip(own, "rgb", strict=False)
                    if slot.unknown.at_end(float(number))]  # fmt: skip
-    return ImageFit(values, sigmas, _bsdfs(rendered.params, list(values)), bounds, list(losses), converged)
-
-
-def _bsdfs(params: mi.SceneParameters, keys: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return the plugin dicts of the BSDFs that keys belong to."""
-    owners = {path: bsdf for key, bsdf, path, _ in declared(params) if key in keys}
-    return {path: _plugin_dict(bsdf) for path, bsdf in owners.items()}
+    bsdfs = {path: _plugin_dict(bsdf) for key, bsdf, path, _ in declared(rendered.params) if key in values}
+    return ImageFit(values, sigmas, bsdfs, bounds, list(losses), converged)
 
 
 def _plugin_dict(bsdf: Any) -> dict[str, Any]:

@@ -98,8 +98,7 @@ class _Target:
         self.root = np.sqrt(weights / max(weights.sum(), 1e-300))
 
     def compared(self, model: Array, jacobian: Array) -> tuple[Array, Array]:
-        """Return the residuals and their derivatives by the unknowns, flat, of the first of the pairs, as many as there
-        are values."""
+        """Return the residuals of the first pairs, as many as there are values, and their derivatives, both flat."""
         root, factor = self.root[: len(model)], self.factor[: len(model)]
         seen = model.astype(np.float64) * factor
         residuals = root * (self.metric.transform(seen) - self.transformed[: len(model)])

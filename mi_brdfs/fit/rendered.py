@@ -92,13 +92,7 @@ class Rendered:
     difference is relative to the picture around it; their squares add to the mean over the usable pixels."""
 
     def __init__(
-        self,
-        scene: mi.Scene,
-        integrator: Any,
-        views: Sequence[View],
-        slots: Sequence[Slot],
-        spp: int,
-        seed: int,
+        self, scene: mi.Scene, integrator: Any, views: Sequence[View], slots: Sequence[Slot], spp: int, seed: int
     ):
         self.scene, self.params, self.integrator = scene, mi.traverse(scene), integrator
         self.views, self.slots, self.spp = views, list(slots), spp

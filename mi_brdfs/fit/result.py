@@ -181,20 +181,23 @@ def notes(fit: Fit) -> str:
     return ", ".join(words + ([f"at an end: {', '.join(fit.bounds)}"] if fit.bounds else []))
 
 
+def number(value: float | None) -> str:
+    """Return a number as text, empty if there is none."""
+    return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
+
+
 def values(fit: Fit) -> list[tuple[str, float, float | None]]:
-    """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's numbers, the first has the
-    name."""
+    """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's, the first has the name."""
     found = []
     for name, sigma in fit.sigma.items():
         value = fit.bsdf[name]
-        for k, number in enumerate(value["value"] if isinstance(value, dict) else [value]):
-            found.append(("" if k else name, number, sigma[k] if isinstance(sigma, list) else sigma))
+        for k, own in enumerate(value["value"] if isinstance(value, dict) else [value]):
+            found.append(("" if k else name, own, sigma[k] if isinstance(sigma, list) else sigma))
     return found
 
 
 def medians(ranked: Sequence[Sequence[Fit]]) -> list[Median]:
-    """Return the medians of each model's errors over materials, whose fits are each in the order of their rank; the
-    best first."""
+    """Return the medians of each model's errors over materials, whose fits are ordered by rank; the best first."""
     by_model: dict[str, list[Fit]] = {}
     for own in ranked:
         for it in own:

@@ -70,8 +70,7 @@ def _hue_and_level(material: Observations) -> tuple[Array, Array]:
 
 
 def warm(configuration: Configuration, given: Mapping[str, Any]) -> dict[int, float] | None:
-    """Return the unknowns that a plugin dict gives, by index; None if it has parameters or words that they do not
-    describe."""
+    """Return the unknowns that a plugin dict gives, by index; None if it has what they do not describe."""
     usual, found = default_words(configuration.model) | configuration.words, dict[int, float]()
     for name, value in given.items():
         if name == "type":

@@ -15,7 +15,7 @@ from ..parameters import Parameter, PerLobe, Quantity, nested
 from ..parameters.messages import listed
 from ..parameters.vocabulary import hint
 from ..probe.arrays import Array
-from ..probe.parameter_space import choices
+from ..probe.parameter_space import choices, present
 from .observations import FitError
 
 SMALLEST, LARGEST = 1e-3, 1e6
@@ -64,6 +64,8 @@ class Unknown:
     default: float | None = None
     limits: tuple[float, float] = (-math.inf, math.inf)
     """The ends of the parameter's own range, of which a share is sought up to ``EDGE``."""
+    isotropic_as: str | None = None
+    """As :class:`~mi_brdfs.parameters.Quantity` has it."""
 
     @property
     def label(self) -> str:
@@ -86,8 +88,7 @@ class Unknown:
         return SCALES[self.scale].slope(x, self.high + self.low)
 
     def shown(self, x: float) -> float:
-        """Return a value as a plugin dict has it: half turns change nothing, and what is at an end of the range is that
-        end itself."""
+        """Return a value as a plugin dict has it, without half turns, and at an end of the range that end itself."""
         if self.scale == "turns":
             return x - round(2 * x) / 2
         if not self.at_end(x):
@@ -116,7 +117,8 @@ def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
     else:
         low, scale = max(low, SMALLEST * min(high, 1)), "log"
     default = None if quantity.colour else quantity.default
-    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default, quantity.limits)
+    kept = quantity.limits, quantity.isotropic_as
+    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default, *kept)
 
 
 @dataclass(frozen=True)
@@ -164,12 +166,12 @@ class Configuration:
             values[name] = numbers[0] if len(numbers) == 1 else {"type": "rgb", "value": numbers}
         return {"type": self.plugin, **self.given, **values}
 
-    def without(self, names: Iterable[str], tied: Mapping[str, str]) -> Configuration:
-        """Return it without some unknowns, and with others tied."""
-        dropped = {*names, *tied}
-        return replace(
-            self, unknowns=tuple(u for u in self.unknowns if u.name not in dropped), tied={**self.tied, **tied}
-        )
+    def isotropic(self) -> Configuration:
+        """Return it for isotropic materials, without the unknowns that have nothing to say of them."""
+        names = {u.name for u in self.unknowns}
+        tied = {u.name: u.isotropic_as for u in self.unknowns if u.isotropic_as and u.isotropic_as in names}
+        kept = tuple(u for u in self.unknowns if u.isotropic_as != "" and u.name not in tied)
+        return replace(self, unknowns=kept, tied={**self.tied, **tied})
 
 
 def default_words(model: type[Model]) -> dict[str, Any]:
@@ -185,20 +187,12 @@ def _choices(declared: Iterable[Parameter]) -> Iterator[tuple[str, tuple[Any, ..
 
 
 def configurations(
-    model: type[Model],
-    given: Mapping[str, Any],
-    tied: Mapping[str, str],
-    lobes: int,
-    channels: int,
-    anisotropic: bool,
+    model: type[Model], given: Mapping[str, Any], tied: Mapping[str, str], lobes: int, channels: int, anisotropic: bool
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
     with the default of those that are not given. Names that it does not have are left out. Numbers and colours that are
-    ``FREE`` are sought even if fits leave them as they are.
-
-    Raises:
-        FitError: if there is no such word, or nothing is left to fit.
-    """
+    ``FREE`` are sought even if fits leave them as they are. Raise a FitError if there is no such word, or nothing is
+    left to fit."""
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
     tied = {key: value for key, value in tied.items() if {key, value} <= known}
@@ -212,9 +206,12 @@ def configurations(
     freed = {key for key, value in given.items() if isinstance(value, str) and value == FREE and key not in words}
     fixed = {key: value for key, value in given.items() if key not in {*words, *freed}}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
+    for parameter in model.declared():
+        if isinstance(parameter, PerLobe) and lobes >= len(parameter.numbers):
+            raise FitError(f"There can be {len(parameter.numbers) - 1} lobes at most, not {lobes}.")
     found = []
     for combination in _combinations(model.declared(), words, fixed):
-        free = _free(model.declared(), combination, lobes)
+        free = (it for it in present(model.declared(), combination, lobes) if not it.words)
         unknowns = [u for parameter in free for u in _unknowns_of(parameter, fixed, freed, channels, anisotropic)]
         usable = {u.name for u in unknowns}
         if missing := {*tied, *tied.values()} - usable:
@@ -265,25 +262,10 @@ def _combinations(
     return combinations
 
 
-def _free(declared: Iterable[Parameter], words: Mapping[str, Any], lobes: int) -> Iterator[Parameter]:
-    """Yield the parameters without words that exist with some words, with those of each lobe."""
-    for parameter in declared:
-        if isinstance(parameter, PerLobe):
-            if lobes >= len(parameter.numbers):
-                raise FitError(f"There can be {len(parameter.numbers) - 1} lobes at most, not {lobes}.")
-            for number in [""] if lobes == 1 else [f"_{k + 1}" for k in range(lobes)]:
-                yield from _free(parameter.lobe(number), words, lobes)
-        elif parameter.words:
-            yield from _free(parameter.words[words[parameter.name]].values(), words, lobes)
-        else:
-            yield parameter
-
-
 def _unknowns_of(
     parameter: Parameter, fixed: Mapping[str, Any], freed: set[str], channels: int, anisotropic: bool
 ) -> Iterator[Unknown]:
-    """Yield the unknowns of a parameter: none if it is given under one of its names, and both of a pair where the data
-    are anisotropic."""
+    """Yield the unknowns of a parameter: none if it is given under any name, both of a pair for anisotropic data."""
     if any(name in fixed for name in parameter.names):
         return
     for quantity in parameter.quantities(pairs=anisotropic):

@@ -146,8 +146,7 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
 
 
 def sweep_row(sweep: Sweep, type: str, stage: str, shots: list[Shot]) -> Row:
-    """Return the pictures of a sweep, as far as they go; under a point light, with what a limb and a terminator look
-    like."""
+    """Return the pictures of a sweep, as far as they go; under a point light, with their profiles."""
     captions = [shown(value) for value in sweep.values[: len(shots)]]
     profiles = [each.profile for each in shots] if stage == "point" else []
     return Row({0: sweep.heading(type)}, [each.picture for each in shots], captions, profiles)

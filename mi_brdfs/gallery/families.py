@@ -1,53 +1,24 @@
-"""The order of the models in the gallery, and the material that stands for each: in a family, the same colour and
-about the same roughness."""
+"""The order of the models in the gallery, and the materials that show each: those that stand for the models of a family
+have the same colour."""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from ..mitsuba.registry import is_own
 from ..model import FAMILIES, Model
 
+MODELS = json.loads(Path(__file__).with_name("models.json").read_text(encoding="utf-8"))
+"""The pack's models, each with its portrait and the sweeps that show it, the main one first: what is swept, its values,
+and what is given besides.
 
-def rgb(*channels: float) -> dict:
-    return {"type": "rgb", "value": list(channels)}
-
-
-CLAY, COPPER, BLUE = rgb(0.6, 0.35, 0.2), rgb(0.955, 0.638, 0.538), rgb(0.1, 0.2, 0.4)
-RED, GREEN = rgb(0.6, 0.1, 0.05), rgb(0.1, 0.3, 0.2)
-LACQUER = {"diffuse_reflectance": BLUE, "specular_reflectance": 0.2}
-ENAMEL = {"diffuse_reflectance": GREEN, "f0": 0.2}
-
-PORTRAITS: dict[str, dict[str, Any]] = {
-    # A roughness of 0.5, or what comes near.
-    "lambert": {"reflectance": CLAY},
-    "minnaert": {"reflectance": CLAY},
-    "orennayar": {"reflectance": CLAY, "sigma": 0.5},
-    "roughdiffuse": {"reflectance": CLAY, "alpha": 0.7},
-    "wrap": {"reflectance": CLAY},
-    "eon": {"reflectance": CLAY, "roughness": 0.5},
-    # α = 0.2
-    "microfacet": {"f0": COPPER, "alpha": 0.2},
-    "cooktorrance": {"f0": COPPER, "alpha": 0.2},
-    "ward": {"diffuse_reflectance": 0.0, "specular_reflectance": COPPER, "alpha": 0.2},
-    "schlick": {"specular_reflectance": COPPER, "roughness": 0.04},
-    "walter": {"f0": COPPER, "alpha": 0.2},
-    "kurt": {"diffuse_reflectance": 0.0, "f0": COPPER, "alpha": 0.2},
-    # A power of the half vector's cosine is about four times that of the mirror direction's.
-    "phong": {**LACQUER, "exponent": 20},
-    "blinnphong": {**LACQUER, "exponent": 80},
-    "lafortune": {**LACQUER, "exponent": 20},
-    "ashikhminshirley": {**LACQUER, "exponent": 80},
-    "burley": {"base_color": RED, "roughness": 0.3},
-    "metallicroughness": {"base_color": RED, "roughness": 0.3},
-    # Lobes as wide as those of α = 0.15
-    "nishino": {**ENAMEL, "kappa": -5.0, "gamma": 100},
-    "low": {"diffuse_reflectance": GREEN, "normalization": "unit", "b": 90, "c": 2.0, "int_ior": 2.6},
-    "brady": {**ENAMEL, "beta": 0.4, "exponent": 2.0},
-    "toon": {"diffuse_reflectance": RED, "diffuse_shadow": 0.3},
-}
+Portraits have facets of about α = 0.2 or what comes near (a power of the half vector's cosine is about four times that
+of the mirror direction's), lobes as wide as those of α = 0.15 among the fits to measurements, and what a model is known
+for."""
 STAGES = {"diffuse": "point", "cartoon": "point"}
 """The stages of families that are not shown in the studio."""
 
@@ -69,9 +40,20 @@ def by_family(models: Iterable[type[Model]]) -> list[type[Model]]:
 
 
 def portrait(model: type[Model]) -> dict[str, Any]:
-    """Return the material that stands for a model: the one above or, for other models, the example on its page."""
-    name = model.plugins[0]
-    return {"type": name, **PORTRAITS[name]} if is_own(model) and name in PORTRAITS else model.example()
+    """Return the material that stands for a model: that of the table or, for other models, the example on its page."""
+    name, known = model.plugins[0], of_own(model)
+    return {"type": name, **coloured(known["portrait"])} if known else model.example()
+
+
+def of_own(model: type[Model]) -> dict[str, Any]:
+    """Return what the table has of a model: of others, nothing."""
+    return MODELS["models"].get(model.plugins[0], {}) if is_own(model) else {}
+
+
+def coloured(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of parameters, with colours in place of their names."""
+    colours = MODELS["colours"]
+    return {name: {"type": "rgb", "value": colours[it]} if str(it) in colours else it for name, it in values.items()}
 
 
 def stage_of(model: type[Model]) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-PAPER, INK, FAINT, PALE = "white", "#222222", "#666666", "#bbbbbb"
+PAPER, INK, FAINT, FIRST = "white", "#222222", "#666666", "#e08214"
 GAP = 8
 FINER = 3
 """How many times larger profiles are drawn, for smooth lines."""
@@ -23,8 +23,7 @@ class Row(NamedTuple):
     captions: list[str]
     """A caption below each picture; its second line is fainter."""
     profiles: Sequence[np.ndarray] = ()
-    """If there are any, the brightness across each picture, to be drawn below it beside the first one, which is
-    pale."""
+    """If any, the brightness across each picture, drawn below it beside the first one, which is orange."""
 
 
 def sheet(rows: list[Row]) -> Image.Image:
@@ -72,10 +71,10 @@ def _profile(profiles: Sequence[np.ndarray], k: int, size: int) -> Image.Image:
     draw = ImageDraw.Draw(image)
     top = max(max(np.max(each) for each in profiles), 1e-9)
     floor = height - 2 * FINER
-    for each, colour in ((profiles[0], PALE), (profiles[k], INK)):
+    for each, colour in ((profiles[0], FIRST), (profiles[k], INK)):
         x = (np.arange(len(each)) + 0.5) * width / len(each)
         y = floor - np.clip(each / top, 0, 1) * (floor - 3 * FINER)
-        draw.line(list(zip(x.tolist(), y.tolist(), strict=True)), colour, round(1.4 * FINER), joint="curve")
+        draw.line(list(zip(x.tolist(), y.tolist(), strict=True)), colour, 2 * FINER, joint="curve")
     return image.resize((size, height // FINER), Image.Resampling.LANCZOS)
 
 

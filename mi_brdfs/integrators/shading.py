@@ -239,8 +239,7 @@ def null_transmission(si: mi.SurfaceInteraction3f, active: mi.Bool) -> Spectrum:
 
 
 def may_pass(scene: mi.Scene) -> bool:
-    """Return whether light may pass straight through some surface: always in scalar variants, which can ask each
-    surface."""
+    """Return whether light may pass straight through some surface: always in scalar variants, which can ask each."""
     if is_scalar():
         return True
     return any(mi.has_flag(it.flags(), mi.BSDFFlags.Null) for it in bsdfs_of(scene))

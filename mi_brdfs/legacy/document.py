@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import xml.etree.ElementTree as ET
@@ -66,8 +67,7 @@ class Element:
 
     def text(self, name: str) -> str:
         """Return the value of a property in lower case."""
-        found = self[name]
-        return found.value.strip().lower() if found else ""
+        return (self[name] or Element("")).value.strip().lower()
 
     def number(self, name: str, default: float) -> float:
         """Return the value of a number, and the default for a texture."""
@@ -80,15 +80,12 @@ class Element:
 
     def numbers(self, *counts: int) -> list[float]:
         """Return the numbers in its value, of which there are as many as one of the counts says, if there are any."""
-        try:
+        with suppress(ValueError):
             numbers = floats(self.value)
-        except ValueError:
-            raise self.error(f"{self.value!r} has something else than numbers") from None
-        if any(number != number for number in numbers):
-            raise self.error(f"{self.value!r} is no number")
-        if counts and len(numbers) not in counts:
-            raise self.error(f"{self.value!r} has {len(numbers)} numbers")
-        return numbers
+            if not any(map(math.isnan, numbers)) and (not counts or len(numbers) in counts):
+                return numbers
+        wanted = {(): "a list of numbers", (1,): "a number"}.get(counts, f"{' or '.join(map(str, counts))} numbers")
+        raise self.error(f"{self.value!r} is not {wanted}")
 
     def to_world(self) -> Element:
         """Return its transform, which it is given if it has none."""
@@ -102,10 +99,9 @@ class Element:
 
     def copy(self, name: str) -> Element:
         """Return a copy with another name and without an id, which stays with the original."""
-        attributes = {**self.attributes, "name": name}
-        for key in ("name",) * (not name) + ("id",) * (self.tag != "ref"):
-            attributes.pop(key, None)
-        return replace(self, attributes=attributes, children=[*self.children])
+        given = {**self.attributes, "name": name}
+        kept = {key: value for key, value in given.items() if value and (key != "id" or self.tag == "ref")}
+        return replace(self, attributes=kept, children=[*self.children])
 
     def of(self, *tags: str) -> list[Element]:
         """Return the children of some tags."""

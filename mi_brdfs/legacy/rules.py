@@ -156,9 +156,9 @@ def rough_alpha(work: Work, element: Element) -> None:
 
 def pair_of_alpha(work: Work, element: Element) -> None:
     """0.6 takes alpha for what is not given of the pair beside it."""
-    pair = "alpha_u", "alpha_v"
-    if any(name in element for name in pair) and (alpha := element.pop("alpha")):
-        element.children += [alpha.copy(name) for name in pair if name not in element]
+    missing = [name for name in ("alpha_u", "alpha_v") if name not in element]
+    if len(missing) < 2 and (alpha := element.pop("alpha")):
+        element.children += [alpha.copy(name) for name in missing]
         work.changed(element, f"alpha of {element.type} is what alphaU and alphaV are where they are not given")
 
 

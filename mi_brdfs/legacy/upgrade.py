@@ -85,10 +85,8 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
         try:
             text = path.read_text(encoding="utf-8")
             tree = ET.fromstring(text.encode())
-        except UnicodeDecodeError as error:
-            raise ValueError(f"{path}: the file is no UTF-8: {error}.") from None
         except (ET.ParseError, LookupError, ValueError) as error:
-            raise ValueError(f"{path}: no well-formed XML: {error}.") from None
+            raise ValueError(f"{path}: no well-formed XML in UTF-8: {error}.") from None
         version = tree.get("version", "").strip()
         if tree.tag != "scene" or not re.fullmatch(r"[\d.]+", version):
             raise ValueError(f"{path}: the file has a <{tree.tag}> of version {version!r}, no scene of Mitsuba.")
@@ -277,7 +275,7 @@ class Work:
                 swapped = self.resolved(child).copy(child.name)
                 for name, it in zip(("color1", "color0"), checks, strict=True):
                     swapped.set(name, float(np.mean(it.numbers())))
-                element.children[element.children.index(child)] = swapped
+                element.put(swapped)
 
     def _succeeded(self, element: Element) -> Element | None:
         """Return a plugin under its name in Mitsuba 3, or what is nearest to it."""

@@ -110,8 +110,7 @@ class RoughDiffuseLobe(Lobe):
         return dr.select(r > 0, root, 0) * share
 
     def _matrix(self, wi: mi.Vector3f) -> tuple[mi.Float, mi.Float, mi.Float, mi.Float]:
-        """Return ``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame whose x axis is the azimuth of
-        wi."""
+        """Return ``(a, b, c, d)`` of the matrix ((a 0 b) (0 c 0) (d 0 1)), in a frame with wi in its xz plane."""
         mu, r = wi.z, self.retro
         a = 1 + r * (0.303392 + mu * (-0.518982 + 0.111709 * mu) + r * (-0.276266 + 0.335918 * mu))
         b = r * (-1.16407 + 1.15859 * mu + r * (0.150815 - 0.150105 * mu)) / (mu * mu * mu - 1.43545)

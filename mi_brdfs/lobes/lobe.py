@@ -1,5 +1,4 @@
-"""The contract of a lobe, one additive part of a BRDF; and mixtures of them: the choice among lobes, and the resulting
-density."""
+"""The contract of a lobe, one additive part of a BRDF, and mixtures of them: choice among lobes, and density."""
 
 from __future__ import annotations
 

@@ -31,8 +31,7 @@ class AxisFrame:
         return log1p(-versine), versine, inside
 
     def direction(self, versine: mi.Float, b: mi.Float, c: mi.Float) -> mi.Vector3f:
-        """Return the direction of cosine A = 1 - ``versine`` whose remainder points along ``b up + c side``, with
-        b² + c² = 1."""
+        """Return the direction with A = 1 - ``versine`` and the rest along ``b up + c side``, with b² + c² = 1."""
         sin = safe_sqrt(versine * (2 - versine))
         return self.axis * (1 - versine) + self.up * (sin * b) + self.side * (sin * c)
 

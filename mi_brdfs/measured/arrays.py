@@ -48,11 +48,8 @@ def vector(x: Any, y: Any, z: Any) -> SimpleNamespace:
 
 
 def components(w: np.ndarray) -> SimpleNamespace:
-    """Return unit vectors, shape (…, 3), by component.
-
-    Raises:
-        ValueError: if they are of another shape, or one has another length: near grazing, half vectors would turn.
-    """
+    """Return unit vectors, shape (…, 3), by component. Raise a ValueError for other shapes and lengths: near grazing,
+    half vectors would turn."""
     w = np.asarray(w, dtype=np.float64)
     if w.shape[-1:] != (3,):
         raise ValueError(f"directions must be arrays of shape (…, 3), not {w.shape}")

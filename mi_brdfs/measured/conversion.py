@@ -23,7 +23,7 @@ from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
 from .report.counts import census
-from .report.summary import ends
+from .report.summary import ends, percent
 from .scattered import as_grid
 from .source import Source, batches, pairs
 
@@ -54,7 +54,7 @@ class Conversion:
     def __str__(self) -> str:
         error = (
             f"Read back at {PAIRS:,} random pairs of directions up to {BAKED_TO}° from the normal, f cosθ is off by "
-            f"{_percent(self.rms)} of its peak (root mean square), and by at most {_percent(self.largest)} farther "
+            f"{percent(self.rms)} of its peak (root mean square), and by at most {percent(self.largest)} farther "
             "than a cell from the peak."
         )
         return "\n".join([f"{named(self.path)}: {self.format}.", error, *self.losses])
@@ -155,10 +155,10 @@ def _not_measured(measurement: Measurement) -> Iterator[str]:
     """Yield what of a measurement means nothing, or is not there, and is made up."""
     data, found = measurement.data, census(measurement.data)
     if found.above.negative and not (isinstance(data, Grid) and data.signed):
-        yield f"{_percent(found.above.negative / found.above.values)} of its values were negative and became 0."
+        yield f"{percent(found.above.negative / found.above.values)} of its values were negative and became 0."
     if found.above.missing:
         yield (
-            f"{_percent(found.above.missing / found.above.values)} of its values were missing; they are filled in from "
+            f"{percent(found.above.missing / found.above.values)} of its values were missing; they are filled in from "
             "those around them, with 0 where there are none."
         )
     ranges = [("θi", *ends(data, "theta_i", found.theta_i)), ("θo", *ends(data, "theta_o", found.theta_o))]
@@ -184,11 +184,7 @@ def _alike(f: Array, other: Array) -> bool:
 
 
 def _writer(path: Path, format: str | None) -> ModuleType:
-    """Return the module of the format to write.
-
-    Raises:
-        ValueError: if there is none.
-    """
+    """Return the module of the format to write, or raise a ValueError."""
     writable = {it.NAME: it for it in FORMATS if hasattr(it, "write")}
     fitting = [name for name in ENDINGS.get(path.suffix.lower(), []) if name in writable]
     chosen = [name for name in fitting if format is None or name.lower() == format.lower()]
@@ -222,14 +218,9 @@ def _compared(source: Source, written: Measurement) -> tuple[float, float, list[
     if grid.coordinates.reciprocal and changes.max() > ALIKE * peak:
         losses.append(
             f"{written.format} is reciprocal: f is the mean over both orders of the directions, between which f "
-            f"cosθ differs by up to {_percent(changes.max() / peak)} of its peak."
+            f"cosθ differs by up to {percent(changes.max() / peak)} of its peak."
         )
     places, _ = grid.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
     cells = np.stack([np.interp(x, a.nodes, np.arange(len(a.nodes))) for a, x in zip(grid.axes, places, strict=True)])
     far = (abs(cells - cells[:, [brightest.argmax()]]) > 1).any(axis=0)
     return float(np.sqrt(np.mean(error**2)) / peak), float(error[far].max(initial=0) / peak), losses
-
-
-def _percent(part: float) -> str:
-    percent = 100 * part
-    return "less than 0.001 %" if percent < 0.001 else f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"

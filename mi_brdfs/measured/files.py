@@ -15,12 +15,8 @@ from .measurement import FileError
 
 
 def checked(path: str | Path) -> Path:
-    """Return the path of a file, in the folder of the environment variable MI_BRDFS_MERL_DIR if only that has it. It
-    can be read, is a file and has something in it.
-
-    Raises:
-        FileError: if not.
-    """
+    """Return the path of a file, in the folder of the environment variable MI_BRDFS_MERL_DIR if only that has it. Raise
+    a FileError if it cannot be read, is no file or has nothing in it."""
     path, folder = Path(path), os.environ.get("MI_BRDFS_MERL_DIR")
     if folder and not path.exists() and (Path(folder) / path).is_file():
         path = Path(folder) / path
@@ -40,11 +36,7 @@ def checked(path: str | Path) -> Path:
 
 
 def content_hash(path: str | Path) -> str:
-    """Return the SHA-256 of a file: another content may have the same size and time.
-
-    Raises:
-        FileError: if it cannot be read.
-    """
+    """Return the SHA-256 of a file, as another content may have the same size and time, or raise a FileError."""
     try:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
@@ -76,11 +68,8 @@ class BinaryFile:
         return FileError(f"{self.path}: at byte {self.offset if offset is None else offset}, {problem}.")
 
     def take(self, dtype: Any, count: int, what: str) -> np.ndarray:
-        """Return the next ``count`` numbers, and move behind them.
-
-        Raises:
-            FileError: if the file ends before; ``what`` says in plural what is missing.
-        """
+        """Return the next ``count`` numbers, and move behind them. Raise a FileError if the file ends before; ``what``
+        says in plural what is missing."""
         dtype = np.dtype(dtype).newbyteorder("<")
         needed = int(count) * dtype.itemsize
         if needed > self.left:

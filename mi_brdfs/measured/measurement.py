@@ -318,10 +318,7 @@ def usable(values: np.ndarray) -> np.ndarray:
 
 def representable(measurement: Measurement) -> Measurement:
     """Return a measurement that can be rendered, with NaN in place of values beyond ``MOST``, infinite ones among them.
-
-    Raises:
-        FileError: if no value is left that is positive, or wavelengths are too many, no numbers or the same.
-    """
+    Raise a FileError if no value is left that is positive, or wavelengths are too many, no numbers or the same."""
     values, nm = measurement.data.values, measurement.wavelengths
     if values.shape[-1] > MOST_CHANNELS:
         raise FileError(

@@ -19,11 +19,7 @@ LEAST_COSINE = 1e-4
 
 
 def checked_angles(file: TextFile, polar: Iterable[np.ndarray], azimuths: Iterable[np.ndarray]) -> None:
-    """Refuse rows with angles, in radians and of shape (N,), that no direction above the surface has.
-
-    Raises:
-        FileError: if there are some.
-    """
+    """Raise a FileError for rows with angles, in radians and of shape (N,), that no direction above the surface has."""
     for name, columns, most in (("θ", polar, np.pi / 2), ("φ", azimuths, 4 * np.pi)):
         for angles in columns:
             good = abs(angles) <= most + SAME

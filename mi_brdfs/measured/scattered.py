@@ -105,8 +105,7 @@ def spaced(places: tuple[np.ndarray, ...], brightness: np.ndarray, size: int) ->
 
 
 def spread(places: np.ndarray, brightness: np.ndarray, end: float, count: int) -> np.ndarray:
-    """Return nodes from 0 to ``end``, a third of which are spread evenly, a third as samples are, and a third as their
-    brightness is."""
+    """Return nodes from 0 to ``end``: a third spread evenly, a third as samples are, a third as their brightness is."""
     x = np.linspace(0, end, 8 * count + 1)
     order = np.argsort(places)
     share = x / end

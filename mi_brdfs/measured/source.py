@@ -42,11 +42,7 @@ class Source:
         return replace(self, evaluate=evaluate, wavelengths=None)
 
     def check_size(self, pairs: int, most: int) -> None:
-        """Refuse to be written at so many pairs of directions.
-
-        Raises:
-            ValueError: if there are more values than ``most``.
-        """
+        """Raise a ValueError if there are more values than ``most`` at so many pairs of directions."""
         if self.wavelengths is not None and pairs * len(self.wavelengths) > most:
             raise ValueError(
                 f"{len(self.wavelengths):,} wavelengths at {pairs:,} pairs of directions would be more values than the "

@@ -62,11 +62,7 @@ class TextFile:
         return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")
 
     def numbers(self, words: Sequence[str], what: str = "a number") -> np.ndarray:
-        """Return words as numbers, also ``nan`` and ``inf``.
-
-        Raises:
-            FileError: if one is none.
-        """
+        """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
         try:
             return np.array(words, dtype=np.float64)
         except ValueError:
@@ -75,12 +71,8 @@ class TextFile:
 
     def table(self, rows: Iterable[Sequence[str]], columns: int, what: str, more: bool = False) -> np.ndarray:
         """Return rows of words as numbers, shape (rows, columns); with ``more``, further columns are left out.
-
-        ``row_lines`` has the line of each.
-
-        Raises:
-            FileError: if a row has fewer numbers or more, or there is no row; ``what`` says what columns are.
-        """
+        ``row_lines`` has the line of each. Raise a FileError if a row has fewer numbers or more, or there is no row;
+        ``what`` says what columns are."""
         numbers = array("d")
         self.row_lines = array("q")
         for words in rows:
@@ -98,11 +90,8 @@ class TextFile:
         return np.frombuffer(numbers).reshape(-1, columns)
 
     def list_of(self, rows: Iterable[Sequence[str]], count: int, what: str, each: str) -> np.ndarray:
-        """Return as many numbers as are announced, from as many rows as they fill.
-
-        Raises:
-            FileError: if there are fewer or more; ``what`` says in plural what they are, and ``each`` what one is.
-        """
+        """Return as many numbers as are announced, from as many rows as they fill. Raise a FileError if there are fewer
+        or more; ``what`` says in plural what they are, and ``each`` what one is."""
         found: list[float] = []
         for row in rows:
             found += self.numbers(row, each).tolist()
@@ -113,8 +102,7 @@ class TextFile:
         raise self.error(f"the file ends after {len(found)} of {count} {what}")
 
     def stated(self, *names: str) -> str:
-        """Return what a comment ``name: …`` or ``name = …`` says, of the first of the names, regular expressions, that
-        has one."""
+        """Return what a comment ``name: …`` or ``name = …`` says, of the first pattern of names that has one."""
         for name in names:
             for comment in self.comments:
                 if match := re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment):

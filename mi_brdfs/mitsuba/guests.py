@@ -24,6 +24,8 @@ ENTRY_POINTS = "mi_brdfs.models"
 """The entry-point group for models of installed packages."""
 _files: dict[str, str] = {}
 """The files imported by path, by module name."""
+_of_bsdfs: list[str] = []
+"""The modules that define BSDFs of Mitsuba's own kind."""
 
 
 def register_installed() -> None:
@@ -68,7 +70,9 @@ def import_models(target: str) -> None:
     except (Exception, SystemExit) as error:
         raise ImportError(_sentence(error, path)) from None
     found = _brought_by(module)
-    if not found and not _defines_bsdf(module):
+    if _defines_bsdf(module):
+        _of_bsdfs.append(module.__name__)
+    elif not found:
         raise ValueError("it defines no subclass of mi_brdfs.Model or mi.BSDF, nor a term of the kit with a word")
     for each in found:
         register(each)
@@ -95,10 +99,10 @@ def source(brought: type[Model] | type[Term]) -> str | None:
 
 
 def sources() -> list[str]:
-    """Return the sources of all models and terms registered by others."""
+    """Return the sources of all models, terms and BSDFs registered by others."""
     brought: list[Any] = [*brought_terms().values(), *(model for model in all_models() if not is_own(model))]
-    found = dict.fromkeys(map(source, brought))
-    return [each for each in found if each]
+    found = [*map(source, brought), *(_files.get(name, name) for name in _of_bsdfs)]
+    return [each for each in dict.fromkeys(found) if each]
 
 
 def _of_file(path: Path) -> ModuleType:

@@ -146,8 +146,7 @@ class PixelCentreIntegrator:
         return dr.forward_to(film.develop())
 
     def put(self, film: mi.Film, sums: Any, count: Any) -> None:
-        """Fill a film with the finished means of its pixels, where ``sums`` are over ``count`` samples, the weight of
-        each pixel."""
+        """Fill a film with the finished means of its pixels: ``sums`` over ``count`` samples, each pixel's weight."""
         film.prepare([])
         block, has_alpha = film.create_block(), mi.has_flag(film.flags(), mi.FilmFlags.Alpha)
         # A box filter needs the corner, as in Mitsuba's own integrators.
@@ -212,8 +211,7 @@ def pixels(film: mi.Film) -> Any:
 
 
 def samples_at_once(film: mi.Film, sampler: mi.Sampler) -> int:
-    """Return the number of samples of each pixel drawn at once: a divisor of all, as samplers that stratify over all
-    passes require."""
+    """Return the samples of each pixel drawn at once: a divisor of all, as samplers that stratify over passes need."""
     spp, most = sampler.sample_count(), max(LANES // dr.width(pixels(film)), 1)
     return next(count for count in range(min(spp, most), 0, -1) if spp % count == 0)
 

@@ -45,11 +45,8 @@ class TooLate:
 
 
 def check(variant: str | None) -> None:
-    """Refuse a variant in which rendering would abort the process, if a restart cures that, and else warn once.
-
-    Raises:
-        ImportError: if Dr.Jit was imported before it could take the library of the ``llvm`` extra.
-    """
+    """Refuse a variant in which rendering would abort the process, by an ImportError if a restart cures that, as where
+    Dr.Jit was imported before it could take the library of the ``llvm`` extra, and else warn once."""
     if variant and variant.startswith("llvm") and (text := problem()):
         if TooLate in sys.meta_path:
             raise ImportError(text)

@@ -202,20 +202,12 @@ def own_models() -> list[type[Model]]:
 
 
 def find_models(names: Iterable[str] | None) -> list[type[Model]]:
-    """Return the models of some plugin names, each once, or all models if there are no names.
-
-    Raises:
-        ValueError: as :func:`find_model`.
-    """
+    """Return the models of some plugin names, each once, or all if there are none; raise as :func:`find_model`."""
     return list(dict.fromkeys(map(find_model, names or []))) or all_models()
 
 
 def find_model(name: str) -> type[Model]:
-    """Return the model of a plugin name.
-
-    Raises:
-        ValueError: if there is none, with the closest name there is.
-    """
+    """Return the model of a plugin name, or raise a ValueError with the closest name there is."""
     return _find(name, MODELS)
 
 
@@ -230,11 +222,7 @@ def info(name: str) -> str:
 
 
 def find_plugin(name: str) -> type[Plugin]:
-    """Return the class of a plugin name, of a model or of another plugin.
-
-    Raises:
-        ValueError: as :func:`info`.
-    """
+    """Return the class of a plugin name, of a model or not, or raise a ValueError with the closest name."""
     return _find(name, _own_plugins())
 
 

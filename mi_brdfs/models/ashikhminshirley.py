@@ -33,12 +33,6 @@ class AshikhminShirley(Model):
 
     Example
     -------
-    <bsdf type="ashikhminshirley">
-        <rgb name="diffuse_reflectance" value="0.3, 0.1, 0.35"/>
-        <float name="exponent_u" value="20"/>
-        <float name="exponent_v" value="400"/>
-    </bsdf>
-
     {"type": "ashikhminshirley", "diffuse_reflectance": {"type": "rgb", "value": [0.3, 0.1, 0.35]},
      "exponent_u": 20, "exponent_v": 400}
     """

@@ -42,12 +42,6 @@ class BlinnPhong(Model):
 
     Example
     -------
-    <bsdf type="blinnphong">
-        <rgb name="diffuse_reflectance" value="0.15, 0.3, 0.05"/>
-        <float name="exponent" value="80"/>
-        <string name="normalization" value="ndf"/>
-    </bsdf>
-
     {"type": "blinnphong", "diffuse_reflectance": {"type": "rgb", "value": [0.15, 0.3, 0.05]},
      "exponent": 80, "normalization": "ndf"}
     """

@@ -34,17 +34,10 @@ class Brady(Model):
     Reciprocal. Energy-conserving for ``unit`` with ρd + ρs <= 1: for F = 1 the albedo is at most ρs, and that of narrow
     lobes falls like cosθ_i towards grazing angles. One-sided. Depolarises.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------
-    <bsdf type="brady">
-        <float name="f0" value="0.6"/>
-        <float name="exponent" value="0.8"/>
-        <float name="diffuse_reflectance" value="0.1"/>
-    </bsdf>
-
     {"type": "brady", "f0": 0.6, "exponent": 0.8, "diffuse_reflectance": 0.1}
     """
 

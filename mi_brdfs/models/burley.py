@@ -61,12 +61,6 @@ class Burley(Model):
 
     Example
     -------
-    <bsdf type="burley">
-        <rgb name="base_color" value="0.6, 0.1, 0.05"/>
-        <float name="roughness" value="0.4"/>
-        <float name="clearcoat" value="1"/>
-    </bsdf>
-
     {"type": "burley", "base_color": {"type": "rgb", "value": [0.6, 0.1, 0.05]}, "roughness": 0.4, "clearcoat": 1.0}
     """
 
@@ -79,7 +73,7 @@ class Burley(Model):
     specular = Number(0.5, (0, 1), "reflectance of the dielectric at normal incidence, in units of 0.08")
     spec_tint = Number(0, (0, 1), "tint of the dielectric's reflection towards the hue of C")
     roughness = Number(0.5, (0, 1), "roughness of the base and the specular lobe; its square is the facets' α")
-    anisotropic = Number(0, (0, 1), "how far the highlight is stretched along dp_du")
+    anisotropic = Number(0, (0, 1), "how far the highlight is stretched along dp_du", isotropic_as="")
     sheen = Number(None, (0, 1), "scale of the sheen; omitted by default")
     sheen_tint = Number(0.5, (0, 1), "tint of the sheen towards the hue of C")
     clearcoat = Number(None, (0, 1), "scale of the clear coat, in units of 0.25; omitted by default")

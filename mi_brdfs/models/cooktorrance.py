@@ -42,16 +42,10 @@ class CookTorrance(Model):
     In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface or film does;
     ``f0``, F = 1 and the diffuse lobe depolarise it.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------
-    <bsdf type="cooktorrance">
-        <string name="material" value="Cu"/>
-        <float name="alpha" value="0.25"/>
-    </bsdf>
-
     {"type": "cooktorrance", "material": "Cu", "alpha": 0.25}
     """
 

@@ -35,11 +35,6 @@ class EON(Model):
 
     Example
     -------
-    <bsdf type="eon">
-        <rgb name="reflectance" value="0.6, 0.35, 0.2"/>
-        <float name="roughness" value="0.8"/>
-    </bsdf>
-
     {"type": "eon", "reflectance": {"type": "rgb", "value": [0.6, 0.35, 0.2]}, "roughness": 0.8}
     """
 

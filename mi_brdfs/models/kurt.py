@@ -27,17 +27,10 @@ class Kurt(Model):
     1.05 at 88° and 3.7 at 89.9°. The power 4 of the cosine in D was not checked against the paper. One-sided.
     Depolarises.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------
-    <bsdf type="kurt">
-        <rgb name="diffuse_reflectance" value="0.03, 0.2, 0.2"/>
-        <float name="alpha_1" value="0.05"/>
-        <float name="alpha_2" value="0.3"/>
-    </bsdf>
-
     {"type": "kurt", "diffuse_reflectance": {"type": "rgb", "value": [0.03, 0.2, 0.2]}, "alpha_1": 0.05, "alpha_2": 0.3}
     """
 
@@ -56,10 +49,7 @@ class Kurt(Model):
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         glossy = [
             MicrofacetLobe(
-                lobe.specular_reflectance,
-                Beckmann(*lobe.alpha),
-                KurtShadowing(lobe.kurt_exponent),
-                Schlick(lobe.f0),
+                lobe.specular_reflectance, Beckmann(*lobe.alpha), KurtShadowing(lobe.kurt_exponent), Schlick(lobe.f0)
             )
             for lobe in p.specular
         ]

@@ -36,14 +36,6 @@ class Lafortune(Model):
 
     Example
     -------
-    <bsdf type="lafortune">
-        <float name="exponent_1" value="20"/>
-        <float name="cx_2" value="0.9"/>
-        <float name="cy_2" value="0.9"/>
-        <float name="cz_2" value="0.7"/>
-        <float name="exponent_2" value="9"/>
-    </bsdf>
-
     {"type": "lafortune", "exponent_1": 20, "cx_2": 0.9, "cy_2": 0.9, "cz_2": 0.7, "exponent_2": 9}
     """
 
@@ -54,7 +46,7 @@ class Lafortune(Model):
         8,
         specular_reflectance=Reflectance(0.2, "scale ρ of lobe i", role="specular"),
         cx=Number(-1, (-1.5, 1.5), "factor Cx of lobe i"),
-        cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i"),
+        cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i", isotropic_as="cx"),
         cz=Number(1, (-1.5, 1.5), "factor Cz of lobe i"),
         exponent=Number(30, (0, 1e6), "exponent n of lobe i"),
     )
@@ -85,8 +77,7 @@ class LafortuneLobe(PowerLobe):
         self.c, self.unit = c, unit
 
     def _stretched(self, wi: mi.Vector3f) -> tuple[mi.Vector3f, mi.Float]:
-        """Return ``(C∘wi, its length)``, the length relative to that of wi, which may differ from one by a rounding
-        error."""
+        """Return ``(C∘wi, its length)``, relative to that of wi, which may differ from one by a rounding error."""
         v = mi.Vector3f(self.c[0] * wi.x, self.c[1] * wi.y, self.c[2] * wi.z)
         # At less than SMALL, the derivatives of its power leave the range of float32.
         return v, dr.sqrt(dr.maximum(dr.squared_norm(v) / dr.squared_norm(wi), SMALL * SMALL))

@@ -19,10 +19,6 @@ class Lambert(Model):
 
     Example
     -------
-    <bsdf type="lambert">
-        <rgb name="reflectance" value="0.2, 0.5, 0.8"/>
-    </bsdf>
-
     {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
     """
 

@@ -48,13 +48,6 @@ class Low(Model):
 
     Example
     -------
-    <bsdf type="low">
-        <rgb name="diffuse_reflectance" value="0.1, 0.3, 0.2"/>
-        <float name="a" value="50"/>
-        <float name="b" value="2000"/>
-        <float name="c" value="1.2"/>
-    </bsdf>
-
     {"type": "low", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.3, 0.2]}, "a": 50.0, "b": 2000, "c": 1.2}
     """
 
@@ -130,8 +123,7 @@ class SmoothLobe(Lobe):
         return dr.maximum(luminance(self._reflectance(wi, x, y)), SMALL)
 
     def _end(self, wi: mi.Vector3f, x: mi.Float, y: mi.Float, u: mi.Float) -> tuple[Any, mi.Float]:
-        """Return ``(point, W)``: the point at the fraction ``u`` of the mass on one side of a chord, and that mass
-        times F."""
+        """Return the point at the fraction ``u`` of the mass on one side of a chord, and that mass times F."""
         mass = self._mass(wi, x, y)
         d = safe_sqrt(self.law.inverse(u * mass))
         point = (d * x - wi.x, d * y - wi.y)

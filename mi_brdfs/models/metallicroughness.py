@@ -45,11 +45,6 @@ class MetallicRoughness(Model):
 
     Example
     -------
-    <bsdf type="metallicroughness">
-        <rgb name="base_color" value="0.9, 0.6, 0.3"/>
-        <float name="metallic" value="1"/>
-    </bsdf>
-
     {"type": "metallicroughness", "base_color": {"type": "rgb", "value": [0.9, 0.6, 0.3]}, "metallic": 1.0}
     """
 

@@ -113,14 +113,6 @@ class Microfacet(Model):
 
     Example
     -------
-    <bsdf type="microfacet">
-        <string name="distribution" value="gtr"/>
-        <float name="alpha" value="0.2"/>
-        <float name="gamma" value="1.5"/>
-        <string name="shadowing" value="vcavity"/>
-        <string name="material" value="Al"/>
-    </bsdf>
-
     {"type": "microfacet", "distribution": "gtr", "alpha": 0.2, "gamma": 1.5, "shadowing": "vcavity", "material": "Al"}
     """
 

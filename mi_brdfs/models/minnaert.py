@@ -36,11 +36,6 @@ class Minnaert(Model):
 
     Example
     -------
-    <bsdf type="minnaert">
-        <rgb name="reflectance" value="0.3, 0.28, 0.25"/>
-        <float name="exponent" value="0.7"/>
-    </bsdf>
-
     {"type": "minnaert", "reflectance": {"type": "rgb", "value": [0.3, 0.28, 0.25]}, "exponent": 0.7}
     """
 

@@ -37,17 +37,10 @@ class Nishino(Model):
     In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface does; ``f0``,
     F = 1, ``dsbrdf`` and the diffuse lobe depolarise it.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------
-    <bsdf type="nishino">
-        <float name="kappa" value="-8"/>
-        <float name="gamma" value="40"/>
-        <string name="material" value="Cu"/>
-    </bsdf>
-
     {"type": "nishino", "kappa": -8, "gamma": 40, "material": "Cu"}
     """
 
@@ -58,8 +51,7 @@ class Nishino(Model):
     kappa = Number(-5, (-80, 80), "κ: below 0 the lobe has a flat top, above 0 a peak")
     gamma = Number(100, (0, 1e5), "exponent γ: the higher, the narrower the lobe")
     variant = OneOf(
-        {"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}},
-        "distribution of the facets, or of f itself",
+        {"microfacet": {"fresnel": FresnelSet()}, "dsbrdf": {}}, "distribution of the facets, or of f itself"
     )
 
     def lobes(self, p: Values) -> tuple[Lobe, ...]:

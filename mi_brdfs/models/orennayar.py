@@ -40,12 +40,6 @@ class OrenNayar(Model):
 
     Example
     -------
-    <bsdf type="orennayar">
-        <rgb name="reflectance" value="0.6, 0.35, 0.2"/>
-        <float name="sigma" value="0.5"/>
-        <string name="model" value="full"/>
-    </bsdf>
-
     {"type": "orennayar", "reflectance": {"type": "rgb", "value": [0.6, 0.35, 0.2]}, "sigma": 0.5, "model": "full"}
     """
 
@@ -77,11 +71,6 @@ class RoughDiffuse(Model):
 
     Example
     -------
-    <bsdf type="roughdiffuse">
-        <float name="alpha" value="0.4"/>
-        <boolean name="use_fast_approx" value="true"/>
-    </bsdf>
-
     {"type": "roughdiffuse", "alpha": 0.4, "use_fast_approx": True}
     """
 

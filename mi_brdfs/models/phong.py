@@ -33,11 +33,6 @@ class Phong(Model):
 
     Example
     -------
-    <bsdf type="phong">
-        <rgb name="diffuse_reflectance" value="0.1, 0.2, 0.4"/>
-        <float name="exponent" value="60"/>
-    </bsdf>
-
     {"type": "phong", "diffuse_reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.4]}, "exponent": 60}
     """
 

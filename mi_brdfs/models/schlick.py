@@ -14,8 +14,7 @@ from ..model import Model, Values
 from ..parameters import Choice, Number, Reflectance, Rotation
 
 TYPICAL = 0.58
-"""The cosine that albedo estimates use for u, for directions that are not mirror images; fitted by
-tests/calibration/schlick.py."""
+"""The cosine u of albedo estimates, for other than mirror directions; fitted by tests/calibration/schlick.py."""
 
 
 class Schlick94(Model):
@@ -51,12 +50,6 @@ class Schlick94(Model):
 
     Example
     -------
-    <bsdf type="schlick">
-        <rgb name="specular_reflectance" value="0.95, 0.7, 0.55"/>
-        <float name="roughness" value="0.05"/>
-        <float name="isotropy" value="0.2"/>
-    </bsdf>
-
     {"type": "schlick", "specular_reflectance": {"type": "rgb", "value": [0.95, 0.7, 0.55]}, "roughness": 0.05,
      "isotropy": 0.2}
     """
@@ -69,7 +62,7 @@ class Schlick94(Model):
         None, "reflectance C' of a diffuse layer below; omitted by default", role="diffuse"
     )
     roughness = Number(0.05, (1e-6, 1), "roughness r, the square of GGX's α")
-    isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed")
+    isotropy = Number(1, (0.01, 1), "isotropy p: 1 is isotropic, 0 the most brushed", isotropic_as="")
     variant = Choice(("shadowed", "interreflection", "plain"), "treatment of the shadowed light")
     rotation = Rotation()
 

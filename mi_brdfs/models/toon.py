@@ -42,11 +42,6 @@ class Toon(Model):
 
     Example
     -------
-    <bsdf type="toon">
-        <rgb name="diffuse_reflectance" value="0.6, 0.15, 0.1"/>
-        <float name="diffuse_shadow" value="0.3"/>
-    </bsdf>
-
     {"type": "toon", "diffuse_reflectance": {"type": "rgb", "value": [0.6, 0.15, 0.1]}, "diffuse_shadow": 0.3}
     """
 

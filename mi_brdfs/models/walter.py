@@ -39,11 +39,6 @@ class Walter(Model):
 
     Example
     -------
-    <bsdf type="walter">
-        <string name="material" value="Au"/>
-        <float name="alpha" value="0.2"/>
-    </bsdf>
-
     {"type": "walter", "material": "Au", "alpha": 0.2}
     """
 

@@ -41,16 +41,10 @@ class Ward(Model):
     Reciprocal. Energy-conserving for ``balanced`` with ρd + ρs <= 1. Same parameters as ``ward`` of Mitsuba 0.6.
     One-sided. Depolarises.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects
-    (mi_brdfs.microfacet.sampling.Pair); no sample falls below the horizon.
+    Sampling: an antithetic pair of half vectors (mi_brdfs.microfacet.sampling.Pair), none below the horizon.
 
     Example
     -------
-    <bsdf type="ward">
-        <float name="alpha_u" value="0.05"/>
-        <float name="alpha_v" value="0.3"/>
-    </bsdf>
-
     {"type": "ward", "alpha_u": 0.05, "alpha_v": 0.3}
     """
 

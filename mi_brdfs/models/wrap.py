@@ -43,12 +43,6 @@ class Wrap(Model):
 
     Example
     -------
-    <bsdf type="wrap">
-        <rgb name="reflectance" value="0.6, 0.35, 0.2"/>
-        <float name="wrap" value="0.5"/>
-        <string name="domain" value="sphere"/>
-    </bsdf>
-
     {"type": "wrap", "reflectance": {"type": "rgb", "value": [0.6, 0.35, 0.2]}, "wrap": 0.5, "domain": "sphere"}
     """
 

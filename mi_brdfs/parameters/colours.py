@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import mitsuba as mi
 
@@ -90,15 +89,11 @@ def _scale_of(name: str) -> str:
     return f"{name}_scale"
 
 
-def constant_texture(value: float) -> mi.Texture:
-    return _texture(value)
-
-
 def rgb_texture(rgb: Sequence[float]) -> mi.Texture:
-    return _texture(mi.ScalarColor3d(rgb))
+    return constant_texture(mi.ScalarColor3d(rgb))
 
 
-def _texture(value: Any) -> mi.Texture:
+def constant_texture(value: float | mi.ScalarColor3d) -> mi.Texture:
     props = mi.Properties()
     props["value"] = value
     return props.get_unbounded_texture("value")

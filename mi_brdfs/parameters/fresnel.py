@@ -81,8 +81,7 @@ class FresnelSet(OneTerm):
 
 
 class ConductorName(Parameter):
-    """The indices of one of Mitsuba's conductors, by its name; "none" stands for no Fresnel term. Evaluated, η and k,
-    or None."""
+    """The indices of a conductor of Mitsuba's, by name, or "none" for no Fresnel term. Evaluated, η and k, or None."""
 
     role = "fresnel"
 
@@ -114,9 +113,6 @@ class ConductorName(Parameter):
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Any, ...] | None:
         return tuple(clamp(it.eval(si, active), *self.ranges[name]) for name, it in self.textures.items()) or None
-
-    def placeholder(self) -> None:
-        return None
 
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "string", "none", "Mitsuba's conductors | none", self.text)]

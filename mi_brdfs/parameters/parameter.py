@@ -38,6 +38,8 @@ class Quantity(NamedTuple):
     """Where its values usually are, if that is not nearly all of its range."""
     sought: bool = True
     """Whether fits seek it."""
+    isotropic_as: str | None = None
+    """Of an isotropic material the name of another one that it equals, or "" if it has its default."""
 
 
 class Parameter:
@@ -103,8 +105,7 @@ class Parameter:
         return []
 
     def quantities(self, pairs: bool) -> tuple[Quantity, ...]:
-        """Return what it is usually given as, or the pair for both tangent directions if it may be and ``pairs`` are
-        wanted."""
+        """Return what it is usually given as, or if ``pairs`` are wanted, the pair along the tangents if any."""
         ways = self.spellings
         paired = [way for way in ways if len(way) > 1] if pairs else []
         return (paired or ways or [()])[0]
@@ -145,7 +146,7 @@ class Parameter:
 
     def placeholder(self) -> Any:
         """Return a value that a bound parameter may have, to build a model's lobes before there is a surface point."""
-        raise NotImplementedError(f"{type(self).__name__} does not define placeholder.")
+        return None
 
     def rows(self) -> list[ParameterRow]:
         """Return its lines in the table of the manual page."""

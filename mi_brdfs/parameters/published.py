@@ -51,11 +51,7 @@ def preset(name: str) -> dict[str, Any]:
 
 
 def provenance(name: str) -> Provenance:
-    """Return where a published material comes from.
-
-    Raises:
-        ValueError: as :func:`preset`.
-    """
+    """Return where a published material comes from; raise as :func:`preset`."""
     entry, _ = _find(name)
     return Provenance(*(entry[field] for field in Provenance._fields))
 
@@ -96,8 +92,7 @@ class Preset(Parameter):
         super().__init__("a published material, as mi-brdfs presets lists them; other parameters replace its values")
 
     def fill_in(self, reader: PropertyReader, declared: Iterable[Parameter]) -> None:
-        """Give the properties the values of the named material: those of parameters that are not given, nor replaced
-        by others that are."""
+        """Give the properties the values of the named material, unless they, or others that replace them, are given."""
         if self.name not in reader:
             return
         values = self._values(reader)
@@ -130,9 +125,6 @@ class Preset(Parameter):
         return self.replace(chosen={self.name: reader.text(self.name)} if self.name in reader else {})
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> None:
-        return None
-
-    def placeholder(self) -> None:
         return None
 
     def rows(self) -> list[ParameterRow]:

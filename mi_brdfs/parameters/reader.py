@@ -112,15 +112,13 @@ class PropertyReader:
         return value
 
     def flag(self, name: str, default: bool) -> bool:
-        if name not in self:
-            return default
-        value = self.props[name]
-        if not isinstance(value, bool):
-            raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be true or false")
-        return value
+        return self._given(name, bool, "true or false") if name in self else default
 
     def text(self, name: str) -> str:
+        return self._given(name, str, "a name")
+
+    def _given(self, name: str, kind: type, allowed: str) -> Any:
         value = self.props[name]
-        if not isinstance(value, str):
-            raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be a name")
+        if not isinstance(value, kind):
+            raise self.error(name, f"= {shown(value)} is {kind_of(value)}; it must be {allowed}")
         return value

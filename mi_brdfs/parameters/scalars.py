@@ -28,8 +28,10 @@ class Number(Parameter):
 
     An ``anisotropic`` one may be given as the pair NAME_u and NAME_v instead, and evaluates to a pair, of the same
     object twice where it was given alone; with ``lone_default``, one of the pair alone leaves the other at the default.
-    One with another ``spelling`` may be given as that instead. Without a default it is None where it is not given. Fits
-    leave one that is not ``sought`` as it is, unless asked for it, and so do searches for the largest albedo.
+    Another one that makes a model anisotropic says what it is in isotropic materials, ``isotropic_as`` a parameter or
+    "", its default. One with another ``spelling`` may be given as that instead. Without a default it is None where it
+    is not given. Fits leave one that is not ``sought`` as it is, unless asked for it, and so do searches for the
+    largest albedo.
     """
 
     def __init__(
@@ -40,6 +42,7 @@ class Number(Parameter):
         *,
         anisotropic: bool = False,
         lone_default: bool = False,
+        isotropic_as: str | None = None,
         spelling: Spelling | None = None,
         role: str | None = None,
         sought: bool = True,
@@ -47,7 +50,7 @@ class Number(Parameter):
         super().__init__(text)
         self.role, self.sought = role, sought
         self.default, self.limits, self.spelling = default, limits, spelling
-        self.anisotropic, self.lone_default = anisotropic, lone_default
+        self.anisotropic, self.lone_default, self.isotropic_as = anisotropic, lone_default, isotropic_as
         self.scale = 1.0
 
     @property
@@ -66,7 +69,8 @@ class Number(Parameter):
 
     @property
     def spellings(self) -> list[tuple[Quantity, ...]]:
-        alone = Quantity(self.names[0], self.limits, self.default, self.text, sought=self.sought)
+        like = self.isotropic_as and self.isotropic_as + self.number
+        alone = Quantity(self.names[0], self.limits, self.default, self.text, sought=self.sought, isotropic_as=like)
         found: list[tuple[Quantity, ...]] = [(alone,)]
         if self.anisotropic:
             ways = zip(self.pair, ("along dp_du", "across"), strict=True)
@@ -139,8 +143,7 @@ class Number(Parameter):
 
 
 class Index(Number):
-    """An index of refraction: a number, a texture, or the name of a substance that Mitsuba knows, by default
-    ``substance``."""
+    """An index of refraction: a number, a texture or a substance that Mitsuba knows, by default ``substance``."""
 
     LIMITS = (0.01, 100)
 
@@ -195,9 +198,6 @@ class Rotation(Parameter):
         turns = self.textures[self.name].eval_1(si, active)
         sin, cos = dr.sincos(dr.two_pi * (turns - dr.round(turns)))  # whole turns would take the digits
         return cos, sin
-
-    def placeholder(self) -> None:
-        return None
 
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "number", "none", "any", self.text)]

@@ -23,11 +23,8 @@ DPI = 200
 
 def asked_for(targets: Sequence[str], parameters: Sequence[str]) -> list[str | dict]:
     """Return the BSDFs that words and ``--param`` options stand for: plugins with parameters as dicts, whose labels say
-    what differs, and other words with the parameters that they have; one for each value of a swept parameter.
-
-    Raises:
-        ValueError: if an option is malformed or fits no word.
-    """
+    what differs, and other words with the parameters that they have; one for each value of a swept parameter. Raise a
+    ValueError if an option is malformed or fits no word."""
     given: dict[str, str] = {}
     for option in parameters:
         name, _, value = option.partition("=")
@@ -60,11 +57,8 @@ def _swept(word: str, given: dict[str, str]) -> Iterator[str | dict]:
 
 
 def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
-    """Return the arguments of a kind of figure from the options given, which are not None.
-
-    Raises:
-        ValueError: if it does not take one of them.
-    """
+    """Return the arguments of a kind of figure from the options given, which are not None. Raise a ValueError if it
+    does not take one of them."""
     try:
         numbers = None if angles is None else degrees_of(angles)
     except ValueError as error:
@@ -81,11 +75,7 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
 
 
 def size_of(text: str | None) -> tuple[float, float] | None:
-    """Return the width and the height that are given as 6x4, in inches.
-
-    Raises:
-        ValueError: if they are no such numbers.
-    """
+    """Return the width and the height that are given as 6x4, in inches, or raise a ValueError."""
     if text is None:
         return None
     try:

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..given import load_described
 from ..measured import read
 from ..measured.measurement import Grid, Samples
 from ..parameters.messages import brief
@@ -40,11 +41,8 @@ class MeasuredProbe(BSDFProbe):
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
-    """Return the BSDFs loaded, with the labels given or found.
-
-    Raises:
-        ValueError: if there are none, one is not a BSDF, or the active variant cannot evaluate arrays of directions.
-    """
+    """Return the BSDFs loaded, with the labels given or found. Raise a ValueError if there are none, one is not a BSDF,
+    or the active variant cannot evaluate arrays of directions."""
     if not is_measurable(mi.variant()):
         raise ValueError(
             f"plots need a vectorized and unpolarized variant, not {mi.variant() or 'none'}: call "
@@ -79,11 +77,7 @@ def scales_of(scale: str) -> tuple[str, ...]:
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:
-    """Return the BSDFs, with a label that mentions delta lobes left out, if any.
-
-    Raises:
-        ValueError: if one has delta functions only.
-    """
+    """Return the BSDFs, labelled if delta lobes are left out. Raise a ValueError if one has no other."""
     for it in found:
         if not it.probe.components:
             raise ValueError(f"{it.label} reflects and transmits in single directions only: there is no lobe to draw")
@@ -91,11 +85,8 @@ def with_smooth_part(found: list[Named]) -> list[Named]:
 
 
 def channels_of(rgb: bool) -> list[tuple[int | None, str]]:
-    """Return the index and the name of each channel to draw, or (None, "") for the luminance.
-
-    Raises:
-        ValueError: if the active variant has no channels.
-    """
+    """Return the index and the name of each channel to draw, or (None, "") for the luminance. Raise a ValueError if the
+    active variant has none."""
     if not rgb:
         return [(None, "")]
     if not mi.is_rgb:
@@ -139,10 +130,7 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe
 
 
 def _probe(given: Any) -> BSDFProbe:
-    bsdf = mi.load_dict(given) if isinstance(given, dict) else given
-    if not isinstance(bsdf, mi.BSDF):
-        word = given.get("type") if isinstance(given, dict) else type(given).__name__
-        raise ValueError(f"{word} is not a BSDF of {mi.variant()}")
+    bsdf = load_described(given)
     # Who says how to extrapolate wants to see that; and tables know nothing of a plugin's rotation.
     if isinstance(given, dict) and given["type"] == "tabulated" and not given.keys() & {"extrapolate", "rotation"}:
         return MeasuredProbe(bsdf, data=read(given["filename"], given.get("quantity", "stated")).data)

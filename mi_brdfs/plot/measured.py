@@ -70,6 +70,7 @@ def measured(*files: str | Path | Measurement) -> Figure:
         it = LitTable(measurement)
         for ax, draw in zip(row.subplots(1, 3), (_draw_slice, _draw_lobes, _draw_albedo), strict=True):
             draw(ax, it)
+            ax.set_box_aspect(1)
         row.suptitle(it.name, fontsize=TEXT + 1, color=INK)
     return figure
 
@@ -80,7 +81,8 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     pair = HalfDifference().directions(np.sqrt(theta_h), theta_d * np.pi / 2, np.full_like(theta_h, np.pi / 2))
     wi, wo = map(stacked, pair)
     f, seen = it.grid.evaluate(wi, wo), it.measurement.data.measured(wi, wo)
-    lit, colour = it.luminance(f), it.colour(f)
+    colour = np.maximum(f, 0)
+    lit = luminance(colour)
     norm = _norm(lit[seen])
     brightness = norm(np.maximum(lit, norm.vmin)).filled(0)
     if colour.shape[-1] == 3:
@@ -92,7 +94,7 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     patch = Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1)
     ax.add_patch(patch)
     ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
-    add_bar(ScalarMappable(norm, palette), ax, it.quantity, shrink=0.75, extend="both")
+    add_bar(ScalarMappable(norm, palette), ax, it.quantity, location="top", extend="both")
     calm(ax)
     ax.grid(False)
     turns = range(0, 91, 30)
@@ -134,7 +136,7 @@ def _draw_albedo(ax: Axes, it: LitTable) -> None:
     angles = np.unique(np.append(np.arange(0, 90, 3), [low, min(high, 89)]))
     angles = angles[(angles >= low) & (angles <= high)]
     values = albedos(as_grid(it.measurement.data, "zero"), np.radians(angles), it.phi, extrapolate="zero")
-    colour = it.colour(values)
+    colour = np.maximum(values, 0)
     names = list(CHANNELS) if colour.shape[-1] == 3 else [""]
     handles = []
     for channel, name in enumerate(names):
@@ -170,13 +172,6 @@ class LitTable:
         self.coloured = self.grid.values.shape[-1] > 1
         self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")
 
-    def colour(self, f: np.ndarray) -> np.ndarray:
-        """Return values in the gamut of sRGB, or as they are if they have one channel."""
-        return np.maximum(f, 0)
-
-    def luminance(self, f: np.ndarray) -> np.ndarray:
-        return luminance(self.colour(f))
-
     @property
     def angles(self) -> np.ndarray:
         """The angles of incidence of lobes, in degrees."""
@@ -199,7 +194,7 @@ class LitTable:
 
         peaks = [end + near * side for end in (-theta_i, theta_i) for side in (-1, 1)]
         theta = np.unique(np.concatenate([np.linspace(-90, 90, 361), *peaks]))
-        curve = refined(lambda t: self.luminance(self.grid.evaluate(wi, toward(t))), theta[abs(theta) < 90])
+        curve = refined(lambda t: luminance(np.maximum(self.grid.evaluate(wi, toward(t)), 0)), theta[abs(theta) < 90])
         seen = self.measurement.data.measured(wi, toward(curve.theta))
         return curve._replace(value=np.where(seen, curve.value, np.nan))
 
@@ -221,7 +216,7 @@ class LitTable:
                 mine = near & (abs(theta_i - wanted) < NEAR)
                 # By as much as the mirror direction: a highlight stays in place.
                 shifted = theta_o[mine] + wanted - theta_i[mine]
-                found[k].append(np.stack([shifted, self.luminance(usable(f[mine]))]))
+                found[k].append(np.stack([shifted, luminance(usable(f[mine]))]))
         return [Curve(*np.concatenate(parts, axis=1)) for parts in found]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -73,7 +74,7 @@ def polar(
     Raises:
         ValueError: if something is not a BSDF or has delta functions only, if angles or scale are wrong, or if the
             variant is scalar or polarized, or has no channels that ``rgb`` could draw.
-        Exception: whatever Mitsuba raises if a BSDF cannot be loaded.
+        Exception: whatever Mitsuba raises if XML cannot be loaded.
     """
     options = azimuth, scale, labels, normalize, rgb, side_by_side, title, size
     return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, *options)
@@ -145,6 +146,9 @@ def _planar(
         return curves
 
     each = [[lines(it, k, theta, j) for j, theta in enumerate(angles)] for k, it in enumerate(found)]
+    peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
+    if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 100:  # the lowest curve cannot be seen
+        warnings.warn(f"the maxima differ by a factor of {ratio:.0f}; --normalize compares shapes", stacklevel=3)
     rows = each if by_bsdf else zip(*each, strict=True)
     headings = [it.label for it in found] if by_bsdf else [incidence(theta) for theta in angles]
     panels = [[curve for part in row for curve in part] for row in rows]

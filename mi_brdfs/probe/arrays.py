@@ -59,8 +59,7 @@ def vectors(w: ArrayLike) -> mi.Vector3f:
 
 
 def sample_arguments(variates: Array) -> tuple[mi.Float, mi.Point2f]:
-    """Return rows of three uniform variates, shape (N, 3), as the two arguments of ``sample``. Vectorized variants
-    only."""
+    """Return rows of three uniform variates, shape (N, 3), as the two arguments of ``sample``; vectorized only."""
     return floats(variates[:, 0]), mi.Point2f(_columns(variates[:, 1:]))
 
 

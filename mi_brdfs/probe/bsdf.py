@@ -217,11 +217,8 @@ class BSDFProbe:
 
 def load(given: Mapping[str, Any]) -> Any:
     """Load a plugin dict that may be loaded again. In spectral variants Mitsuba writes the coefficients of spectra into
-    the bitmaps that it is given, and a second time those of the coefficients: give it copies.
-
-    Raises:
-        ValueError: if it holds None, at which Mitsuba would end the process.
-    """
+    the bitmaps that it is given, and a second time those of the coefficients: give it copies. Raise a ValueError for a
+    None, at which Mitsuba would end the process."""
     return mi.load_dict(_copied(given))
 
 

@@ -134,7 +134,7 @@ def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None, log2_co
     It is the mean weight of samples of the BSDF's own sampler, with the same variates at each angle, so that the curve
     is smooth.
     """
-    theta = np.concatenate([np.arange(0, 87, 3), [87, 88, 88.5, 89, 89.5, 89.9]])
+    theta = np.concatenate([np.arange(0, 78, 3), np.arange(78, 88), [88, 88.5, 89, 89.5, 89.9]])
     points = lattice(log2_count, 5)
     part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)

@@ -37,8 +37,7 @@ SEEDS = range(100, 108)
 
 
 class Maximum(NamedTuple):
-    """An albedo, its standard error, and where it was found: the direction of view, the free numbers by name, and what
-    was given."""
+    """An albedo, its standard error, and where it was found: direction of view, free numbers, and what was given."""
 
     albedo: float
     noise: float
@@ -55,11 +54,7 @@ class Maximum(NamedTuple):
 
 def albedos(bsdf: mi.BSDF, wi: Array, log2_count: int, seed: int = 1) -> Array:
     """Return the directional albedos at directions of shape (N, 3): the means of sample's weights over the same 2^n
-    variates. 2⁸ are good to about 1 %, 2¹⁴ to some 1e-4.
-
-    Raises:
-        ValueError: if one is not a number.
-    """
+    variates. 2⁸ are good to about 1 %, 2¹⁴ to some 1e-4. Raise a ValueError if one is not a number."""
     probe = BSDFProbe(bsdf)
     found = luminance(probe.weights(probe.whole, wi, sobol(log2_count, seed))).mean(axis=1)
     if np.isnan(found).any():
@@ -77,12 +72,8 @@ def default_albedo(model: type[Model]) -> float:
 
 
 def largest_albedo(model: type[Model], given: Mapping[str, Any]) -> Maximum:
-    """Return the brightest setting of a model in white over all that is not ``given``, where a tuple stands for each
-    of its words. What the plugin refuses is left out.
-
-    Raises:
-        ValueError: if it refuses all.
-    """
+    """Return the brightest setting of a model in white over all that is not ``given``, where a tuple stands for each of
+    its words. What the plugin refuses is left out; raise a ValueError if it refuses all."""
     found = [_Search(model, setting).run() for setting in accepted(model, given)]
     return max(found, key=lambda setting: setting.albedo)
 

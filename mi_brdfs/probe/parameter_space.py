@@ -56,7 +56,7 @@ def axes(model: type[Model], given: Mapping[str, Any]) -> list[Dimension]:
     """Return the numbers that are sought and not ``given``, both of a pair, and the direction of view."""
     least = {name: value for word in given.values() for name, value in LEAST.get(word, {}).items()}
     free = []
-    for parameter in _parameters(model.declared(), given):
+    for parameter in present(model.declared(), given):
         for it in parameter.quantities(pairs=True):
             if it.sought and not (it.colour or it.turns or parameter.name in given):
                 low, high = (limit if isfinite(limit) else copysign(FARTHEST, limit) for limit in it.limits)
@@ -66,7 +66,7 @@ def axes(model: type[Model], given: Mapping[str, Any]) -> list[Dimension]:
 
 def white(model: type[Model], given: Mapping[str, Any]) -> dict[str, float]:
     """Return the colours that make a model brightest: 1, but 0 for ``diffuse_reflectance`` beside others."""
-    known = [(it, it.quantities(pairs=False)) for it in _parameters(model.declared(), given)]
+    known = [(it, it.quantities(pairs=False)) for it in present(model.declared(), given)]
     colours = [(it.role, quantity) for it, quantities in known for quantity in quantities if quantity.colour]
     return {
         colour.name: 0.0 if role == "diffuse" and len(colours) > 1 else min(1.0, colour.limits[1])
@@ -74,15 +74,16 @@ def white(model: type[Model], given: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _parameters(declared: Iterable[Parameter], given: Mapping[str, Any]) -> Iterator[Parameter]:
-    """Yield declared parameters with those of a lobe, and of the words that are given, among them."""
+def present(declared: Iterable[Parameter], words: Mapping[str, Any], lobes: int = 1) -> Iterator[Parameter]:
+    """Yield declared parameters with those of each lobe, and of the words that are given, among them."""
     for parameter in declared:
         if isinstance(parameter, PerLobe):
-            yield from _parameters(parameter.lobe(""), given)
+            for number in [""] if lobes == 1 else parameter.numbers[1 : lobes + 1]:
+                yield from present(parameter.lobe(number), words, lobes)
             continue
         yield parameter
-        if parameter.name in given:
-            yield from _parameters(parameter.words.get(given[parameter.name], {}).values(), given)
+        if parameter.name in words:
+            yield from present(parameter.words.get(words[parameter.name], {}).values(), words, lobes)
 
 
 # --- Choices --------------------------------------------------------------------------------------------------------
@@ -113,12 +114,8 @@ def _words(parameter: Parameter, given: Mapping[str, Any]) -> list[dict[str, Any
 
 
 def accepted(model: type[Model], given: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return what is ``given``, with every combination of words that it leaves open and that the plugin accepts.
-
-    Raises:
-        ValueError: if there is none.
-        Exception: what Mitsuba raises where the plugin fails for another reason.
-    """
+    """Return what is ``given``, with every combination of words that it leaves open and that the plugin accepts. Raise
+    a ValueError if there is none, or what Mitsuba raises where the plugin fails for another reason."""
     found, refusal = [], "there are no such choices"
     named = {name for name, value in given.items() if isinstance(value, (str, bool, tuple))}
     for words in choices(model.declared(), given):

@@ -31,8 +31,7 @@ class Partition:
     """Cells that cover the sphere, along a space-filling curve, with a density's integral over each."""
 
     axis: Array
-    """The azimuth that longitudes are measured from, as a unit vector (cosφ, sinφ): that of the plane of incidence, as
-    a rule."""
+    """The azimuth of longitude 0, as (cosφ, sinφ): as a rule, that of the plane of incidence."""
     starts: Array
     """The place of each cell along the curve, in cells of the last level."""
     level: Array

@@ -112,11 +112,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
 def split(word: str) -> tuple[str, dict[str, str]]:
     """Return a word without its own parameters, ``:name=value,name=value`` at its end, and these as text. What is no
     ``name=value`` after a comma belongs to the value before it, as in ``alpha=0.1,0.2``. The name of a file that exists
-    has none, nor has what is within XML.
-
-    Raises:
-        ValueError: if a parameter has no value.
-    """
+    has none, nor has what is within XML. Raise a ValueError if a parameter has no value."""
     start = word.rfind(">") + 1 if word.startswith("<") else 0
     found = None if os.path.exists(word) else OWN.search(word, start)
     if found is None:
@@ -201,11 +197,7 @@ def value_of(text: str) -> Any:
 
 
 def degrees_of(text: str) -> list[float]:
-    """Return angles in degrees that are given as 10,40,70.
-
-    Raises:
-        ValueError: if they are no numbers.
-    """
+    """Return angles in degrees that are given as 10,40,70, or raise a ValueError."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -270,11 +262,7 @@ def _chosen(source: BSDFSource, names: list[str], wanted: str) -> Iterator[BSDFS
 
 
 def _fits(path: Path) -> list[dict[str, Any]]:
-    """Return the fits that ``mi-brdfs fit --json`` wrote.
-
-    Raises:
-        ValueError: if the file holds none.
-    """
+    """Return the fits that ``mi-brdfs fit --json`` wrote, or raise a ValueError."""
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
         if rows and all(isinstance(it["bsdf"]["type"], str) and it["model"] and it["file"] for it in rows):

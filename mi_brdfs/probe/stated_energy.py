@@ -21,14 +21,12 @@ Row = tuple[dict[str, Any], float]
 
 
 def configurations(model: type[Model]) -> list[dict[str, Any]]:
-    """Return the choices for which the class of a model states the largest albedo, or if it states none, all that there
-    are."""
+    """Return the choices for which a model's class states the largest albedo, or all choices if it states none."""
     return [given for given, _ in model.energy.largest] if model.energy else accepted(model, {})
 
 
 def energy_of(model: type[Model], default: float, found: Iterable[tuple[dict[str, Any], Maximum]]) -> Energy:
-    """Return what the class of a model should state, by the largest albedo of its defaults and what was found for its
-    configurations."""
+    """Return what a model's class should state, by the largest albedo of its defaults and of its configurations."""
     rows = [(given, rounded_up(setting.albedo, setting.noise)) for given, setting in found]
     return Energy(rounded_up(default), rows if model.energy else merged(rows))
 

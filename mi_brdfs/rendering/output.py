@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import mitsuba as mi
@@ -33,6 +34,15 @@ def denoise(colours: np.ndarray) -> np.ndarray:
     # It leaves lines along the edges where sides are no multiples of 16.
     padded = np.pad(colours, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
     return mitsuba_oidn.denoise(np.ascontiguousarray(padded, np.float32), hdr=True)[:height, :width]
+
+
+def denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return :func:`denoise` if what it needs is installed and loads."""
+    try:
+        import mitsuba_oidn  # noqa: F401
+    except ImportError:
+        return None
+    return denoise
 
 
 def denoised(picture: Picture) -> Picture:
@@ -74,8 +84,7 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
 
 
 def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
-    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None if it has no
-    colours."""
+    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours."""
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
     colours = next((it for it in formats if names.startswith(it.name)), None)
@@ -103,7 +112,12 @@ def write(bitmap: mi.Bitmap, path: str | os.PathLike) -> None:
     if suffix not in IMAGES:
         raise ValueError(f"{path}: unknown image format; use {', '.join(IMAGES)}")
     # Mitsuba takes only file names in UTF-8, and does not notice if the last 8 KB find no room on the disk.
-    stream = mi.MemoryStream()
-    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, IMAGES[suffix]))
     with replacing(path) as part:
-        part.write_bytes(stream.raw_buffer())
+        part.write_bytes(encoded(bitmap, IMAGES[suffix]))
+
+
+def encoded(bitmap: mi.Bitmap, format: str, quality: int = -1) -> bytes:
+    """Return what a file of a format holds, by its name in ``mitsuba.Bitmap.FileFormat``."""
+    stream = mi.MemoryStream()
+    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, format), quality)
+    return stream.raw_buffer()

@@ -194,8 +194,7 @@ def _pixel_count(film: mi.Film, particles: bool) -> int:
 
 
 def _pass_sizes(sampler: mi.Sampler, spp: int, limit: int) -> tuple[Iterable[int], int]:
-    """Return the samples per pixel of each pass, powers of two up to ``limit`` and a rest, rounded as the sampler does,
-    and their sum."""
+    """Return the samples of each pass, powers of two up to ``limit`` and a rest, as rounded, and their sum."""
     full = _rounded(sampler, min(spp, _power_of_2(limit)))
     count, rest = divmod(spp, full)
     last = [_rounded(sampler, rest)] if rest else []

@@ -8,8 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import indent
 from typing import Any
-from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
+from xml.dom import minidom
+from xml.parsers.expat import ExpatError
 
 import mitsuba as mi
 
@@ -67,8 +67,10 @@ class SceneFile:
         parameters = self.parameters
         if text is not None:
             contents[_rootless(self.path)], parameters = text.encode(), {}
-        return replace(self, path=_rootless(self.path), parameters=parameters, lenient=False, contents=contents,
-                       names=names, folder=_rootless("."))  # fmt: skip
+        path, folder = _rootless(self.path), _rootless(".")
+        return replace(
+            self, path=path, parameters=parameters, lenient=False, contents=contents, names=names, folder=folder
+        )
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         config = mi.parser.ParserConfig(mi.variant())
@@ -102,11 +104,7 @@ def _check_films(state: Any) -> None:
 
 def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
     """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it; on
-    both sides, in place of ``twosided``.
-
-    Raises:
-        ValueError: if there is none.
-    """
+    both sides, in place of ``twosided``. Raise a ValueError if there is none."""
     kinds = mi.ObjectType.BSDF, mi.ObjectType.Shape
     ids = {node.props.id(): k for k, node in enumerate(state.nodes) if node.type in kinds and node.props.id()}
     if id not in ids:
@@ -119,15 +117,11 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
             if isinstance(value, mi.Properties.ResolvedReference):
                 usual = state.nodes[value.index()]
                 if usual.type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]:
-                    wrapped = usual.props.plugin_name() == "twosided"
-                    node.props[name] = _on_both_sides(bsdf) if wrapped else bsdf
+                    wrapped = usual.props.plugin_name() == "twosided" and not _is_seen_from_behind(bsdf)
+                    node.props[name] = mi.load_dict({"type": "twosided", "bsdf": bsdf}) if wrapped else bsdf
                     found = True
     if is_shape and not found:
         state.nodes[ids[id]].props["bsdf"] = bsdf
-
-
-def _on_both_sides(bsdf: mi.BSDF) -> mi.BSDF:
-    return bsdf if _is_seen_from_behind(bsdf) else mi.load_dict({"type": "twosided", "bsdf": bsdf})
 
 
 def _is_seen_from_behind(bsdf: mi.BSDF) -> bool:
@@ -136,60 +130,35 @@ def _is_seen_from_behind(bsdf: mi.BSDF) -> bool:
 
 def with_material(path: Path, id: str, xml: str) -> str:
     """Return the text of a scene file with a ``<bsdf>`` in the place of the BSDF with an id, or of that of the shape
-    with it, on both sides in place of ``twosided``, and all else as it is; a scene of Mitsuba 0.6 is upgraded.
-
-    Raises:
-        ValueError: if the file itself has none, or is no scene.
-    """
-    data = upgrade(path).xml.encode()
-    found: list[_Written] = []
-    inside: list[_Written] = []
-    parser = expat.ParserCreate()
-
-    def begin(tag: str, attributes: dict[str, str]) -> None:
-        inside.append(_Written(tag, attributes, parser.CurrentByteIndex, parent=inside[-1] if inside else None))
-        found.append(inside[-1])
-
-    def end(tag: str) -> None:
-        element, at = inside.pop(), parser.CurrentByteIndex
-        is_empty = found[-1] is element and data[at - 2 : at] == b"/>"
-        element.end = at if is_empty else data.index(b">", at) + 1
-
-    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    with it, on both sides in place of ``twosided``; a scene of Mitsuba 0.6 is upgraded. Raise a ValueError if the file
+    itself has none, or is no scene."""
     try:
-        parser.Parse(data, True)
-    except expat.ExpatError as error:
+        document = minidom.parseString(upgrade(path).xml.encode())
+    except ExpatError as error:
         raise ValueError(f"{path}: {error}") from None
-    bsdfs = {it.attributes.get("id") for it in found if it.tag == "bsdf"}
-    own = [it for it in found if it.tag in ("bsdf", "shape") and id and it.attributes.get("id") == id]
-    if not own:
+    bsdfs, shapes = (document.getElementsByTagName(tag) for tag in ("bsdf", "shape"))
+    by_id = {it.getAttribute("id"): it for it in bsdfs}
+    place: Any = next((it for it in (*bsdfs, *shapes) if id and it.getAttribute("id") == id), None)
+    if place is None:
         raise ValueError(f"{path} itself has no BSDF or shape with the id {id or 'of this material'}; give it one.")
-    if own[0].tag == "shape":
-        children = [it for it in found if it.parent is own[0]]
-        own = [it for it in children if it.tag == "bsdf" or (it.tag == "ref" and it.attributes.get("id") in bsdfs)]
-        if not own:
+    if place in shapes:
+        refs = [it for it in place.getElementsByTagName("ref") if it.getAttribute("id") in by_id]
+        inside = [it for it in place.childNodes if it in bsdfs or it in refs]
+        if not inside:
             raise ValueError(f"{path}: the shape {id} has no BSDF to be replaced; give it one.")
-    place = own[0]
-    usual = [it for it in found if place.tag == "ref" and it.attributes.get("id") == place.attributes["id"]] or [place]
-    if usual[0].attributes.get("type") == "twosided" and not _is_seen_from_behind(mi.load_string(versioned(xml))):
+        place = inside[0]
+    usual = by_id[place.getAttribute("id")] if place.nodeName == "ref" else place
+    if usual.getAttribute("type") == "twosided" and not _is_seen_from_behind(mi.load_string(versioned(xml))):
         xml = f'<bsdf type="twosided">\n{indent(xml, "    ")}\n</bsdf>'
-    kept = [name for name in ("name", "id") if name in place.attributes and (name, place.tag) != ("id", "ref")]
-    named = "".join(f" {name}={quoteattr(place.attributes[name])}" for name in kept)
-    before = data[data.rfind(b"\n", 0, place.start) + 1 : place.start].decode()
-    margin = before[: len(before) - len(before.lstrip())]
-    lines = xml.replace("<bsdf", f"<bsdf{named}", 1).replace("\n", "\n" + margin)
-    return (data[: place.start] + lines.encode() + data[place.end :]).decode()
-
-
-@dataclass(eq=False)
-class _Written:
-    """An element of a file, and where its text is."""
-
-    tag: str
-    attributes: dict[str, str]
-    start: int
-    end: int = 0
-    parent: _Written | None = None
+    margin = getattr(place.previousSibling, "data", "").rpartition("\n")[2]
+    indented = xml.replace("\n", f"\n{margin if margin.isspace() else ''}")
+    given: Any = minidom.parseString(indented).documentElement
+    new = document.importNode(given, deep=True)
+    for name in ("name", "id") if place is usual else ("name",):
+        if place.hasAttribute(name):
+            new.setAttribute(name, place.getAttribute(name))
+    place.parentNode.replaceChild(new, place)
+    return "\n".join(node.toxml() for node in document.childNodes) + "\n"
 
 
 def _rootless(path: str) -> str:

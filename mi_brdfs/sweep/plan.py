@@ -107,9 +107,7 @@ class Sweep:
 
     def fit(self, workers: int | None = None, scheduler: str | None = None) -> Generator[Outcome, None, None]:
         """Make the fits that are not in the folder, and put them there, those of a model to a material together.
-
-        Args:
-            workers: as :func:`mi_brdfs.cluster.run` has it; ``scheduler``, too.
+        ``workers`` and ``scheduler`` are as :func:`mi_brdfs.cluster.run` has them.
 
         Raises:
             OSError: if the folder cannot be written to.
@@ -168,8 +166,7 @@ def fit_material(model: str, jobs: list[tuple[Observations | str, str, int]], st
 
 
 def check_content(file: str, expected: str) -> None:
-    """Raise a FileError if a file that was read has another content than when the sweep began, under which its results
-    would be kept."""
+    """Raise a FileError if a file has another content than when the sweep began, under which its results are kept."""
     if content_hash(file) != expected:
         raise FileError(f"{file} has changed since the sweep began; give the same command again.")
 

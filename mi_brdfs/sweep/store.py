@@ -62,11 +62,7 @@ class Store:
         self.folder = folder
 
     def prepare(self) -> None:
-        """Make the folder, and see that it can be written to: before the work whose results it is to hold.
-
-        Raises:
-            OSError: if not.
-        """
+        """Make the folder, and raise an OSError if it cannot be written to, before the work for it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=self.folder).close()
 

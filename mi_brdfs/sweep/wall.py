@@ -81,11 +81,8 @@ class Wall:
         return sum(self._path(cell).exists() for cell in self._cells().values())
 
     def render(self, workers: int | None = None, scheduler: str | None = None) -> Generator[Outcome, None, None]:
-        """Render what is not in the folder.
-
-        Args:
-            workers: as :func:`mi_brdfs.cluster.run` has it; ``scheduler``, too. Its workers need the files.
-        """
+        """Render what is not in the folder. ``workers`` and ``scheduler`` are as :func:`mi_brdfs.cluster.run` has them;
+        a scheduler's workers need the files."""
         tasks = {key: (cell.bsdf, cell.content) for key, cell in self._cells().items() if not self._path(cell).exists()}
         if not tasks:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -22,24 +23,20 @@ from ..measured.scattered import as_grid
 from ..observer import to_srgb
 from ..probe.arrays import luminance
 from ..variants import is_scalar
-from .basis import BASIS, WAVELENGTHS
 from .proposal import Proposal
+
+WAVELENGTHS, *BASIS = np.loadtxt(Path(__file__).with_name("basis.txt")).T
+"""In nm, and three spectra for linear sRGB values, linear between these."""
 
 
 class Tables:
-    """f, the albedo at normal incidence, and the density that directions are drawn from; ``captured`` is all of them
-    that kernels read."""
+    """f, the albedo at normal incidence, and the density of directions; ``captured`` is what of them kernels read."""
 
     _shared: WeakValueDictionary[tuple, Tables] = WeakValueDictionary()
 
     @classmethod
     def of(
-        cls,
-        filename: str,
-        interpolation: Interpolation,
-        extrapolate: Extrapolation,
-        quantity: Quantity,
-        shared: bool,
+        cls, filename: str, interpolation: Interpolation, extrapolate: Extrapolation, quantity: Quantity, shared: bool
     ) -> Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
         path = checked(filename)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..lobes import Lobe
 from ..math import Spectrum
-from ..model import Model, Values
+from ..model import Model, Section, Values
 from ..parameters import Choice, Colour, File, Flag, Rotation
 
 if TYPE_CHECKING:
@@ -55,10 +55,6 @@ class Tabulated(Model):
 
     Example
     -------
-    <bsdf type="tabulated">
-        <string name="filename" value="alum-bronze.binary"/>
-    </bsdf>
-
     {"type": "tabulated", "filename": "alum-bronze.binary"}
     """
 
@@ -86,8 +82,8 @@ class Tabulated(Model):
             self.arrays = {"values": self.tables.f.values}
 
     @classmethod
-    def manual(cls) -> str:
-        return super(Model, cls).manual()  # a file has no largest albedo but its own
+    def sections(cls) -> list[Section]:
+        return super(Model, cls).sections()  # a file has no largest albedo but its own
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Values:
         p = super().evaluate(si, active)

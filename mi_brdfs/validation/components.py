@@ -6,8 +6,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import Array, context, interaction, numbers, vectors
-from ..probe.bsdf import BSDFProbe, Part, Samples
-from ..probe.directions import angles_of, direction, hemisphere, on_side
+from ..probe.bsdf import Part, Samples
+from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
 from .outcome import Findings, Outcome, relative
@@ -18,24 +18,18 @@ COUNT = 4000
 
 def components(run: Run) -> Findings:
     """Check that the components add up to the whole, whose density is a mixture of theirs; ``sampled_component`` and
-    ``sampled_type`` lie within what was asked for and drawn, the density of a delta function's sample is how often it
-    is drawn, and its weight what it is alone over that, ``eta`` is 1 for light that stays on its side, what a context
-    excludes is black, and a type mask of one bit or several lets through the components of these types, drawn as
-    ``pdf`` says."""
+    ``sampled_type`` lie within what was asked for and drawn, ``eta`` is 1 for light that stays on its side, what a
+    context excludes is black, and a type mask of one bit or several lets through the components of these types, drawn
+    as ``pdf`` says."""
     probe = run.probe
     for part in probe.parts:
         outcome = Outcome("components", part.name)
         for incident in run.views(part):
             _check_sampled(run, outcome, part, incident)
         if part.component is None:
-            _check_deltas(run, outcome, part)
             _check_sum(run, outcome)
             _check_there_and_back(run, outcome, part)
         yield outcome.finding("Sums, sampled components and types are as asked for.")
-    for part in (_delta(probe, k) for k in probe.deltas):
-        outcome = Outcome("components", part.name)
-        _check_alone(run, outcome, part)
-        yield outcome.finding("It carries as much light as where it is drawn alone.")
     for part in probe.components:
         outcome = Outcome("components", f"{part.name} masked out")
         _check_masks(run, outcome, part)
@@ -58,19 +52,19 @@ def _check_sampled(run: Run, outcome: Outcome, part: Part, incident: Incident) -
         if wrong.any():
             told = f"for light from {incident.name} sampled_{told}"
             outcome.fault(told, wi=incident.vector(int(wrong.argmax())), seed=SEED)
-    _check_eta(outcome, incident, samples)
+    check_eta(outcome, incident, samples, samples.lit)
     if len(allowed) > 1 and samples.lit.any():
         _check_drawn(run, outcome, incident, samples)
 
 
-def _check_eta(outcome: Outcome, incident: Incident, samples: Samples) -> None:
+def check_eta(outcome: Outcome, incident: Incident, samples: Samples, lit: Array) -> None:
     """Check that light that stays on its side stays in its medium."""
-    stays = samples.lit & (samples.wo[:, 2] * incident.wi[..., 2] > 0)
+    stays = lit & (samples.wo[:, 2] * incident.wi[..., 2] > 0)
     for wrong, needed in (
         (stays & (samples.eta != 1), "1 as the light stays on its side"),
-        (samples.lit & ~(np.isfinite(samples.eta) & (samples.eta > 0)), "above 0"),
+        (lit & ~(np.isfinite(samples.eta) & (samples.eta > 0)), "above 0"),
     ):
-        why = f"but must be {needed}; {wrong.sum() / max(samples.lit.sum(), 1):.1%} of the samples are wrong"
+        why = f"but must be {needed}; {wrong.sum() / max(lit.sum(), 1):.1%} of the samples are wrong"
         outcome.wrong(wrong, "a sample's eta", samples.eta, why, incident.wi, samples.wo, seed=SEED)
 
 
@@ -92,48 +86,6 @@ def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Sample
             share = said[alone].mean()
             told = f"{start} only {share:.1%} of the samples where nothing but {part.name} draws any are said to be its"
             outcome.fault(f"{told} own", 1 - share, wi=incident.vector(int(lit[alone][0])), seed=SEED)
-
-
-def _check_deltas(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that the density that samples of delta functions state is how often they are drawn."""
-    for incident in run.incidents(part) if run.probe.deltas else ():
-        samples = run.samples(part, incident)
-        for k in run.probe.deltas:
-            own = (samples.component == k) & samples.weight.any(axis=1)
-            share, density = own.mean(), samples.density[own].mean() if own.any() else 0
-            # Six standard errors: a false alarm once in 1e8.
-            if abs(share - density) > 6 * np.sqrt(share * (1 - share) / len(own)) + 1e-3:
-                outcome.fault(
-                    f"for light from {incident.name} samples of {run.probe.name_of(k)} state the density "
-                    f"{density:.4g}, but are {share:.2%} of the samples",
-                    abs(share - density),
-                    wi=incident.wi,
-                    seed=SEED,
-                )
-
-
-def _check_alone(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that samples of a delta function carry as much light among others as if it were drawn alone."""
-    for incident in run.incidents(run.probe.whole):
-        samples = run.samples(run.probe.whole, incident)
-        together = samples.weight * (samples.component == part.component)[:, None]
-        alone = run.probe.sample(part, incident.wi, random(SCATTERED, SEED)).weight
-        (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
-        error = abs(got - expected)
-        # Six standard errors: a false alarm once in 1e8.
-        if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
-            channel = int(np.argmax(error))
-            outcome.fault(
-                f"for light from {incident.name} its samples carry {got[channel]:.4g} of the light among those of "
-                f"others, but {expected[channel]:.4g} where only these are drawn",
-                float(error.max()),
-                wi=incident.wi,
-                seed=SEED,
-            )
-
-
-def _delta(probe: BSDFProbe, k: int) -> Part:
-    return Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
 
 
 def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
@@ -219,9 +171,8 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
 
 def flags(run: Run) -> Findings:
     """Check that a component's flags fit its behaviour. One that gathers half of its light within 10° of the mirror
-    direction is not diffuse, one whose f or density changes as the frame turns about the normal is anisotropic, so is a
-    delta function that does not turn with the light, one that is for reflection and transmission does both, and one
-    that the differentials of uv change needs them."""
+    direction is not diffuse, one whose f or density changes as the frame turns about the normal is anisotropic,
+    one that is for reflection and transmission does both, and one that the differentials of uv change needs them."""
     probe, kinds = run.probe, mi.BSDFFlags
     for part in probe.components:
         outcome = Outcome("flags", part.name)
@@ -249,12 +200,6 @@ def flags(run: Run) -> Findings:
         if not probe.bsdf.needs_differentials():
             _check_differentials(run, outcome, part)
         yield outcome.finding("They fit what it does.")
-    for k in probe.deltas:
-        part = _delta(probe, k)
-        outcome = Outcome("flags", part.name)
-        if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
-            _check_delta_turned(run, outcome, part)
-        yield outcome.finding("It turns with the light, or is flagged anisotropic.")
 
 
 def _check_both_ways(run: Run, outcome: Outcome, part: Part) -> None:
@@ -271,9 +216,9 @@ def _check_turned(run: Run, outcome: Outcome, part: Part) -> None:
     normal by any angle."""
     wi = on_side(hemisphere(COUNT, 8, 0.2), part.sides[0])
     wo = run.probe.sample(part, wi, random(COUNT, 5)).wo
-    turned = _turned(wi), _turned(wo)
+    both = turned(wi), turned(wo)
     for name, method in (("f", run.probe.eval), ("pdf", run.probe.pdf)):
-        before, after = (method(part, *pair).reshape(COUNT, -1).max(axis=1) for pair in ((wi, wo), turned))
+        before, after = (method(part, *pair).reshape(COUNT, -1).max(axis=1) for pair in ((wi, wo), both))
         lit = np.maximum(before, after) > 0
         change = relative(after, before, 1e-6, unknown=0) * lit
         difference = float(np.quantile(change[lit], 0.99)) if lit.any() else 0.0
@@ -288,25 +233,7 @@ def _check_turned(run: Run, outcome: Outcome, part: Part) -> None:
             )
 
 
-def _check_delta_turned(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that the direction of a delta function turns with the light."""
-    wi, u = on_side(hemisphere(COUNT, 8, 0.2), part.sides[0]), random(COUNT, 5)
-    before, after = run.probe.sample(part, wi, u), run.probe.sample(part, _turned(wi), u)
-    lit = before.weight.any(axis=1) & after.weight.any(axis=1)
-    apart = np.linalg.norm(after.wo - _turned(before.wo), axis=1) * lit
-    if np.quantile(apart, 0.99) > 1e-3:
-        k = int(np.argmax(apart))
-        outcome.fault(
-            f"light from {angles_of(wi[k])} goes to {angles_of(before.wo[k])}, but light from "
-            f"{angles_of(_turned(wi)[k])} to {angles_of(after.wo[k])}: it does not turn with the light about the "
-            "normal, and is not flagged anisotropic",
-            apart.max(),
-            wi=wi[k],
-            seed=5,
-        )
-
-
-def _turned(w: Array) -> Array:
+def turned(w: Array) -> Array:
     """Return directions, each turned about the normal by an angle of its own."""
     angle = 2 * np.pi * np.random.default_rng(9).random(len(w))
     (x, y, z), cos, sin = w.T.astype(np.float64), np.cos(angle), np.sin(angle)

@@ -146,7 +146,8 @@ def mode(run: Run) -> Findings:
                 expected = run.probe.eval(part, wi, wo)
             else:
                 expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
-            error = relative(got, expected, 1e-6, unknown=0)
+            # What grazing facets transmit is faint and has few digits.
+            error = relative(got, expected, 1e-3, unknown=0)
             off = (error.max(axis=1) > tolerance).mean()
             if off > 1e-3:
                 why = "it is not flagged NonSymmetric" if symmetric else "that is its adjoint, f from wo to wi"

@@ -32,7 +32,7 @@ def albedo(run: Run) -> Findings:
     1/η² of radiance. Where the sampler is wrong, too much light is its fault: see ``weight``, ``pdf`` and ``chi2``."""
     points = lattice(12, 5)
     limits = _limits(run)
-    for part in run.probe.parts:
+    for part in run.probe.parts or [run.probe.whole]:
         outcome, found = Outcome("albedo", part.name), []
         added = limits.diffuse if part.component is None else 0
         angles = sorted({*run.angles, 0, 45, 70, 85, 89, 89.9})

@@ -18,7 +18,19 @@ from ..probe.directions import angles_of, scattered
 from ..probe.sources import name_of
 from ..probe.variates import random
 from ..variants import activated, is_measurable
-from . import components, contract, derivatives, energy, polarization, sampling, spectral, textures, updates, values
+from . import (
+    components,
+    contract,
+    deltas,
+    derivatives,
+    energy,
+    polarization,
+    sampling,
+    spectral,
+    textures,
+    updates,
+    values,
+)
 from .incidents import SCATTERED, all_over, incidents
 from .outcome import Findings, Outcome, told
 from .report import Finding, Report
@@ -40,6 +52,7 @@ CHECKS: dict[str, Callable[[Run], Findings]] = {
         energy.efficiency,
         components.components,
         components.flags,
+        deltas.deltas,
         textures.textures,
         derivatives.gradients,
         updates.updates,
@@ -66,6 +79,8 @@ SIGNIFICANCE = 0.01
 AGAINST_SEED = 91
 FAINT = 1e-6
 """Values below this part of the largest one for an angle of incidence differ as much as this part does."""
+OF_SAMPLES = "albedo", "deltas", "active", "recorded", "calls", "null"
+"""The checks that do without values, which delta functions have none of."""
 DELTA = "A delta function, which cannot be evaluated or tested."
 
 
@@ -113,7 +128,7 @@ def check(
         run = Run(probe, angles, significance, conserves, given)
         findings = [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
         for word in wanted:
-            if probe.parts:
+            if probe.parts or word in OF_SAMPLES:
                 findings += _found(word, run)
             on_progress()
         return Report(name or _name(bsdf), findings, list(run.shown_trials()))

@@ -135,7 +135,7 @@ def support(run: Run) -> Findings:
             pdf = run.probe.pdf(part, wi, wo)
             missed = np.where((value > 1e-9 * value.max()) & ~(pdf > 0), value, 0)
             tried += len(wo)
-            outcome.wrong(missed, "eval", value, "but pdf is 0: this light is never sampled", wi, wo)
+            outcome.wrong(missed, "eval", value, "but pdf is not above 0: this light is never sampled", wi, wo)
         yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
 
 
@@ -298,14 +298,14 @@ def _check_octaves(
 ) -> None:
     """Add a fault for values that change far more while the height above the horizon halves than while it halves before
     and after: a power of the height changes alike. Of the pairs, as many may jump as there are hard ``edges`` in a STEP
-    elsewhere."""
+    elsewhere, and three by chance."""
     change = _changes(values)
     lit = np.maximum(values[:-1], values[1:]) > 1e-2 * values.max()  # a soft edge may end between two heights
     beside = np.pad(change, ((1, 1), (0, 0)))
     jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
     jump[0] = False  # a highlight may end there: without what lies above, a slope is no jump
     usual = 2 * edges * -np.diff(OCTAVES)
-    if (jump.sum(axis=1) > 0.01 * np.maximum(lit.sum(axis=1), 1) + usual).any():
+    if (jump.sum(axis=1) > np.maximum(0.01 * lit.sum(axis=1), 3) + usual).any():
         octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
         upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
         factor = np.exp(change[octave, k])

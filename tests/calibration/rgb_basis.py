@@ -3,7 +3,7 @@ under D65, and as smooth as these allow (the least squared differences of neighb
 
     python tests/calibration/rgb_basis.py [--check]
 
-Writes mi_brdfs/tabulated/basis.py; with --check, exits with 1 if that is not what it would write.
+Writes mi_brdfs/tabulated/basis.txt; with --check, exits with 1 if that is not what it would write.
 
 I. Mallett and C. Yuksel, Spectral primary decomposition for rendering with sRGB reflectance, Eurographics Symposium on
 Rendering 2019, doi:10.2312/sr.20191216, pose the problem.
@@ -20,18 +20,9 @@ from scipy.optimize import nnls
 
 from mi_brdfs.observer import to_srgb
 
-FILE = Path(__file__).parents[2] / "mi_brdfs" / "tabulated" / "basis.py"
+FILE = Path(__file__).parents[2] / "mi_brdfs" / "tabulated" / "basis.txt"
 WAVELENGTHS = np.arange(360, 831, 10)
 DIGITS = 5
-HEAD = '''"""Three spectra for linear sRGB values, as tests/calibration/rgb_basis.py computes them."""
-
-import numpy as np
-
-WAVELENGTHS = np.linspace({}, {}, {})
-"""In nm; the spectra are linear between them."""
-BASIS = np.array(
-    [
-'''
 
 
 def basis() -> np.ndarray:
@@ -53,21 +44,14 @@ def basis() -> np.ndarray:
     return np.round(rounded, DIGITS)
 
 
-def module() -> str:
-    lines = [HEAD.format(WAVELENGTHS[0], WAVELENGTHS[-1], len(WAVELENGTHS))]
-    for spectrum in basis():
-        lines.append("        [\n")
-        lines += [
-            "            " + " ".join(f"{x:.{DIGITS}f}," for x in spectrum[k : k + 10]) + "\n"
-            for k in range(0, len(spectrum), 10)
-        ]
-        lines.append("        ],\n")
-    return "".join([*lines, "    ]\n)  # fmt: skip\n", '"""Of red, green and blue, shape (3, wavelengths)."""\n'])
+def table() -> str:
+    rows = (f"{nm} " + " ".join(f"{x:.{DIGITS}f}" for x in row) for nm, row in zip(WAVELENGTHS, basis().T, strict=True))
+    return "\n".join(["# nm, red, green, blue", *rows]) + "\n"
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true")
     if parser.parse_args().check:
-        sys.exit(0 if FILE.read_text() == module() else f"{FILE.name} is not what this script writes.")
-    FILE.write_text(module())
+        sys.exit(0 if FILE.read_text() == table() else f"{FILE.name} is not what this script writes.")
+    FILE.write_text(table())

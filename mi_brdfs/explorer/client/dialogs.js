@@ -132,7 +132,7 @@ function drawRanking() {
   byId("fit-remarks").textContent = ranking.length && ranking[0].text ? `${ranking[0].model}: ${ranking[0].text}` : "";
 }
 
-/** Wipe a fit over what was measured; it takes the place of another fit. */
+/** Wipe a fit over what was measured, alone with it; it takes the place of another fit. */
 function showFit({ bsdf, model }) {
   const told = (it) => JSON.stringify(it.bsdf);
   const known = ranking.map(told);
@@ -146,6 +146,7 @@ function showFit({ bsdf, model }) {
     changeSubject(at, subject);
   }
   const measured = session.state.subjects.findIndex((it) => it.bsdf.file === fitted);
-  if (measured >= 0) change({ compare: "wipe", pair: [measured, at] });
+  const subjects = session.state.subjects.map((it, k) => ({ ...it, hidden: k !== measured && k !== at }));
+  if (measured >= 0) change({ compare: "wipe", pair: [measured, at], subjects });
   byId("fit-dialog").close();
 }

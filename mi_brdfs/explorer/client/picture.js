@@ -170,6 +170,7 @@ function point(canvas, k, event) {
 
 function put(canvas, answer) {
   canvas.answer = answer;
+  canvas.classList.toggle("rough", answer.spp < 2);
   if (canvas.width !== answer.width || canvas.height !== answer.height)
     Object.assign(canvas, { width: answer.width, height: answer.height });
   stack.style.setProperty("--aspect", answer.width / answer.height);

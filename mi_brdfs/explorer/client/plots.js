@@ -127,7 +127,9 @@ export function drawPolar() {
       class: "incident",
     }),
   );
-  svg.append(label(...place(-theta - 4, 0.97), "ωi", "middle", "direction"));
+  const aside = degrees(16 / radius);
+  const [besideX, besideY] = place(-theta + (theta < 30 ? -aside : aside), 1 - 14 / radius);
+  svg.append(label(besideX, besideY + 4, "ωi", "middle", "direction"));
   const overlay = shape("g");
   svg.append(overlay);
 

@@ -103,9 +103,11 @@ function showFound() {
   const words = byId("search").value.toLowerCase().split(/\s+/).filter(Boolean);
   const fits = (...texts) => words.every((word) => texts.join(" ").toLowerCase().includes(word));
   const kinds = {};
-  for (const { name, title, group } of hello.types) {
-    if (fits(name, title, group)) (kinds[group] ??= []).push([name, title === name ? "" : title, { type: name }]);
-  }
+  const own = hello.types.filter(({ group }) => group === "mi_brdfs").length;
+  hello.types.forEach(({ name, title, group }, at) => {
+    const ball = at < own ? ballOf("models", at, own, own) : null;
+    if (fits(name, title, group)) (kinds[group] ??= []).push([name, title === name ? "" : title, { type: name }, ball]);
+  });
   const files = hello.files.filter(({ name }) => fits(name, "file measured"));
   const presets = {};
   hello.presets.forEach((name, at) => {
@@ -132,15 +134,15 @@ function showFound() {
       element(
         "ul",
         {},
-        ...shown.map(([name, text, bsdf]) =>
+        ...shown.map(([name, text, bsdf, ball]) =>
           Array.isArray(text) ? ballsOf(name, text) : element(
             "li",
             {},
             element(
               "button",
               { class: "found", onclick: () => choose(bsdf, name) },
-              element("b", {}, name),
-              text ? element("span", {}, text) : null,
+              ball,
+              element("div", {}, element("b", {}, name), text ? element("span", {}, text) : null),
             ),
           ),
         ),
@@ -151,19 +153,21 @@ function showFound() {
   byId("found").replaceChildren(...(nodes.length ? nodes : [element("p", {}, "Nothing has this name.")]));
 }
 
+/** Return a ball of a sheet, by its number in rows of `across`. */
+function ballOf(sheet, at, across, count) {
+  const [column, last] = [at % across, Math.ceil(count / across) - 1];
+  const place = `${(100 * column) / (across - 1)}% ${(100 * (at - column)) / across / (last || 1)}%`;
+  return element("i", { class: "of-sheet", style: `background:url(client/${sheet}.jpg) ${place} / ${100 * across}%` });
+}
+
 /** Return a published material, with a ball for each model that it was fitted with. */
 function ballsOf(material, members) {
   const { presets, across } = session.hello;
-  const last = Math.ceil(presets.length / across) - 1;
   const ball = ([name, at]) =>
     element(
       "button",
       { class: "ball", "aria-label": name, onclick: () => choose({ type: "preset", name }, name) },
-      element("i", {
-        style:
-          `background:url(client/published.jpg) ${(100 * (at % across)) / (across - 1)}% ` +
-          `${(100 * Math.floor(at / across)) / last}% / ${100 * across}%`,
-      }),
+      ballOf("published", at, across, presets.length),
       name.slice(0, -material.length - 1),
     );
   return element("li", { class: "preset" }, element("b", {}, material.replaceAll("-", " ")), ...members.map(ball));

@@ -110,8 +110,7 @@ def projected(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Pair:
 
 
 def retro(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Pair:
-    """V in polar coordinates about L, whose azimuth is 0 towards the normal: the mirror image of those about the mirror
-    direction."""
+    """V in polar coordinates about L with azimuth 0 towards the normal: those about the mirror direction, mirrored."""
     light, about = SpecularPolar(mirrored=False).directions(theta_l, np.arctan2(y, x), np.hypot(x, y))
     return light, vector(-about.x, about.y, about.z)
 

@@ -118,8 +118,7 @@ class Columns:
     def __init__(self, file: TextFile, names: list[str], quantity: Quantity) -> None:
         self.file, self.count = file, len(names)
         self.angles: dict[str, tuple[int, float]] = {}
-        """The column of an angle, and its unit in radians, by ``theta_i``, ``phi_i``, ``theta_o``, ``phi_o`` or
-        ``delta_phi``."""
+        """The column of an angle and its unit in radians, by its name: ``theta_i``, ``phi_o``, ``delta_phi`` …"""
         found: dict[str, int] = {}
         cosines = set()
         for k, name in enumerate(names):

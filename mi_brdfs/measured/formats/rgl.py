@@ -153,11 +153,7 @@ class Field:
 
 
 class TensorFile:
-    """A file of named arrays.
-
-    Raises:
-        FileError: if it is none, or an array is not in it as a whole, or shares bytes with another.
-    """
+    """A file of named arrays, or a FileError if one is not in it as a whole, or shares bytes with another."""
 
     def __init__(self, path: Path) -> None:
         self.file = file = BinaryFile(path)
@@ -237,11 +233,7 @@ class TensorFile:
 
 
 def write_tensors(path: Path, fields: dict[str, np.ndarray]) -> None:
-    """Write arrays, each from a multiple of 8 bytes on.
-
-    Raises:
-        OSError: if the file cannot be written.
-    """
+    """Write arrays, each from a multiple of 8 bytes on."""
     arrays = {name: np.ascontiguousarray(field, field.dtype.newbyteorder("<")) for name, field in fields.items()}
     head = struct.pack("<12sBBI", MAGIC, *VERSION, len(fields))
     offset = len(head) + sum(13 + len(name.encode()) + 8 * field.ndim for name, field in arrays.items())

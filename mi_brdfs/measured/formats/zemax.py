@@ -180,11 +180,8 @@ def write(path: Path, source: Source) -> None:
 
 
 class Header:
-    """What stands above the data, up to the line DataBegin: settings, angles in degrees as in the file, and comments.
-
-    Raises:
-        FileError: if there is something else.
-    """
+    """What stands above the data, up to the line DataBegin: settings, angles in degrees as in the file, and comments. A
+    FileError says that there is something else."""
 
     def __init__(self, file: TextFile, rows: Iterator[list[str]]) -> None:
         self.file = file

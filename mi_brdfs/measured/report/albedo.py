@@ -37,8 +37,7 @@ def albedos(grid: Grid, theta_i: np.ndarray, phi_i: float = 0, extrapolate: Extr
 
 
 def coverage(grid: Grid, theta_i: np.ndarray, phi_i: float = 0) -> np.ndarray:
-    """Return the shares of the hemisphere of wo, by solid angle, that were measured at angles of incidence, shape
-    (N,)."""
+    """Return the shares of the hemisphere of wo, by solid angle, that were measured at angles θi, shape (N,)."""
     return np.array([
         solid_angle @ grid.measured(wi, wo) / TWO_PI for wi, wo, solid_angle in _nodes(theta_i, phi_i)
     ])  # fmt: skip

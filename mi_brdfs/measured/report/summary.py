@@ -95,7 +95,7 @@ class Summary:
     def rows(self) -> list[tuple[str, str]]:
         """Return what each finding is called, and what it is, in words."""
         above = self.above
-        lowest = f", down to {_percent(self.most_negative)} of the largest" if above.negative else ""
+        lowest = f", down to {percent(self.most_negative)} of the largest" if above.negative else ""
         rows = [
             ("format", self.format),
             ("material", self.material or "not named"),
@@ -132,7 +132,7 @@ class Summary:
         if self.reciprocity is None:
             return "unknown: no pair of directions was measured both ways"
         it = self.reciprocity
-        return f"off by {_percent(it.median)} in the median, {_percent(it.percentile95)} at the 95th percentile"
+        return f"off by {percent(it.median)} in the median, {percent(it.percentile95)} at the 95th percentile"
 
     def _place(self, it: Albedo | Scatter) -> str:
         return f"θi = {it.theta_i:g}°" + (f", φi = {it.phi_i:g}°" if self.symmetry == "anisotropic" else "")
@@ -144,7 +144,7 @@ class Summary:
         off = np.array([abs(it.integrated - it.stated) / max(it.stated, 1e-6) for it in self.scatter])
         worst = self.scatter[int(off.argmax())]
         return [
-            f"{len(off)} figures, which differ from the values' albedo by {_percent(np.median(off))} in the median, "
+            f"{len(off)} figures, which differ from the values' albedo by {percent(np.median(off))} in the median, "
             f"most at {self._place(worst)}: {worst.stated:.4g}, and the albedo is {worst.integrated:.4g}"
         ]
 
@@ -234,8 +234,7 @@ def ends(data: Grid | Samples, name: str, seen: Range) -> Range:
 
 
 def azimuths(grid: Grid) -> np.ndarray:
-    """Return the azimuths of incidence at which an anisotropic material was measured, in radians; 0 for an isotropic
-    one."""
+    """Return the azimuths of incidence, in radians, at which a material was measured; 0 for an isotropic one."""
     if not grid.anisotropic:
         return np.zeros(1)
     if "phi_i" in grid.coordinates.names:
@@ -281,8 +280,10 @@ def thinned(items: Any, most: int) -> Any:
 def _share(count: int, of: int) -> str:
     if not count:
         return "none"
-    return f"{count:,} ({_percent(count / of)})"
+    return f"{count:,} ({percent(count / of)})"
 
 
-def _percent(part: float) -> str:
-    return f"{100 * part:.0f} %" if abs(part) >= 0.1 else f"{100 * part:.2g} %"
+def percent(part: float) -> str:
+    """Return a part of a whole in words."""
+    percent = 100 * part
+    return "less than 0.001 %" if abs(percent) < 0.001 else f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"

@@ -1,0 +1,143 @@
+"""A check of delta functions, which have no values, by their samples."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+
+from ..probe.arrays import Array, context
+from ..probe.bsdf import BSDFProbe, Part, Samples
+from ..probe.directions import angles_of, scattered
+from ..probe.variates import random
+from .components import check_eta, turned
+from .incidents import SCATTERED, Incident
+from .outcome import Findings, Outcome, relative
+from .report import Finding
+from .run import SEED, Run
+
+KNOWN = 1e-3
+"""What direction and light of a sample are known to, at angles that are not near grazing."""
+
+
+def deltas(run: Run) -> Findings:
+    """Check delta functions by their samples: their density is how often they are drawn, they carry as much light among
+    others as alone, to the side that their type says, and ``eval`` and ``pdf`` do not know of them. Light is bent as
+    ``eta`` says, after Snell, unless flags say that the surface turns it, and goes back where it came from, as much of
+    it."""
+    probe = run.probe
+    if not probe.deltas:
+        yield Finding("deltas", "whole", "skip", "There is no delta function.")
+    for part in (delta(probe, k) for k in probe.deltas):
+        outcome = Outcome("deltas", part.name)
+        _check_share(run, outcome, part)
+        _check_alone(run, outcome, part)
+        _check_paths(run, outcome, part)
+        yield outcome.finding("Its samples fit together.")
+
+
+def delta(probe: BSDFProbe, k: int) -> Part:
+    """Return the component of a delta function."""
+    return Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
+
+
+def _check_share(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that the density that the samples state is how often they are drawn."""
+    for incident in run.incidents(run.probe.whole):
+        samples = run.samples(run.probe.whole, incident)
+        own = (samples.component == part.component) & samples.weight.any(axis=1)
+        share, density = own.mean(), samples.density[own].mean() if own.any() else 0
+        # Six standard errors: a false alarm once in 1e8.
+        if abs(share - density) > 6 * np.sqrt(share * (1 - share) / len(own)) + 1e-3:
+            outcome.fault(
+                f"for light from {incident.name} its samples state the density {density:.4g}, but are {share:.2%} of "
+                "all",
+                abs(share - density),
+                wi=incident.wi,
+                seed=SEED,
+            )
+
+
+def _check_alone(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that the samples carry as much light among others as if they were drawn alone."""
+    for incident in run.incidents(run.probe.whole):
+        samples = run.samples(run.probe.whole, incident)
+        together = samples.weight * (samples.component == part.component)[:, None]
+        alone = run.probe.sample(part, incident.wi, random(SCATTERED, SEED)).weight
+        (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
+        error = abs(got - expected)
+        # Six standard errors: a false alarm once in 1e8.
+        if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
+            channel = int(np.argmax(error))
+            outcome.fault(
+                f"for light from {incident.name} its samples carry {got[channel]:.4g} of the light among those of "
+                f"others, but {expected[channel]:.4g} where only these are drawn",
+                float(error.max()),
+                wi=incident.wi,
+                seed=SEED,
+            )
+
+
+def _check_paths(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check where samples go, and that light goes back the same way."""
+    kinds, wi, u = mi.BSDFFlags, scattered(SCATTERED, 81, part.sides), random(SCATTERED, 82)
+    there = run.probe.sample(part, wi, u)
+    wo, weight = there.wo, there.weight
+    lit = np.logical_or.reduce(weight != 0, axis=1)
+    steep = np.minimum(abs(wi[:, 2]), abs(wo[:, 2])) > 0.1
+
+    unknown = ~(np.isfinite(weight) & (weight >= 0))
+    outcome.wrong(unknown, "a sample's weight", weight, "but must be finite and not negative", wi, wo, seed=82)
+    length = np.linalg.norm(wo, axis=1)
+    wrong = lit & ~(abs(length - 1) < KNOWN)
+    outcome.wrong(wrong, "the length of a sample's wo", length, "but must be 1", wi, wo, seed=82)
+    stays = wi[:, 2] * wo[:, 2] > 0
+    kind = there.kind.astype(np.int64)
+    said = [(kind & int(it)) != 0 for it in (kinds.Reflection, kinds.Transmission)]
+    wrong = lit & steep & (np.where(stays, *said) == 0)
+    outcome.wrong(wrong, "sampled_type", kind, "which goes to the other side", wi, wo, digits=9)
+    check_eta(outcome, Incident("all directions", wi), there, lit)
+    if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
+        _check_turned(run, outcome, part, wi, there)
+        sines = [np.hypot(w[:, 0], w[:, 1]) for w in (wi, wo)]
+        bent = sines[0] / np.where(lit & (there.eta != 0), there.eta, 1)
+        why = "is that by its eta"
+        error = abs(sines[1] - bent) * (lit & steep & ~stays) > KNOWN
+        outcome.wrong(error, "the sine of a sample's angle", sines[1], why, wi, wo, expected=bent, seed=82)
+    for name, value in zip(("eval", "pdf"), run.probe.eval_pdf(part, wi, wo), strict=True):
+        outcome.wrong(value != 0, name, value, "but must be 0, as it is a delta function", wi, wo)
+
+    seen = stays if len(part.sides) < 2 else np.ones(len(wi), bool)
+    back = run.probe.sample(part, np.where(steep[:, None], wo, wi), u)
+    same = lit & steep & seen & (stays == (back.wo[:, 2] * wo[:, 2] > 0))
+    if not same.any():
+        return
+    error = relative(_light(back), _light(there), 1e-3) * same[:, None]
+    if np.quantile(error[same], 0.99) > 10 * KNOWN:
+        name, why = "the light of a sample back to wi", "is what goes there"
+        outcome.wrong(error, name, _light(back), why, wi, wo, expected=_light(there), seed=82)
+    apart = np.linalg.norm(back.wo - wi, axis=1) * (same & back.weight.any(axis=1))
+    if np.quantile(apart[same], 0.99) > KNOWN:
+        why = "from wi, where light from wo must go, as that from wi goes to wo"
+        outcome.wrong(apart, "the distance of a sample", apart, why, wi, wo, seed=82)
+
+
+def _check_turned(run: Run, outcome: Outcome, part: Part, wi: Array, there: Samples) -> None:
+    """Check that samples turn with the light about the normal."""
+    after = run.probe.sample(part, turned(wi), random(SCATTERED, 82))
+    lit = there.weight.any(axis=1) & after.weight.any(axis=1)
+    apart = np.linalg.norm(after.wo - turned(there.wo), axis=1) * lit
+    if np.quantile(apart, 0.99) > KNOWN:
+        k = int(np.argmax(apart))
+        outcome.fault(
+            f"light from {angles_of(wi[k])} goes to {angles_of(there.wo[k])}, but light from "
+            f"{angles_of(turned(wi)[k])} to {angles_of(after.wo[k])}: it does not turn with the light about the "
+            "normal, and is not flagged anisotropic",
+            apart.max(),
+            wi=wi[k],
+            seed=82,
+        )
+
+
+def _light(samples: Samples) -> Array:
+    """Return the part of the light that samples stand for, without the factor 1/η² of refracted radiance."""
+    return samples.weight * (samples.density * samples.eta**2)[:, None]
