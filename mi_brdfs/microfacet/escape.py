@@ -3,7 +3,7 @@ what it meets before. Polynomials for walks on Smith's surfaces, which tests/cal
 
 A walk is that of E. Heitz, J. Hanika, E. d'Eon and C. Dachsbacher, Multiple-scattering microfacet BSDFs with the Smith
 model, ACM Transactions on Graphics 35(4), 2016, doi:10.1145/2897824.2925943. On given facets, what it does depends on a
-direction v: the polynomials are in
+direction v: the polynomials for what is lost are in
 
     x = v_z/(v_z + k (l - v_z)),  l² = v_z² + (αu v_x)² + (αv v_y)²,
     y = α²/(α² + αu αv/2),        α² = ((αu v_x)² + (αv v_y)²)/(v_x² + v_y²),
@@ -32,10 +32,10 @@ FILE = Path(__file__).with_name("escape.npz")
 ROUGHEST = 3.2
 """The largest tabulated α: that of Burley's most anisotropic facets."""
 COUNTS = {
-    "lost": (7, 6, 4, 3), "mean": (5,), "bend": (1,), "second": (3, 2, 1), "schlick": (4, 3, 2), "dip": (3, 2, 1)
+    "lost": (7, 6, 4, 3), "mean": (5,), "bend": (1,), "second": (4, 2, 1), "schlick": (4, 3, 2), "dip": (4, 2, 1)
 }  # fmt: skip
-"""How many entries the table has for each polynomial, which are the coefficients of those in x by which 1, y, y² … are
-multiplied; and for the means and k."""
+"""How many entries the table has for the means, for k, and for each polynomial: the coefficients of those by which 1,
+y, y² … are multiplied, in x for what is lost, and in 1 - cosθ for the others, where 1 - cosθ is a factor of y, too."""
 
 
 class Escape(NamedTuple):
@@ -96,8 +96,13 @@ class Walks:
             inverse, scale, shift = self.azimuth
             along, sin2 = slope2 * inverse + 2 * EPSILON, v.x * v.x + v.y * v.y + EPSILON
             y = along / (along + sin2) * scale + shift
-        lost, second, schlick, dip = (horner([horner(row, x) for row in self.rows[name]], y) for name in Escape._fields)
-        return Escape(dr.maximum(lost, 0), second, schlick, dip)
+        lost = horner([horner(row, x) for row in self.rows["lost"]], y)
+        # The others change with the angle itself, and at the normal not with the azimuth.
+        versine, others = 1 - v.z, []
+        for name in Escape._fields[1:]:
+            first, *rest = (horner(row, versine) for row in self.rows[name])
+            others.append(dr.fma(versine * y, horner(rest, y), first) if rest else first)
+        return Escape(dr.maximum(lost, 0), *others)
 
 
 def ends(ratio: Any) -> tuple[Any, Any]:

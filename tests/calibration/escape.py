@@ -271,8 +271,9 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         phi = np.append(np.linspace(0, np.pi / 2, 9), between)
     # Half of the places are even in the stretched space, most of which is at grazing where facets are smooth.
     upright = np.cos(np.radians([1, 15, 30, 45, 55, 65, 72, 78, 83, 87]))
-    places = Places.joined(Places.of(upright, phi, u, v), Places.of(chebyshev(13), phi, u, v, stretched=True))
-    stretched = np.arange(len(places.cos)) >= len(phi) * len(upright)
+    above = Places.of(upright, phi, u, v)
+    places = Places.joined(above, Places.of(chebyshev(13), phi, u, v, stretched=True))
+    stretched = np.arange(len(places.cos)) >= len(above.cos)
     losses = np.array([
         blinn_lost(cos, u) if shape == "blinn" else lost(shape, cos, angle, u, v)
         for cos, angle in zip(places.cos, places.phi, strict=True)
@@ -286,11 +287,11 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale = np.minimum(1 / (1 - loss), 3)
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
-        weights = (0.02 + loss) * np.where(stretched, 0.1, 1)
+        weights = 0.02 + np.maximum(above.terms("lost", bend) @ polynomial, 0)
         others = [
             np.linalg.lstsq(
-                places.terms(name, bend) * weights[:, None],
-                along_line(walked[name](places.at), places.rho2) * weights,
+                above.terms(name) * weights[:, None],
+                along_line(walked[name](above.at), above.rho2) * weights,
                 rcond=None,
             )[0]
             for name in ("second", "schlick", "dip")
@@ -354,9 +355,12 @@ class Places(NamedTuple):
     def joined(cls, *places: Places) -> Places:
         return cls(*(np.concatenate(each) for each in zip(*places, strict=True)))
 
-    def terms(self, name: str, bend: float) -> np.ndarray:
-        x = 2 * self.at[:, 0] / (self.at[:, 0] + bend * (1 - self.at[:, 0])) - 1
-        return np.stack([x**i * self.y**j for j, count in enumerate(COUNTS[name]) for i in range(count)], axis=-1)
+    def terms(self, name: str, bend: float = 1) -> np.ndarray:
+        x, factor = 1 - self.cos, 1 - self.cos
+        if name == "lost":
+            x, factor = 2 * self.at[:, 0] / (self.at[:, 0] + bend * (1 - self.at[:, 0])) - 1, np.ones(len(self.cos))
+        powers = [(i, j) for j, count in enumerate(COUNTS[name]) for i in range(count)]
+        return np.stack([x**i * self.y**j * factor ** min(j, 1) for i, j in powers], axis=-1)
 
 
 def along_line(line: np.ndarray, rho2: np.ndarray, channel: int = 0) -> np.ndarray:
