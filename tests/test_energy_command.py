@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import qmc
 from test_cli import invoke
 
-from mi_brdfs.probe.stated_energy import fault, merged, rounded_up
+from mi_brdfs.probe.stated_energy import fault, rounded_up
 from mi_brdfs.probe.variates import sobol
 
 GUESTS = '''
@@ -139,14 +139,7 @@ ERRORS = {
     "unknown name": ("chlk", RIGHT, 2, "There is no model 'chlk'; did you mean 'chalk'?"),
     "broken": ("broken", RIGHT, 1, "broken: .*no attribute 'color'"),
     "not a number": ("void", RIGHT, 1, "void: the albedo is not a number at θ = "),
-    "no choice": (
-        "glow",
-        '1, [({"knid": "new"}, 1)]',
-        1,
-        "glow: {'knid': 'new'} is no configuration: there are no such",
-    ),
     "no word": ("glow", '1, [({"kind": "old"}, 1)]', 1, "glow: {'kind': 'old'} is no configuration: glow: kind = "),
-    "no number": ("glow", '1, [({"depth": 0.5}, 1)]', 1, "glow: unknown parameter depth"),
 }
 
 
@@ -180,12 +173,6 @@ def test_what_cannot_be_measured_is_told_in_a_sentence(tmp_path, name, glow, sta
 def test_albedos_are_rounded_up(albedo, noise, stated):
     assert rounded_up(albedo, noise) == stated
     assert not fault(stated, albedo, noise) and fault(stated, float("nan"))
-
-
-def test_rows_merge_what_is_nearly_the_same():
-    albedos = {("a", "x"): 0.99, ("a", "y"): 1, ("b", "x"): 1, ("b", "y"): 1.01, ("c", "x"): inf, ("c", "y"): inf}
-    rows = [({"d": d, "g": g}, albedo) for (d, g), albedo in albedos.items()]
-    assert merged(rows) == [({"d": "a"}, 1), ({"d": "b", "g": "x"}, 1), ({"d": "b", "g": "y"}, 1.01), ({"d": "c"}, inf)]
 
 
 def test_variates_are_those_of_sobol():

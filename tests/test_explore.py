@@ -28,9 +28,7 @@ from mi_brdfs.probe.sources import find_sources
 
 STAGES = ["studio", "lamp", "point"]
 LOFT = str(ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf")
-QUICK = ("kurt", "walter")
 MODELS_BY_NAME = {model.plugins[0]: model for model in own_models()}
-MODELS = [*MODELS_BY_NAME]
 
 
 class Client:
@@ -281,7 +279,7 @@ def same_bsdfs():
 
 
 @pytest.mark.usefixtures("same_bsdfs")
-@pytest.mark.parametrize("name", [pytest.param(it, marks=[] if it in QUICK else pytest.mark.slow) for it in MODELS])
+@pytest.mark.parametrize("name", ["kurt", "walter", pytest.param("burley", marks=pytest.mark.slow)])
 def test_no_kernel_is_compiled_where_a_value_changes(client, name):
     views = ["picture", "lobe", "polar", "albedo", "slice", "sampler"]
     found = client.show({"type": name}, views=views, size=64, theta=30)

@@ -13,7 +13,6 @@ from mi_brdfs.fit import fit
 from mi_brdfs.fit.unknowns import configurations
 from mi_brdfs.models.walter import Walter
 from mi_brdfs.testing import assert_bsdf
-from mi_brdfs.validation import CHECKS
 
 COUNT = 400
 BASES = {
@@ -242,20 +241,14 @@ GTR = {"type": "microfacet", "distribution": "gtr", "gamma": 1.5, "shadowing": "
 @pytest.mark.parametrize("given", [
     {**GTR, "film_thickness": 150.0, "film_ior": 2.5},
     {"type": "cooktorrance", "int_ior": 1.0, "ext_ior": 1.5, "film_thickness": 2000.0, "film_ior": 4.0},
+    {"type": "walter", "alpha": 0.7, "int_ior": 2.0, "film_thickness": 300.0, "multiscatter": "walk"},
 ])  # fmt: skip
 def test_a_checker_finds_nothing(given):
-    """But for derivatives, whose kernels take long to compile: the test above and fuzzing have them."""
-    assert_bsdf(given, only=[name for name in CHECKS if name != "gradients"])
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-def test_a_checker_finds_nothing_with_multiple_reflections():
-    """Of what the kernels of values show: others take minutes to compile."""
-    given = {"type": "walter", "alpha": 0.7, "int_ior": 2.0, "film_thickness": 300.0, "multiscatter": "walk"}
+    """Of what the kernels of values show: others take long to compile, of multiple reflections minutes."""
     assert_bsdf(given, only=["finite", "support", "eval_pdf", "reciprocity", "weight", "pdf", "chi2", "albedo"])
 
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_a_checker_finds_nothing_in_derivatives():
+    """Nor in anything else."""
     assert_bsdf({"type": "walter", "alpha": 0.3, "int_ior": 1.5, "film_thickness": 450.0, "film_ior": 1.33})

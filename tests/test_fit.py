@@ -59,7 +59,7 @@ def test_recovers_parameters(name):
 @pytest.mark.slow
 def test_the_uncertainty_is_neither_too_small_nor_too_large():
     """Deviations have a root mean square of 1, up to about three of its own standard deviations."""
-    off = np.concatenate([np.ravel(noisy(name, 24)) for name in MODELS])
+    off = np.concatenate([np.ravel(noisy(name, 12)) for name in MODELS])
     assert np.sqrt(np.mean(off**2)) == pytest.approx(1, abs=0.08)
 
 

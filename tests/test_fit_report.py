@@ -151,13 +151,6 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     assert verdict == f"first comes nearest to the data. {told} {first.starts.agree} of 1 starts of first agree."
 
 
-def test_it_prints_in_full(written):
-    """What is folded opens, and nothing is cut off at the edge of the paper."""
-    assert "addEventListener('beforeprint'" in written[2] and "held out.Δ" not in written[2]
-    paper = re.search(r"@media print \{(.*?)\n\}", written[2], re.DOTALL)[1]
-    assert ".wide, pre { overflow: visible }" in paper and 'loading="lazy"' not in written[2]
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_pictures_choose_where_the_metric_misleads(fits, tmp_path):

@@ -1,7 +1,6 @@
 """The gallery: its sweeps, what it writes, and the pictures in the documentation."""
 
 import errno
-import html
 import os
 import re
 import signal
@@ -20,7 +19,7 @@ from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.cli import app
-from mi_brdfs.gallery import Entry, Row, Shot, gallery, overview, page, sheet, shot
+from mi_brdfs.gallery import Entry, Row, Shot, gallery, sheet, shot
 from mi_brdfs.gallery.families import MODELS, by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, sweeps_of
 from mi_brdfs.lobes import LambertLobe
@@ -103,19 +102,6 @@ def test_models_are_shown_by_family_and_year():
     for family in FAMILIES:
         years = [year(model) for model in ordered if model.family == family]
         assert years == sorted(years)
-
-
-def test_families_share_a_row_as_far_as_there_is_room():
-    def size(*families):
-        models = [type("Some", (Lambert,), {"__doc__": "Some (1990).", "family": family}) for family in families]
-        return np.array(overview([(model, Image.new("RGB", (80, 80))) for model in models]).size)
-
-    one, two, below = size("a"), size("a", "a"), size("a", *"bbbbbb")
-    across, down = two[0] - one[0], below[1] - one[1]
-    for families, columns, rows in (
-        ("aaaaaa", 6, 1), ("aaaabb", 6, 1), ("aaaabbb", 4, 2), ("aaaaaaab", 6, 2), ("aaabbbcccd", 6, 2),
-    ):  # fmt: skip
-        assert tuple(size(*families) - one) == ((columns - 1) * across, (rows - 1) * down), families
 
 
 def test_labels_cover_no_picture_and_are_not_cut():
@@ -259,15 +245,6 @@ def test_the_command_writes_a_page_and_its_pictures(folder):
         assert width > 5 * 16 and height > 2 * 16
 
 
-def test_the_page_has_all_about_a_model():
-    text = html.unescape(page([Entry(find_model("disney"))], 50))
-    assert find_model("disney").summary() in text and "<code>disney</code>" in text and "2012" in text
-    assert (
-        find_model("disney").manual() in text and str(portrait(find_model("disney"))) in text and "production" in text
-    )
-    assert "64 samples" in text
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
@@ -333,8 +310,6 @@ def test_a_missing_package(monkeypatch, package):
 # --- The pictures in the documentation ------------------------------------------------------------------------------
 
 STALE = "looks different; if that is meant, run python docs/generate"
-QUICK = ("ward",)
-THUMBNAILS = [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in NAMES]
 
 
 def difference(name: str, **changes) -> float:
@@ -349,14 +324,9 @@ def difference(name: str, **changes) -> float:
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("name", THUMBNAILS)
-def test_thumbnails_show_the_models(name):
-    assert difference(name) < 4, f"{name} {STALE} {name}"
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-def test_thumbnails_tell_lobes_and_models_apart():
+def test_a_thumbnail_shows_its_model():
+    """And neither another lobe nor another model. Of the other models, the strips tell."""
+    assert difference("ward") < 4, f"ward {STALE} ward"
     assert difference("ward", diffuse_reflectance=0.03) > 8
     assert difference("walter", type="cooktorrance") > 8
 
@@ -365,10 +335,11 @@ def test_thumbnails_tell_lobes_and_models_apart():
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model", own_models(), ids=lambda model: model.plugins[0])
 def test_strips_show_the_main_sweeps(model):
+    """Noise is .003 to .007; of a specular lobe a fifth too dark, Phong's strip is off by .011."""
     name = model.plugins[0]
     committed = blocks(Image.open(docs.STRIPS / f"{name}.jpg"))
     now = blocks(docs.strip(model, 4))
-    assert now.shape == committed.shape and np.sqrt(np.square(now - committed).mean()) < 0.02, f"{STALE} {name}"
+    assert now.shape == committed.shape and np.sqrt(np.square(now - committed).mean()) < 0.01, f"{STALE} {name}"
 
 
 def test_the_picture_in_the_readme_has_all_thumbnails():

@@ -1,7 +1,5 @@
 """What is generated is made from what there is now, and one command says what is not."""
 
-import re
-
 import pytest
 import typer
 from generate import made, models, scenes
@@ -69,20 +67,6 @@ def test_another_model_makes_its_own_pages_and_pictures_stale(monkeypatch, as_be
     assert text.count('<shape type="sphere" id=') == len(own_models())
     assert text.count('        <bsdf type="chalk">\n            <float name="reflectance" value="0.9"/>\n') == 1
     assert "minnaert 1941" in text and "lambert 1760, chalk 1899, minnaert 1941" in " ".join(text.split())
-
-
-@pytest.mark.parametrize("count", [1, 2, 21, 22, 30, 40])
-def test_balls_do_not_touch(monkeypatch, count):
-    """However many models there are."""
-    monkeypatch.setattr(scenes, "own_models", lambda: [Lambert] * count)
-    text = scenes.catalogue()
-    number = r"([\d.e-]+)"
-    pattern = rf'x="{number}" y="{number}" z="{number}"/>\n(?: *<float name="radius" value="{number}"/>\n)? *<bsdf'
-    balls = [[float(value or 1) for value in found] for found in re.findall(pattern, text)]
-    assert len(balls) == count
-    for k, (x, y, z, radius) in enumerate(balls):
-        assert abs(x) <= 7.5 and any(z - radius == pytest.approx(step) for _, step in scenes.ROWS.values())
-        assert all(y != b or x - a > radius + r for a, b, _, r in balls[:k])
 
 
 @pytest.fixture

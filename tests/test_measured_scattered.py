@@ -4,10 +4,10 @@ back."""
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, context, direction, efficiencies, pairs, shared, turned
+from support import call, context, direction, efficiencies, pairs, shared
 
 from mi_brdfs.measured import Samples, read, scattered
-from mi_brdfs.measured.scattered import embedded, gridded, nearest, weights
+from mi_brdfs.measured.scattered import embedded, gridded, nearest
 
 
 def glossy(wi, wo):
@@ -21,38 +21,6 @@ def streaked(wi, wo):
     """The same, narrow in x and wide in y."""
     half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
     return 0.1 + np.exp(-8 * half[..., :1] ** 2 - half[..., 1:2] ** 2)
-
-
-def test_weights_are_positive_and_balance():
-    rng = np.random.default_rng(1)
-    points, node = rng.uniform(-1, 1, (500, 3)), rng.uniform(-0.5, 0.5, (50, 3))
-    index = nearest(points, node, 11)
-    offsets = points[index] - node[:, None]
-    weight = weights(offsets)
-    assert np.all(weight >= 0)
-    np.testing.assert_allclose(weight.sum(axis=1), 1, rtol=1e-12)
-    balance = np.linalg.norm(np.einsum("nk,nkd->nd", weight, offsets), axis=1)
-    assert np.median(balance / np.linalg.norm(offsets, axis=-1).min(axis=1)) < 0.15
-    at_sample = weights(points[nearest(points, points[:1], 11)] - points[0])
-    assert at_sample.max() > 1 - 1e-6
-
-
-def test_nearest_points_are_the_nearest():
-    rng = np.random.default_rng(2)
-    points, nodes = rng.normal(size=(3000, 3)), rng.normal(size=(700, 3))
-    squared = np.sum((nodes[:, None] - points) ** 2, axis=-1)
-    expected = np.sort(np.argsort(squared, axis=1)[:, :7], axis=1)
-    np.testing.assert_array_equal(np.sort(nearest(points, nodes, 7), axis=1), expected)
-
-
-def test_distance_knows_the_symmetries():
-    (wi, wo), mirror = pairs(100, 3, 0.05), np.array([1, -1, 1])
-    turn = turned(wi, 0.7), turned(wo, 0.7)
-    for anisotropic in (False, True):
-        np.testing.assert_allclose(embedded(wo, wi, anisotropic), embedded(wi, wo, anisotropic), atol=1e-9)
-    np.testing.assert_allclose(embedded(wi * mirror, wo * mirror, False), embedded(wi, wo, False), atol=1e-9)
-    np.testing.assert_allclose(embedded(*turn, False), embedded(wi, wo, False), atol=1e-9)
-    assert np.all(np.linalg.norm(embedded(*turn, True) - embedded(wi, wo, True), axis=1) > 0.02)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import itertools
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import OTHER_VARIANTS, REPRESENTATIVES, ROWS, mostly_slow
+from catalogue import FIRST_ROWS, OTHER_VARIANTS, REPRESENTATIVES, ROWS, mostly_slow
 from support import call, chi_square, context, direction, hemisphere, is_scalar
 
 from mi_brdfs.lobes import MicrofacetLobe
@@ -60,11 +60,17 @@ def test_passes_the_checker(row):
     assert report.passed, report
 
 
-@pytest.mark.parametrize("variant_name", OTHER_VARIANTS, scope="module")
-@pytest.mark.parametrize("row", REPRESENTATIVES, ids=str)
+ELSEWHERE = [
+    pytest.param(variant.values[0], row, id=f"{variant.values[0]} {row}", marks=pytest.mark.slow)
+    for variant in OTHER_VARIANTS
+    for row in (REPRESENTATIVES if variant.values[0].startswith("scalar") else FIRST_ROWS.values())
+]
+"""Variants other than the checker's, with a row of each plugin, or where nothing has to be compiled of each choice."""
+
+
+@pytest.mark.parametrize("variant_name, row", ELSEWHERE, indirect=["variant_name"], scope="module")
 def test_weights_and_reciprocity(row, variant):
-    """In variants other than the checker's, with eval_pdf = (eval, pdf), and eval_pdf_sample both at once; and values
-    are reciprocal where the model is."""
+    """With eval_pdf = (eval, pdf), and eval_pdf_sample both at once; and values are reciprocal where the model is."""
     bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
     count = 40 if is_scalar() else 20_000
     rng = np.random.default_rng(3)

@@ -187,7 +187,7 @@ def test_mirrors_are_drawn_as_they_say_and_turn_with_the_light(density, mirrors,
             return dr.select(active & (si.wi.z > 0) & (wo.z > 0), share * wo.z, 0)
 
     mi.register_bsdf("polish", Polish)
-    report = check({"type": "polish"}, only=["components", "deltas", "flags", "weight", "pdf"])
+    report = check({"type": "polish"}, only=["components", "deltas", "flags", "weight", "pdf"], angles=(60,))
     assert {finding.check for finding in report.failures} == set(fails.split()), report
 
 
@@ -242,8 +242,6 @@ RIGHT = {
     "walter sharp": {"type": "walter", "alpha": 1e-3},
     "burley": {"type": "burley", "clearcoat": 0.5, "sheen": 0.5},
     "transmission": {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5},
-    "diffuse": {"type": "diffuse"},
-    "roughconductor": {"type": "roughconductor", "distribution": "ggx"},
     "roughconductor sharp": {"type": "roughconductor", "alpha": 1e-3},
     "twosided": {"type": "twosided", "inner": {"type": "ward"}},
     "textured": {"type": "ward", "specular_reflectance": {"type": "checkerboard"}},
@@ -266,86 +264,59 @@ def test_what_is_right_passes(name):
     assert judged >= set(CHECKS) - skipped
 
 
-NARROW = ["pdf", "chi2", "continuity"]
+def case(only, plugin, **given):
+    """The checks to make, and the dict to check."""
+    return only.split(), {"type": plugin, **given}
+
+
+def texels(raw):
+    """A bitmap of random colours."""
+    values = np.random.default_rng(1).random((2, 2, 3)).astype(np.float32)
+    return {"type": "bitmap", "bitmap": mi.Bitmap(values), "raw": raw}
+
+
+NARROW = "pdf chi2 continuity"
 FALSE_ALARMS = {
-    "derivatives that cancel": ({"type": "ward", "rotation": 0.3}, ["active"]),
-    "many turns": ({"type": "ward", "rotation": 100.0, "alpha_u": 0.1, "alpha_v": 0.4}, ["gradients"]),
-    "line of ward": ({"type": "ward", "alpha_u": 0.906, "alpha_v": 0.0003}, NARROW),
-    "line of walter": ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.001}, NARROW),
-    "line at the normal": ({"type": "ward", "variant": "ward", "alpha_u": 0.00015}, NARROW),
-    "hard edges": (
-        {"type": "toon", "diffuse_threshold": 0.62, "specular_reflectance": 1.0, "specular_smooth": 0.0},
-        NARROW,
+    "derivatives that cancel": case("active", "ward", rotation=0.3),
+    "many turns": case("gradients", "ward", rotation=100.0, alpha_u=0.1, alpha_v=0.4),
+    "line of ward": case(NARROW, "ward", alpha_u=0.906, alpha_v=0.0003),
+    "line of walter": case(NARROW, "walter", alpha_u=0.5, alpha_v=0.001),
+    "line at the normal": case(NARROW, "ward", variant="ward", alpha_u=0.00015),
+    "hard edges": case(NARROW, "toon", diffuse_threshold=0.62, specular_reflectance=1.0, specular_smooth=0.0),
+    "a lobe below the horizon": case("chi2 pdf", "lafortune", cx=-0.4, cy=-1.5, cz=-1.5),
+    "a black band": case("chi2 pdf", "toon", diffuse_threshold=1.0, diffuse_smooth=0.0),
+    "peaks far narrower than steps": case("gradients", "schlick", roughness=1e-6, isotropy=0.01, rotation=0.3),
+    "turns that float32 hardly knows": case("gradients", "ward", rotation=1e4, alpha_v=0.01),
+    "lines at the horizon": case("chi2 pdf", "schlick", roughness=1.1e-5, variant="interreflection"),
+    "beyond what a choice leaves of a range": case("gradients", "cooktorrance", distribution="blinn", alpha=1.5),
+    "narrow along and across": case(NARROW, "walter", alpha_u=0.0041, alpha_v=0.00035),
+    "diffuse lobe beside facets": case("albedo", "walter", diffuse_reflectance=0.9, f0=0.9),
+    "texels beyond a limit": case("gradients", "phong", specular_reflectance=texels(True)),
+    "gradients of textures": case("textures", "bumpmap", arbitrary=texels(True), a={"type": "diffuse"}),
+    "index above one as a colour": case("colours spectral", "low", variant="microfacet", int_ior=1.006),
+    "tints": case("colours spectral", "burley", sheen=1.0, sheen_tint=1.0, spec_tint=1.0, base_color=0.5),
+    "a lobe opposite to the normal": case("pdf chi2", "lafortune", cz=-1.5, exponent=0.0, diffuse_reflectance=0.2),
+    "a narrow lobe far below the horizon": case(
+        "pdf chi2", "lafortune", cx=1.5, cy=-1.5, cz=-1.5, exponent=11546.6, normalization="none"
     ),
-    "a lobe below the horizon": ({"type": "lafortune", "cx": -0.4, "cy": -1.5, "cz": -1.5}, ["chi2", "pdf"]),
-    "a black band": ({"type": "toon", "diffuse_threshold": 1.0, "diffuse_smooth": 0.0}, ["chi2", "pdf"]),
-    "peaks far narrower than steps": (
-        {"type": "schlick", "roughness": 1e-6, "isotropy": 0.01, "rotation": 0.3},
-        ["gradients"],
+    "two lobes, both black": case(
+        "components", "microfacet", diffuse_reflectance=0.0, int_ior="water", ext_ior="water"
     ),
-    "turns that float32 hardly knows": ({"type": "ward", "rotation": 1e4, "alpha_v": 0.01}, ["gradients"]),
-    "lines at the horizon": ({"type": "schlick", "roughness": 1.1e-5, "variant": "interreflection"}, ["chi2", "pdf"]),
-    "beyond what a choice leaves of a range": (
-        {"type": "cooktorrance", "distribution": "blinn", "alpha": 1.5},
-        ["gradients"],
-    ),
-    "narrow along and across": ({"type": "walter", "alpha_u": 0.0041, "alpha_v": 0.00035}, NARROW),
-    "diffuse lobe beside facets": ({"type": "walter", "diffuse_reflectance": 0.9, "f0": 0.9}, ["albedo"]),
-    "texels beyond a limit": (
-        {"type": "phong", "specular_reflectance": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True}},
-        ["gradients"],
-    ),
-    "gradients of textures": (
-        {
-            "type": "bumpmap",
-            "arbitrary": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": True},
-            "a": {"type": "diffuse"},
-        },
-        ["textures"],
-    ),
-    "index above one as a colour": (
-        {"type": "low", "variant": "microfacet", "int_ior": 1.006},
-        ["colours", "spectral"],
-    ),
-    "tints": (
-        {"type": "burley", "sheen": 1.0, "sheen_tint": 1.0, "spec_tint": 1.0, "base_color": 0.5},
-        ["colours", "spectral"],
-    ),
-    "a lobe opposite to the normal": (
-        {"type": "lafortune", "cz": -1.5, "exponent": 0.0, "diffuse_reflectance": 0.2},
-        ["pdf", "chi2"],
-    ),
-    "a narrow lobe far below the horizon": (
-        {"type": "lafortune", "cx": 1.5, "cy": -1.5, "cz": -1.5, "exponent": 11546.6, "normalization": "none"},
-        ["pdf", "chi2"],
-    ),
-    "two lobes, both black": (
-        {"type": "microfacet", "diffuse_reflectance": 0.0, "int_ior": "water", "ext_ior": "water"},
-        ["components"],
-    ),
-    "a highlight beside a bitmap in colours": (
-        {
-            "type": "phong",
-            "exponent": 1e6,
-            "normalization": "energy",
-            "diffuse_reflectance": {"type": "bitmap", "bitmap": mi.Bitmap, "raw": False},
-        },
-        ["spectral"],
+    "a highlight beside a bitmap in colours": case(
+        "spectral", "phong", exponent=1e6, normalization="energy", diffuse_reflectance=texels(False)
     ),
 }
 ALL_PASS = {
-    "minnaert 8": ({"type": "minnaert", "exponent": 8.0}, ["continuity"]),
-    "a narrow lobe at grazing": (
-        {"type": "microfacet", "preset": "low/ashikhmin-shirley-e1/white-marble"},
-        ["continuity"],
-    ),
-    "wrap 8": ({"type": "wrap", "exponent": 8.0, "wrap": 0.0}, ["continuity"]),
-    "lafortune cz = 1": ({"type": "lafortune", "cx": 0.0, "cy": 0.0, "cz": 1.0, "exponent": 8.0}, ["continuity"]),
-    "lafortune anisotropic": ({"type": "lafortune", "cx": -0.9, "cy": -0.3, "cz": 1.0}, ["flags"]),
-    "eta of 1": ({"type": "roughconductor", "eta": 1.0, "k": 0.0}, ["gradients"]),
-    "int_ior of 1": ({"type": "microfacet", "int_ior": 1.0, "ext_ior": 1.0}, ["gradients"]),
-    "int_ior of air": ({"type": "microfacet", "int_ior": 1.0}, ["gradients"]),
-    "total reflection": ({"type": "roughconductor", "eta": 0.8, "k": 0.0}, ["gradients"]),
+    "minnaert 8": case("continuity", "minnaert", exponent=8.0),
+    "a narrow lobe at grazing": case("continuity", "microfacet", preset="low/ashikhmin-shirley-e1/white-marble"),
+    "wrap 8": case("continuity", "wrap", exponent=8.0, wrap=0.0),
+    "lafortune cz = 1": case("continuity", "lafortune", cx=0.0, cy=0.0, cz=1.0, exponent=8.0),
+    "lafortune anisotropic": case("flags", "lafortune", cx=-0.9, cy=-0.3, cz=1.0),
+    "eta of 1": case("gradients", "roughconductor", eta=1.0, k=0.0),
+    "int_ior of 1": case("gradients", "microfacet", int_ior=1.0, ext_ior=1.0),
+    "int_ior of air": case("gradients", "microfacet", int_ior=1.0),
+    "total reflection": case("gradients", "roughconductor", eta=0.8, k=0.0),
+    "texels of an index down to that outside": case("gradients", "walter", int_ior=texels(True), ext_ior=0.01),
 }
 """Powers of the height above the horizon, an index of refraction of one, and what is black until a parameter changes:
 each finding passes, and none is skipped."""
@@ -360,11 +331,7 @@ each finding passes, and none is skipped."""
     ],
 )
 def test_no_false_alarm(name):
-    given, only = (FALSE_ALARMS | ALL_PASS)[name]
-    for key, value in given.items():
-        if isinstance(value, dict) and value["type"] == "bitmap":
-            texels = np.random.default_rng(1).random((2, 2, 3)).astype(np.float32)
-            given = given | {key: value | {"bitmap": mi.Bitmap(texels)}}
+    only, given = (FALSE_ALARMS | ALL_PASS)[name]
     report = check(given, only=only)
     assert not report.failures and report.judged, report
     if name in ALL_PASS:
@@ -514,9 +481,9 @@ def test_refraction():
     its density is off by 0.3 % at 80°: Mitsuba approximates the masking in it."""
     bsdf = {"type": "roughdielectric", "alpha": 0.3}
     only = ["finite", "horizon", "support", "eval_pdf", "flags", "components", "pdf", "chi2"]
-    report = check(bsdf | {"distribution": "ggx"}, only=only)
+    report = check(bsdf | {"distribution": "ggx"}, only=only, angles=(30, 80))
     assert not [finding for finding in report.failures if finding.subject == "whole"], report
-    approximate = check(bsdf, only=["pdf"]).failures[0]
+    approximate = check(bsdf, only=["pdf"], angles=(80,)).failures[0]
     assert approximate.subject == "whole" and "for light from 80° pdf integrates to 0.97" in approximate.message
 
 
@@ -603,11 +570,10 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("inner", ["diffuse", "lambert"])
-def test_masks(inner):
+def test_masks():
     """They pass as a whole. With a context of one component, Mitsuba's sampler lets all light through."""
     only = [word for word in CHECKS if word not in ("gradients", "recompiles", "continuity", "spectral", "colours")]
-    report = check({"type": "mask", "opacity": 0.4, "inner": {"type": inner}}, only=only, angles=(60,))
+    report = check({"type": "mask", "opacity": 0.4, "inner": {"type": "lambert"}}, only=only, angles=(60,))
     part = "component 0 (diffuse reflection)"
     assert {finding.subject for finding in report.failures} == {part, f"{part} masked out", "component 1 (null)"}, (
         report
@@ -761,26 +727,16 @@ def test_command_on_xml_and_on_a_scene(tmp_path, monkeypatch, pytestconfig):
     [
         ([], "name plugins or files to check, or give --all"),
         (["ward", "--all"], "name plugins or files to check, or give --all"),
-        (["wrad"], "wrad: "),
         (["path"], "path is not a BSDF"),
-        (["nowhere.xml"], "nowhere.xml: no such file"),
         (["ward", "--only", "chi"], "there is no such check; there are finite"),
         (["ward", "--variant", "scalar_rgb"], "needs a vectorized and unpolarized variant"),
         (["ward", "--json", "/nowhere/out.json"], "there is no folder /nowhere"),
-        (["ward", "--html", "/nowhere/out.html"], "there is no folder /nowhere"),
-        (["ward", "--junit", "tests"], "--junit tests: it is a folder"),
         (["ward", "--angles", "5,95"], "must be in [0, 90) degrees, not 95"),
         (["ward", "--angles", "5;10"], "write degrees, such as 10,40,70"),
         (["ward", "--significance", "1"], "--significance 1: it must be in (0, 1)"),
-        (["ward", "-D", "alpha"], "-D alpha: write -D name=value"),
-        (["ward", "-D", "alpa=1"], "ward: unknown parameter alpa; did you mean alpha?"),
         (["ward", "--against", "scenes/first_light.xml"], "name one of scenes/first_light.xml:Lambert 1, "),
         (["ward", "--against", "phong", "--only", "pdf"], "--against compares values; --only"),
-        (["scenes/first_light.xml:gold"], "there is no such material; there are Lambert 1, "),
-        (["scenes/first_light.xml", "-D", "optimize=1"], "-D optimize: Mitsuba reserves this name"),
-        (["<bsdf"], "<bsdf: XML parsing failed"),
         (['<emitter type="constant"/>'], "is not a BSDF"),
-        (['<bsdf type="ward"><float name="alpa" value="1"/></bsdf>'], "did you mean alpha?"),
     ],
 )
 def test_wrong_usage(arguments, message, monkeypatch, pytestconfig):

@@ -18,7 +18,7 @@ from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import Fit, Median, medians, notes, number, values
+from .result import Fit, medians, notes, number, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
@@ -116,10 +116,9 @@ class Page:
     def text(self, unfinished: str = "") -> str:
         """Return the page; ``unfinished`` says what it lacks."""
         everything = [[card.fit for card in section.cards] for section in self.sections]
-        table: list[Median] = medians(everything) if len(everything) > 1 else []
         return environment.get_template("fit.html").render(
             sections=self.sections,
-            medians=table,
+            medians=medians(everything) if len(everything) > 1 else [],
             metrics=METRICS,
             flip=any(it.flip is not None for own in everything for it in own),
             unfinished=unfinished,

@@ -98,10 +98,9 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     calm(ax)
     ax.grid(False)
     turns = range(0, 91, 30)
-    ax.set_xticks(turns, [f"{turn}°" for turn in turns])
-    ax.set_yticks(turns, [f"{turn}°" for turn in turns])
-    ax.set_xlabel(r"$\theta_h$", fontsize=TEXT, color=INK)
-    ax.set_ylabel(r"$\theta_d$", fontsize=TEXT, color=INK)
+    for axis, name in ((ax.xaxis, r"$\theta_h$"), (ax.yaxis, r"$\theta_d$")):
+        axis.set_ticks(turns, [f"{turn}°" for turn in turns])
+        axis.set_label_text(name, fontsize=TEXT, color=INK)
     if not seen.all():
         _legend(ax, [patch], ["not measured"])
 

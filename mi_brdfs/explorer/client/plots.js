@@ -255,26 +255,25 @@ export function drawCartesian() {
 
 export function drawAlbedo() {
   const curves = curvesOf("albedo");
+  const gained = largest(curves.map(({ y }) => y));
+  const dark = gained < 0.2;
   // Where energy is gained without end, the scale is that of angles up to 85°.
   const scale = valueScale(
     curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)),
     false,
-    1.02,
+    dark ? 0 : 1.02,
   );
-  const gained = largest(curves.map(({ y }) => y));
   cards.albedo.note.textContent = "over the angle of incidence" + (gained > 1.005 ? `, up to ${format(gained)}` : "");
   const mark = ({ svg, x, y, top, bottom }) => {
-    svg.append(
-      line(x(0), y(1), x(90), y(1), "unity"),
-      line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"),
-    );
+    if (!dark) svg.append(line(x(0), y(1), x(90), y(1), "unity"));
+    svg.append(line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"));
   };
   graph(
     cards.albedo,
     curves,
     quarter,
     scale,
-    summary(curves, "Albedo over the angle of incidence, with a line at 1", ""),
+    summary(curves, `Albedo over the angle of incidence${dark ? "" : ", with a line at 1"}`, ""),
     mark,
     (angle, cross) => cross(angle, "θi"),
   );
