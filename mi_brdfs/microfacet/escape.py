@@ -25,12 +25,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON
 from .shadowing import Smith
 
 FILE = Path(__file__).with_name("escape.npz")
 ROUGHEST = 3.2
 """The largest tabulated α: that of Burley's most anisotropic facets."""
+UPRIGHT = 1e-3
+"""The sin²θ below which the azimuth counts less and less: what is tabulated changes little with it there."""
 COUNTS = {
     "lost": (7, 6, 4, 3), "mean": (5,), "bend": (1,), "second": (4, 2, 1), "schlick": (4, 3, 2), "dip": (4, 2, 1)
 }  # fmt: skip
@@ -92,9 +93,9 @@ class Walks:
         length = dr.sqrt(slope2 + v.z * v.z)
         x = 2 * v.z / (v.z + self.bend * (length - v.z)) - 1
         if not self.isotropic:
-            # At the normal, which has no azimuth, take the one where α² is αu αv.
+            # Towards the normal, which has no azimuth, go to the one where α² is αu αv.
             inverse, scale, shift = self.azimuth
-            along, sin2 = slope2 * inverse + 2 * EPSILON, v.x * v.x + v.y * v.y + EPSILON
+            along, sin2 = slope2 * inverse + 2 * UPRIGHT, v.x * v.x + v.y * v.y + UPRIGHT
             y = along / (along + sin2) * scale + shift
         lost = horner([horner(row, x) for row in self.rows["lost"]], y)
         # The others change with the angle itself, and at the normal not with the azimuth.
