@@ -409,5 +409,5 @@ if __name__ == "__main__":
             # By the median, as what little light does is noise; the first reflection has none, but rounding to 16 bits.
             exact, walked = float(error[..., :first].max()), float(np.median(error[..., first:]))
             print(f"{name}: {exact:.4f}, {walked:.4f}")
-            wrong |= exact > 5e-3 or walked > 0.05
+            wrong |= exact > 5e-3 or walked > 0.02
     sys.exit(wrong)
