@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import mitsuba as mi
 
 from .lobes import Lobe
+from .lobes.uniform import Uniform
 from .parameters import Parameter, ParameterRow, PropertyReader
 from .parameters.parameter import BoundParameters
 from .parameters.xml import to_xml
@@ -29,7 +30,7 @@ EXAMPLE = "Example\n-------\n"
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
 
-MEMBERS = "parameters", "textures", "ranges", "constants", "arrays", "captured"
+MEMBERS = "parameters", "textures", "ranges", "constants", "arrays", "captured", "uniform"
 """What an instance of a plugin holds, besides its choices."""
 
 Section = tuple[str, list[tuple[str, ...]], str]
@@ -97,7 +98,8 @@ class Plugin:
     An instance belongs to one plugin instance. It holds the bound ``parameters`` by declared name, and all their
     ``textures`` and ``ranges`` by property name, with the channels of the colours that it was given or has by default
     as ``constants``; choices are attributes under their declared names. ``arrays`` are what else ``mitsuba.traverse``
-    shows, with derivatives, and ``captured`` what else kernels read.
+    shows, with derivatives, ``captured`` what else kernels read, and ``uniform`` keeps what lobes compute of parameters
+    alone.
     """
 
     plugins: ClassVar[tuple[str, ...]] = ()
@@ -123,6 +125,7 @@ class Plugin:
         self.constants = reader.constants
         self.arrays: dict[str, Any] = {}
         self.captured: list[Any] = []
+        self.uniform = Uniform()
         vars(self).update(self.parameters.chosen)
 
     @classmethod

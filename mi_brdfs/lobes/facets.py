@@ -49,10 +49,9 @@ def facet_lobes(
         spread = SPREAD if p.haze_spread is None else p.haze_spread
         shares = [(1 - p.haze, distribution), (p.haze, distribution.widened(spread))]
     lobes: list[Lobe] = []
-    for share, facets in shares:
-        first, *others = multiscattering(
-            model, MicrofacetLobe(colour * share, facets, shadowing(facets), fresnel, scale)
-        )
+    for index, (share, facets) in enumerate(shares):
+        lobe = MicrofacetLobe(colour * share, facets, shadowing(facets), fresnel, scale)
+        first, *others = multiscattering(model, lobe, index)
         if p.retroreflectivity is not None:
             first = RetroreflectiveLobe(first, p.retroreflectivity)
         lobes += [first, *others]

@@ -2,82 +2,100 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, expm1, log1p, safe_sqrt
-from ..microfacet.escape import Escape, MeanEscape, Walks, textures
+from ..math import EPSILON, Spectrum, luminance
+from ..microfacet.escape import Escape, MeanEscape, Walks, table
 from ..microfacet.shadowing import Smith
+from ..microfacet.terms import Fresnel
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
 
 
 class MultipleScattering(Lobe):
-    """f = ρ C (1 - E(wi)) (1 - E(wo)) / (π (1 - Ē)), where E is the albedo of a lobe with F = 1, Ē its mean, and C a
+    """f = C (1 - E(wi)) (1 - E(wo)) / (π (1 - Ē)), where E is the albedo of a lobe with F = 1, Ē its mean, and C a
     colour: with C = 1 all that the lobe loses is reflected (C. Kulla and A. Conty, Revisiting physically based shading
     at Imageworks, in: Physically based shading in theory and practice, SIGGRAPH 2017 courses). Reciprocal.
 
-    Draw cos²θ from a density ∝ 1/(b + cos²θ): that is from the cosine on rough surfaces, where b is large, and towards
-    grazing angles on smooth ones, which lose light there.
+    Draw cos²θ from a density ∝ 1/(b + cos²θ)²: that is from about the cosine on rough surfaces, where b is large, and
+    towards grazing angles on smooth ones, which lose light there.
     """
 
-    GRAZING = 30
-    """b over (1 - Ē)^1.5. A tenth of it costs .1 of the efficiency of this lobe, and three times as much up to .05."""
+    GRAZING = 5.5
+    """b over (1 - Ē)^¾."""
 
-    def __init__(self, lobe: MicrofacetLobe, walks: Walks) -> None:
-        self.reflectance, self.fresnel, self.anisotropic = lobe.reflectance, lobe.fresnel, lobe.anisotropic
-        self.walks, self.mean = walks, walks.mean
+    def __init__(self, lobe: MicrofacetLobe, walks: Walks, uniform: Callable[[str, Any], Any]) -> None:
+        self.anisotropic, self.walks, self.mean = lobe.anisotropic, walks, walks.mean
+        self.fresnel = uniform("fresnel", lobe.fresnel.combination())
+        self.colours = uniform("colours", self.between(lobe.reflectance))
         lost = dr.maximum(self.mean.lost, EPSILON)
-        self.b = self.GRAZING * lost * dr.sqrt(lost)
-        self.norm = log1p(dr.rcp(self.b))
+        b, typical = self.GRAZING * dr.sqrt(lost * dr.sqrt(lost)), luminance(self.colour(self.mean, self.mean))
+        self.b, self.norm, self.scale, self.typical = uniform(
+            "lobe", (b, dr.inv_pi * b * (1 + b), dr.inv_pi / lost, typical)
+        )
 
-    def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
-        """Return C for what becomes of light from both directions, or of the mean one; it is 1 if F is."""
+    def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
+        """Return what of the colour is the same for all directions."""
+        raise NotImplementedError(f"{type(self).__name__} does not define between.")
+
+    def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
+        """Return C for what becomes of light from both directions, or of the mean one; it is ρ if F is 1."""
         raise NotImplementedError(f"{type(self).__name__} does not define colour.")
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         i = self.walks.of(wi)
-        return self.reflectance * self.colour(i, self.mean) * i.lost
+        return self.colour(i, self.mean) * i.lost
+
+    def energy(self, wi: mi.Vector3f) -> mi.Float:
+        return self.typical * self.walks.of(wi).lost
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         i, o = self.walks.of(wi), self.walks.of(wo)
-        scale = i.lost * o.lost / dr.maximum(self.mean.lost, EPSILON)
-        cosine = wo.z * dr.inv_pi
-        return self.reflectance * self.colour(i, o) * (scale * cosine), cosine / ((self.b + wo.z * wo.z) * self.norm)
+        # What is the same for all directions of wi comes first, so that Dr.Jit computes it once.
+        value = self.colour(i, o) * (i.lost * self.scale * (o.lost * wo.z))
+        return value, wo.z * self.norm * dr.square(dr.rcp(self.b + wo.z * wo.z))
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
-        cos2 = self.b * expm1(v.x * self.norm)
-        sin, (sin_phi, cos_phi) = safe_sqrt(1 - cos2), dr.sincos(dr.two_pi * v.y)
-        return mi.Vector3f(sin * cos_phi, sin * sin_phi, safe_sqrt(cos2))
+        # The angle is that of visible normals, too, which Dr.Jit computes once.
+        cos2, (sin_phi, cos_phi) = self.b * v.y / (1 + self.b - v.y), dr.sincos(dr.two_pi * v.x)
+        sin = dr.safe_sqrt(1 - cos2)
+        return mi.Vector3f(sin * cos_phi, sin * sin_phi, dr.sqrt(cos2))
 
 
 class WalkLobe(MultipleScattering):
     """The colour of a walk that is reflected at wi's end and at wo's by F₁, and in between by F₂, which are means of F,
     and escapes at the second reflection with probability p, later with q:
 
-        C = F₁(wi) F₁(wo) (p + (1 - p) F₂ q / (1 - F₂ (1 - q))),  p = p(wi) + p(wo) - p̄
+        C = ρ F₁(wi) F₁(wo) (p + (1 - p) L),  L = F₂ q / (1 - F₂ (1 - q)),  p = p(wi) + p(wo) - p̄
 
     p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk.
     """
 
-    def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
-        second, between = dr.clip(i.second + o.second - self.mean.second, 0, 1), self._reflectance(self.mean)
-        later = between * self.mean.third / (1 - between * (1 - self.mean.third))
-        return self._reflectance(i) * self._reflectance(o) * (second + (1 - second) * later)
+    def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
+        between, third = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip), self.mean.third
+        later = between * third / (1 - between * (1 - third))
+        return reflectance, later, 1 - later
 
-    def _reflectance(self, facets: Any) -> Spectrum:
-        return self.fresnel.mean(facets.schlick, facets.dip)
+    def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
+        reflectance, later, sooner = self.colours
+        first, last = (Fresnel.mean(self.fresnel, end.schlick, end.dip) for end in (i, o))
+        return reflectance * first * last * (later + dr.maximum(i.second - self.mean.second + o.second, 0) * sooner)
 
 
 class KullaContyLobe(MultipleScattering):
     """Kulla and Conty's colour, a geometric series in the means F̄ = 2 ∫ F cosθ dcosθ and Ē:
-    C = F̄² Ē / (1 - F̄ (1 - Ē))."""
+    C = ρ F̄² Ē / (1 - F̄ (1 - Ē))."""
 
-    def colour(self, i: Escape, o: Escape | MeanEscape) -> Spectrum:
-        mean, lost = self.fresnel.mean(1 / 21, 1 / 126), self.mean.lost
-        return mean * mean * (1 - lost) / (1 - mean * lost)
+    def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
+        mean, lost = Fresnel.mean(self.fresnel, 1 / 21, 1 / 126), self.mean.lost
+        return (reflectance * mean * mean * (1 - lost) / (1 - mean * lost),)
+
+    def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
+        return self.colours[0]
 
 
 class TurquinLobe(WeightedLobe):
@@ -104,14 +122,18 @@ def turquin(lobe: MicrofacetLobe, walks: Walks) -> Lobe:
     return scaled
 
 
-def multiscattering(model: Any, lobe: MicrofacetLobe) -> tuple[Lobe, ...]:
-    """Return a lobe of a model with what its ``multiscatter`` adds, if it has that word."""
+def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe, ...]:
+    """Return the model's lobe of facets of that index with what its ``multiscatter`` adds, if it has that word."""
     way, smith = model.parameters.chosen.get("multiscatter", "none"), lobe.shadowing
     if way == "none" or not isinstance(smith, Smith):
         return (lobe,)
     if not model.captured:
-        model.captured += textures(smith)
-    walks = Walks(smith, *model.captured)
+        model.captured += [table(smith), model.uniform.kept]
+
+    def uniform(name: str, values: Any) -> Any:
+        return model.uniform(f"{name} {index}", values)
+
+    lobe.walks = walks = Walks(smith, model.captured[0], uniform)
     if way == "turquin":
         return (turquin(lobe, walks),)
-    return lobe, (WalkLobe if way == "walk" else KullaContyLobe)(lobe, walks)
+    return lobe, (WalkLobe if way == "walk" else KullaContyLobe)(lobe, walks, uniform)

@@ -98,11 +98,11 @@ class Film(Fresnel):
         amplitude = safe_sqrt(luminance(self(mi.Float(1))))
         return Dielectric((1 + amplitude) / dr.maximum(1 - amplitude, SMALL)).forward(distribution, wi)
 
-    def mean(self, schlick: Any, dip: Any) -> Spectrum:
-        """That of the combination nearest to the reflectance at four angles: at 0, 82 and 90° alone it has other
-        hues."""
-        fitted = (self(mi.Float(cos)) * (constant + a * schlick + b * dip) for cos, (constant, a, b) in _combination())
-        return dr.clip(sum(fitted), 0, 1)
+    def combination(self) -> tuple[Spectrum, ...]:
+        """That nearest to the reflectance at four angles: at 0, 82 and 90° alone it has other hues."""
+        seen = [(self(mi.Float(cos)), weights) for cos, weights in _combination()]
+        normal, rise, raised = (sum(f * weights[k] for f, weights in seen) for k in range(3))
+        return normal, rise, -raised
 
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
         s, p = self._polarized(cos, self.thickness)

@@ -62,6 +62,11 @@ class Schlick(Fresnel):
             power = dr.power(dr.maximum(m, EPSILON), self.exponent)
         return self.f0 + ((1 if self.f90 is None else self.f90) - self.f0) * power
 
+    def combination(self) -> tuple[Spectrum, ...]:
+        if self.f82 is not None or self.exponent is not None:
+            return super().combination()
+        return self.f0, (1 if self.f90 is None else self.f90) - self.f0
+
     def brightness(self, cos: mi.Float) -> mi.Float:
         if self.f82 is not None:
             return super().brightness(cos)

@@ -3,7 +3,7 @@ proposals that samplers are made of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import drjit as dr
@@ -141,14 +141,21 @@ class Fresnel(Term):
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
 
-    def mean(self, schlick: Any, dip: Any) -> Spectrum:
+    def combination(self) -> tuple[Spectrum, ...]:
+        """Return a, b and c of a + b (1 - cosθ)⁵ - c cosθ (1 - cosθ)⁶, or a and b where c is 0, as for Schlick's
+        reflectance. That of conductors (Lazányi and Szirmay-Kalos 2005) and others is replaced by the one with its
+        values at 0, 82 and 90°."""
+        normal, m = self(mi.Float(1)), 1 - self.DIP
+        rise = self(mi.Float(0)) - normal
+        return normal, rise, (normal + rise * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
+
+    @staticmethod
+    def mean(combination: Sequence[Spectrum], schlick: Any, dip: Any) -> Spectrum:
         """Return the mean reflectance of facets over which (1 - cosθ)⁵ has the mean ``schlick``, and cosθ (1 - cosθ)⁶
-        the mean ``dip``. It is exact for combinations of these, such as Schlick's reflectance; that of conductors
-        (Lazányi and Szirmay-Kalos 2005) and others is replaced by the combination with its values at 0, 82 and 90°."""
-        normal, grazing = self(mi.Float(1)), self(mi.Float(0))
-        m = 1 - self.DIP
-        below = (normal + (grazing - normal) * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
-        return dr.maximum(normal + (grazing - normal) * schlick - below * dip, 0)
+        the mean ``dip``."""
+        normal, rise, *below = combination
+        mean = normal + rise * schlick
+        return dr.clip(mean - below[0] * dip, 0, 1) if below else mean
 
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...] | None:
         """Return ``(F, B, C, S)``, of which a facet's Mueller matrix consists if Stokes vectors have their first axis

@@ -61,6 +61,7 @@ class ModelBSDF:
         self.m_flags = 0
         for component in components:
             self.m_flags |= component
+        self.parameters_changed()
 
     # --- Evaluation and sampling ------------------------------------------------------------------------------------
 
@@ -226,6 +227,12 @@ class ModelBSDF:
     def traverse(self, callback: mi.TraversalCallback) -> None:
         for name, value in {**self.textures, **self.model.arrays}.items():
             callback.put(name, value, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        uniform = self.model.uniform
+        if uniform.names and not is_scalar():
+            si = dr.zeros(mi.SurfaceInteraction3f, 2)
+            uniform.settle(lambda: self._lobes(self.model.evaluate(si, mi.Bool(True))))
 
     def to_string(self) -> str:
         return self.model.described()
