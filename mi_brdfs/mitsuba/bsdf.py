@@ -230,7 +230,8 @@ class ModelBSDF:
 
     def parameters_changed(self, keys: Any = ()) -> None:
         uniform = self.model.uniform
-        if uniform.names and not is_scalar():
+        # Textures in Python may say something else in each call.
+        if uniform.names and not is_scalar() and all(type(it) is mi.Texture for it in self.textures.values()):
             si = dr.zeros(mi.SurfaceInteraction3f, 2)
             uniform.settle(lambda: self._lobes(self.model.evaluate(si, mi.Bool(True))))
 
