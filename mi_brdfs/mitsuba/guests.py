@@ -106,7 +106,10 @@ def sources() -> list[str]:
 
 
 def _of_file(path: Path) -> ModuleType:
-    name = f"{path.stem} (imported)"  # in the way of no module
+    name = path.stem
+    known = sys.modules.get(name)
+    if known and name not in _files and not _brought_by(known):
+        name += " (imported)"  # whose name is that of a module
     spec: Any = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # where dataclasses and pickle look it up
