@@ -569,6 +569,40 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("circular", "verdict"), [(0.5, "pass"), (1.5, "fail")])
+def test_delta_functions_polarize_no_more_than_fully(circular, verdict):
+    for variant in ("llvm_ad_spectral_polarized", "llvm_ad_rgb"):  # that of the check, and the usual one
+        mi.set_variant(variant)
+
+        class Foil(mi.BSDF):
+            """A mirror of the intensity and of a part of the circular polarization."""
+
+            def __init__(self, props):
+                mi.BSDF.__init__(self, props)
+                self.m_flags = int(mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.FrontSide)
+                self.m_components = [self.m_flags]
+
+            def sample(self, ctx, si, u, v, active=True):
+                bs, matrix = dr.zeros(mi.BSDFSample3f), dr.zeros(mi.Spectrum)
+                bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
+                lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
+                bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
+                if not mi.is_polarized:
+                    return bs, dr.select(lit, mi.Spectrum(1), 0)
+                matrix[0, 0], matrix[3, 3] = mi.UnpolarizedSpectrum(1), mi.UnpolarizedSpectrum(circular)
+                return bs, matrix & lit
+
+            def eval(self, ctx, si, wo, active=True):
+                return dr.zeros(mi.Spectrum)
+
+            def pdf(self, ctx, si, wo, active=True):
+                return mi.Float(0)
+
+        mi.register_bsdf("foil", Foil)
+    assert check({"type": "foil"}, only="polarization").verdict("polarization") == verdict
+
+
+@pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_masks():
     """They pass as a whole. With a context of one component, Mitsuba's sampler lets all light through."""
