@@ -292,6 +292,7 @@ FALSE_ALARMS = {
     "narrow along and across": case(NARROW, "walter", alpha_u=0.0041, alpha_v=0.00035),
     "diffuse lobe beside facets": case("albedo", "walter", diffuse_reflectance=0.9, f0=0.9),
     "texels beyond a limit": case("gradients", "phong", specular_reflectance=texels(True)),
+    "texels of an index down to that outside": case("gradients", "walter", int_ior=texels(True), ext_ior=0.01),
     "gradients of textures": case("textures", "bumpmap", arbitrary=texels(True), a={"type": "diffuse"}),
     "index above one as a colour": case("colours spectral", "low", variant="microfacet", int_ior=1.006),
     "tints": case("colours spectral", "burley", sheen=1.0, sheen_tint=1.0, spec_tint=1.0, base_color=0.5),
@@ -316,7 +317,6 @@ ALL_PASS = {
     "int_ior of 1": case("gradients", "microfacet", int_ior=1.0, ext_ior=1.0),
     "int_ior of air": case("gradients", "microfacet", int_ior=1.0),
     "total reflection": case("gradients", "roughconductor", eta=0.8, k=0.0),
-    "texels of an index down to that outside": case("gradients", "walter", int_ior=texels(True), ext_ior=0.01),
 }
 """Powers of the height above the horizon, an index of refraction of one, and what is black until a parameter changes:
 each finding passes, and none is skipped."""
