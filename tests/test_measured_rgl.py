@@ -192,7 +192,11 @@ PATCHED = {
     "no magic": (0, b"tenser", "no known format"),
     "version": (12, b"\2", "at byte 12, the version is 2.0"),
     "long name": (18, b"\xff\xff", "at byte 20, 65,535 bytes of a field's name"),
-    "65535 dimensions": (FIRST, b"\xff\xff", "bytes of the shape of 'description' should follow"),
+    "65535 dimensions": (
+        FIRST,
+        b"\xff\xff",
+        "at byte 18, field 'description' has 65535 dimensions; there are at most 8",
+    ),
     "type": (FIRST + 2, b"\x0c", "at byte 18, field 'description' is of the unknown type 12"),
     "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "at byte 18, field 'description' should have"),
     "overlap": (FIRST + 3, struct.pack("<Q", 100), "'description' starts, but the table of contents reaches to byte"),

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import drjit as dr
 
 
+@dataclass
 class Uniform:
     """Numbers that kernels read instead of computing them in each lane, if they are the same everywhere on a surface.
     Called with a name and numbers, it returns those that it has ``kept`` of that name, or else the numbers: also while
     derivatives are sought, which those that are kept have not."""
 
-    def __init__(self) -> None:
-        self.kept: dict[str, list[Any]] = {}
-        self.names: set[str] = set()
-        self.settling = False
+    kept: dict[str, list[Any]] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+    settling: bool = False
 
     def __call__(self, name: str, numbers: Any) -> Any:
         self.names.add(name)
