@@ -155,7 +155,7 @@ class Fresnel(Term):
         the mean ``dip``."""
         normal, rise, *below = combination
         mean = normal + rise * schlick
-        return dr.clip(mean - below[0] * dip if below else mean, 0, 1)
+        return dr.clip(mean - below[0] * dip, 0, 1) if below else dr.maximum(mean, 0)
 
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...] | None:
         """Return ``(F, B, C, S)``, of which a facet's Mueller matrix consists if Stokes vectors have their first axis
