@@ -21,6 +21,7 @@ from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..rendering.passes import Picture
+    from ..rendering.scene_file import SceneFile
 
 Output = Annotated[
     Path | None,
@@ -44,10 +45,12 @@ def output_files(output: Path) -> tuple[Path, Path]:
     return files
 
 
-def refuse_to_overwrite(files: Iterable[Path], read: Iterable[str]) -> None:
+def refuse_to_overwrite(files: Iterable[Path], scene: SceneFile) -> None:
     """Fail if a picture would take the place of a file that its scene is read from."""
-    for file in files:
-        if file.exists() and any(os.path.samefile(file, path) for path in read):
+    there = [file for file in files if file.exists()]
+    read = scene.files()[0] if there else []  # which parses the scene
+    for file in there:
+        if any(os.path.samefile(file, path) for path in read):
             fail(f"{file}: the scene reads this file; name another picture with -o", Exit.USAGE)
 
 

@@ -69,7 +69,7 @@ def render(
 
     def load() -> tuple[mi.Scene, int]:
         loaded = _load(file)
-        refuse_to_overwrite(files, file.files()[0])
+        refuse_to_overwrite(files, file)
         index = _index(loaded, sensor)
         if window:
             from ..rendering.passes import crop  # imports numpy

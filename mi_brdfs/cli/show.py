@@ -44,7 +44,7 @@ def show(
         with failing(Exit.USAGE):
             source = source_of(material, given, "show")
             if source.source.endswith(".xml"):
-                refuse_to_overwrite(files, SceneFile(source.source, {**source.parameters}).files()[0])
+                refuse_to_overwrite(files, SceneFile(source.source, {**source.parameters}))
             scene = preview_scene(source.load(), stage)
         film = scene["sensor"]["film"]
         film |= {"width": size, "height": size}

@@ -162,7 +162,8 @@ class Reader:
 
     def __init__(self, scene: Path, values: Mapping[str, str], lenient: bool) -> None:
         self.scene, self.values, self.lenient = scene, dict(values), lenient
-        self.longest = max(map(len, values), default=0)
+        self.lengths = set(map(len, values))
+        """Of the parameters' names."""
         self.missing: list[Element] = []
         """Includes whose files are missing, if ``lenient``."""
         self.used: set[str] = set()
@@ -203,7 +204,7 @@ class Reader:
             element = open_.pop()
             if tag == "default":
                 self.values.setdefault(element.name, element.value)
-                self.longest = max(self.longest, len(element.name))
+                self.lengths.add(len(element.name))
             elif tag == "include" and (found := self._found(element, path)):
                 open_[-1].children += self.read(found).children
             if tag in ("default", "include"):
@@ -227,12 +228,11 @@ class Reader:
     def _substituted(self, value: str, place: str) -> str:
         """Return an attribute with the values of the parameters, the longest name first."""
         first, *parts = value.split("$")
-        found, length = [first], len(first)
+        found, length, lengths = [first], len(first), sorted(self.lengths, reverse=True) if parts else []
         for part in parts:
-            lengths = range(min(len(part), self.longest), 0, -1)
-            name = next((part[:k] for k in lengths if part[:k] in self.values), None)
-            self.used |= {name} if name else set()
-            found.append(f"${part}" if name is None else self.values[name] + part[len(name) :])
+            name = next((part[:k] for k in lengths if part[:k] in self.values), "")
+            self.used.add(name)
+            found.append(self.values[name] + part[len(name) :] if name else f"${part}")
             length += len(found[-1])
             if length > LONGEST:
                 break

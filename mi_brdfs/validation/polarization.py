@@ -52,7 +52,7 @@ def polarization(run: Run) -> Findings:
             with unwrapped_ctrl_c():
                 bsdf, mueller = load(run.given), _mueller if run.probe.parts else _weight
                 if not run.probe.parts:
-                    wo = _drawn(bsdf, wi)
+                    wo = _directions(_sampled(bsdf, wi)[0], len(wi))
                 matrix = mueller(bsdf, wi, wo)
                 if not isinstance(matrix, mi.Spectrum):
                     yield Finding("polarization", part.name, "skip", "It returns no Mueller matrices.")
@@ -97,10 +97,10 @@ def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[
     context, si, variates = mi.BSDFContext(), interaction(wi), sample_arguments(random(len(wi), SEED))
     pair = bsdf.eval_pdf(context, si, vectors(wo), True)
     triple = bsdf.eval_pdf_sample(context, si, vectors(wo), *variates, True)
-    bs, weight = bsdf.sample(context, si, *variates, True)
+    bs, weight = _sampled(bsdf, wi)
     weights = [dr.select(run.probe.is_smooth(each), it, 0) for each, it in ((bs, weight), triple[2:])]
     dr.eval(bs, pair, triple, weights)
-    drawn = _drawn(bsdf, wi)
+    drawn = _directions(bs, len(wi))
     of_drawn = _of_f(_mueller(bsdf, wi, drawn), drawn)
     return [
         ("eval_pdf", wo, _of_f(pair[0], wo), matrices),
@@ -122,13 +122,17 @@ def _mueller(bsdf: Any, wi: Array, wo: Array) -> Any:
 
 def _weight(bsdf: Any, wi: Array, wo: Array) -> Any:
     """Return that of a delta function's samples, which go to wo."""
-    return bsdf.sample(mi.BSDFContext(), interaction(wi), *sample_arguments(random(len(wi), SEED)), True)[1]
+    return _sampled(bsdf, wi)[1]
 
 
-def _drawn(bsdf: Any, wi: Array) -> Array:
+def _sampled(bsdf: Any, wi: Array) -> tuple[Any, Any]:
+    """Return samples with their weights."""
+    return bsdf.sample(mi.BSDFContext(), interaction(wi), *sample_arguments(random(len(wi), SEED)), True)
+
+
+def _directions(bs: Any, count: int) -> Array:
     """Return where samples go."""
-    bs, _ = bsdf.sample(mi.BSDFContext(), interaction(wi), *sample_arguments(random(len(wi), SEED)), True)
-    return numbers(dr.select(bs.pdf > 0, bs.wo, mi.Vector3f(0, 0, 1)), len(wi)).astype(np.float32)
+    return numbers(dr.select(bs.pdf > 0, bs.wo, mi.Vector3f(0, 0, 1)), count).astype(np.float32)
 
 
 def _turned(mueller: Callable[..., Any], bsdf: Any, wi: Array, wo: Array) -> Any:
