@@ -262,15 +262,15 @@ def test_pairs_are_rendered_in_turn_and_alone(monkeypatch):
 
 @pytest.mark.slow
 def test_what_is_slower_and_quieter_is_told():
-    """``burley`` has four lobes where ``walter`` has one, and wastes less."""
+    """``burley`` has four lobes where ``walter`` has one, and wastes less; it takes twice the time of ``lambert``."""
     burley = {"type": "burley", "sheen": 0.5, "clearcoat": 0.5}
-    cases = [Case("burley", burley, WALTER, True), Case("other", LAMBERT, WALTER), Case("alone", WALTER)]
+    cases = [Case("burley", burley, WALTER, True), Case("other", burley, LAMBERT), Case("alone", WALTER)]
     found = {(f.section, f.subject, f.name): f for f in times.pictures(cases)}
-    pair, other = "burley / walter", "other / walter, another model"
+    pair, other = "burley / walter", "other / lambert, another model"
     assert {subject for _, subject, _ in found} == {pair, other}
-    slower = found["time", pair, SPHERE]
+    slower = found["time", other, SPHERE]
     assert slower.value > 1.3 and slower.missed and slower.interval[0] <= slower.value <= slower.interval[1]
-    assert found["time", pair, f"{SPHERE}, ours"].value > found["time", pair, f"{SPHERE}, built-in"].value > 0
+    assert found["time", other, f"{SPHERE}, ours"].value > found["time", other, f"{SPHERE}, built-in"].value > 0
     alone, noise = (found["variance", pair, f"{ALONE}{words}"] for words in ("", ", variance"))
     assert noise.value < 0.2 and not alone.targets
     assert found["variance", pair, SPHERE].targets == (Target("≤", 1.0, "walter"),)
