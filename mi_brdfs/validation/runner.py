@@ -81,7 +81,7 @@ FAINT = 1e-6
 """Values below this part of the largest one for an angle of incidence differ as much as this part does."""
 OF_SAMPLES = "albedo", "deltas", "active", "recorded", "calls", "null", "polarization"
 """The checks that do without values, which delta functions have none of."""
-DELTA = "A delta function, which cannot be evaluated or tested."
+DELTA = "A delta function, which has no values: deltas judges its samples."
 
 
 def check(
