@@ -32,7 +32,7 @@ from . import (
     values,
 )
 from .incidents import SCATTERED, all_over, incidents
-from .outcome import Findings, Outcome, told
+from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding, Report
 from .run import Run
 
@@ -233,9 +233,11 @@ def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:
 
 
 def _found(word: str, run: Run) -> Findings:
-    """Yield the findings of a check; if it raises, that is another."""
+    """Yield the findings of a check; if it is skipped or raises, that is another."""
     try:
         with unwrapped_ctrl_c():
             yield from CHECKS[word](run)
+    except Skipped as reason:
+        yield Finding(word, "whole", "skip", str(reason))
     except Exception as error:
         yield Finding(word, "whole", "fail", f"It could not be checked to the end, as it raised {told(error)}.")
