@@ -125,13 +125,13 @@ def check(
 
 def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     """Return the arguments that are given."""
+    from ..given import angles_of_incidence
     from ..probe.sources import degrees_of
-    from ..validation.runner import checked_angles
 
     options: dict[str, Any] = {}
     if angles is not None:
         try:
-            options["angles"] = checked_angles(degrees_of(angles))
+            options["angles"] = angles_of_incidence(degrees_of(angles))
         except ValueError as error:
             fail(f"--angles {angles}: {str(error).removeprefix(f'{angles}: ')}", Exit.USAGE)
     if significance is not None:

@@ -60,15 +60,6 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
     return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
 
 
-def check_angles(angles: Sequence[float]) -> None:
-    """Raise ValueError unless these are angles of incidence, in degrees."""
-    if not len(angles):
-        raise ValueError("there is no angle of incidence; give one or more, in degrees")
-    for angle in angles:
-        if not 0 <= angle < 90:
-            raise ValueError(f"an angle of incidence must be in [0, 90) degrees, not {angle:g}")
-
-
 def scales_of(scale: str) -> tuple[str, ...]:
     """Return the scales to draw: linear, log, or both."""
     if scale not in SCALES:
