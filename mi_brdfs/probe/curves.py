@@ -106,26 +106,21 @@ def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float, chan
 
 def refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
     """Return a curve through points at these angles, and between them wherever it departs from the chord."""
-    points, values = [theta], [evaluate(theta)]
-    left, right = (theta[:-1], values[0][:-1]), (theta[1:], values[0][1:])
-    while len(left[0]) and sum(map(len, points)) < MOST_POINTS:
-        between = (left[0] + right[0]) / 2
-        middle = between, evaluate(between)
-        points.append(middle[0])
-        values.append(middle[1])
-        peak = max(np.nan_to_num(each, posinf=0).max() for each in values)
-        a, b, c = (np.nan_to_num(each[1], posinf=0) for each in (left, middle, right))
+    value, left = evaluate(theta), np.arange(len(theta) - 1)
+    while len(left) and len(theta) < MOST_POINTS:
+        width, between = theta[left + 1] - theta[left], (theta[left] + theta[left + 1]) / 2
+        middle = evaluate(between)
+        a, b, c = (np.nan_to_num(each, posinf=0) for each in (value[left], middle, value[left + 1]))
+        theta, value = np.insert(theta, left + 1, between), np.insert(value, left + 1, middle)
+        peak = np.nan_to_num(value, posinf=0).max()
         off = abs(b - (a + c) / 2) > 2e-3 * peak
         with np.errstate(divide="ignore"):
             a, b, c = (np.log(np.maximum(each, 1e-7 * peak)) if peak else each for each in (a, b, c))
         off |= abs(b - (a + c) / 2) > 0.02
-        off &= right[0] - left[0] > 1e-4
-        halves = (left, middle), (middle, right)
-        left, right = (  # type: ignore[assignment]
-            tuple(np.concatenate([half[end][which][off] for half in halves]) for which in (0, 1)) for end in (0, 1)
-        )
-    order = np.argsort(np.concatenate(points))
-    return Curve(np.concatenate(points)[order], np.concatenate(values)[order])
+        off &= width > 1e-4
+        first = (left + np.arange(len(left)))[off]  # of the two halves, each as far on as there are new points before
+        left = np.sort(np.concatenate([first, first + 1]))
+    return Curve(theta, value)
 
 
 def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None, log2_count: int = 9) -> Curve:
