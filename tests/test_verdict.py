@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from mutants import MUTANTS, of_others
 from support import ROOT
-from typer.testing import CliRunner
+from test_cli import invoke
 
 import mi_brdfs
-from mi_brdfs.cli import app
 from mi_brdfs.cli.app import imported
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import warn_once
@@ -339,7 +338,7 @@ def test_materials_have_parameters_of_their_own(tmp_path):
 
 
 def run(*arguments):
-    done = CliRunner().invoke(app, ["check", *map(str, arguments)])
+    done = invoke("check", *arguments)
     assert all(len(line) <= 80 for line in done.stdout.splitlines() if not line.startswith("    Again: "))
     return done
 
