@@ -7,7 +7,7 @@ the sampler locate narrow lobes: none is too narrow to be found.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -28,13 +28,6 @@ class Curve(NamedTuple):
     """Values over the signed angle, in increasing order."""
 
     theta: Array
-    value: Array
-
-
-class Mesh(NamedTuple):
-    """Values over directions, shape (…, 3) and (…)."""
-
-    wo: Array
     value: Array
 
 
@@ -167,13 +160,14 @@ def disc(
     return picture.reshape(n, n)
 
 
-def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, channel: int | None = None) -> list[Mesh]:
-    """Return the lobe over all directions, one mesh for each half-space into which it reflects or transmits. Their
-    lines are ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws
-    directions."""
+def meshes(
+    probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, channel: int | None = None
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield the lobe over all directions, ``(theta, phi, value)`` for each half-space into which it reflects or
+    transmits: ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws
+    directions, and the values where they cross; θ is the angle to the normal or its opposite."""
     wi = direction(theta_i, azimuth)
     wo = drawn(probe, wi, 4096)
-    found = []
     for side in (1, -1) if transmits(probe) else (1,):
         mine = wo[wo[:, 2] * side > 0].astype(np.float64)
         theta = np.degrees(np.arctan2(np.hypot(mine[:, 0], mine[:, 1]), abs(mine[:, 2])))
@@ -181,10 +175,8 @@ def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, ch
         theta = _lines(np.linspace(0, GRAZING, resolution), theta, theta_i)
         phi = _lines(np.linspace(0, 360, 2 * resolution), phi, (azimuth + 180) % 360)
         grid = np.stack([angles.ravel() for angles in np.meshgrid(theta, phi, indexing="ij")])
-        directions = on_side(direction(*grid).T, side)
-        values = value(probe, wi, directions, channel).reshape(len(theta), len(phi))
-        found.append(Mesh(directions.reshape(*values.shape, 3), values))
-    return found
+        values = value(probe, wi, on_side(direction(*grid).T, side), channel)
+        yield theta, phi, values.reshape(len(theta), len(phi))
 
 
 def _lines(even: Array, sampled: Array, mirror: float) -> Array:
