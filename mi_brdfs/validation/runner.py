@@ -30,7 +30,7 @@ from . import (
     updates,
     values,
 )
-from .incidents import SCATTERED, all_over, incidents
+from .incidents import SCATTERED
 from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding, Report
 from .run import Run
@@ -167,7 +167,7 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
     sides = tuple(sorted({side for probe in probes for side in probe.whole.sides}, reverse=True))
     part = run.probe.whole._replace(sides=sides)
     largest, words, at = 0.0, "both are black", {}
-    for incident in [*incidents(part, run.angles), all_over(part)]:
+    for incident in run.views(part):
         lanes = np.tile(np.arange(SCATTERED), 3)
         drawn = [probe.sample(probe.whole, incident.wi, random(SCATTERED, AGAINST_SEED)).wo for probe in probes]
         wo = np.concatenate([scattered(SCATTERED, AGAINST_SEED, (1, -1)), *drawn])
