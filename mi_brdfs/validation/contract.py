@@ -288,9 +288,9 @@ def null(run: Run) -> Findings:
         error = abs(got - each.mean(axis=0)) - 6 * each.std(axis=0) / np.sqrt(len(u)) - 1e-4
         if (error > 0).any():
             k = int(np.argmax(error))
-            words = f"eval_null_transmission is {got[k]:.4g} for light from {incident.name}, but samples that go"
-            words = f"{words} straight through weigh {each[:, k].mean():.4g} in the mean"
-            outcome.fault(words, float(error[k]), wi=incident.wi, seed=75)
+            words = f"eval_null_transmission is {got[k]:.4g} for light from {incident.name}"
+            other = f"but samples that go straight through weigh {each[:, k].mean():.4g} in the mean"
+            outcome.fault(f"{words}, {other}", float(error[k]), wi=incident.wi, seed=75)
     yield outcome.finding("As much as its samples.")
 
 

@@ -49,10 +49,9 @@ def pdf(run: Run) -> Findings:
             largest = max(largest, trial.mismatch)
             outcome.data[name] = {"integral": trial.integral, "drawn": trial.share}
             if not erfc(excess / sqrt(2)) >= run.level:
-                told = f"for light from {name} pdf integrates to {trial.integral:.4g}"
                 share = "all" if trial.share == 1 else f"{100 * trial.share:.2f} % of the"
-                told = f"{told}, but {share} samples are drawn"
-                outcome.fault(told, excess, wi=trial.incident.wi, seed=trial.seed)
+                told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
+                outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
         yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.")
 
 

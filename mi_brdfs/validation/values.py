@@ -64,10 +64,10 @@ def finite(run: Run) -> Findings:
                 bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(abs(length - 1) < 1e-3))
                 if bad.any():
                     k = int(np.argmax(bad))
-                    told = f"the weight {_shown(samples.weight[k])}, the density {samples.density[k]:.4g} and the"
-                    told = f"{told} direction {samples.wo[k].tolist()}, of length {length[k]:.4g}"
-                    told = f"for light from {theta:g}° a sample has {told}, for the variates {u[k].tolist()}"
-                    outcome.fault(told, bad.sum(), wi=w)
+                    energy = f"the weight {_shown(samples.weight[k])}, the density {samples.density[k]:.4g}"
+                    way = f"the direction {samples.wo[k].tolist()}, of length {length[k]:.4g}"
+                    told = f"for light from {theta:g}° a sample has {energy} and {way}"
+                    outcome.fault(f"{told}, for the variates {u[k].tolist()}", bad.sum(), wi=w)
         remark = "Channels may be negative, as its page says." if signed else ""
         yield outcome.finding(f"{len(wi)} pairs of directions, down to the horizon.", remark)
 
