@@ -27,6 +27,7 @@ from mutants import (
     lambert,
     of_others,
     without_fields,
+    wrapped,
 )
 from support import shared
 from test_cli import invoke
@@ -86,35 +87,22 @@ FAULTY = [("eval", each) for each in (None, turned, beyond_its_intensity, in_fra
 @pytest.mark.parametrize(("method", "fault"), [*FAULTY, ("eval_pdf", turned), ("sample", turned)])
 def test_mueller_matrices(method, fault):
     """Of a rough conductor, with and without faults of a method."""
+
+    def altered(own, ctx, si, *given):
+        result = own(ctx, si, *given)
+        if not (fault and mi.is_polarized):
+            return result
+        if method == "eval":
+            return fault(result, -given[0], si.wi)
+        if method == "eval_pdf":
+            return fault(result[0], -given[0], si.wi), result[1]
+        return result[0], fault(result[1], -result[0].wo, si.wi)
+
     for variant in ("llvm_ad_spectral_polarized", "llvm_ad_rgb"):
         mi.set_variant(variant)
-        given = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.3, "material": "Au"}
-
-        class Metal(mi.BSDF):
-            def __init__(self, props, given=given):
-                mi.BSDF.__init__(self, props)
-                self.metal = mi.load_dict(given)
-                self.m_components, self.m_flags = [int(self.metal.flags())], int(self.metal.flags())
-
-            def altered(self, name, value, si, wo):
-                return fault(value, -wo, si.wi) if fault and name == method and mi.is_polarized else value
-
-            def eval(self, ctx, si, wo, active=True):
-                return self.altered("eval", self.metal.eval(ctx, si, wo, active), si, wo)
-
-            def pdf(self, *arguments):
-                return self.metal.pdf(*arguments)
-
-            def eval_pdf(self, ctx, si, wo, active=True):
-                value, density = self.metal.eval_pdf(ctx, si, wo, active)
-                return self.altered("eval_pdf", value, si, wo), density
-
-            def sample(self, ctx, si, u, v, active=True):
-                bs, weight = self.metal.sample(ctx, si, u, v, active)
-                return bs, self.altered("sample", weight, si, bs.wo)
-
-        mi.register_bsdf("wrapped_metal", Metal)
-    report = check({"type": "wrapped_metal"}, only="polarization")
+        metal = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.3, "material": "Au"}
+        bsdf = wrapped("wrapped_metal", metal, **{method: altered})
+    report = check(bsdf, only="polarization")
     assert report.verdict("polarization") == ("fail" if fault else "pass"), report
 
 
