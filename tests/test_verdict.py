@@ -42,13 +42,9 @@ def albedo(bsdf, **options):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-def test_what_gains_energy_fails():
-    """Though its page says that it does not, in each channel."""
+def test_what_gains_energy_in_a_channel_fails():
+    """Though its page says that it does not."""
     warn_once.cache_clear()
-    with pytest.warns(mi_brdfs.EnergyWarning):
-        found = albedo({"type": "phong"} | BRIGHT)
-    assert found.verdict == "fail" and found.message.startswith("it gains energy: light from 0° is reflected 1.6 times")
-    assert "diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1." in found.message
     red = {"type": "rgb", "value": [0.9, 0.1, 0.1]}
     with pytest.warns(mi_brdfs.EnergyWarning):
         found = albedo({"type": "phong", "diffuse_reflectance": red})
