@@ -48,7 +48,7 @@ def textures(run: Run) -> Findings:
 def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Collection[str]) -> None:
     """Compare the BSDF whose ``free`` parameters vary with one in which each lane has the values of its point; add
     faults."""
-    part, given = run.probe.whole, run.given or {}
+    part, given, tolerance = run.probe.whole, run.given or {}, 3 * run.rounding(run.probe.whole)
     uv = np.random.default_rng(33).uniform(-1, 2, (COUNT, 2)).astype(np.float32)
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (30, 32))
     constant = {name: pinned(texture, interaction(wi, uv)) for name, texture in varied.items()}
@@ -66,23 +66,18 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     if len(free) == len(varied):  # those that are pinned have as many lanes
         alone = real.eval(part, wi[few], wo[few], uv[few])
         rows.append(("eval", value[few], alone, "if fewer points are evaluated at once"))
-    if _weights_fit(run, run.probe.sample(part, wi, u, uv)):  # else it is no matter of textures
+    error = relative(*_reflected(run.probe.sample(part, wi, u, uv)))
+    if np.quantile(error, 0.999) <= tolerance:  # else it is no matter of textures
         rows.append(("the weight times pdf", *_reflected(samples), "is eval"))
     for name, got, expected, but in rows:
         error = relative(got, expected)
-        over = error * (error > 3 * run.rounding(part))
-        outcome.wrong(over, name, got, but, wi, wo, expected=expected, uv=uv)
+        outcome.wrong(error * (error > tolerance), name, got, but, wi, wo, expected=expected, uv=uv)
 
 
 def _reflected(samples: Samples) -> tuple[Array, Array]:
     """Return weights times pdf, and the values that these must be, where samples carry light."""
     lit = samples.lit[:, None]
     return samples.weight * samples.pdf[:, None] * lit, samples.value * lit
-
-
-def _weights_fit(run: Run, samples: Samples) -> bool:
-    error = relative(*_reflected(samples))
-    return bool(np.quantile(error, 0.999) <= 3 * run.rounding(run.probe.whole))
 
 
 def _textured(probe: BSDFProbe, given: dict[str, Any]) -> tuple[dict[str, mi.Texture], list[str]]:
