@@ -18,7 +18,7 @@ from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import Fit, medians, notes, number, values
+from .result import ANGLES, Fit, medians, notes, number, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
@@ -123,6 +123,7 @@ class Page:
             flip=any(it.flip is not None for own in everything for it in own),
             unfinished=unfinished,
             curves=CURVES,
+            steepest=ANGLES[-1],
             notes=notes,
             values=values,
         )

@@ -117,8 +117,8 @@ class Fit:
             probe = BSDFProbe(mi.load_dict(self.bsdf))
             return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
 
-    def remarks(self) -> list[str]:
-        """Return what to know of this fit, in sentences."""
+    def remarks(self, scatter: bool = True) -> list[str]:
+        """Return what to know of this fit, in sentences, with or without those of the ``scatter``."""
         found = []
         if self.albedo > 1:
             found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
@@ -132,7 +132,7 @@ class Fit:
                  if a < b and abs(r) > CORRELATED and a.partition(".")[0] != b.partition(".")[0]]  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(close)}.")
-        for theta, stated, values in self.scatter:
+        for theta, stated, values in self.scatter if scatter else ():
             own = float(np.mean(self.albedos(theta)))
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values add to {values:.3g}"
