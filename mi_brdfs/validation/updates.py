@@ -39,8 +39,8 @@ def updates(run: Run) -> Findings:
         with restored(params, key) as original:
             if rest not in ("", "value") or dr.width(original) != 1:
                 _check_taken_up(run, outcome, params, key, wi, wo, u)
-                if outcome.faults:
-                    yield outcome.finding("")
+                tried += 1
+                yield outcome.finding("Once it is changed, all of it is taken up.")
                 continue
             value = original * 0.95 + 1e-3
             number = numbers(value, 1)[0]
