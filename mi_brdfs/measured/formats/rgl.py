@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-import struct
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mitsuba import tensor_io
 
 from ...parameters.messages import brief
 from ..adaptation import LAST, adapted, brightness, turned
@@ -237,18 +238,5 @@ class TensorFile:
 
 
 def write_tensors(path: Path, fields: dict[str, np.ndarray]) -> None:
-    """Write arrays, each from a multiple of 8 bytes on."""
-    arrays = {name: np.ascontiguousarray(field, field.dtype.newbyteorder("<")) for name, field in fields.items()}
-    head = struct.pack("<12sBBI", MAGIC, *VERSION, len(fields))
-    offset = len(head) + sum(13 + len(name.encode()) + 8 * field.ndim for name, field in arrays.items())
-    types = {dtype: number for number, dtype in TYPES.items()}
-    for name, field in arrays.items():
-        offset += -offset % 8
-        head += struct.pack("<H", len(name.encode())) + name.encode()
-        head += struct.pack(f"<HBQ{field.ndim}Q", field.ndim, types[field.dtype.str[1:]], offset, *field.shape)
-        offset += field.nbytes
-    with path.open("wb") as file:
-        file.write(head)
-        for field in arrays.values():
-            file.write(bytes(-file.tell() % 8))
-            file.write(field.tobytes())
+    with redirect_stdout(None):  # it prints what it wrote
+        tensor_io.write(str(path), **fields)
