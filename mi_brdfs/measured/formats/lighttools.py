@@ -19,7 +19,7 @@ Channel = tuple[int, float]
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path)
+    lines = opening(head)
     return is_table(lines) and has_incidence_lines(lines)
 
 

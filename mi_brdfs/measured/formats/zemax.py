@@ -39,7 +39,7 @@ LIGHT = re.compile(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ")
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path)
+    lines = opening(head)
     return is_table(lines) and not has_incidence_lines(lines)
 
 
