@@ -163,12 +163,9 @@ def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
 
 def _colours(f: np.ndarray, wavelengths: np.ndarray | None) -> tuple[np.ndarray, bool]:
     """Return one channel, or linear sRGB where there are several that have wavelengths, and whether it is converted:
-    then a negative channel is a colour outside sRGB, and a spectrum with a negative value is missing. Of others the
-    mean counts."""
-    if f.shape[1] == 1 or (wavelengths is None and f.shape[1] == 3):
+    then a negative channel is a colour outside sRGB, and a spectrum with a negative value is missing."""
+    if f.shape[1] == 1 or wavelengths is None:
         return f, False
-    if wavelengths is None or np.isnan(wavelengths).any():
-        return f.mean(axis=1, keepdims=True), False
     return np.where(f < 0, np.nan, f) @ to_srgb(wavelengths), True
 
 
