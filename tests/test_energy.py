@@ -34,6 +34,8 @@ def test_largest_albedo(model, given, stated):
     assert not fault(stated, found.albedo, found.noise), found
     for reference in REFERENCES:
         if reference.model == PLUGINS[model] and reference.given == given:
+            if found.given.get("multiscatter", "none") != "none":  # which references do not know
+                found = largest_albedo(model, given | {"multiscatter": "none"})
             tolerance = 2e-3 * found.albedo + 3 * found.noise
             assert reference.albedo(found.numbers, 18) == pytest.approx(found.albedo, abs=tolerance), found
 

@@ -279,6 +279,7 @@ NARROW = "pdf chi2 continuity"
 FALSE_ALARMS = {
     "derivatives that cancel": case("active", "ward", rotation=0.3),
     "many turns": case("gradients", "ward", rotation=100.0, alpha_u=0.1, alpha_v=0.4),
+    "a narrow round lobe, turned": case("gradients", "ward", alpha_u=1e-4, alpha_v=1e-4, rotation=76.0),
     "line of ward": case(NARROW, "ward", alpha_u=0.906, alpha_v=0.0003),
     "line of walter": case(NARROW, "walter", alpha_u=0.5, alpha_v=0.001),
     "line at the normal": case(NARROW, "ward", variant="ward", alpha_u=0.00015),

@@ -47,9 +47,10 @@ class Escape(NamedTuple):
     second: mi.Float
     """The part of that which escapes at the second."""
     schlick: mi.Float
-    """The mean of (1 - cosθ_d)⁵ at the first reflection of what does not escape at it, and"""
+    """The mean of (1 - cosθ_d)⁵ at the first reflection of what does not escape at it, and what those at later ones
+    differ by from their own mean,"""
     dip: mi.Float
-    """of cosθ_d (1 - cosθ_d)⁶; see :meth:`.terms.Fresnel.mean`."""
+    """and of cosθ_d (1 - cosθ_d)⁶; see :meth:`.terms.Fresnel.mean`."""
 
 
 class MeanEscape(NamedTuple):

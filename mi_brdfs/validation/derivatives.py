@@ -23,6 +23,8 @@ from .updates import attach, restored, set_value, traced_floats, value_of
 TOLERANCE = 0.02
 LOST = 3
 """How many times its last digit a value may be off, as of formulas whose terms cancel."""
+ROUNDING = 4e-7
+"""The relative error of the difference of two values by rounding."""
 COUNT = 2000
 TURN = 0.01
 """The step by which directions are turned, in parts of the width of a lobe."""
@@ -89,8 +91,11 @@ def gradients(run: Run) -> Findings:
                     beyond = outwards * max(0.1 * min(highest - lowest, 1), 1e-3 * abs(limit))
                     _check_way_back(run, outcome, params, key, limit, beyond, wi, wo)
             set_value(params, key, original)
+            rounding = ROUNDING
             if key.partition(".")[0] in turning:
                 size = min(size, 1)  # many turns are as few
+                # Turned directions are rounded anew, which a narrow lobe sees.
+                rounding += 1e-7 / min(run.spread(part), 1)
             step = 0.01 * size if size > 0 else 0.01
             trusted = np.zeros(1)
             least, most = (float(extreme(np.array(original))) for extreme in (np.min, np.max))
@@ -106,7 +111,8 @@ def gradients(run: Run) -> Findings:
                 # Float32 must know the values to far less than a step.
                 known = np.spacing(np.abs(np.array(original + shift, np.float32)).max()) < 0.01 * part_of * step
                 # Plugins other than ours may clip: look beside such ends.
-                tried = _differences(_shifted(run, params, key, wi, wo), part_of * step, known, probe.is_ours)
+                shifted = _shifted(run, params, key, wi, wo)
+                tried = _differences(shifted, part_of * step, known, probe.is_ours, rounding)
                 if tried.trusted.mean() > trusted.mean():
                     low, high, trusted, noise = tried
                     compared = derivative
@@ -359,9 +365,16 @@ def _shifted(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: Arra
     return at
 
 
-def _differences(at: Callable[[float], Array], step: float, known: bool = True, leads_back: bool = True) -> Differences:
+def _differences(
+    at: Callable[[float], Array],
+    step: float,
+    known: bool = True,
+    leads_back: bool = True,
+    rounding: float = ROUNDING,
+) -> Differences:
     """Return the derivatives of some values for a parameter, by differences of two steps, extrapolated, where ``at``
-    returns the values for a shift of the parameter; none are trusted unless it is ``known`` well enough for that.
+    returns the values for a shift of the parameter, with that relative ``rounding`` error; none are trusted unless the
+    parameter is ``known`` well enough for that.
 
     The bounds are the same, except where the differences to the two sides do not approach each other: at a kink any
     derivative between them will do. Where one side changes nothing, the other counts, if that is so of most, as at the
@@ -373,7 +386,7 @@ def _differences(at: Callable[[float], Array], step: float, known: bool = True, 
         return (at(h) - centre) / h, (centre - at(-h)) / h
 
     (above, below), (nearer_above, nearer_below) = quotients(step), quotients(step / 2)
-    noise = 4e-7 * abs(centre) / step
+    noise = rounding * abs(centre) / step
     up, down = 2 * nearer_above - above, 2 * nearer_below - below
     lone = (above == 0) != (below == 0)
     if lone.sum() > 0.5 * ((above != 0) | (below != 0)).sum():

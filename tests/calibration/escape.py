@@ -179,8 +179,9 @@ def visible_normal(
 
 def walks(shape: str, cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alpha_v: np.ndarray, count: int) -> dict:
     """Return, for each setting, of walks that do not escape at the first reflection: the parts that escape at the
-    second, and at the third of what is left; and the means of (1 - cosθ_d)⁵ and cosθ_d (1 - cosθ_d)⁶ at the first
-    reflection, over paths weighed as TYPICAL says, and at the second, over what does not escape there."""
+    second, and at the third of what is left; over paths weighed as TYPICAL says, the means of (1 - cosθ_d)⁵ and
+    cosθ_d (1 - cosθ_d)⁶ at the first reflection, those of their sums over the later ones, and of the number of these;
+    and the means at the second reflection, over what does not escape there."""
     at = dr.repeat(dr.arange(mi.UInt32, len(cos)), count)
     cos, phi, alpha_u, alpha_v = (
         dr.gather(mi.Float, mi.Float(np.float32(each)), at) for each in (cos, phi, alpha_u, alpha_v)
@@ -189,7 +190,8 @@ def walks(shape: str, cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alp
     size = dr.width(at)
     w, below, energy = -mi.Vector3f(sin * x, sin * y, cos), dr.ones(mi.Float, size), dr.ones(mi.Float, size)
     rng, cos_d = mi.PCG32(size=size), dr.zeros(mi.Float, size)
-    first, paths = dr.zeros(mi.Vector2f, size), dr.zeros(mi.Vector3f, size)
+    first, later = dr.zeros(mi.Vector2f, size), dr.zeros(mi.Vector2f, size)
+    paths = [dr.zeros(mi.Float, size) for _ in range(6)]
     escaped, left, between = [], [], []
     for reflection in range(REFLECTIONS + 1):
         # ``below`` is the part of the heights that are lower. A ray leaves the surface with probability below^Λ: take
@@ -201,7 +203,9 @@ def walks(shape: str, cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alp
             first = _moments(cos_d)
         elif reflection > 1:
             escaped.append(_means(gone, count))
-            paths += gone * TYPICAL ** (reflection - 2) * mi.Vector3f(1, first.x, first.y)
+            later += _moments(cos_d)
+            weight, moments = gone * TYPICAL ** (reflection - 2), (1, *first, *later, reflection - 1)
+            paths = [dr.fma(weight, moment, path) for moment, path in zip(moments, paths, strict=True)]
             if reflection == 2:
                 between = [_means(energy * moment, count) for moment in _moments(cos_d)]
         if reflection:
@@ -212,13 +216,12 @@ def walks(shape: str, cos: np.ndarray, phi: np.ndarray, alpha_u: np.ndarray, alp
         h = visible_normal(shape, -w, alpha_u, alpha_v, rng.next_float32(), rng.next_float32())
         cos_d = dr.clip(-dr.dot(w, h), 0, 1)
         w = dr.normalize(dr.fma(h, 2 * cos_d, w))
-        dr.eval(w, below, energy, cos_d, rng, first, paths)
-    total, schlick, dip = (_means(each, count) for each in paths)
+        dr.eval(w, below, energy, cos_d, rng, first, later, paths)
+    total, *sums = (_means(each, count) for each in paths)
     return {
         "second": escaped[0] / left[0],
         "third": escaped[1] / left[1],
-        "schlick": schlick / total,
-        "dip": dip / total,
+        "paths": np.stack(sums) / total,
         "left": left[1] / left[0],
         "between": np.stack(between) / left[1],
     }
@@ -275,6 +278,7 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
     above = Places.of(upright, phi, u, v)
     places = Places.joined(above, Places.of(chebyshev(13), phi, u, v, stretched=True))
     stretched = np.arange(len(places.cos)) >= len(above.cos)
+    everywhere = Places.of(NODES, np.pi / 2 * (np.arange(16) + 0.5) / 16, u, v)
     losses = np.array([
         blinn_lost(cos, u) if shape == "blinn" else lost(shape, cos, angle, u, v)
         for cos, angle in zip(places.cos, places.phi, strict=True)
@@ -288,16 +292,13 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale = np.minimum(1 / (1 - loss), 3)
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
-        weights = 0.02 + np.maximum(above.terms("lost", bend) @ polynomial, 0)
+        mean, second, *colours = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
+        weights = 0.02 + lost_at(above, polynomial, bend)
         others = [
-            np.linalg.lstsq(
-                above.terms(name) * weights[:, None],
-                along_line(walked[name](above.at), above.rho2) * weights,
-                rcond=None,
-            )[0]
-            for name in ("second", "schlick", "dip")
+            np.linalg.lstsq(above.terms(name) * weights[:, None], values * weights, rcond=None)[0]
+            for name, values in (("second", second), ("schlick", colours[0]), ("dip", colours[1]))
         ]
-        entries.append(np.concatenate([polynomial, means(u, v, polynomial, bend, walked), [bend], *others]))
+        entries.append(np.concatenate([polynomial, mean, [bend], *others]))
     return entries
 
 
@@ -364,23 +365,38 @@ class Places(NamedTuple):
         return np.stack([x**i * self.y**j * factor ** min(j, 1) for i, j in powers], axis=-1)
 
 
-def along_line(line: np.ndarray, rho2: np.ndarray, channel: int = 0) -> np.ndarray:
-    return line[..., 0, channel] + rho2 * line[..., 1, channel]
+def lost_at(places: Places, polynomial: np.ndarray, bend: float) -> np.ndarray:
+    return np.maximum(places.terms("lost", bend) @ polynomial, 0)
 
 
-def means(
-    alpha_u: float, alpha_v: float, polynomial: np.ndarray, bend: float, walked: dict[str, RegularGridInterpolator]
-) -> list[float]:
-    """Return the means over the hemisphere for a polynomial of what is lost."""
-    places = Places.of(NODES, np.pi / 2 * (np.arange(16) + 0.5) / 16, alpha_u, alpha_v)
-    loss = np.tile(WEIGHTS, 16) / 16 * 2 * places.cos * np.maximum(places.terms("lost", bend) @ polynomial, 0)
+def after_the_first(
+    walked: dict[str, RegularGridInterpolator], places: Places, everywhere: Places, loss: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Return the means over the hemisphere, of which ``everywhere`` are the places and ``loss`` is what is lost there,
+    and at other places what escapes at the second reflection, and both moments that colour the walk from there.
 
-    def mean(name: str, weights: np.ndarray, channel: int = 0) -> float:
-        return np.sum(weights * along_line(walked[name](places.at), places.rho2, channel)) / np.sum(weights)
+    These are those of the first reflection, and what those of later ones differ by from their means, as far as the
+    first leaves light: a facet that is seen at a grazing angle sends light to others at such angles, if all are rough
+    along one axis alone.
+    """
 
-    left = loss * along_line(walked["left"](places.at), places.rho2)
-    later = mean("third", left), mean("between", left, 0), mean("between", left, 1)
-    return [np.sqrt(np.sum(loss)), mean("second", loss), *later]
+    def at(places: Places, name: str, channel: int = 0) -> np.ndarray:
+        line = walked[name](places.at)
+        return line[..., 0, channel] + places.rho2 * line[..., 1, channel]
+
+    def mean(values: np.ndarray, weights: np.ndarray) -> float:
+        return np.sum(values * weights) / np.sum(weights)
+
+    loss = np.tile(WEIGHTS, 16) / 16 * 2 * everywhere.cos * loss
+    left = loss * at(everywhere, "left")
+    between = [mean(at(everywhere, "between", k), left) for k in range(2)]
+
+    def later(places: Places, k: int) -> np.ndarray:
+        return TYPICAL * (at(places, "paths", 2 + k) - between[k] * at(places, "paths", 4))
+
+    colours = [at(places, "paths", k) + later(places, k) - mean(later(everywhere, k), loss) for k in range(2)]
+    means = [np.sqrt(np.sum(loss)), mean(at(everywhere, "second"), loss), mean(at(everywhere, "third"), left), *between]
+    return np.array(means), at(places, "second"), *colours
 
 
 def made(count: int, step: int = 1) -> dict[str, np.ndarray]:
