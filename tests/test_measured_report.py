@@ -273,16 +273,6 @@ def test_the_help_names_the_formats():
     assert listed([format.NAME for format in FORMATS]) == measured.FORMATS
 
 
-@pytest.mark.parametrize("option, file, words", [
-    ("--plot", "a.html", "a.html: write a .png, .svg, .pdf or .jpg"),
-    ("--json", "nowhere/a.json", "there is no folder"),
-])  # fmt: skip
-def test_a_wrong_option(lambert, tmp_path, option, file, words):
-    done = invoke("measured", lambert, option, tmp_path / file)
-    assert done.exit_code == 2 and done.stdout == ""
-    assert words in done.stderr and done.stderr.count("\n") == 1
-
-
 # --- The pictures ---------------------------------------------------------------------------------------------------
 
 
