@@ -23,9 +23,6 @@ SMALLEST, LARGEST = 1e-3, 1e6
 EDGE = 1e-5
 """How near to its ends a share is sought, as a part of its range; so near, it counts as at the end."""
 
-FREE = "free"
-"""Given for a parameter that fits do not seek of themselves."""
-
 
 class Scale(NamedTuple):
     """u of x, x of u, and dx/du of x, for numbers with the sum of the ends of their range."""
@@ -190,7 +187,7 @@ def configurations(
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
     with the default of those that are not given. Names that it does not have are left out. Numbers and colours that are
-    ``FREE`` are sought even if fits leave them as they are. Raise a FitError if there is no such word, or nothing is
+    "free" are sought even if fits leave them as they are. Raise a FitError if there is no such word, or nothing is
     left to fit."""
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
@@ -202,7 +199,7 @@ def configurations(
         for word in words[choice]:
             if word not in allowed:
                 raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
-    freed = {key for key, value in given.items() if isinstance(value, str) and value == FREE and key not in words}
+    freed = {key for key, value in given.items() if isinstance(value, str) and value == "free" and key not in words}
     fixed = {key: value for key, value in given.items() if key not in {*words, *freed}}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
     for parameter in model.declared():

@@ -30,7 +30,6 @@ RESOLUTION, RESOLUTION_ANISOTROPIC = 64, 48
 MOST_VALUES = 1 << 27
 """Those of a file of 512 MiB."""
 MAGIC = b"tensor_file\0"
-VERSION = 1, 0
 TYPES = dict(enumerate(("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8"), start=1))
 MOST_DIMENSIONS = 8
 HEAD = [("dimensions", "<u2"), ("type", "u1"), ("offset", "<u8")]
@@ -111,7 +110,8 @@ def write(path: Path, source: Source, resolution: int | None = None) -> None:
         "jacobian": np.ones(1, dtype=np.uint8),
         "valid": np.packbits(valid),
     }
-    write_tensors(path, fields)
+    with redirect_stdout(None):  # it prints what it wrote
+        tensor_io.write(str(path), **fields)
 
 
 def _slice(source: Source, coordinates: Adaptive, places: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
@@ -162,7 +162,7 @@ class TensorFile:
         self.fields: dict[str, Field] = {}
         file.take("u1", len(MAGIC), "the words 'tensor_file'")
         version = tuple(int(n) for n in file.take("u1", 2, "version numbers"))
-        if version != VERSION:
+        if version != (1, 0):
             raise file.error(f"the version is {version[0]}.{version[1]}; only 1.0 is known", file.offset - 2)
         for _ in range(int(file.take("u4", 1, "the number of fields")[0])):
             start = file.offset
@@ -235,8 +235,3 @@ class TensorFile:
         for k in np.flatnonzero(np.diff(nodes) <= 0):
             raise self.error(name, f"must increase, but {nodes[k + 1]:g} follows {nodes[k]:g}", int(k) + 1)
         return nodes
-
-
-def write_tensors(path: Path, fields: dict[str, np.ndarray]) -> None:
-    with redirect_stdout(None):  # it prints what it wrote
-        tensor_io.write(str(path), **fields)
