@@ -14,7 +14,7 @@ from ..probe.arrays import Array, interaction, numbers, sample_arguments, vector
 from ..probe.bsdf import load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
-from .outcome import Findings, Outcome, told
+from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding
 from .run import Run
 
@@ -35,13 +35,10 @@ def polarization(run: Run) -> Findings:
     frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
     ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does. Of delta functions alone, the weights of
     samples are looked at, and not exchanged. For this the BSDF must be given as a dict."""
-    part, name = run.probe.whole, "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
-    if run.given is None:
-        yield Finding("polarization", part.name, "skip", "To load it in a polarized variant, its dict is needed.")
-        return
+    part, described = run.probe.whole, run.described("To load it in a polarized variant")
+    name = "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if name not in mi.variants():
-        yield Finding("polarization", part.name, "skip", f"It takes the variant {name}.")
-        return
+        raise Skipped(f"It takes the variant {name}.")
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (101, 102))
     # About the mirror direction, where most BSDFs that polarize have their light.
     near = wi * [-1, -1, 1] + 0.1 * hemisphere(COUNT, 103)
@@ -50,7 +47,7 @@ def polarization(run: Run) -> Findings:
     with mi.variant_context(name):
         try:
             with unwrapped_ctrl_c():
-                bsdf, mueller = load(run.given), _mueller if run.probe.parts else _weight
+                bsdf, mueller = load(described), _mueller if run.probe.parts else _weight
                 if not run.probe.parts:
                     wo = _directions(_sampled(bsdf, wi)[0], len(wi))
                 matrix = mueller(bsdf, wi, wo)
@@ -61,8 +58,7 @@ def polarization(run: Run) -> Findings:
                 back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
                 others = _others(run, bsdf, wi, wo, matrices) if run.probe.parts else []
         except Exception as error:
-            yield Finding("polarization", part.name, "skip", f"It does not work in {name}: {told(error)}.")
-            return
+            raise Skipped(f"It does not work in {name}: {told(error)}.") from None
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)
     states = np.random.default_rng(104).normal(size=(STATES, 3))
     states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)

@@ -28,13 +28,11 @@ def updates(run: Run) -> Findings:
     is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change. For
     this the BSDF must be given as a dict."""
     probe, part = run.probe, run.probe.whole
-    if run.given is None:
-        yield Finding("updates", "whole", "skip", "To load it with another value, its dict is needed.")
-        return
+    described = run.described("To load it with another value")
     params, keys, _ = traced_floats(run, "updates")
     wi, u = on_side(hemisphere(COUNT, 91), part.sides[0]), random(COUNT, 92)
     wo = probe.sample(part, wi, u).wo
-    tried = 0
+    tried, tolerance = 0, 10 * run.rounding(part)
     for key in keys:
         name, _, rest = key.partition(".")
         outcome = Outcome("updates", key)
@@ -47,55 +45,43 @@ def updates(run: Run) -> Findings:
             if len(number) != 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
                 continue
             before = probe.eval(part, wi, wo)
-            try:
-                with unwrapped_ctrl_c():
-                    fresh = BSDFProbe(load(run.given | {name: given}))
-            except (RuntimeError, TypeError):  # it is given otherwise
+            if (other := loaded_or_none(described | {name: given})) is None:  # it is given otherwise
                 continue
+            fresh = BSDFProbe(other)
             told = ", ".join(f"{each:.4g}" for each in number)
             after, first = (each.eval(part, wi, wo) for each in (probe, fresh))
             set_value(params, key, value)
             tried += 1
-            once, why, shared = (
-                f"once it is set to {told}, ",
-                "if it is loaded with that",
-                "before: they share something",
-            )
+            once, as_loaded = f"once it is set to {told}, ", "if it is loaded with that"
+            shared, unnoticed = "they share something", "parameters_changed without names must take up any change"
             mine, last = (each.eval(part, wi, wo) for each in (probe, fresh))
             pdf, expected_pdf = (each.pdf(part, wi, wo)[:, None] for each in (probe, fresh))
-            for name, got, expected, but in (
-                (f"{once}eval", mine, last, why),
-                (f"{once}pdf", pdf, expected_pdf, why),
-                (f"{once}eval of another that was loaded with that", last, first, shared),
-                (f"once another is loaded with {told}, eval", after, before, shared),
-            ):
-                error = relative(got, expected)
-                over = error * (error > 10 * run.rounding(part))
-                outcome.wrong(over, name, got, but, wi, wo, expected=expected)
             params[key] = original
             probe.bsdf.parameters_changed()
-            back, why = probe.eval(part, wi, wo), "before: parameters_changed without names must take up any change"
-            error = relative(back, before)
-            over = error * (error > 10 * run.rounding(part))
-            outcome.wrong(over, "once it is set back, eval", back, why, wi, wo, expected=before)
+            back = probe.eval(part, wi, wo)
+            for name, got, expected, but in (
+                (f"{once}eval", mine, last, as_loaded),
+                (f"{once}pdf", pdf, expected_pdf, as_loaded),
+                (f"{once}eval of another that was loaded with that", last, first, f"before: {shared}"),
+                (f"once another is loaded with {told}, eval", after, before, f"before: {shared}"),
+                ("once it is set back, eval", back, before, f"before: {unnoticed}"),
+            ):
+                error = relative(got, expected)
+                outcome.wrong(error * (error > tolerance), name, got, but, wi, wo, expected=expected)
             set_value(params, key, value)
             ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
             # What sample keeps of former values shows beside pdf, which has the new ones.
             error, others = (relative(each.pdf, each.density, unknown=0) * each.lit for each in (ours, loaded))
-            over = error * (error > 10 * run.rounding(part)) * (np.quantile(others, 0.99) <= 10 * run.rounding(part))
+            over = error * (error > tolerance) * (np.quantile(others, 0.99) <= tolerance)
             why = "is the density that sample states"
             outcome.wrong(over, f"{once}pdf", ours.pdf, why, wi, ours.wo, expected=ours.density, seed=92)
             turned = np.linalg.norm(ours.wo - loaded.wo, axis=1) * (ours.lit & loaded.lit)
             # A choice among lobes may fall otherwise where a rounding error decides it.
             if np.quantile(turned, 0.9) > 1e-3:
                 k = int(np.argmax(turned))
-                outcome.fault(
-                    f"once it is set to {told}, sample draws {angles_of(ours.wo[k])} for light from "
-                    f"{angles_of(wi[k])}, but {angles_of(loaded.wo[k])} by the same variates if it is loaded with that",
-                    turned.sum(),
-                    wi=wi[k],
-                    seed=92,
-                )
+                words = f"{once}sample draws {angles_of(ours.wo[k])} for light from {angles_of(wi[k])}"
+                other = f"but {angles_of(loaded.wo[k])} by the same variates {as_loaded}"
+                outcome.fault(f"{words}, {other}", turned.sum(), wi=wi[k], seed=92)
         yield outcome.finding("Set and updated, it acts as loaded.")
     if not tried:
         yield Finding("updates", "whole", "skip", "It has no parameters that could be given as a number or a colour.")
@@ -129,6 +115,15 @@ def recompiles(run: Run) -> Findings:
             yield outcome.finding("No kernel is compiled for a new value.")
     if not keys and not findings:
         yield Finding("recompiles", "whole", "skip", "It has no parameters.")
+
+
+def loaded_or_none(given: dict[str, Any]) -> Any:
+    """Return what a dict stands for, or None if the plugin refuses it."""
+    try:
+        with unwrapped_ctrl_c():
+            return load(given)
+    except (RuntimeError, TypeError):
+        return None
 
 
 # --- The parameters, as mi.traverse lists them ----------------------------------------------------------------------
