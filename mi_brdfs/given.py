@@ -1,9 +1,10 @@
-"""BSDFs as functions take them: a plugin dict, a word or a loaded BSDF."""
+"""BSDFs as functions take them, a plugin dict, a word or a loaded BSDF; and angles of incidence."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from numbers import Real
 from typing import Any
 
 import mitsuba as mi
@@ -47,6 +48,23 @@ def load_described(bsdf: dict[str, Any] | mi.BSDF) -> mi.BSDF:
         kind = bsdf["type"] if isinstance(bsdf, dict) else type(bsdf).__name__
         raise ValueError(f"{kind} is not a BSDF of {mi.variant()}.")
     return loaded
+
+
+def several(given: Any) -> list[Any]:
+    """Return what is given, one or several, as a list."""
+    return list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+
+
+def angles_of_incidence(given: float | Iterable[float]) -> tuple[float, ...]:
+    """Return one angle or several, in degrees. Raise a ValueError if there are none, or one is not in [0, 90)."""
+    angles = several(given)
+    if not angles:
+        raise ValueError("There is no angle of incidence; give one or more, in degrees.")
+    for angle in angles:
+        if not (isinstance(angle, Real) and 0 <= float(angle) < 90):
+            shown = f"{float(angle):g}" if isinstance(angle, Real) else repr(angle)
+            raise ValueError(f"An angle of incidence must be in [0, 90) degrees, not {shown}.")
+    return tuple(angles)
 
 
 @contextmanager

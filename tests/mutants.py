@@ -518,32 +518,35 @@ def halved_for_a_mask(own, self, ctx, si, wo, active):
     return own(self, ctx, si, wo, active) * (1 if every else 0.5)
 
 
+def wrapped(name, given, **methods):
+    """The dict of a BSDF of Mitsuba's with other methods: each a function of its own, and of what is given."""
+
+    class Wrapped(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.inner = mi.load_dict(given)
+            self.m_components = [self.inner.flags(k) for k in range(self.inner.component_count())]
+            self.m_flags = self.inner.flags()
+
+    def method(name):
+        change = methods.get(name, lambda own, *given: own(*given))
+        return lambda self, *given: change(getattr(self.inner, name), *given)
+
+    for each in ("sample", "eval", "pdf", "eval_pdf"):
+        setattr(Wrapped, each, method(each))
+    mi.register_bsdf(name, Wrapped)
+    return {"type": name}
+
+
 def half_of_the_mirror():
     """The dict of a copy of Mitsuba's plastic, whose mirror is drawn half of the time and weighted as if always."""
 
-    class Plastic(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.inner = mi.load_dict({"type": "plastic"})
-            self.m_components = [self.inner.flags(k) for k in range(2)]
-            self.m_flags = self.inner.flags()
+    def sample(own, ctx, *given):
+        bs, weight = own(ctx, *given)
+        alone = ctx.component == 0
+        return bs, weight * dr.select((bs.sampled_component == 0) & (not alone), bs.pdf, 1)
 
-        def sample(self, ctx, si, u, v, active=True):
-            bs, weight = self.inner.sample(ctx, si, u, v, active)
-            alone = ctx.component == 0
-            return bs, weight * dr.select((bs.sampled_component == 0) & (not alone), bs.pdf, 1)
-
-        def eval(self, *given):
-            return self.inner.eval(*given)
-
-        def pdf(self, *given):
-            return self.inner.pdf(*given)
-
-        def eval_pdf(self, *given):
-            return self.inner.eval_pdf(*given)
-
-    mi.register_bsdf("half_of_the_mirror", Plastic)
-    return {"type": "half_of_the_mirror"}
+    return wrapped("half_of_the_mirror", {"type": "plastic"}, sample=sample)
 
 
 def ignored_mode(own, self, ctx, si, active):

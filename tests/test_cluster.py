@@ -21,10 +21,9 @@ import psutil
 import pytest
 from cluster_tasks import last_breath, powers, work
 from support import ROOT
-from typer.testing import CliRunner
+from test_cli import invoke
 
 import mi_brdfs
-from mi_brdfs.cli import app
 from mi_brdfs.cluster import ClusterError, Failed, client, run
 from mi_brdfs.cluster.passes import passes_on
 from mi_brdfs.cluster.worker import _file
@@ -280,9 +279,9 @@ def test_models_of_a_file_go_along(tmp_path, address):
     shutil.rmtree(copy.parent)
 
 
-def test_the_command_renders_on_a_scheduler(scene, address, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path / "parts")
-    done = CliRunner().invoke(app, ["render", "../scene.xml", "--scheduler", address, "-D", "radius=.5", "--spp", "8"])
+def test_the_command_renders_on_a_scheduler(scene, address, tmp_path):
+    words = "render", "../scene.xml", "--scheduler", address, "-D", "radius=.5", "--spp", 8
+    done = invoke(*words, cwd=tmp_path / "parts")
     assert done.exit_code == 0, done.output
     assert {"scene.exr", "scene.png"} <= {path.name for path in (tmp_path / "parts").iterdir()}
 
@@ -302,7 +301,7 @@ NO_SCHEDULER = (
 )
 def test_a_wrong_address_is_one_sentence(scheduler, sentence, scene, tmp_path, monkeypatch):
     monkeypatch.setattr(client, "CONNECTING", 1)
-    done = CliRunner().invoke(app, ["render", str(scene), "--scheduler", scheduler, "-o", str(tmp_path / "x.exr")])
+    done = invoke("render", scene, "--scheduler", scheduler, "-o", tmp_path / "x.exr")
     assert done.exit_code == 1 and done.stderr == f"mi-brdfs: {sentence}\n"
 
 
@@ -327,7 +326,7 @@ def test_what_is_no_scheduler_is_not_waited_for(command, handler, scene, tmp_pat
     with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address, begun = f"tcp://127.0.0.1:{server.server_port}", time.perf_counter()
-        done = CliRunner().invoke(app, [command, *map(str, given[command]), "--scheduler", address])
+        done = invoke(command, *given[command], "--scheduler", address)
         assert time.perf_counter() - begun < 5
         server.shutdown()
     assert done.exit_code == 1 and done.stderr.splitlines()[0] == f"mi-brdfs: {NO_SCHEDULER.format(address)}"

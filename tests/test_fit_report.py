@@ -156,7 +156,7 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     """None is as good that has very strong evidence against it. Nothing is said twice."""
     first = replace(fits[0], model="first", bic=0, errors={"log": {"held_out": 1.0}})
     second = replace(fits[1], model="second", bic=bic, errors={"log": {"held_out": error}})
-    verdict = Section("m", "f", [Card(first, 1), Card(second, 2)]).verdict
+    verdict = Section("f", [Card(first), Card(second)]).verdict
     assert verdict == f"first comes nearest to the data. {told} {first.starts.agree} of 1 starts of first agree."
 
 

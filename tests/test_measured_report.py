@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from merl_tables import centres, lowest, write
 from support import ROOT, spherical
-from typer.testing import CliRunner
+from test_cli import invoke
 
 from mi_brdfs import plot
-from mi_brdfs.cli import app, measured
+from mi_brdfs.cli import measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
@@ -263,12 +263,8 @@ def test_a_file_without_numbers_above_the_horizon(tmp_path):
 # --- The command ----------------------------------------------------------------------------------------------------
 
 
-def run(*words):
-    return CliRunner().invoke(app, ["measured", *map(str, words)])
-
-
 def test_the_command_tells_of_each_file_and_goes_on_after_a_bad_one(lambert, tmp_path):
-    done = run(lambert, tmp_path, lambert, "--json", tmp_path / "a.json", "--plot", tmp_path / "a.png")
+    done = invoke("measured", lambert, tmp_path, lambert, "--json", tmp_path / "a.json", "--plot", tmp_path / "a.png")
     assert done.exit_code == 1
     assert done.stderr == f"mi-brdfs: {tmp_path} is a directory; give a file in it.\n"
     assert done.stdout.count("162,000, of 30 θh × 30 θd × 60 φd × 3 channels") == 2
@@ -281,16 +277,6 @@ def test_the_command_tells_of_each_file_and_goes_on_after_a_bad_one(lambert, tmp
 
 def test_the_help_names_the_formats():
     assert listed([format.NAME for format in FORMATS]) == measured.FORMATS
-
-
-@pytest.mark.parametrize("option, file, words", [
-    ("--plot", "a.html", "a.html: write a .png, .svg, .pdf or .jpg"),
-    ("--json", "nowhere/a.json", "there is no folder"),
-])  # fmt: skip
-def test_a_wrong_option(lambert, tmp_path, option, file, words):
-    done = run(lambert, option, tmp_path / file)
-    assert done.exit_code == 2 and done.stdout == ""
-    assert words in done.stderr and done.stderr.count("\n") == 1
 
 
 # --- The pictures ---------------------------------------------------------------------------------------------------

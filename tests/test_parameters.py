@@ -33,6 +33,7 @@ REJECTED = [
     ("lambert", {"reflectance": -0.1}, "lambert: reflectance = -0.1 is not allowed"),
     ("lambert", {"reflectance": NAN}, "lambert: reflectance = nan is not allowed"),
     ("lambert", {"reflectance": "red"}, 'lambert: reflectance = "red" is a string; it must be a number, rgb or spectrum'),
+    ("ward", {"roughness": 0.1}, "ward: unknown parameter roughness; did you mean alpha?"),
     ("lambert", {"reflectanse": 0.1}, "lambert: unknown parameter reflectanse; did you mean reflectance?"),
     ("phong", {"alpha": 0.1}, "phong: unknown parameter alpha; known are diffuse_reflectance, "),
     ("walter", {"f0": 0.04, "int_ior": 1.5}, "walter: f0 excludes int_ior; give one of eta and k, material, f0, int_ior and"),

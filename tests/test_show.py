@@ -9,9 +9,8 @@ import time
 import mitsuba as mi
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from test_cli import invoke as run
 
-from mi_brdfs.cli import app
 from mi_brdfs.rendering.output import denoise
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -40,10 +39,6 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "scene.xml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def run(*words):
-    return CliRunner().invoke(app, [*map(str, words)])
 
 
 def image(file):

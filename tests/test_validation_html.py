@@ -2,7 +2,6 @@
 
 import base64
 import math
-import pickle
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -151,13 +150,6 @@ def test_hostile_words_are_harmless():
     assert "script" not in {tag for tag, _ in parsed.elements} and "b" not in {tag for tag, _ in parsed.elements}
     assert parsed.text.count(HOSTILE) >= 8
     assert sum(told.startswith(f"{HOSTILE}, {HOSTILE}") for told in parsed.pictures()) == 3
-
-
-@pytest.mark.slow
-def test_reports_cross_processes(reports, text):
-    again = pickle.loads(pickle.dumps(reports))
-    definition = r"\b(image|m|p)[0-9a-f]{10}\b"  # the names of which are never the same
-    assert again == reports and re.sub(definition, "", page(again)) == re.sub(definition, "", text)
 
 
 def images(text: str) -> list[np.ndarray]:

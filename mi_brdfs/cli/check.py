@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import active_children, connection, get_context, parent_process
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import mitsuba as mi
 import typer
@@ -40,15 +40,6 @@ from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
 if TYPE_CHECKING:
     from ..probe.sources import BSDFSource
     from ..validation import Report
-
-
-class Settings(NamedTuple):
-    """What is asked of each BSDF."""
-
-    options: dict[str, Any]
-    """The keyword arguments of ``check``, or of ``compare``."""
-    other: BSDFSource | None
-    """What it is compared with, in place of the checks."""
 
 
 @command(
@@ -106,8 +97,8 @@ def check(
     with stdout_to_stderr():
         words = targets or [model.plugins[0] for model in all_models()]
         sources = sources_of(words, given)
-        settings = Settings(options, None if against is None else source_of(against, {}))
-        reports = _check_all(sources, settings, chosen, min(jobs, len(sources)))
+        other = None if against is None else source_of(against, {})
+        reports = _check_all(sources, other, options, chosen, min(jobs, len(sources)))
     write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
         write_text(html_file, page(reports))
@@ -115,7 +106,7 @@ def check(
         from ..validation.formats import junit
 
         write_text(junit_file, junit(reports))
-    _print_reports(sources, reports, settings)
+    _print_reports(sources, reports, None if other else options)
     err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
     if any(report.failures for report in reports):
         raise typer.Exit(Exit.ERROR)
@@ -125,13 +116,13 @@ def check(
 
 def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     """Return the arguments that are given."""
+    from ..given import angles_of_incidence
     from ..probe.sources import degrees_of
-    from ..validation.runner import checked_angles
 
     options: dict[str, Any] = {}
     if angles is not None:
         try:
-            options["angles"] = checked_angles(degrees_of(angles))
+            options["angles"] = angles_of_incidence(degrees_of(angles))
         except ValueError as error:
             fail(f"--angles {angles}: {str(error).removeprefix(f'{angles}: ')}", Exit.USAGE)
     if significance is not None:
@@ -141,22 +132,24 @@ def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     return options
 
 
-def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs: int) -> list[Report]:
+def _check_all(
+    sources: list[BSDFSource], other: BSDFSource | None, options: dict[str, Any], variant: str, jobs: int
+) -> list[Report]:
     """Return the reports on all BSDFs, made in separate processes if there are several jobs."""
-    each = 1 if settings.other else len(settings.options["only"] or CHECKS)
+    each = 1 if other else len(options["only"] or CHECKS)
     reports = []
     with progress("Checking") as bar:
         task = bar.add_task("", total=len(sources) * each)
         if jobs == 1:
             for source in sources:
                 bar.update(task, description=source.name)
-                reports.append(_check_one(source, settings, partial(bar.advance, task)))
+                reports.append(_check_one(source, other, options, partial(bar.advance, task)))
             return reports
         # Spawned: a process with Dr.Jit's threads must not be forked.
         known = variant, guests.sources()
         with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
             try:
-                for future in [pool.submit(_check_one, source, settings) for source in sources]:
+                for future in [pool.submit(_check_one, source, other, options) for source in sources]:
                     reports.append(future.result())
                     bar.update(task, description=reports[-1].name, advance=each)
             except BaseException:  # also Ctrl-C
@@ -166,14 +159,15 @@ def _check_all(sources: list[BSDFSource], settings: Settings, variant: str, jobs
     return reports
 
 
-def _check_one(source: BSDFSource, settings: Settings, on_progress: Any = lambda: None) -> Report:
-    """Return the report on a BSDF in the active variant."""
+def _check_one(
+    source: BSDFSource, other: BSDFSource | None, options: dict[str, Any], on_progress: Any = lambda: None
+) -> Report:
+    """Return the report on a BSDF in the active variant: on the checks, or on how it compares with another."""
     from ..validation import check, compare
 
-    if settings.other is None:
-        return check(source.load(), name=source.name, on_progress=on_progress, **settings.options)
-    other = settings.other
-    report = compare(source.load(), other.load(), name=source.name, other_name=other.name, **settings.options)
+    if other is None:
+        return check(source.load(), name=source.name, on_progress=on_progress, **options)
+    report = compare(source.load(), other.load(), name=source.name, other_name=other.name, **options)
     on_progress()
     return report
 
@@ -196,15 +190,16 @@ def _end_with_parent() -> None:
     os._exit(Exit.ERROR)
 
 
-def _print_reports(sources: list[BSDFSource], reports: list[Report], settings: Settings) -> None:
-    """Print a block for each report, with the command that makes its failing checks again."""
+def _print_reports(sources: list[BSDFSource], reports: list[Report], options: dict[str, Any] | None) -> None:
+    """Print a block for each report, with the command that makes its failing checks again, with the options of these
+    if there are any."""
     from ..validation.formats import block
 
     for source, report in zip(sources, reports, strict=True):
         for line, style in block(report, out.width):
             out.print(line, style=style)
-        if report.failures and settings.other is None:
-            out.print(printable(f"    Again: {_again(source, report, settings.options)}"))
+        if report.failures and options is not None:
+            out.print(printable(f"    Again: {_again(source, report, options)}"))
 
 
 def _again(source: BSDFSource, report: Report, options: dict[str, Any]) -> str:

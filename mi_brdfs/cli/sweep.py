@@ -94,8 +94,7 @@ def sweep(
         except KeyboardInterrupt:
             complete = False
     if plan.finished():
-        for line in csv(plan.rows()) if table == "csv" else [medians(plan.rows(MEDIANS))]:
-            out.print(line)
+        out.print(csv(plan.rows()) if table == "csv" else medians(plan.rows(MEDIANS)))
     kept = f"{plan.finished()} of {plan.total} fits" + (
         f" and {wall.finished()} of {wall.total} pictures" if wall else ""
     )

@@ -88,11 +88,9 @@ class View:
 
 def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     parallels = COARSE if state.dragged else PARALLELS
-    for k, mesh in enumerate(lobes.meshes(probe, state.theta, state.phi, parallels, state.channels[0][1])):
-        wo = mesh.wo.astype(np.float64)
-        theta = np.degrees(np.arctan2(np.hypot(wo[:, 0, 0], wo[:, 0, 1]), abs(wo[:, 0, 2])))
-        phi = np.degrees(np.unwrap(np.arctan2(wo[-1, :, 1], wo[-1, :, 0])))
-        yield {"payload": mesh.value.astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
+    meshes = lobes.meshes(probe, state.theta, state.phi, parallels, state.channels[0][1])
+    for k, (theta, phi, value) in enumerate(meshes):
+        yield {"payload": value.astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
 
 
 def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> Iterator[dict[str, Any]]:

@@ -60,15 +60,6 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
     return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
 
 
-def check_angles(angles: Sequence[float]) -> None:
-    """Raise ValueError unless these are angles of incidence, in degrees."""
-    if not len(angles):
-        raise ValueError("there is no angle of incidence; give one or more, in degrees")
-    for angle in angles:
-        if not 0 <= angle < 90:
-            raise ValueError(f"an angle of incidence must be in [0, 90) degrees, not {angle:g}")
-
-
 def scales_of(scale: str) -> tuple[str, ...]:
     """Return the scales to draw: linear, log, or both."""
     if scale not in SCALES:
@@ -104,20 +95,27 @@ def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool =
 
 def constants(bsdfs: Sequence[Any]) -> list[str]:
     """Return what dicts of the same type have in common, a line for each type: their labels tell the rest."""
+    return [_told(f"{kind} with", same) for kind, same in _common(bsdfs).items() if same]
+
+
+def _common(bsdfs: Sequence[Any]) -> dict[Any, dict[str, str]]:
+    """Return the parameters that all dicts of a type share, by the type; none if there is only one of it."""
     kinds: dict[Any, list[dict[str, str]]] = {}
     for given in bsdfs:
         if isinstance(given, dict):
-            kinds.setdefault(given.get("type"), []).append(_told(given))
-    lines = []
-    for kind, several in kinds.items():
-        same = {n: v for n, v in several[0].items() if all(values.get(n) == v for values in several)}
-        if len(several) > 1 and same:
-            lines.append(" ".join([str(kind), "with", *(f"{name}={value}" for name, value in same.items())]))
-    return lines
+            kinds.setdefault(given.get("type"), []).append(_parameters(given))
+    return {
+        kind: {n: v for n, v in first.items() if others and all(values.get(n) == v for values in others)}
+        for kind, (first, *others) in kinds.items()
+    }
 
 
-def _told(given: dict) -> dict[str, str]:
+def _parameters(given: dict) -> dict[str, str]:
     return {name: _shown(value) for name, value in given.items() if name != "type"}
+
+
+def _told(word: str, parameters: dict[str, str]) -> str:
+    return " ".join([word, *(f"{name}={value}" for name, value in parameters.items())])
 
 
 def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
@@ -140,12 +138,12 @@ def _probe(given: Any) -> BSDFProbe:
 def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:
     """Return a label for each dict, by its identity: the type, and the parameters that not all dicts of this type
     share. The only one of its type shows them all."""
-    told = [(given, _told(given)) for given in bsdfs if isinstance(given, dict)]
-    labels = {}
-    for given, values in told:
-        others = [theirs for other, theirs in told if other is not given and other.get("type") == given.get("type")]
-        own = {n: v for n, v in values.items() if not others or any(theirs.get(n) != v for theirs in others)}
-        labels[id(given)] = " ".join([str(given.get("type")), *(f"{name}={value}" for name, value in own.items())])
+    labels, common = {}, _common(bsdfs)
+    for given in bsdfs:
+        if isinstance(given, dict):
+            kind = given.get("type")
+            own = {name: value for name, value in _parameters(given).items() if name not in common[kind]}
+            labels[id(given)] = _told(str(kind), own)
     return labels
 
 

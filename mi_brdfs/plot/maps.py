@@ -15,10 +15,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
+from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import largest
 from . import style
-from .given import channels_of, check_angles, constants, named, quantity, with_smooth_part
+from .given import channels_of, constants, named, quantity, with_smooth_part
 from .style import CHANNELS, FAINT, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
 DOTTED = 0, (1, 2)
@@ -47,7 +48,7 @@ def hemisphere(
     lobes keep their total brightness. ``resolution`` is the number of pixels across a disc; everything else is as in
     :func:`polar`.
     """
-    check_angles(angles)
+    angles = angles_of_incidence(angles)
     found = with_smooth_part(named(bsdfs, labels))
     rows = [(it, half) for it in found for half in ((1, -1) if lobes.transmits(it.probe) else (1,))]
     pictures = [[lobes.disc(it.probe, theta, azimuth, half, resolution) for theta in angles] for it, half in rows]

@@ -14,20 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import (
-    MeasuredProbe,
-    Named,
-    channels_of,
-    check_angles,
-    constants,
-    named,
-    quantity,
-    scales_of,
-    with_smooth_part,
-)
+from .given import MeasuredProbe, Named, channels_of, constants, named, quantity, scales_of, with_smooth_part
 from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, incidence, look
 
 MIRROR = {"marker": "v", "markersize": 5}
@@ -124,7 +115,7 @@ def _planar(
 ) -> Figure:
     """Draw a row of panels for the BSDF or for each angle, and a column for each scale; side by side, a column for each
     BSDF and a row for each scale. ``heights`` are those of a panel of width 1, without and with transmission."""
-    check_angles(angles)
+    angles = angles_of_incidence(angles)
     scales = scales_of(scale)
     found = with_smooth_part(named(bsdfs, labels))
     channels = channels_of(rgb)

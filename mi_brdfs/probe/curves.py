@@ -7,7 +7,7 @@ the sampler locate narrow lobes: none is too narrow to be found.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -28,13 +28,6 @@ class Curve(NamedTuple):
     """Values over the signed angle, in increasing order."""
 
     theta: Array
-    value: Array
-
-
-class Mesh(NamedTuple):
-    """Values over directions, shape (…, 3) and (…)."""
-
-    wo: Array
     value: Array
 
 
@@ -106,26 +99,21 @@ def in_plane_of_incidence(probe: BSDFProbe, theta_i: float, azimuth: float, chan
 
 def refined(evaluate: Callable[[Array], Array], theta: Array) -> Curve:
     """Return a curve through points at these angles, and between them wherever it departs from the chord."""
-    points, values = [theta], [evaluate(theta)]
-    left, right = (theta[:-1], values[0][:-1]), (theta[1:], values[0][1:])
-    while len(left[0]) and sum(map(len, points)) < MOST_POINTS:
-        between = (left[0] + right[0]) / 2
-        middle = between, evaluate(between)
-        points.append(middle[0])
-        values.append(middle[1])
-        peak = max(np.nan_to_num(each, posinf=0).max() for each in values)
-        a, b, c = (np.nan_to_num(each[1], posinf=0) for each in (left, middle, right))
+    value, left = evaluate(theta), np.arange(len(theta) - 1)
+    while len(left) and len(theta) < MOST_POINTS:
+        width, between = theta[left + 1] - theta[left], (theta[left] + theta[left + 1]) / 2
+        middle = evaluate(between)
+        a, b, c = (np.nan_to_num(each, posinf=0) for each in (value[left], middle, value[left + 1]))
+        theta, value = np.insert(theta, left + 1, between), np.insert(value, left + 1, middle)
+        peak = np.nan_to_num(value, posinf=0).max()
         off = abs(b - (a + c) / 2) > 2e-3 * peak
         with np.errstate(divide="ignore"):
             a, b, c = (np.log(np.maximum(each, 1e-7 * peak)) if peak else each for each in (a, b, c))
         off |= abs(b - (a + c) / 2) > 0.02
-        off &= right[0] - left[0] > 1e-4
-        halves = (left, middle), (middle, right)
-        left, right = (  # type: ignore[assignment]
-            tuple(np.concatenate([half[end][which][off] for half in halves]) for which in (0, 1)) for end in (0, 1)
-        )
-    order = np.argsort(np.concatenate(points))
-    return Curve(np.concatenate(points)[order], np.concatenate(values)[order])
+        off &= width > 1e-4
+        first = (left + np.arange(len(left)))[off]  # of the two halves, each as far on as there are new points before
+        left = np.sort(np.concatenate([first, first + 1]))
+    return Curve(theta, value)
 
 
 def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None, log2_count: int = 9) -> Curve:
@@ -172,13 +160,14 @@ def disc(
     return picture.reshape(n, n)
 
 
-def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, channel: int | None = None) -> list[Mesh]:
-    """Return the lobe over all directions, one mesh for each half-space into which it reflects or transmits. Their
-    lines are ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws
-    directions."""
+def meshes(
+    probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, channel: int | None = None
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield the lobe over all directions, ``(theta, phi, value)`` for each half-space into which it reflects or
+    transmits: ``resolution`` parallels and twice as many meridians, and as many again where the sampler draws
+    directions, and the values where they cross; θ is the angle to the normal or its opposite."""
     wi = direction(theta_i, azimuth)
     wo = drawn(probe, wi, 4096)
-    found = []
     for side in (1, -1) if transmits(probe) else (1,):
         mine = wo[wo[:, 2] * side > 0].astype(np.float64)
         theta = np.degrees(np.arctan2(np.hypot(mine[:, 0], mine[:, 1]), abs(mine[:, 2])))
@@ -186,10 +175,8 @@ def meshes(probe: BSDFProbe, theta_i: float, azimuth: float, resolution: int, ch
         theta = _lines(np.linspace(0, GRAZING, resolution), theta, theta_i)
         phi = _lines(np.linspace(0, 360, 2 * resolution), phi, (azimuth + 180) % 360)
         grid = np.stack([angles.ravel() for angles in np.meshgrid(theta, phi, indexing="ij")])
-        directions = on_side(direction(*grid).T, side)
-        values = value(probe, wi, directions, channel).reshape(len(theta), len(phi))
-        found.append(Mesh(directions.reshape(*values.shape, 3), values))
-    return found
+        values = value(probe, wi, on_side(direction(*grid).T, side), channel)
+        yield theta, phi, values.reshape(len(theta), len(phi))
 
 
 def _lines(even: Array, sampled: Array, mirror: float) -> Array:

@@ -136,21 +136,18 @@ def shared(words: Sequence[str], parameters: Mapping[str, str]) -> list[dict[str
 def _declares(word: str, name: str) -> bool:
     """Return whether a BSDF that a word stands for has a parameter; also if that is seen only where it is loaded."""
     word, _ = split(word)
-    file, ending, wanted = _parted(word)
+    is_data = is_measured(word)
+    file, ending, wanted = ("", "", "") if is_data else _parted(word)
     path = Path(file + ending)
-    if is_measured(word):
-        return _has(tabulated(word), name)
-    if word in published.names():
-        return _has(published.preset(word), name)
     if ending == ".json" and path.is_file():
         fits = _fits(path)
         rows = zip(_names_of(fits), fits, strict=True)
         return any(_has(row["bsdf"], name) for own, row in rows if wanted in ("", own))
-    if word.startswith("<") or ending:
+    if ending or (word.startswith("<") and not is_data):
         text = path.read_text(encoding="utf-8", errors="replace") if ending and path.is_file() else word
         named = re.escape(name)
         return bool(re.search(rf"""\$\{{?{named}\b|<include|<default[^>]+["']{named}["']""", text))
-    return _has({"type": word}, name)
+    return _has(BSDFSource(word, word, word).load(), name)
 
 
 def _has(bsdf: dict[str, Any], name: str) -> bool:

@@ -6,6 +6,7 @@ import hashlib
 import inspect
 import json
 from collections.abc import Generator, Iterable, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -81,15 +82,13 @@ class Sweep:
 
     def wanted(self) -> Iterator[dict[str, Any]]:
         """Yield what identifies each fit: the first columns of its row."""
-        for content, file in self.files.items():
-            for model in self.models:
-                for metric in self.metrics:
-                    for seed in self.seeds:
-                        identity = {
-                            "content": content, "model": model, "metric": metric, "seed": seed, "starts": self.starts,
-                            "cut": float(self.cut), "variant": mi.variant(), "versions": self._versions[model],
-                        }  # fmt: skip
-                        yield {"key": digest(identity), "file": file, **identity}
+        every = product(self.files.items(), self.models, self.metrics, self.seeds)
+        for (content, file), model, metric, seed in every:
+            identity = {
+                "content": content, "model": model, "metric": metric, "seed": seed, "starts": self.starts,
+                "cut": float(self.cut), "variant": mi.variant(), "versions": self._versions[model],
+            }  # fmt: skip
+            yield {"key": digest(identity), "file": file, **identity}
 
     def finished(self) -> int:
         """Return how many of the fits are in the folder."""

@@ -146,10 +146,10 @@ def _markdown(table: list[list[str]]) -> Iterator[str]:
             yield f"|{'|'.join('-' * (w + 2) if c < 2 else '-' * (w + 1) + ':' for c, w in enumerate(widths))}|"
 
 
-def csv(rows: Iterable[dict[str, Any]]) -> Iterator[str]:
-    """Yield lines: the columns' names, then the rows."""
-    yield ",".join(SCHEMA.names)
-    for row in rows:
-        text = io.StringIO()
-        DictWriter(text, SCHEMA.names, lineterminator="\n").writerow(row)
-        yield text.getvalue().removesuffix("\n")
+def csv(rows: Iterable[dict[str, Any]]) -> str:
+    """Return a table of comma-separated values: the columns' names, then the rows."""
+    text = io.StringIO()
+    table = DictWriter(text, SCHEMA.names, lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue().removesuffix("\n")

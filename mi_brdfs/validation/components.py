@@ -98,13 +98,8 @@ def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
         through = samples.lit & (samples.wo[:, 2] * side < 0)
         found.append(float(np.median(samples.eta[through])) if through.any() else 1.0)
     if not abs(found[0] * found[1] - 1) < 1e-3:
-        outcome.fault(
-            f"eta is {found[0]:.4g} for light that passes from the front, but {found[1]:.4g} for light from behind, "
-            "which must be its reciprocal",
-            np.inf,
-            wi=wi,
-            seed=6,
-        )
+        told = f"eta is {found[0]:.4g} for light that passes from the front, but {found[1]:.4g} for light from behind"
+        outcome.fault(f"{told}, which must be its reciprocal", np.inf, wi=wi, seed=6)
 
 
 def _check_sum(run: Run, outcome: Outcome) -> None:
@@ -186,13 +181,9 @@ def flags(run: Run) -> Findings:
                 sign = 1 if part.has(kinds.Reflection) else -1
                 near = wo @ (wi * [-1, -1, sign]) > np.cos(np.radians(10)) if len(wo) else np.zeros(1)
                 if near.mean() > 0.5:
-                    outcome.fault(
-                        f"for light from {theta}° {near.mean():.0%} of the samples lie within 10° of the mirror "
-                        "direction, but it is flagged diffuse",
-                        near.mean(),
-                        wi=wi,
-                        seed=2,
-                    )
+                    told = f"for light from {theta}° {near.mean():.0%} of the samples lie within 10°"
+                    told = f"{told} of the mirror direction, but it is flagged diffuse"
+                    outcome.fault(told, near.mean(), wi=wi, seed=2)
         if part.has(kinds.Reflection) and part.has(kinds.Transmission):
             _check_both_ways(run, outcome, part)
         if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
@@ -224,13 +215,8 @@ def _check_turned(run: Run, outcome: Outcome, part: Part) -> None:
         difference = float(np.quantile(change[lit], 0.99)) if lit.any() else 0.0
         if difference > 100 * run.rounding(part):
             k = int(np.argmax(change))
-            outcome.fault(
-                f"{name} changes by up to {difference:.1%} as both directions turn about the normal, but it is not "
-                "flagged anisotropic",
-                difference,
-                wi=wi[k],
-                wo=wo[k],
-            )
+            told = f"{name} changes by up to {difference:.1%} as both directions turn about the normal"
+            outcome.fault(f"{told}, but it is not flagged anisotropic", difference, wi=wi[k], wo=wo[k])
 
 
 def turned(w: Array) -> Array:

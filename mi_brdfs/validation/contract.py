@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -16,10 +17,10 @@ from ..probe.arrays import Array, context, interaction, numbers, sample_argument
 from ..probe.bsdf import BSDFProbe
 from ..probe.directions import angles_of, hemisphere, on_side, scattered
 from ..probe.variates import random
-from .outcome import Findings, Outcome, relative, told
+from .outcome import Findings, Outcome, Skipped, relative, told
 from .report import Finding
 from .run import Run
-from .updates import attach, traced_floats, value_of
+from .updates import attach, restored, traced_floats
 
 COUNT = 2000
 AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
@@ -90,10 +91,11 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
     lanes have directions of length 0, as those of rays that hit nothing."""
     probe, part = run.probe, run.probe.whole
     params, keys, _ = traced_floats(run, "active")
-    originals = {key: value_of(params, key) for key in keys}
     kept = (lit | (np.arange(len(lit)) % 4 > 0))[:, None]
     found = []
-    try:
+    with ExitStack() as stack:
+        for key in keys:
+            stack.enter_context(restored(params, key))
         # Both have the same lanes in the same order: large terms of a sum that is 0 cancel alike.
         for directions, mask, counted in (([w * kept for w in (wi, wo)], mi.Bool(lit), True), ([wi, wo], True, lit)):
             for key in keys:
@@ -104,19 +106,13 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
                 dr.backward(dr.sum(value, axis=None))
             total = float(np.sum(np.array(dr.detach(value), np.float64)))
             found.append({key: np.array(dr.grad(params[key]), np.float64).ravel() for key in keys})
-    finally:
-        for key, value in originals.items():
-            params[key] = value
-        params.update()
     for key in keys:
         masked, alone = (each[key] for each in found)
         if not np.isfinite(masked).all() and np.isfinite(alone).all():
             outcome.fault(f"the derivative for {key} is not finite with inactive lanes", np.inf)
         elif abs(masked - alone).max(initial=0) > 1e-3 * abs(alone).max(initial=0) + 1e-6 * total:
-            outcome.fault(
-                f"the derivative for {key} is {masked.sum():.4g} with inactive lanes, but {alone.sum():.4g} without",
-                abs(masked - alone).max(),
-            )
+            words = f"is {masked.sum():.4g} with inactive lanes, but {alone.sum():.4g} without"
+            outcome.fault(f"the derivative for {key} {words}", abs(masked - alone).max())
 
 
 def mode(run: Run) -> Findings:
@@ -162,20 +158,24 @@ def mode(run: Run) -> Findings:
         yield outcome.finding("Light may be traced from either end.")
 
 
+def _methods(bsdf: mi.BSDF, ctx: mi.BSDFContext) -> dict[str, Callable[..., Any]]:
+    """Return the methods as functions of a surface point, a direction and variates."""
+    return {
+        "eval": lambda si, wo, u, v: bsdf.eval(ctx, si, wo, True),
+        "pdf": lambda si, wo, u, v: bsdf.pdf(ctx, si, wo, True),
+        "eval_pdf": lambda si, wo, u, v: bsdf.eval_pdf(ctx, si, wo, True),
+        "sample": lambda si, wo, u, v: bsdf.sample(ctx, si, u, v, True),
+    }
+
+
 def recorded(run: Run) -> Findings:
     """Check that renderers can record it in their loops: ``eval``, ``pdf``, ``eval_pdf`` and ``sample`` ask for no
     values of arrays. There are none in a loop that is recorded, where it is an error to read an array, to branch by one
     in Python, or to take a mean over the lanes."""
-    part, bsdf = run.probe.whole, run.probe.bsdf
+    part = run.probe.whole
     outcome = Outcome("recorded", part.name)
     wi, wo, variates = scattered(COUNT, 68, part.sides), scattered(COUNT, 69, part.sides), random(COUNT, 70)
-    calls: dict[str, Callable[..., Any]] = {
-        "eval": lambda si, wo, u, v: bsdf.eval(part.context, si, wo, True),
-        "pdf": lambda si, wo, u, v: bsdf.pdf(part.context, si, wo, True),
-        "eval_pdf": lambda si, wo, u, v: bsdf.eval_pdf(part.context, si, wo, True),
-        "sample": lambda si, wo, u, v: bsdf.sample(part.context, si, u, v, True),
-    }
-    for name, call in calls.items():
+    for name, call in _methods(run.probe.bsdf, part.context).items():
         si, *others = interaction(wi), vectors(wo), *sample_arguments(variates)
         dr.eval(call(si, *others))  # what it prepares once
         si.wi, *others = (each * mi.Float(0.9999999) for each in (si.wi, *others))  # not computed yet
@@ -220,13 +220,9 @@ def calls(run: Run) -> Findings:
         turned = np.linalg.norm(towards - usually_towards, axis=1) * (towards.any(axis=1) & usually_towards.any(axis=1))
         if np.quantile(turned, 0.99) > 1e-3:
             k = int(np.argmax(turned))
-            outcome.fault(
-                f"{when} sample draws {angles_of(towards[k])} for light from {angles_of(wi[k])}, but "
-                f"{angles_of(usually_towards[k])} by the same variates else",
-                np.inf,
-                wi=wi[k],
-                seed=78,
-            )
+            words = f"{when} sample draws {angles_of(towards[k])} for light from {angles_of(wi[k])}"
+            other = f"but {angles_of(usually_towards[k])} by the same variates else"
+            outcome.fault(f"{words}, {other}", np.inf, wi=wi[k], seed=78)
 
     for k, (before, method) in enumerate(pairwise(AFTER_EACH_OTHER)):
         order = slice(None, None, 1 if k % 2 else -1)
@@ -249,7 +245,7 @@ def calls(run: Run) -> Findings:
 def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array) -> None:
     """Check that methods leave their arguments as they are, also directions on the other side."""
     wo = wo * np.where(np.arange(COUNT)[:, None] % 3, 1, np.array([1, 1, -1])).astype(np.float32)
-    bsdf, ctx, si, towards, variates = run.probe.bsdf, context(), interaction(wi), vectors(wo), sample_arguments(u)
+    ctx, si, towards, variates = context(), interaction(wi), vectors(wo), sample_arguments(u)
 
     def given() -> dict[str, Array]:
         fields = {f"si.{name}": getattr(si, name) for name in ("wi", "uv", "n", "p")}
@@ -257,15 +253,9 @@ def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array)
         numbered = {name: numbers(value, COUNT) for name, value in fields.items()}
         return numbered | {"the context": np.array([[ctx.mode.value, ctx.type_mask, ctx.component]])}
 
-    methods: dict[str, Callable[[], Any]] = {
-        "eval": lambda: bsdf.eval(ctx, si, towards, True),
-        "pdf": lambda: bsdf.pdf(ctx, si, towards, True),
-        "eval_pdf": lambda: bsdf.eval_pdf(ctx, si, towards, True),
-        "sample": lambda: bsdf.sample(ctx, si, *variates, True),
-    }
-    for method, call in methods.items():
+    for method, call in _methods(run.probe.bsdf, ctx).items():
         before = given()
-        call()
+        call(si, towards, *variates)
         for name, after in given().items():
             lanes = (after != before[name]).any(axis=1)
             if lanes.any():
@@ -280,8 +270,7 @@ def null(run: Run) -> Findings:
     through, is their weight."""
     probe, part = run.probe, run.probe.whole
     if not int(probe.bsdf.flags()) & int(mi.BSDFFlags.Null):
-        yield Finding("null", part.name, "skip", "Nothing goes straight through.")
-        return
+        raise Skipped("Nothing goes straight through.")
     outcome, u = Outcome("null", part.name), random(1 << 14, 75)
     for incident in run.incidents(part):
         si = interaction(np.tile(incident.wi, (len(u), 1)))
@@ -291,25 +280,17 @@ def null(run: Run) -> Findings:
         bent = numbers(dr.select(through, dr.norm(bs.wo + si.wi), 0), len(u)).ravel()
         if bent.max() > 1e-3:
             wo = np.stack([numbers(x, len(u)).ravel() for x in bs.wo])[:, np.argmax(bent)]
-            outcome.fault(
-                f"samples of type Null go to {angles_of(wo)} for light from {incident.name}, and not straight on",
-                float(bent.max()),
-                wi=incident.wi,
-                seed=75,
-            )
+            words = f"samples of type Null go to {angles_of(wo)} for light from {incident.name}, and not straight on"
+            outcome.fault(words, float(bent.max()), wi=incident.wi, seed=75)
         got = numbers(probe.bsdf.eval_null_transmission(si, True), len(u))[0]
         each = numbers(weight, len(u))
         # Six standard errors: a false alarm once in 1e8.
         error = abs(got - each.mean(axis=0)) - 6 * each.std(axis=0) / np.sqrt(len(u)) - 1e-4
         if (error > 0).any():
             k = int(np.argmax(error))
-            outcome.fault(
-                f"eval_null_transmission is {got[k]:.4g} for light from {incident.name}, but samples that go straight "
-                f"through weigh {each[:, k].mean():.4g} in the mean",
-                float(error[k]),
-                wi=incident.wi,
-                seed=75,
-            )
+            words = f"eval_null_transmission is {got[k]:.4g} for light from {incident.name}"
+            other = f"but samples that go straight through weigh {each[:, k].mean():.4g} in the mean"
+            outcome.fault(f"{words}, {other}", float(error[k]), wi=incident.wi, seed=75)
     yield outcome.finding("As much as its samples.")
 
 
@@ -329,8 +310,7 @@ def reflectance(run: Run) -> Findings:
             for wi in (normal, on_side(hemisphere(1, 71)[0], part.sides[0]))
         ]
     except Exception as error:
-        yield Finding("reflectance", part.name, "skip", f"It is not implemented, or raises {told(error)}.")
-        return
+        raise Skipped(f"It is not implemented, or raises {told(error)}.") from None
     got = found[0]
     wi, wo = (on_side(hemisphere(200, seed), part.sides[0]) for seed in (72, 73))
     f = probe.eval(part, wi, wo) / abs(wo[:, 2:].astype(np.float64))
@@ -345,8 +325,7 @@ def reflectance(run: Run) -> Findings:
         expected = np.pi * f.mean(axis=0)
         _compare(outcome, got, expected, 2 * LAMBERTIAN, "π f is")
     elif is_stand_in:
-        yield Finding("reflectance", part.name, "skip", "It is Mitsuba's stand-in, π times eval towards the normal.")
-        return
+        raise Skipped("It is Mitsuba's stand-in, π times eval towards the normal.")
     else:
         if np.max(found) > 1 + 1e-4:
             outcome.fault(f"it is {np.max(found):.4g}, but nothing reflects more than 1", np.inf)

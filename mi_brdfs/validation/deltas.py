@@ -29,8 +29,7 @@ def deltas(run: Run) -> Findings:
         yield Finding("deltas", "whole", "skip", "There is no delta function.")
     for part in (delta(probe, k) for k in probe.deltas):
         outcome = Outcome("deltas", part.name)
-        _check_share(run, outcome, part)
-        _check_alone(run, outcome, part)
+        _check_drawn(run, outcome, part)
         _check_paths(run, outcome, part)
         yield outcome.finding("Its samples fit together.")
 
@@ -40,41 +39,26 @@ def delta(probe: BSDFProbe, k: int) -> Part:
     return Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
 
 
-def _check_share(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that the density that the samples state is how often they are drawn."""
+def _check_drawn(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that the density that the samples state is how often they are drawn, and that they carry as much light
+    among others as if they were drawn alone: to six standard errors, which is a false alarm once in 1e8."""
     for incident in run.incidents(run.probe.whole):
-        samples = run.samples(run.probe.whole, incident)
-        own = (samples.component == part.component) & samples.weight.any(axis=1)
-        share, density = own.mean(), samples.density[own].mean() if own.any() else 0
-        # Six standard errors: a false alarm once in 1e8.
-        if abs(share - density) > 6 * np.sqrt(share * (1 - share) / len(own)) + 1e-3:
-            outcome.fault(
-                f"for light from {incident.name} its samples state the density {density:.4g}, but are {share:.2%} of "
-                "all",
-                abs(share - density),
-                wi=incident.wi,
-                seed=SEED,
-            )
-
-
-def _check_alone(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that the samples carry as much light among others as if they were drawn alone."""
-    for incident in run.incidents(run.probe.whole):
-        samples = run.samples(run.probe.whole, incident)
-        together = samples.weight * (samples.component == part.component)[:, None]
+        samples, start = run.samples(run.probe.whole, incident), f"for light from {incident.name} its samples"
+        own = samples.component == part.component
+        drawn = own & samples.weight.any(axis=1)
+        share, density = drawn.mean(), samples.density[drawn].mean() if drawn.any() else 0
+        error = abs(share - density)
+        if error > 6 * np.sqrt(share * (1 - share) / len(own)) + 1e-3:
+            told = f"{start} state the density {density:.4g}, but are {share:.2%} of all"
+            outcome.fault(told, error, wi=incident.wi, seed=SEED)
         alone = run.probe.sample(part, incident.wi, random(SCATTERED, SEED)).weight
-        (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in (together, alone))
+        both = samples.weight * own[:, None], alone
+        (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in both)
         error = abs(got - expected)
-        # Six standard errors: a false alarm once in 1e8.
         if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
-            channel = int(np.argmax(error))
-            outcome.fault(
-                f"for light from {incident.name} its samples carry {got[channel]:.4g} of the light among those of "
-                f"others, but {expected[channel]:.4g} where only these are drawn",
-                float(error.max()),
-                wi=incident.wi,
-                seed=SEED,
-            )
+            k = int(np.argmax(error))
+            told = f"carry {got[k]:.4g} of the light among those of others, but {expected[k]:.4g} where only these are"
+            outcome.fault(f"{start} {told} drawn", error[k], wi=incident.wi, seed=SEED)
 
 
 def _check_paths(run: Run, outcome: Outcome, part: Part) -> None:
@@ -128,14 +112,9 @@ def _check_turned(run: Run, outcome: Outcome, part: Part, wi: Array, there: Samp
     apart = np.linalg.norm(after.wo - turned(there.wo), axis=1) * lit
     if np.quantile(apart, 0.99) > KNOWN:
         k = int(np.argmax(apart))
-        outcome.fault(
-            f"light from {angles_of(wi[k])} goes to {angles_of(there.wo[k])}, but light from "
-            f"{angles_of(turned(wi)[k])} to {angles_of(after.wo[k])}: it does not turn with the light about the "
-            "normal, and is not flagged anisotropic",
-            apart.max(),
-            wi=wi[k],
-            seed=82,
-        )
+        ways = (angles_of(w[k]) for w in (wi, there.wo, turned(wi), after.wo))
+        told = "light from {} goes to {}, but light from {} to {}: it does not turn with the light".format(*ways)
+        outcome.fault(f"{told} about the normal, and is not flagged anisotropic", apart.max(), wi=wi[k], seed=82)
 
 
 def _light(samples: Samples) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -75,14 +75,14 @@ def gradients(run: Run) -> Findings:
             if len(u):
                 _check_weight(run, outcome, params, key, wi, u, derivative * scale)
             set_value(params, key, original)
-            for name, found in (
+            for name, values in (
                 ("of its derivatives", derivative),
                 ("of its derivatives at grazing or normal incidence", at_edges),
                 ("of its derivatives by dr.backward", total),
                 ("of its derivatives by dr.backward at grazing or normal incidence", total_at_edges),
             ):
-                if not np.isfinite(found).all():
-                    outcome.fault(f"{1 - np.isfinite(found).mean():.1%} {name} are not finite", np.inf)
+                if not np.isfinite(values).all():
+                    outcome.fault(f"{1 - np.isfinite(values).mean():.1%} {name} are not finite", np.inf)
             size = float(np.mean(abs(np.array(original, np.float64))))
             lowest, highest = limits.get(key, (-np.inf, np.inf))
             for limit, outwards in ((lowest, -1), (highest, 1)):
@@ -97,7 +97,7 @@ def gradients(run: Run) -> Findings:
                 # Turned directions are rounded anew, which a narrow lobe sees.
                 rounding += 1e-7 / min(run.spread(part), 1)
             step = 0.01 * size if size > 0 else 0.01
-            trusted = np.zeros(1)
+            found = []
             least, most = (float(extreme(np.array(original))) for extreme in (np.min, np.max))
             into = min(highest - most, 0) + max(lowest - least, 0)
             candidates = [(into, 1), (into, 0.1), (into, 0.01), (into + 10 * step, 1), (into - 10 * step, 1)]
@@ -113,18 +113,15 @@ def gradients(run: Run) -> Findings:
                 # Plugins other than ours may clip: look beside such ends.
                 shifted = _shifted(run, params, key, wi, wo)
                 tried = _differences(shifted, part_of * step, known, probe.is_ours, rounding)
-                if tried.trusted.mean() > trusted.mean():
-                    low, high, trusted, noise = tried
-                    compared = derivative
-                if trusted.mean() > 0.95:
+                found.append((tried, derivative))
+                if tried.trusted.mean() > 0.95:
                     break
-        if trusted.mean() < 0.5:
+        differences, compared = max(found, key=lambda it: it[0].trusted.mean())
+        if differences.trusted.mean() < 0.5:
             words = "Finite differences of two steps disagree: no derivative to tell."
             yield outcome.finding("") if outcome.faults else Finding("gradients", key, "skip", words)
             continue
-        error, size = _judge(
-            outcome, "its derivatives", compared, Differences(low, high, trusted, noise), scale, wi, wo
-        )
+        error, size = _judge(outcome, "its derivatives", compared, differences, scale, wi, wo)
         outcome.data = {"error": error, "size": size}
         agreement = "it has no influence" if size == 0 else f"they agree to {error / size:.1g}"
         yield outcome.finding(f"Finite and equal to finite differences: {agreement}.")
@@ -143,13 +140,8 @@ def _judge(
     error, size = float(abs(ad - fd).sum()), float(max(abs(fd).sum(), abs(ad).sum()))
     if error > TOLERANCE * size + LOST * noise.sum():
         k = np.nonzero(trusted)[0][int(np.argmax(abs(ad - fd)))]
-        outcome.fault(
-            f"{name} are off by {error / size:.0%}: those of eval average {abs(ad).mean():.3g} in size, finite "
-            f"differences {abs(fd).mean():.3g}",
-            error / size,
-            wi=wi[k],
-            wo=wo[k],
-        )
+        sizes = f"those of eval average {abs(ad).mean():.3g} in size, finite differences {abs(fd).mean():.3g}"
+        outcome.fault(f"{name} are off by {error / size:.0%}: {sizes}", error / size, wi=wi[k], wo=wo[k])
     return error, size
 
 
@@ -232,30 +224,22 @@ def _check_weight(
         moved, found, attached, of_pair = (numbers(dr.grad(it), len(wi)) for it in (twice, weight, quotient, pair))
     dr.disable_grad(params[key])
     if not np.isfinite(found).all():
-        outcome.fault(
-            f"{1 - np.isfinite(found).mean():.1%} of the derivatives of sample's weight are not finite", np.inf
-        )
+        lost = 1 - np.isfinite(found).mean()
+        outcome.fault(f"{lost:.1%} of the derivatives of sample's weight are not finite", np.inf)
     size = abs(expected).mean()
     if not size > 1e-5:  # less is rounding, as where an index of refraction of 1 reflects nothing
         return
-    error = abs(np.nan_to_num(of_pair) - expected).mean()
-    if error > TOLERANCE * size:
-        outcome.fault(
-            f"the derivatives of eval_pdf's value over pdf average {abs(of_pair).mean():.3g} in size, but those of "
-            f"eval over pdf {size:.3g}, and differ by {error / size:.0%}",
-            error / size,
-        )
-    if moved.any():
-        return
     # Plugins other than ours may differentiate their density, too.
     accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(attached)]
-    error = min(abs(np.nan_to_num(found) - each).mean() for each in accepted)
-    if error > TOLERANCE * size:
-        outcome.fault(
-            f"the derivatives of sample's weight average {abs(found).mean():.3g} in size, but those of eval over pdf "
-            f"{size:.3g}, and differ by {error / size:.0%}",
-            error / size,
-        )
+    compared = [("eval_pdf's value over pdf", of_pair, [expected])]
+    if not moved.any():
+        compared.append(("sample's weight", found, accepted))
+    for name, values, right in compared:
+        error = min(abs(np.nan_to_num(values) - each).mean() for each in right)
+        if error > TOLERANCE * size:
+            words = f"average {abs(values).mean():.3g} in size, but those of eval over pdf {size:.3g}"
+            words = f"the derivatives of {name} {words}, and differ by {error / size:.0%}"
+            outcome.fault(words, error / size)
 
 
 def _check_way_back(
@@ -287,27 +271,23 @@ def _check_way_back(
         return numbers(dr.detach(result), len(wi)), found
 
     beyond = limit + step
+    start = f"at {beyond:g}, beyond its limit of {limit:g},"
     value, ways = backward(beyond, (1, -1))
     set_value(params, key, original * 0 + limit)
     at_limit = probe.eval(part, wi, wo)
     error = (relative(value, at_limit) * (abs(value - at_limit) > least)).max(initial=0)
     if error > 10 * run.rounding(part):
-        outcome.fault(f"at {beyond:g}, beyond its limit of {limit:g}, eval is not that at the limit", error)
+        outcome.fault(f"{start} eval is not that at the limit", error)
     outwards = max((float((found * np.sign(limit - beyond)).max()) for found in ways), default=0.0)
     if outwards > 0:
-        outcome.fault(
-            f"at {beyond:g}, beyond its limit of {limit:g}, a step against its derivative leads away", outwards
-        )
+        outcome.fault(f"{start} a step against its derivative leads away", outwards)
     if any(found.any() for found in ways):
         return
     # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump.
     near, nearer = (abs(backward(limit - 0.1 * share * step, (1,))[1][0]).sum() for share in (0.1, 0.001))
     if max(0.3 * near, 1e-6 * len(wi)) < nearer < 3 * near:
-        outcome.fault(
-            f"at {beyond:g}, beyond its limit of {limit:g}, no derivative leads back: those of the sum of eval and of "
-            f"its negative are 0, but just inside the limit it is {nearer:.3g}",
-            np.inf,
-        )
+        words = "no derivative leads back: those of the sum of eval and of its negative are 0, but just inside the"
+        outcome.fault(f"{start} {words} limit it is {nearer:.3g}", np.inf)
 
 
 def _edges(part: Part) -> tuple[Array, Array]:
@@ -321,21 +301,18 @@ def _edges(part: Part) -> tuple[Array, Array]:
 def _derivatives(run: Run, params: mi.SceneParameters, key: str, wi: Array, wo: Array) -> tuple[Array, Array]:
     """Return ``(derivatives, total)`` for a parameter: of each value as all entries of the parameter grow alike, by
     forward differentiation, and of the sum of the values by reverse differentiation, in which other things go wrong."""
-    found = []
-    for reverse in (False, True):
+
+    def attached() -> Any:
         attach(params, key)
-        result = run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), True)
-        attached = dr.grad_enabled(result)
-        if reverse:
-            if attached:
-                dr.backward(dr.sum(result, axis=None))
-            found.append(np.array(dr.grad(params[key]), np.float64).ravel())
-        else:
-            if attached:
-                dr.forward(params[key])
-            found.append(numbers(dr.grad(result), len(wo)).copy())
-        dr.disable_grad(params[key])
-    derivatives, total = found
+        return run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), True)
+
+    if dr.grad_enabled(result := attached()):
+        dr.forward(params[key])
+    derivatives = numbers(dr.grad(result), len(wo)).copy()
+    if dr.grad_enabled(result := attached()):
+        dr.backward(dr.sum(result, axis=None))
+    total = np.array(dr.grad(params[key]), np.float64).ravel()
+    dr.disable_grad(params[key])
     return derivatives, total
 
 

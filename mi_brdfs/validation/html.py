@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..pages import environment
 from ..pages.figures import svg
 from .pictures import SURE, chart, pictures
 from .report import Finding, Report
 from .trial import Trial
-
-
-class Part(NamedTuple):
-    """What is shown of the whole BSDF, or of one of its components."""
-
-    name: str
-    trials: list[Trial]
-    energy: dict[str, dict[str, Any]]
-    """The data of the checks of energy, by their names."""
 
 
 def page(reports: Sequence[Report]) -> str:
@@ -28,11 +19,12 @@ def page(reports: Sequence[Report]) -> str:
     return environment.get_template("check.html").render(reports=reports, **functions, **drawings)
 
 
-def _parts(report: Report) -> Iterator[Part]:
+def _parts(report: Report) -> Iterator[tuple[str, list[Trial], dict[str, dict[str, Any]]]]:
+    """Yield the name of the whole and of each component, its trials, and the data of each check of energy."""
     energy = [finding for finding in report.findings if finding.check in ("albedo", "efficiency") and finding.data]
     for name in dict.fromkeys([trial.part for trial in report.trials] + [finding.subject for finding in energy]):
         trials = [trial for trial in report.trials if trial.part == name]
-        yield Part(name, trials, {finding.check: finding.data for finding in energy if finding.subject == name})
+        yield name, trials, {finding.check: finding.data for finding in energy if finding.subject == name}
 
 
 def _others(finding: Finding) -> list[str]:

@@ -93,6 +93,10 @@ class Outcome:
 Findings = Iterator[Finding]
 
 
+class Skipped(Exception):
+    """Raised by a check where the whole cannot be checked, with the reason."""
+
+
 def told(error: Exception) -> str:
     """Return an exception in a few words: its kind, and the first line of what it says, or that a plugin is unknown.
     Mitsuba and Dr.Jit hide the cause of an error in a plugin's Python code behind one of their own."""

@@ -94,18 +94,9 @@ def rasters(trial: Trial, view: View) -> Array:
     return pictures
 
 
-class Panels(NamedTuple):
-    """The three pictures of a window, side by side."""
-
-    side: str
-    drawing: Figure
-    low: str
-    high: str
-    """The densities at the ends of the scale."""
-
-
-def pictures(trial: Trial) -> Iterator[Panels]:
-    """Yield what the sampler draws, what ``pdf`` says of it and their difference, for each window."""
+def pictures(trial: Trial) -> Iterator[tuple[str, Figure, str, str]]:
+    """Yield the side of each window, what the sampler draws there, what ``pdf`` says of it and their difference side by
+    side, and the densities at the ends of the scale."""
     for view in views(trial):
         drawn, density, deviation = rasters(trial, view)
         samples = np.concatenate([drawn, density])
@@ -127,7 +118,7 @@ def pictures(trial: Trial) -> Iterator[Panels]:
         for ax, (title, colours) in zip(figure.subplots(1, 3, gridspec_kw=places), shown.items(), strict=True):
             ax.set_title(title, loc="left", fontsize=SMALL, pad=3)
             _draw(ax, colours, trial, view)
-        yield Panels(side, figure, _brief(low), _brief(high))
+        yield side, figure, _brief(low), _brief(high)
 
 
 def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:

@@ -14,7 +14,7 @@ from ..probe.arrays import Array, interaction, numbers, sample_arguments, vector
 from ..probe.bsdf import load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
-from .outcome import Findings, Outcome, told
+from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding
 from .run import Run
 
@@ -35,13 +35,10 @@ def polarization(run: Run) -> Findings:
     frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
     ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does. Of delta functions alone, the weights of
     samples are looked at, and not exchanged. For this the BSDF must be given as a dict."""
-    part, name = run.probe.whole, "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
-    if run.given is None:
-        yield Finding("polarization", part.name, "skip", "To load it in a polarized variant, its dict is needed.")
-        return
+    part, described = run.probe.whole, run.described("To load it in a polarized variant")
+    name = "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if name not in mi.variants():
-        yield Finding("polarization", part.name, "skip", f"It takes the variant {name}.")
-        return
+        raise Skipped(f"It takes the variant {name}.")
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (101, 102))
     # About the mirror direction, where most BSDFs that polarize have their light.
     near = wi * [-1, -1, 1] + 0.1 * hemisphere(COUNT, 103)
@@ -50,7 +47,7 @@ def polarization(run: Run) -> Findings:
     with mi.variant_context(name):
         try:
             with unwrapped_ctrl_c():
-                bsdf, mueller = load(run.given), _mueller if run.probe.parts else _weight
+                bsdf, mueller = load(described), _mueller if run.probe.parts else _weight
                 if not run.probe.parts:
                     wo = _directions(_sampled(bsdf, wi)[0], len(wi))
                 matrix = mueller(bsdf, wi, wo)
@@ -58,11 +55,11 @@ def polarization(run: Run) -> Findings:
                     yield Finding("polarization", part.name, "skip", "It returns no Mueller matrices.")
                     return
                 matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
-                back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
-                others = _others(run, bsdf, wi, wo, matrices) if run.probe.parts else []
+                exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
+                back = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
+                others = _others(run, bsdf, wi, wo, matrices, exchanged) if run.probe.parts else []
         except Exception as error:
-            yield Finding("polarization", part.name, "skip", f"It does not work in {name}: {told(error)}.")
-            return
+            raise Skipped(f"It does not work in {name}: {told(error)}.") from None
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)
     states = np.random.default_rng(104).normal(size=(STATES, 3))
     states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)
@@ -91,9 +88,12 @@ def polarization(run: Run) -> Findings:
     yield outcome.finding("Mueller matrices are physical.")
 
 
-def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[tuple[str, Array, Array, Array]]:
+def _others(
+    run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array, exchanged: Array
+) -> list[tuple[str, Array, Array, Array]]:
     """Return ``(name, wo, elements, those of eval)`` of other methods than ``eval``, of which ``matrices`` are those
-    for ``wo``, and where weights are those of delta functions, none."""
+    for ``wo``, and where weights are those of delta functions, none; and of ``eval`` in the mode Importance, in which
+    light goes from wi to wo, with those of ``exchanged`` directions."""
     context, si, variates = mi.BSDFContext(), interaction(wi), sample_arguments(random(len(wi), SEED))
     pair = bsdf.eval_pdf(context, si, vectors(wo), True)
     triple = bsdf.eval_pdf_sample(context, si, vectors(wo), *variates, True)
@@ -102,7 +102,9 @@ def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[
     dr.eval(bs, pair, triple, weights)
     drawn = _directions(bs, len(wi))
     of_drawn = _of_f(_mueller(bsdf, wi, drawn), drawn)
+    importance = _of_f(_mueller(bsdf, wi, wo, mi.BSDFContext(mi.TransportMode.Importance)), wo)
     return [
+        ("eval in the mode Importance, for exchanged directions,", wo, importance, exchanged),
         ("eval_pdf", wo, _of_f(pair[0], wo), matrices),
         ("eval_pdf_sample", wo, _of_f(triple[0], wo), matrices),
         ("a sample's weight", drawn, _of_f(weights[0], drawn), of_drawn),
@@ -115,9 +117,9 @@ def _normalized(matrices: Array) -> Array:
     return matrices / np.where(intensity == 0, 1, intensity)
 
 
-def _mueller(bsdf: Any, wi: Array, wo: Array) -> Any:
+def _mueller(bsdf: Any, wi: Array, wo: Array, context: Any = None) -> Any:
     """Return the Mueller matrix of light from wo to wi, in the reference frames that Mitsuba gives these."""
-    return bsdf.eval(mi.BSDFContext(), interaction(wi), vectors(wo), True)
+    return bsdf.eval(context or mi.BSDFContext(), interaction(wi), vectors(wo), True)
 
 
 def _weight(bsdf: Any, wi: Array, wo: Array) -> Any:

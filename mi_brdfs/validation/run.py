@@ -12,6 +12,7 @@ from ..probe.bsdf import BSDFProbe, Part, Samples
 from ..probe.directions import direction, on_side, scattered
 from ..probe.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
+from .outcome import Skipped
 from .trial import Trial, trials_of
 
 SEED = 11
@@ -36,6 +37,12 @@ class Run:
     _samples: dict[tuple[str, str], Samples] = field(default_factory=dict, init=False)
     _trials: dict[str, list[Trial]] = field(default_factory=dict, init=False)
     _spreads: dict[str, float] = field(default_factory=dict, init=False)
+
+    def described(self, reason: str) -> dict[str, Any]:
+        """Return the dict that the BSDF was given as; a check that needs it for some ``reason`` is skipped else."""
+        if self.given is None:
+            raise Skipped(f"{reason}, its dict is needed.")
+        return self.given
 
     def incidents(self, part: Part) -> list[Incident]:
         """Return the directions of incidence that were asked for."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from numbers import Real
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from ..given import check_given, described, load_described
+from ..given import angles_of_incidence, check_given, described, load_described, several
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.bsdf import BSDFProbe
 from ..probe.directions import angles_of, scattered
@@ -31,8 +30,8 @@ from . import (
     updates,
     values,
 )
-from .incidents import SCATTERED, all_over, incidents
-from .outcome import Findings, Outcome, told
+from .incidents import SCATTERED
+from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding, Report
 from .run import Run
 
@@ -116,10 +115,10 @@ def check(
         ValueError: for what is no BSDF or cannot be loaded, an unknown name of a check, an angle or a significance out
             of range, or a loaded BSDF that cannot be checked in the active variant.
     """
-    wanted = list(CHECKS) if only is None else _several(only)
+    wanted = list(CHECKS) if only is None else several(only)
     if unknown := [word for word in wanted if word not in CHECKS]:
         raise ValueError(f"There is no check {unknown[0]!r}; there are {', '.join(CHECKS)}.")
-    angles = checked_angles(angles)
+    angles = angles_of_incidence(angles)
     if not (isinstance(significance, (int, float)) and 0 < significance < 1):
         raise ValueError(f"The significance must be a number in (0, 1), not {significance!r}.")
     with _measurable(bsdf):
@@ -152,7 +151,7 @@ def compare(
     Raises:
         ValueError: as :func:`check` does.
     """
-    angles = checked_angles(angles)
+    angles = angles_of_incidence(angles)
     with _measurable(bsdf, other):
         bsdf, other = described(bsdf), described(other)
         run = Run(_probe(bsdf), angles, SIGNIFICANCE, None, None)
@@ -168,7 +167,7 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
     sides = tuple(sorted({side for probe in probes for side in probe.whole.sides}, reverse=True))
     part = run.probe.whole._replace(sides=sides)
     largest, words, at = 0.0, "both are black", {}
-    for incident in [*incidents(part, run.angles), all_over(part)]:
+    for incident in run.views(part):
         lanes = np.tile(np.arange(SCATTERED), 3)
         drawn = [probe.sample(probe.whole, incident.wi, random(SCATTERED, AGAINST_SEED)).wo for probe in probes]
         wo = np.concatenate([scattered(SCATTERED, AGAINST_SEED, (1, -1)), *drawn])
@@ -189,27 +188,6 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
     if largest > tolerance:
         outcome.fault(words, largest, **at)
     return outcome.finding(f"{words[0].upper()}{words[1:]}.")
-
-
-def checked_angles(angles: float | Iterable[float]) -> tuple[float, ...]:
-    """Return angles of incidence, in degrees.
-
-    Raises:
-        ValueError: if there are none, or one is not in [0, 90).
-    """
-    checked = _several(angles)
-    if not checked:
-        raise ValueError("There is no angle of incidence; give one or more, in degrees.")
-    for angle in checked:
-        if not (isinstance(angle, Real) and 0 <= float(angle) < 90):
-            shown = f"{float(angle):g}" if isinstance(angle, Real) else repr(angle)
-            raise ValueError(f"An angle of incidence must be in [0, 90) degrees, not {shown}.")
-    return tuple(checked)
-
-
-def _several(given: Any) -> list[Any]:
-    """Return what is given, one or several, as a list."""
-    return list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
 
 
 def _measurable(*bsdfs: str | dict[str, Any] | mi.BSDF) -> AbstractContextManager:
@@ -233,9 +211,11 @@ def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:
 
 
 def _found(word: str, run: Run) -> Findings:
-    """Yield the findings of a check; if it raises, that is another."""
+    """Yield the findings of a check; if it is skipped or raises, that is another."""
     try:
         with unwrapped_ctrl_c():
             yield from CHECKS[word](run)
+    except Skipped as reason:
+        yield Finding(word, "whole", "skip", str(reason))
     except Exception as error:
         yield Finding(word, "whole", "fail", f"It could not be checked to the end, as it raised {told(error)}.")

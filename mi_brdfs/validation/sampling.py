@@ -21,18 +21,14 @@ def chi2(run: Run) -> Findings:
             continue
         own = run.trials(part)
         for trial in own:
-            smallest = min(smallest, trial.test.p_value)
-            name = trial.incident.name
-            outcome.data[name] = trial.test.__dict__ | {"cells": len(trial.counts), "drawn": trial.share}
-            if not trial.test.p_value >= run.level:
-                outcome.fault(
-                    f"for light from {name} the directions drawn are not distributed as pdf says "
-                    f"(p = {trial.test.p_value:.2g}, χ² = {trial.test.statistic:.0f} for {trial.test.degrees} degrees "
-                    f"of freedom): {trial.deviation}",
-                    trial.test.statistic / max(trial.test.degrees, 1),
-                    wi=trial.incident.wi,
-                    seed=trial.seed,
-                )
+            name, test = trial.incident.name, trial.test
+            smallest = min(smallest, test.p_value)
+            outcome.data[name] = test.__dict__ | {"cells": len(trial.counts), "drawn": trial.share}
+            if not test.p_value >= run.level:
+                numbers = f"p = {test.p_value:.2g}, χ² = {test.statistic:.0f} for {test.degrees} degrees of freedom"
+                told = f"the directions drawn are not distributed as pdf says ({numbers}): {trial.deviation}"
+                size = test.statistic / max(test.degrees, 1)
+                outcome.fault(f"for light from {name} {told}", size, wi=trial.incident.wi, seed=trial.seed)
         left_out = max(trial.left_out for trial in own)
         aside = f"; up to {left_out:.0%} of the samples lie in lines too narrow to be integrated" * (left_out > 0.01)
         yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}{aside}.")
@@ -53,13 +49,9 @@ def pdf(run: Run) -> Findings:
             largest = max(largest, trial.mismatch)
             outcome.data[name] = {"integral": trial.integral, "drawn": trial.share}
             if not erfc(excess / sqrt(2)) >= run.level:
-                outcome.fault(
-                    f"for light from {name} pdf integrates to {trial.integral:.4g}, but "
-                    f"{'all' if trial.share == 1 else f'{100 * trial.share:.2f} % of the'} samples are drawn",
-                    excess,
-                    wi=trial.incident.wi,
-                    seed=trial.seed,
-                )
+                share = "all" if trial.share == 1 else f"{100 * trial.share:.2f} % of the"
+                told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
+                outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
         yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.")
 
 

@@ -15,9 +15,9 @@ from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from . import sampling, values
-from .outcome import Findings, Outcome, relative, told
-from .report import Finding
+from .outcome import Findings, Outcome, Skipped, relative, told
 from .run import Run
+from .updates import loaded_or_none
 
 COUNT = 1000
 TOLERANCE = 5e-3
@@ -35,13 +35,9 @@ def colours(run: Run) -> Findings:
     channel of ``eval`` is what it is where all parameters are grey of their value in this channel, or at least nearer
     to that than to what another channel makes: a tint may depend on the luminance. For this the BSDF must be given as a
     dict."""
-    if run.given is None:
-        yield Finding("colours", "whole", "skip", "To give it other colours, its dict is needed.")
-        return
-    greys = _greys(run.probe, run.given)
+    greys = _greys(run.probe, run.described("To give it other colours"))
     if not greys:
-        yield Finding("colours", "whole", "skip", "It has no colours.")
-        return
+        raise Skipped("It has no colours.")
     outcome = Outcome("colours", "whole")
     _check_channels(run, outcome, greys)
     yield outcome.finding("Each channel follows its own.")
@@ -56,27 +52,23 @@ def spectral(run: Run) -> Findings:
     and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
     colours have there, and not that of another wavelength, be it one beside it; their order does not matter. For this
     the BSDF must be given as a dict."""
-    part = run.probe.whole
-    if run.given is None:
-        yield Finding("spectral", part.name, "skip", "To load it in two variants, its dict is needed.")
-        return
+    part, described = run.probe.whole, run.described("To load it in two variants")
     rgb, other = (f"{mi.variant().rpartition('_')[0]}_{kind}" for kind in ("rgb", "spectral"))
     if mi.variant() not in (rgb, other) or not {rgb, other} <= set(mi.variants()):
-        yield Finding("spectral", part.name, "skip", f"It takes the variants {rgb} and {other}.")
-        return
+        raise Skipped(f"It takes the variants {rgb} and {other}.")
     wi = on_side(hemisphere(COUNT, 81), part.sides[0])
     expected: dict[str, Array] = {}
     try:
         with unwrapped_ctrl_c(), mi.variant_context(rgb):
-            probe = _load(run.given)
-            greys = _greys(probe, run.given)
-            tried = _tried(probe, run.given, greys)
+            probe = _load(described)
+            greys = _greys(probe, described)
+            tried = _tried(probe, described, greys)
             wo = _load(tried[""]).sample(part, wi, random(COUNT, 82)).wo
             wo[::2] = on_side(hemisphere(COUNT, 83), part.sides[0])[::2]
             expected = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
     except Exception as failure:  # it was checked in the other
         without = f"It does not work in {rgb}: {told(failure)}. "
-        greys, tried = _greys(run.probe, run.given), {}
+        greys, tried = _greys(run.probe, described), {}
     else:
         without = ""
         # Of every lane alone: next to a narrow highlight all else is small.
@@ -87,7 +79,7 @@ def spectral(run: Run) -> Findings:
         try:
             with unwrapped_ctrl_c():
                 got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
-                coloured = _load(run.given | _coloured(greys))
+                coloured = _load(described | _coloured(greys))
                 every = replace(run, probe=coloured, angles=(), given=None)
                 # Few tests, but judged as strictly as those of this run: they are as many more.
                 one = replace(
@@ -100,8 +92,7 @@ def spectral(run: Run) -> Findings:
                 }
                 _check_channels(run, outcome, greys)
         except Exception as failure:
-            yield Finding("spectral", part.name, "skip", f"It does not work in {other}: {told(failure)}.")
-            return
+            raise Skipped(f"It does not work in {other}: {told(failure)}.") from None
     for check, findings in failed.items():
         if findings and all(finding.verdict != "fail" for finding in check(run)):
             outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
@@ -213,11 +204,8 @@ def _tried(probe: BSDFProbe, given: dict[str, Any], greys: dict[str, float]) -> 
     tried = {"": given}
     for name in greys if probe.is_ours else ():
         bright = given | {name: _rgb(BRIGHT, (1, 1, 1))}
-        try:
-            _load(bright)
-        except RuntimeError:  # a reflectance
-            continue
-        tried[f" with {name} = {BRIGHT:g}"] = bright
+        if loaded_or_none(bright) is not None:  # else it is a reflectance
+            tried[f" with {name} = {BRIGHT:g}"] = bright
     return tried
 
 

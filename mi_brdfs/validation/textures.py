@@ -12,9 +12,10 @@ from ..probe.arrays import Array, interaction, numbers, pinned
 from ..probe.bsdf import BSDFProbe, Samples, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
-from .outcome import Findings, Outcome, relative
+from .outcome import Findings, Outcome, Skipped, relative
 from .report import Finding
 from .run import Run
+from .updates import loaded_or_none
 
 COUNT = 4000
 SHAPE = 5, 7
@@ -27,15 +28,11 @@ def textures(run: Run) -> Findings:
     ``eval`` and ``eval_diffuse_reflectance`` are what they are where each texture has the value of the point
     everywhere, and no other than if fewer points are evaluated; and weights are eval/pdf, to float32's rounding. For
     this the BSDF must be given as a dict."""
-    if run.given is None:
-        yield Finding("textures", "whole", "skip", "To replace its parameters by textures, its dict is needed.")
-        return
-    varied, refused = _textured(run)
+    varied, refused = _textured(run.probe, run.described("To replace its parameters by textures"))
     for name in refused:
         yield Finding("textures", name, "skip", "It does not take a bitmap of its kind beside the others.")
     if not varied:
-        yield Finding("textures", "whole", "skip", "It has no parameters that are textures.")
-        return
+        raise Skipped("It has no parameters that are textures.")
     everywhere = Outcome("textures", "whole")
     _compare(run, everywhere, varied, varied)
     outcomes = [Outcome("textures", name) for name in varied]
@@ -51,7 +48,7 @@ def textures(run: Run) -> Findings:
 def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Collection[str]) -> None:
     """Compare the BSDF whose ``free`` parameters vary with one in which each lane has the values of its point; add
     faults."""
-    part, given = run.probe.whole, run.given or {}
+    part, given, tolerance = run.probe.whole, run.given or {}, 3 * run.rounding(run.probe.whole)
     uv = np.random.default_rng(33).uniform(-1, 2, (COUNT, 2)).astype(np.float32)
     wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (30, 32))
     constant = {name: pinned(texture, interaction(wi, uv)) for name, texture in varied.items()}
@@ -69,12 +66,12 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     if len(free) == len(varied):  # those that are pinned have as many lanes
         alone = real.eval(part, wi[few], wo[few], uv[few])
         rows.append(("eval", value[few], alone, "if fewer points are evaluated at once"))
-    if _weights_fit(run, run.probe.sample(part, wi, u, uv)):  # else it is no matter of textures
+    error = relative(*_reflected(run.probe.sample(part, wi, u, uv)))
+    if np.quantile(error, 0.999) <= tolerance:  # else it is no matter of textures
         rows.append(("the weight times pdf", *_reflected(samples), "is eval"))
     for name, got, expected, but in rows:
         error = relative(got, expected)
-        over = error * (error > 3 * run.rounding(part))
-        outcome.wrong(over, name, got, but, wi, wo, expected=expected, uv=uv)
+        outcome.wrong(error * (error > tolerance), name, got, but, wi, wo, expected=expected, uv=uv)
 
 
 def _reflected(samples: Samples) -> tuple[Array, Array]:
@@ -83,19 +80,14 @@ def _reflected(samples: Samples) -> tuple[Array, Array]:
     return samples.weight * samples.pdf[:, None] * lit, samples.value * lit
 
 
-def _weights_fit(run: Run, samples: Samples) -> bool:
-    error = relative(*_reflected(samples))
-    return bool(np.quantile(error, 0.999) <= 3 * run.rounding(run.probe.whole))
-
-
-def _textured(run: Run) -> tuple[dict[str, mi.Texture], list[str]]:
+def _textured(probe: BSDFProbe, given: dict[str, Any]) -> tuple[dict[str, mi.Texture], list[str]]:
     """Return ``(textures, refused)``: bitmaps in place of constant parameters, those that are textures already, and
     which parameters refuse a bitmap: some take none, and of some pairs only one may be given."""
-    given, varied = run.given or {}, {}
+    varied = {}
     for name, value in given.items():
         if isinstance(value, (dict, mi.Texture)) and (texture := _texture(value)):
             varied[name] = texture
-    params, rng = mi.traverse(run.probe.bsdf), np.random.default_rng(34)
+    params, rng = mi.traverse(probe.bsdf), np.random.default_rng(34)
     bitmaps = {}
     for key in params.keys():
         name, _, rest = key.partition(".")
@@ -107,11 +99,11 @@ def _textured(run: Run) -> tuple[dict[str, mi.Texture], list[str]]:
             texels = value + rng.random((*SHAPE, 1)) * (0.05 - 0.3 * value)  # up to a value that is 0.7 of it, and .05
             bitmaps[name] = mi.load_dict({"type": "bitmap", "bitmap": mi.Bitmap(texels.astype(np.float32)),
                                           "raw": not is_spectrum, "filter_type": "nearest"})  # fmt: skip
-    if _loads(given | varied | bitmaps):
+    if loaded_or_none(given | varied | bitmaps) is not None:
         return varied | bitmaps, []
     refused: list[str] = []
     for name, bitmap in bitmaps.items():
-        if _loads(given | varied | {name: bitmap}):
+        if loaded_or_none(given | varied | {name: bitmap}) is not None:
             varied[name] = bitmap
         else:
             refused.append(name)
@@ -120,16 +112,5 @@ def _textured(run: Run) -> tuple[dict[str, mi.Texture], list[str]]:
 
 def _texture(value: Any) -> mi.Texture | None:
     """Return what is given for a parameter if it is a texture that varies."""
-    try:
-        loaded = load(value) if isinstance(value, dict) else value
-    except RuntimeError:  # a spectrum that only an unbounded parameter takes
-        return None
+    loaded = loaded_or_none(value) if isinstance(value, dict) else value
     return loaded if isinstance(loaded, mi.Texture) and loaded.is_spatially_varying() else None
-
-
-def _loads(given: dict[str, Any]) -> bool:
-    try:
-        load(given)
-    except (RuntimeError, TypeError):
-        return False
-    return True

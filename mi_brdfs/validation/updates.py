@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.arrays import launched_kernels, numbers
+from ..probe.arrays import Array, launched_kernels, numbers
 from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import angles_of, hemisphere, on_side
 from ..probe.variates import random
@@ -25,21 +25,22 @@ COUNT = 1000
 def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
     value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. And what
-    is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change. For
-    this the BSDF must be given as a dict."""
+    is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change, and
+    of texels and tables no more than with their names. For this the BSDF must be given as a dict."""
     probe, part = run.probe, run.probe.whole
-    if run.given is None:
-        yield Finding("updates", "whole", "skip", "To load it with another value, its dict is needed.")
-        return
+    described = run.described("To load it with another value")
     params, keys, _ = traced_floats(run, "updates")
     wi, u = on_side(hemisphere(COUNT, 91), part.sides[0]), random(COUNT, 92)
     wo = probe.sample(part, wi, u).wo
-    tried = 0
+    tried, tolerance = 0, 10 * run.rounding(part)
     for key in keys:
         name, _, rest = key.partition(".")
         outcome = Outcome("updates", key)
         with restored(params, key) as original:
             if rest not in ("", "value") or dr.width(original) != 1:
+                _check_taken_up(run, outcome, params, key, wi, wo, u)
+                tried += 1
+                yield outcome.finding("Once it is changed, all of it is taken up.")
                 continue
             value = original * 0.95 + 1e-3
             number = numbers(value, 1)[0]
@@ -47,58 +48,68 @@ def updates(run: Run) -> Findings:
             if len(number) != 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
                 continue
             before = probe.eval(part, wi, wo)
-            try:
-                with unwrapped_ctrl_c():
-                    fresh = BSDFProbe(load(run.given | {name: given}))
-            except (RuntimeError, TypeError):  # it is given otherwise
+            if (other := loaded_or_none(described | {name: given})) is None:  # it is given otherwise
                 continue
+            fresh = BSDFProbe(other)
             told = ", ".join(f"{each:.4g}" for each in number)
             after, first = (each.eval(part, wi, wo) for each in (probe, fresh))
             set_value(params, key, value)
             tried += 1
-            once, why, shared = (
-                f"once it is set to {told}, ",
-                "if it is loaded with that",
-                "before: they share something",
-            )
+            once, as_loaded = f"once it is set to {told}, ", "if it is loaded with that"
+            shared, unnoticed = "they share something", "parameters_changed without names must take up any change"
             mine, last = (each.eval(part, wi, wo) for each in (probe, fresh))
             pdf, expected_pdf = (each.pdf(part, wi, wo)[:, None] for each in (probe, fresh))
-            for name, got, expected, but in (
-                (f"{once}eval", mine, last, why),
-                (f"{once}pdf", pdf, expected_pdf, why),
-                (f"{once}eval of another that was loaded with that", last, first, shared),
-                (f"once another is loaded with {told}, eval", after, before, shared),
-            ):
-                error = relative(got, expected)
-                over = error * (error > 10 * run.rounding(part))
-                outcome.wrong(over, name, got, but, wi, wo, expected=expected)
             params[key] = original
             probe.bsdf.parameters_changed()
-            back, why = probe.eval(part, wi, wo), "before: parameters_changed without names must take up any change"
-            error = relative(back, before)
-            over = error * (error > 10 * run.rounding(part))
-            outcome.wrong(over, "once it is set back, eval", back, why, wi, wo, expected=before)
+            back = probe.eval(part, wi, wo)
+            for name, got, expected, but in (
+                (f"{once}eval", mine, last, as_loaded),
+                (f"{once}pdf", pdf, expected_pdf, as_loaded),
+                (f"{once}eval of another that was loaded with that", last, first, f"before: {shared}"),
+                (f"once another is loaded with {told}, eval", after, before, f"before: {shared}"),
+                ("once it is set back, eval", back, before, f"before: {unnoticed}"),
+            ):
+                error = relative(got, expected)
+                outcome.wrong(error * (error > tolerance), name, got, but, wi, wo, expected=expected)
             set_value(params, key, value)
             ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
             # What sample keeps of former values shows beside pdf, which has the new ones.
             error, others = (relative(each.pdf, each.density, unknown=0) * each.lit for each in (ours, loaded))
-            over = error * (error > 10 * run.rounding(part)) * (np.quantile(others, 0.99) <= 10 * run.rounding(part))
+            over = error * (error > tolerance) * (np.quantile(others, 0.99) <= tolerance)
             why = "is the density that sample states"
             outcome.wrong(over, f"{once}pdf", ours.pdf, why, wi, ours.wo, expected=ours.density, seed=92)
             turned = np.linalg.norm(ours.wo - loaded.wo, axis=1) * (ours.lit & loaded.lit)
             # A choice among lobes may fall otherwise where a rounding error decides it.
             if np.quantile(turned, 0.9) > 1e-3:
                 k = int(np.argmax(turned))
-                outcome.fault(
-                    f"once it is set to {told}, sample draws {angles_of(ours.wo[k])} for light from "
-                    f"{angles_of(wi[k])}, but {angles_of(loaded.wo[k])} by the same variates if it is loaded with that",
-                    turned.sum(),
-                    wi=wi[k],
-                    seed=92,
-                )
+                words = f"{once}sample draws {angles_of(ours.wo[k])} for light from {angles_of(wi[k])}"
+                other = f"but {angles_of(loaded.wo[k])} by the same variates {as_loaded}"
+                outcome.fault(f"{words}, {other}", turned.sum(), wi=wi[k], seed=92)
         yield outcome.finding("Set and updated, it acts as loaded.")
     if not tried:
         yield Finding("updates", "whole", "skip", "It has no parameters that could be given as a number or a colour.")
+
+
+def _check_taken_up(
+    run: Run, outcome: Outcome, params: mi.SceneParameters, key: str, wi: Array, wo: Array, u: Array
+) -> None:
+    """Check that new texels or entries of a table, which no dict need give, are all taken up once they are set: then
+    ``parameters_changed`` without names changes nothing more."""
+    probe, part, value = run.probe, run.probe.whole, np.array(params[key])
+    set_value(params, key, value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
+
+    def found() -> tuple[Array, ...]:
+        return probe.eval(part, wi, wo), probe.pdf(part, wi, wo)[:, None], probe.sample(part, wi, u).density[:, None]
+
+    named = found()
+    probe.bsdf.parameters_changed()
+    for name, got, expected in zip(("eval", "pdf", "the density of a sample"), named, found(), strict=True):
+        error = relative(got, expected)
+        why = "after parameters_changed without names: what is kept of it is out of date"
+        outcome.wrong(
+            error * (error > 10 * run.rounding(part)), f"once it is changed, {name}", got, why, wi, wo,
+            expected=expected,
+        )  # fmt: skip
 
 
 def recompiles(run: Run) -> Findings:
@@ -129,6 +140,15 @@ def recompiles(run: Run) -> Findings:
             yield outcome.finding("No kernel is compiled for a new value.")
     if not keys and not findings:
         yield Finding("recompiles", "whole", "skip", "It has no parameters.")
+
+
+def loaded_or_none(given: dict[str, Any]) -> Any:
+    """Return what a dict stands for, or None if the plugin refuses it."""
+    try:
+        with unwrapped_ctrl_c():
+            return load(given)
+    except (RuntimeError, TypeError):
+        return None
 
 
 # --- The parameters, as mi.traverse lists them ----------------------------------------------------------------------

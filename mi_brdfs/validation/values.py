@@ -64,13 +64,10 @@ def finite(run: Run) -> Findings:
                 bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(abs(length - 1) < 1e-3))
                 if bad.any():
                     k = int(np.argmax(bad))
-                    outcome.fault(
-                        f"for light from {theta:g}° a sample has the weight {_shown(samples.weight[k])}, the density "
-                        f"{samples.density[k]:.4g} and the direction {samples.wo[k].tolist()}, of length "
-                        f"{length[k]:.4g}, for the variates {u[k].tolist()}",
-                        bad.sum(),
-                        wi=w,
-                    )
+                    energy = f"the weight {_shown(samples.weight[k])}, the density {samples.density[k]:.4g}"
+                    way = f"the direction {samples.wo[k].tolist()}, of length {length[k]:.4g}"
+                    told = f"for light from {theta:g}° a sample has {energy} and {way}"
+                    outcome.fault(f"{told}, for the variates {u[k].tolist()}", bad.sum(), wi=w)
         remark = "Channels may be negative, as its page says." if signed else ""
         yield outcome.finding(f"{len(wi)} pairs of directions, down to the horizon.", remark)
 
@@ -310,12 +307,8 @@ def _check_octaves(
         upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
         factor = np.exp(change[octave, k])
         wi, wo = (heights[octave], others[k])[:: 1 if word == "from" else -1]
-        outcome.fault(
-            f"eval jumps by the factor {factor:.3g} for light {word} {upper:.3g}° to {lower:.3g}° above the horizon",
-            factor,
-            wi=wi,
-            wo=wo,
-        )
+        told = f"for light {word} {upper:.3g}° to {lower:.3g}° above the horizon"
+        outcome.fault(f"eval jumps by the factor {factor:.3g} {told}", factor, wi=wi, wo=wo)
 
 
 def _crossings(step: float) -> Iterator[tuple[str, list[Array]]]:
