@@ -58,7 +58,7 @@ class Observations:
     quantity: Quantity = "stated"
     """What the file holds, by itself or because that was asked for."""
     scatter: tuple[tuple[float, float, float], ...] = ()
-    """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, at the first azimuth."""
+    """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, at the first azimuth."""
 
     @property
     def channels(self) -> int:

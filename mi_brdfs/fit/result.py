@@ -85,7 +85,7 @@ class Fit:
     quantity: Quantity = "stated"
     """What the file holds, by itself or because that was asked for."""
     scatter: list[tuple[float, float, float]] = field(default_factory=list)
-    """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, where it states any."""
+    """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, where it states any."""
     fixed: list[str] = field(default_factory=list)
     """Parameters that isotropic data say nothing about, left at their defaults."""
     flip: float | None = None
@@ -135,7 +135,7 @@ class Fit:
         for theta, stated, values in self.scatter:
             own = float(np.mean(self.albedos(theta)))
             if abs(own - stated) > 0.1 * stated:
-                told = f"the file states {stated:.3g}, its values add to {values:.3g}"
+                told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
                 found.append(f"At {theta:g}° the albedo is {own:.3g}; {told}.")
         if self.fixed:
             found.append(f"Isotropic data leave at the default: {', '.join(self.fixed)}.")
