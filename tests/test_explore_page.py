@@ -525,6 +525,18 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     assert tab.locator("#chips").inner_text().split() == ["ward", "walter"]
     assert tab.locator("#view-polar svg path").count() > 1
     assert tab.locator(".pictures canvas").count() == 2
+    assert tab.locator("#subject-type").inner_text() == ""  # it has that name
+
+
+def test_curves_have_the_colours_of_reports_on_dark_ground(tab, address):
+    report = (ROOT / "mi_brdfs" / "pages" / "style.css").read_text(encoding="utf-8")
+    light, dark = re.findall(r"--series-1: (#\w+)", report)
+    opened(tab, address, {"subjects": [{"bsdf": {"type": "lambert"}, "name": "lambert"}], **STILL, "dark": False})
+    curve = tab.locator("#view-polar .curve")
+    assert curve.get_attribute("stroke").lower() == light
+    tab.locator("#theme").click()
+    shown = "document.querySelector('#view-polar .curve').getAttribute('stroke').toLowerCase()"
+    tab.wait_for_function(f"() => {shown} === '{dark}'")
 
 
 @pytest.mark.slow
@@ -532,10 +544,10 @@ def test_models_open_one_after_the_other(tab, address):
     """With all kinds of controls."""
     opened(tab, address, {"subjects": [{"bsdf": {"type": "lambert"}, "name": "lambert"}], **STILL})
     for name in ("kurt", "microfacet", "lafortune", "roughdiffuse"):
-        state = {"subjects": [{"bsdf": {"type": name}, "name": name}], **STILL}
+        state = {"subjects": [{"bsdf": {"type": name}, "name": f"my {name}"}], **STILL}
         tab.evaluate("hash => { location.hash = hash; }", json.dumps(state))
         tab.wait_for_function(
-            f"() => document.querySelector('#chips').innerText === '{name}' && "
+            f"() => document.querySelector('#subject-name').value === 'my {name}' && "
             f"document.querySelector('#subject-type').innerText === '{name}' && "
             "document.querySelector('#controls input')"
         )

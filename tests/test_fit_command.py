@@ -43,7 +43,6 @@ def test_ranks_models_and_writes_rows(tmp_path):
         (("--metric", "loglog"), "There is no metric 'loglog'; did you mean 'log'?"),
         (("--variant", "scalar_rgb"), "this needs a vectorized and unpolarized variant, not scalar_rgb"),
         (("--json", "nowhere/x.json"), "--json nowhere/x.json: there is no folder nowhere"),
-        (("-o", "nowhere/r.html"), "-o nowhere/r.html: there is no folder nowhere"),
         (("-o", "r.pdf"), "-o r.pdf: give the report a name that ends in .html, or the best fit one in .xml"),
         ((LOFT, "-o", "r.xml"), "-o r.xml: it holds one fit, and there are 2 files; give --save FOLDER"),
         ((LOFT, "--save", "all"), "--save all: two files are called AnoBlackEC1onAlum; fit them"),

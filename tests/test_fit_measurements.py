@@ -32,12 +32,6 @@ def ward():
     return measured("ward", WARD, 1000)
 
 
-def anisotropic(wi, wo, **parameters):
-    """A measurement of single pairs, of Ward's model."""
-    f = ref.ward(wi, wo, **parameters, variant="balanced") / wo[:, 2]
-    return Measurement(Path("brushed"), "made", Samples(wi, wo, f[:, None], True), np.array([550.0]))
-
-
 def test_weights_are_solid_angles():
     """4 cosθd sinθh sinθd ΔθhΔθdΔφd of half and difference angles, and sinθi sinθo ΔθiΔθoΔφ of polar ones."""
     u, theta, phi = (np.arange(count) + 0.5 for count in (40, 30, 20))
@@ -154,10 +148,9 @@ def test_tinted_models_have_all_derivatives():
 
 def test_anisotropic_data_have_anisotropic_parameters():
     wi, wo = pairs(3000, 4)
-    turned = [ref.rotate(w, 0.1).astype(np.float32) for w in (wi, wo)]
-    data = anisotropic(*turned, diffuse_reflectance=0.2, specular_reflectance=0.4, alpha_u=0.1, alpha_v=0.3)
-    data = Measurement(data.path, "made", Samples(wi, wo, data.data.values, True), data.wavelengths)
-    (it,) = fit(data, "ward", starts=6)
+    f = ref.ward(*(ref.rotate(w, 0.1) for w in (wi, wo)), 0.2, 0.4, 0.1, 0.3, "balanced") / wo[:, 2]
+    brushed = Measurement(Path("brushed"), "made", Samples(wi, wo, f[:, None], True), np.array([550.0]))
+    (it,) = fit(brushed, "ward", starts=6)
     u, v, turn = (it.bsdf[name] for name in ("alpha_u", "alpha_v", "rotation"))
     if u > v:  # the same lobe, a quarter of a turn on
         u, v, turn = v, u, turn + 0.25

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from merl_tables import centres, lowest, write
-from support import spherical
-from typer.testing import CliRunner
+from support import ROOT, spherical
+from test_cli import invoke
 
 from mi_brdfs import plot
-from mi_brdfs.cli import app, measured
+from mi_brdfs.cli import measured
 from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read, summarize
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
 from mi_brdfs.measured.report.albedo import albedos, hemisphere
+from mi_brdfs.measured.report.counts import in_one_plane
 from mi_brdfs.measured.report.reciprocity import reciprocity_error
 from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.observer import to_srgb
@@ -126,6 +127,11 @@ def test_directions_that_are_none_are_refused(direction):
 
 
 # --- The summary ----------------------------------------------------------------------------------------------------
+
+
+def test_data_in_one_plane_are_told():
+    names = {path.name: in_one_plane(read(path).data) for path in (ROOT / "scenes" / "measured").glob("*.bsdf")}
+    assert [name for name, planar in names.items() if planar] == ["aeroglaze_z307.bsdf"] and len(names) == 4
 
 
 def test_counts_are_exact(tmp_path):
@@ -257,12 +263,8 @@ def test_a_file_without_numbers_above_the_horizon(tmp_path):
 # --- The command ----------------------------------------------------------------------------------------------------
 
 
-def run(*words):
-    return CliRunner().invoke(app, ["measured", *map(str, words)])
-
-
 def test_the_command_tells_of_each_file_and_goes_on_after_a_bad_one(lambert, tmp_path):
-    done = run(lambert, tmp_path, lambert, "--json", tmp_path / "a.json", "--plot", tmp_path / "a.png")
+    done = invoke("measured", lambert, tmp_path, lambert, "--json", tmp_path / "a.json", "--plot", tmp_path / "a.png")
     assert done.exit_code == 1
     assert done.stderr == f"mi-brdfs: {tmp_path} is a directory; give a file in it.\n"
     assert done.stdout.count("162,000, of 30 θh × 30 θd × 60 φd × 3 channels") == 2
@@ -275,16 +277,6 @@ def test_the_command_tells_of_each_file_and_goes_on_after_a_bad_one(lambert, tmp
 
 def test_the_help_names_the_formats():
     assert listed([format.NAME for format in FORMATS]) == measured.FORMATS
-
-
-@pytest.mark.parametrize("option, file, words", [
-    ("--plot", "a.html", "a.html: write a .png, .svg, .pdf or .jpg"),
-    ("--json", "nowhere/a.json", "there is no folder"),
-])  # fmt: skip
-def test_a_wrong_option(lambert, tmp_path, option, file, words):
-    done = run(lambert, option, tmp_path / file)
-    assert done.exit_code == 2 and done.stdout == ""
-    assert words in done.stderr and done.stderr.count("\n") == 1
 
 
 # --- The pictures ---------------------------------------------------------------------------------------------------

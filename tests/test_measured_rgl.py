@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from mitsuba import tensor_io
 from support import context, interaction, numbers, pairs, shared
 
 from mi_brdfs.measured import FileError, convert, read
@@ -67,7 +68,7 @@ KINDS = {
 def written(tmp_path, fields):
     """A file with fields, which Mitsuba's reading of it shows to be one."""
     path = tmp_path / "material.bsdf"
-    rgl.write_tensors(path, fields)
+    tensor_io.write(str(path), **fields)
     return path
 
 

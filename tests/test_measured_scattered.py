@@ -5,26 +5,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from support import call, context, direction, efficiencies, pairs, shared
+from test_measured_rows import colours, streaks
 
 from mi_brdfs.measured import Samples, read, scattered
 from mi_brdfs.measured.scattered import embedded, gridded, nearest
 
 
-def glossy(wi, wo):
-    """A reciprocal and isotropic BRDF with a highlight and two colours."""
-    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
-    lobe = np.exp(-8 * (1 - half[..., 2:] ** 2))
-    return np.concatenate([0.1 + lobe, 0.3 - 0.1 * lobe], axis=-1)
-
-
-def streaked(wi, wo):
-    """The same, narrow in x and wide in y."""
-    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
-    return 0.1 + np.exp(-8 * half[..., :1] ** 2 - half[..., 1:2] ** 2)
-
-
 @pytest.mark.parametrize(
-    "f, anisotropic, gain", [(glossy, False, 0.5), pytest.param(streaked, True, 0.75, marks=pytest.mark.slow)]
+    "f, anisotropic, gain", [(colours, False, 0.5), pytest.param(streaks, True, 0.75, marks=pytest.mark.slow)]
 )
 def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
     """Better than from the nearest neighbour; in four dimensions, 2000 samples are few."""
@@ -44,7 +32,7 @@ def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
 def test_beyond_the_measured_range(monkeypatch):
     monkeypatch.setattr(scattered, "MOST_NODES", 20_000)
     wi, wo = pairs(2000, 13, 0.5)
-    samples = Samples(wi, wo, glossy(wi, wo), False)
+    samples = Samples(wi, wo, colours(wi, wo), False)
     inside, outside = direction(30)[None], direction(80, 60)[None]
     held, zero = gridded(samples), gridded(samples, "zero")
     assert np.all(held.evaluate(inside, outside) > 0.05)
@@ -55,7 +43,7 @@ def test_beyond_the_measured_range(monkeypatch):
 
 def test_missing_values_and_few_samples():
     wi, wo = pairs(30, 15, 0.05)
-    values = glossy(wi, wo)
+    values = colours(wi, wo)
     values[3] = np.nan
     assert np.all(gridded(Samples(wi, wo, values, False)).evaluate(wi, wo) > 0.05)
     one = gridded(Samples(wi[:1], wo[:1], values[:1], False))

@@ -84,15 +84,18 @@ def in_frames_of_the_facet(matrix, light, viewer):
 FAULTY = [("eval", each) for each in (None, turned, beyond_its_intensity, in_frames_of_the_facet)]
 
 
-@pytest.mark.parametrize(("method", "fault"), [*FAULTY, ("eval_pdf", turned), ("sample", turned)])
+ONE = ("eval_pdf", turned), ("sample", turned), ("importance", turned)
+
+
+@pytest.mark.parametrize(("method", "fault"), [*FAULTY, *ONE])
 def test_mueller_matrices(method, fault):
-    """Of a rough conductor, with and without faults of a method."""
+    """Of a rough conductor, with and without faults of a method, or of ``eval`` in the mode Importance."""
 
     def altered(own, ctx, si, *given):
         result = own(ctx, si, *given)
-        if not (fault and mi.is_polarized):
+        if not (fault and mi.is_polarized) or (method == "importance" and ctx.mode == mi.TransportMode.Radiance):
             return result
-        if method == "eval":
+        if method in ("eval", "importance"):
             return fault(result, -given[0], si.wi)
         if method == "eval_pdf":
             return fault(result[0], -given[0], si.wi), result[1]
@@ -101,9 +104,48 @@ def test_mueller_matrices(method, fault):
     for variant in ("llvm_ad_spectral_polarized", "llvm_ad_rgb"):
         mi.set_variant(variant)
         metal = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.3, "material": "Au"}
-        bsdf = wrapped("wrapped_metal", metal, **{method: altered})
+        bsdf = wrapped("wrapped_metal", metal, **{"eval" if method == "importance" else method: altered})
     report = check(bsdf, only="polarization")
     assert report.verdict("polarization") == ("fail" if fault else "pass"), report
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize(("key", "verdict"), [("table", "pass"), ("values", "fail")])
+def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
+    """By a density of four steps of the cosine, whose sum is taken where that key is said to have changed."""
+
+    class Steps(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.m_flags = int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)
+            self.m_components, self.table = [self.m_flags], mi.Float([0.1, 0.4, 0.2, 0.3])
+            self.parameters_changed([])
+
+        def traverse(self, callback):
+            callback.put("table", self.table, mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys=()):
+            if not keys or key in keys:
+                self.mean = dr.mean(self.table)
+
+        def pdf(self, ctx, si, wo, active=True):
+            step = dr.gather(mi.Float, self.table, mi.UInt(dr.clip(wo.z * 4, 0, 3)))
+            return dr.select(active & (wo.z > 0) & (si.wi.z > 0), step / (dr.two_pi * self.mean), 0)
+
+        def eval(self, ctx, si, wo, active=True):
+            return mi.Color3f(0.5 * self.pdf(ctx, si, wo, active))
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+        def sample(self, ctx, si, u, v, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo = mi.warp.square_to_uniform_hemisphere(v)
+            bs.pdf, bs.eta, bs.sampled_type = self.pdf(ctx, si, bs.wo, active), 1, self.m_flags
+            return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
+
+    mi.register_bsdf("steps", Steps)
+    assert check({"type": "steps"}, only="updates").verdict("updates") == verdict
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -107,7 +107,7 @@ def _checker() -> Image.Image:
     """What the sampler of a faulty model draws, what its density expects, and the difference."""
     Faulty.plugins = ("faulty",)
     mi_brdfs.register(Faulty)
-    figure = next(drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0])).drawing
+    _, figure, *_ = next(drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0]))
     figure.set_layout_engine("none")
     figure.set_size_inches(4, 3)
     for ax, place in zip(

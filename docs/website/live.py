@@ -27,6 +27,8 @@ PAGES: dict[str, tuple[str, list[str]]] = {
     "measured_paint": ("a measured black paint and its fit", [MEASURED.name, "fit.json:walter", "--exposure", "2"]),
 }
 """What each page shows: in words, and as arguments of ``mi-brdfs explore``."""
+NAMES = {MEASURED.name: "measured", "fit.json:walter": "walter, fitted"}
+"""What pages call materials, in place of the words of the command."""
 
 
 def links() -> str:
@@ -45,10 +47,15 @@ def write_pages(folder: Path) -> None:
         with contextlib.redirect_stdout(io.StringIO()):
             _run("fit", MEASURED.name, "--model", "walter", "--starts", "1", "--json", "fit.json")
             for name, (_, words) in PAGES.items():
-                _run("explore", *words, "--export", f"{name}.html")
-                Path(f"{name}.jpg").write_bytes(_picture(Path(f"{name}.html").read_text(encoding="utf-8")))
-        for file in ("fit.json", MEASURED.name):
-            Path(file).unlink()
+                file = Path(f"{name}.html")
+                _run("explore", *words, "--export", str(file))
+                page = file.read_text(encoding="utf-8")
+                for word, told in NAMES.items():
+                    page = page.replace(f'"name": "{word}"', f'"name": "{told}"')
+                file.write_text(page, encoding="utf-8")
+                file.with_suffix(".jpg").write_bytes(_picture(page))
+        for used in ("fit.json", MEASURED.name):
+            Path(used).unlink()
     finally:
         os.chdir(before)
 

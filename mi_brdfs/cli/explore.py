@@ -75,7 +75,10 @@ def explore(
 
     from ..explorer.server import PortError, listening, serve
     from ..explorer.stages import MESHES, UserScene
+    from ..measured import read
+    from ..measured.report.counts import in_one_plane
     from ..parameters.messages import brief
+    from ..probe.sources import is_measured
 
     file, _, material = (scene or "").partition(".xml:")
     user = UserScene(Path(f"{file}.xml" if material else file) if scene else None, material or None)
@@ -83,6 +86,8 @@ def explore(
         fail(f"--scene {user.scene}: no such file", Exit.USAGE)
     sources, subjects = _subjects(targets or ["walter"], given)
     state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body", "exposure": exposure}
+    if any(is_measured(it.word) and in_one_plane(read(it.word).data) for it in sources):
+        state["views"] = ["picture", "polar", "cartesian", "albedo"]  # a lobe would be mostly guessed
     if mesh and mesh.suffix.lower() not in MESHES:
         fail(f"--mesh {mesh}: give a file whose name ends in {' or '.join(MESHES)}", Exit.USAGE)
     state |= dict(user.add(it, brief(it.name)) for it in (environment, mesh) if it)

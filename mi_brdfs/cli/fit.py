@@ -31,7 +31,7 @@ from .terminal import Exit, err, fail, failing, out, print_table, progress, stdo
 
 if TYPE_CHECKING:
     from ..fit import Fit, Observations
-    from ..fit.html import Page
+    from ..fit.html import Section
 
 TOGETHER = 10
 """The most files that are fitted together: Ctrl-C keeps what was finished before."""
@@ -100,15 +100,12 @@ def fit_(
         words = parameters_of(parameters)
         quantity = words.pop("quantity", "stated")
         given = _given(words, models)
-    page: Page | None = None
     if image:
         from ..fit.appearance import evaluator
 
         evaluator()  # is there, or the error says what brings it
     if report:
-        from ..fit.html import Page
-
-        page = Page()
+        from ..fit.html import page_of  # so is what it needs
     set_tracing_variant(variant, "_ad_rgb")
     if save:
         with writing_to(save):
@@ -124,8 +121,9 @@ def fit_(
             complete = False
         by_file = groupby(sorted(fits, key=lambda it: it.file), key=lambda it: it.file)
         ranked = [sorted(own, key=lambda it: it.held_out) for _, own in by_file]
-        if page or image:
-            ranked, seen = _look(ranked, page, image, complete)
+        sections: list[Section] = []
+        if report or image:
+            ranked, seen = _look(ranked, sections if report else None, image, complete)
     for own in ranked:
         print_ranking(own)
     if len(ranked) > 1 and len(names) > 1:
@@ -136,8 +134,8 @@ def fit_(
     interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(names)} fits were finished."
     if complete and not seen:
         interrupted = "Interrupted; not all pictures were made."
-    if page and report and ranked:
-        write_text(report, page.text(interrupted))
+    if report and ranked:
+        write_text(report, page_of(sections, interrupted))
     if best and ranked:
         write_text(best, ranked[0][0].to_xml(_id(files[0])) + "\n")
     if save:
@@ -226,31 +224,32 @@ def _fit_all(
     return len(failed)
 
 
-def _look(ranked: list[list[Fit]], page: Page | None, image: bool, complete: bool) -> tuple[list[list[Fit]], bool]:
-    """Render the fits to each material until Ctrl-C is pressed, and add them to the report if there is one. Return
-    them, in the order of their FLIP errors if ``image``, and whether all were rendered."""
-    from ..fit.appearance import MOST, Appearance, by_flip, render
+def _look(
+    ranked: list[list[Fit]], sections: list[Section] | None, image: bool, complete: bool
+) -> tuple[list[list[Fit]], bool]:
+    """Render the fits to each material until Ctrl-C is pressed, and add to the sections of the report if there is one.
+    Return the fits, in the order of their FLIP errors if ``image``, and whether all were rendered."""
+    from ..fit.appearance import MOST, look
 
+    if sections is not None:
+        from ..fit.html import section_of
     found = []
     with progress("Rendering") as bar:
         task = bar.add_task("", total=sum(1 + len(own if image else own[:MOST]) for own in ranked))
         for own in ranked:
-            shown: Appearance | None = None
+            section = None
             bar.update(task, description=Path(own[0].file).name)
             if complete:
                 try:
                     with unwrapped_ctrl_c():
-                        shown = render(own if image else own[:MOST], lambda: bar.advance(task))
-                    own, shown = by_flip(own, shown) if image else (own, shown)
-                    if page:
-                        page.add(own, shown)
+                        own, shown = look(own, image, lambda: bar.advance(task))
+                    section = section_of(own, shown) if sections is not None else None
                 except KeyboardInterrupt:
-                    complete, shown = False, None
+                    complete = False
                 except (ValueError, RuntimeError) as error:
-                    shown = None
                     bar.console.print(f"mi-brdfs: {own[0].file}: no pictures: {one_line(error)}")
-            if page and not shown:
-                page.add(own)
+            if sections is not None:
+                sections.append(section or section_of(own))
             found.append(own)
     return found, complete
 

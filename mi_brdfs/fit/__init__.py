@@ -131,10 +131,9 @@ def fit(
 
         for configuration, alike in todo:
             own = [materials[k] for k in alike]
-            reduced = configuration if own[0].anisotropic else configuration.isotropic()
-            names = {unknown.name for unknown in reduced.unknowns} | set(reduced.tied)
-            fixed = list(dict.fromkeys(u.name for u in configuration.unknowns if u.name not in names))
-            fits = fit_configuration(reduced, own, metric, starts, given_starts, seed, advance, fixed)
+            if not own[0].anisotropic:
+                configuration = configuration.isotropic()
+            fits = fit_configuration(configuration, own, metric, starts, given_starts, seed, advance)
             found += list(zip(alike, fits, strict=True))
     return [it for _, it in sorted(found, key=lambda pair: (pair[0], pair[1].held_out))]
 
@@ -157,19 +156,13 @@ def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[F
         FitError: if the data of a fit are no file.
         OSError: if the page cannot be written.
     """
-    from .appearance import MOST, by_flip, render
-    from .html import Page
+    from .appearance import look
+    from .html import page_of, section_of
 
-    page, found = Page(), []
-    by_file: dict[str, list[Fit]] = {}
-    for it in fits:
-        by_file.setdefault(it.file, []).append(it)
-    for own in by_file.values():
-        ranked = sorted(own, key=lambda it: it.held_out)
-        shown = render(ranked if image else ranked[:MOST])
-        if image:
-            ranked, shown = by_flip(ranked, shown)
-        page.add(ranked, shown)
+    sections, found = [], []
+    for file in dict.fromkeys(it.file for it in fits):
+        ranked, shown = look(sorted((it for it in fits if it.file == file), key=lambda it: it.held_out), image)
+        sections.append(section_of(ranked, shown))
         found += ranked
-    write_text(path, page.text())
+    write_text(path, page_of(sections))
     return found

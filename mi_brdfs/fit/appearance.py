@@ -54,6 +54,12 @@ def render(fits: Sequence[Fit], advance: Callable[[], None] = lambda: None) -> A
     return Appearance(measured, others, stops)
 
 
+def look(fits: Sequence[Fit], image: bool, advance: Callable[[], None] = lambda: None) -> tuple[list[Fit], Appearance]:
+    """Return fits to one material and pictures of the best ones, or with ``image`` of all, in the order of FLIP."""
+    shown = render(fits if image else fits[:MOST], advance)
+    return by_flip(fits, shown) if image else (list(fits), shown)
+
+
 def by_flip(fits: Sequence[Fit], shown: Appearance) -> tuple[list[Fit], Appearance]:
     """Return fits with their FLIP errors, the least first, and their pictures in the same order.
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from ..probe.arrays import Array, luminance
 from .metrics import METRICS
-from .observations import Observations
+from .observations import Data, Observations
 from .problem import Problem
 from .result import Fit, Starts
 from .solver import solve
@@ -22,8 +23,6 @@ AGREEMENT = 1.02
 BLIND = 1e-10
 """The part of the largest eigenvalue of JᵀJ, its columns of length 1, below which a direction is rounding."""
 
-Advance = Callable[[int], None]
-
 
 def fit_configuration(
     configuration: Configuration,
@@ -32,8 +31,7 @@ def fit_configuration(
     count: int,
     given: list[Mapping[str, Any]],
     seed: int,
-    advance: Advance = lambda ended: None,
-    fixed: Sequence[str] = (),
+    advance: Callable[[int], None],
 ) -> list[Fit]:
     """Return the best fit for each of some materials with the same number of channels."""
     problem = Problem(configuration, materials, METRICS[metric])
@@ -51,7 +49,7 @@ def fit_configuration(
         x, own = values[best[m]], costs[owners == m]
         residuals = int(material.usable[: material.fitted].sum())
         fits.append(Fit(
-            file=material.name,
+            **{it.name: getattr(material, it.name) for it in fields(Data)},
             model=configuration.title,
             metric=metric,
             bsdf=configuration.bsdf(x),
@@ -60,15 +58,9 @@ def fit_configuration(
             bounds=[u.label for u, value in zip(configuration.unknowns, x, strict=True) if u.at_end(float(value))],
             starts=Starts(len(own), warm, int((own <= AGREEMENT**2 * own.min() + 1e-16).sum())),
             bic=float(residuals * np.log(max(own.min(), 1e-300)) + len(x) * np.log(residuals)),
-            cut=material.cut,
             pairs=material.fitted,
-            negative=material.negative,
-            missing=material.missing,
-            quantity=material.quantity,
-            scatter=list(material.scatter),
             in_highlight=_in_highlight(problem, material, x),
-            anisotropic=material.anisotropic,
-            fixed=list(fixed),
+            fixed=configuration.fixed,
         ))  # fmt: skip
     return fits
 

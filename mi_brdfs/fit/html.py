@@ -18,7 +18,7 @@ from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import Fit, medians, notes, number, values
+from .result import ANGLES, Fit, medians, notes, number, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
@@ -39,7 +39,6 @@ class Card:
     """A fit, as it is shown. What is not shown is empty."""
 
     fit: Fit
-    rank: int
     picture: str = ""
     difference: str = ""
     residuals: str = ""
@@ -49,7 +48,6 @@ class Card:
 class Section:
     """A material. What is not shown is empty."""
 
-    anchor: str
     file: str
     cards: list[Card]
     material: str = ""
@@ -95,37 +93,33 @@ class Section:
         return " ".join([*told, agreement])
 
 
-class Page:
-    """A report, to which materials are added one after the other."""
+def section_of(fits: Sequence[Fit], shown: Appearance | None = None) -> Section:
+    """Return the part of a report on a material, from its fits, the best first. With pictures of them, in the same
+    order, it also gets drawings.
 
-    def __init__(self) -> None:
-        self.sections: list[Section] = []
+    Raises:
+        FileError: if the data cannot be read any more.
+    """
+    section = Section(fits[0].file, [Card(it) for it in fits])
+    if shown:
+        _draw(section, shown)
+    return section
 
-    def add(self, fits: Sequence[Fit], shown: Appearance | None = None) -> None:
-        """Add the fits to a material, the best first. With pictures of them, in the same order, it also gets drawings.
 
-        Raises:
-            FileError: if the data cannot be read any more.
-        """
-        cards = [Card(it, rank) for rank, it in enumerate(fits, 1)]
-        section = Section(f"material-{len(self.sections) + 1}", fits[0].file, cards)
-        if shown:
-            _draw(section, shown)
-        self.sections.append(section)
-
-    def text(self, unfinished: str = "") -> str:
-        """Return the page; ``unfinished`` says what it lacks."""
-        everything = [[card.fit for card in section.cards] for section in self.sections]
-        return environment.get_template("fit.html").render(
-            sections=self.sections,
-            medians=medians(everything) if len(everything) > 1 else [],
-            metrics=METRICS,
-            flip=any(it.flip is not None for own in everything for it in own),
-            unfinished=unfinished,
-            curves=CURVES,
-            notes=notes,
-            values=values,
-        )
+def page_of(sections: Sequence[Section], unfinished: str = "") -> str:
+    """Return a report; ``unfinished`` says what it lacks."""
+    everything = [[card.fit for card in section.cards] for section in sections]
+    return environment.get_template("fit.html").render(
+        sections=sections,
+        medians=medians(everything) if len(everything) > 1 else [],
+        metrics=METRICS,
+        flip=any(it.flip is not None for own in everything for it in own),
+        unfinished=unfinished,
+        curves=CURVES,
+        steepest=ANGLES[-1],
+        notes=notes,
+        values=values,
+    )
 
 
 def _draw(section: Section, shown: Appearance) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -85,23 +86,24 @@ class Lanes:
         jacobian = np.zeros((*found.shape, len(self.configuration.unknowns) if sweeps else 0), np.float32)
         for sweep, tangent in zip(sweeps, tangents, strict=True):
             columns = self._array(tangent)
-            if len(sweep) == 1:
-                jacobian[..., sweep[0]] = columns
-            else:
-                for channel, k in enumerate(sweep):
-                    jacobian[:, channel, k] = columns[:, channel]
+            for channel, k in enumerate(sweep):  # of a sweep of one unknown, all channels are its own
+                jacobian[:, channel :: len(sweep), k] = columns[:, channel :: len(sweep)]
         return found, jacobian
 
     def _array(self, value: mi.Color3f) -> Array:
         return np.ascontiguousarray(numbers(value)[:, : self.channels])
 
+    def _typed(self, name: str, numbers: list[Any]) -> mi.Float | mi.Color3f:
+        """Return the numbers of a parameter as its texture has them: of a colour one, or one for each channel."""
+        if not self.configuration.is_colour(name):
+            return mi.Float(numbers[0])
+        return mi.Color3f(numbers if len(numbers) == 3 else numbers * 3)
+
     def _set(self, settings: Array, differentiable: bool) -> dict[str, mi.Float | mi.Color3f]:
         """Give the textures the values of a setting for each lane, and return these."""
         inputs = {}
         for name, texture in self.textures.items():
-            columns = [floats(settings[:, k]) for k in self.configuration.indices(name)]
-            colour = self.configuration.is_colour(name)
-            value = mi.Color3f(columns if len(columns) == 3 else columns * 3) if colour else columns[0]
+            value = self._typed(name, [floats(settings[:, k]) for k in self.configuration.indices(name)])
             dr.make_opaque(value)
             if differentiable:
                 dr.enable_grad(value)
@@ -111,12 +113,7 @@ class Lanes:
     def _tangent(self, value: mi.Color3f, inputs: dict[str, mi.Float | mi.Color3f], sweep: list[int]) -> mi.Color3f:
         """Return the derivative of the value by some unknowns together."""
         for name, each in inputs.items():
-            own = self.configuration.indices(name)
-            ones = [float(k in sweep) for k in own]
-            if not self.configuration.is_colour(name):
-                dr.set_grad(each, ones[0])
-            else:
-                dr.set_grad(each, mi.Color3f(ones if len(ones) == 3 else ones * 3))
+            dr.set_grad(each, self._typed(name, [float(k in sweep) for k in self.configuration.indices(name)]))
         tangent = dr.forward_to(value, flags=dr.ADFlag.ClearVertices)
         for each in (value, *inputs.values()):
             dr.clear_grad(each)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..measured import Axis, Grid, Measurement, read
 from ..measured.arrays import stacked
 from ..measured.measurement import Quantity
-from ..measured.report.albedo import albedos
+from ..measured.report.summary import azimuths, scatter
 from ..observer import to_srgb
 
 Arrays: TypeAlias = tuple[ArrayLike, ArrayLike, ArrayLike]
@@ -33,11 +33,30 @@ class FitError(ValueError):
     """Data and a model that cannot be fitted. The message is one sentence that says why."""
 
 
-@dataclass(frozen=True)
-class Observations:
+@dataclass(frozen=True, kw_only=True)
+class Data:
+    """What fits tell of the data."""
+
+    file: str
+    """The file, or "arrays"."""
+    anisotropic: bool
+    negative: int
+    """Values below 0 within the cut, which have no weight."""
+    missing: int
+    """Values within the cut that are no numbers, which have none either."""
+    cut: float
+    """The largest angle of wi and wo to the normal, in degrees."""
+    quantity: Quantity = "stated"
+    """What the file holds, by itself or because that was asked for."""
+    scatter: list[tuple[float, float, float]] = field(default_factory=list)
+    """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, at the first azimuth, where
+    it states any."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observations(Data):
     """Usable pairs of directions of a material, at random: the first ``fitted`` are fitted, the others held out."""
 
-    name: str
     wi: np.ndarray
     """Float32, shape (N, 3), as ``wo``."""
     wo: np.ndarray
@@ -47,18 +66,7 @@ class Observations:
     """Which of these have a weight, shape (N, channels)."""
     solid_angle: np.ndarray
     """What each pair stands for, dωi dωo up to a common scale, shape (N,)."""
-    anisotropic: bool
     fitted: int
-    negative: int
-    """Values below 0 within the cut, which get no weight."""
-    missing: int
-    """Values within the cut that are no numbers, which get none either."""
-    cut: float
-    """The largest angle of wi and wo to the normal, in degrees."""
-    quantity: Quantity = "stated"
-    """What the file holds, by itself or because that was asked for."""
-    scatter: tuple[tuple[float, float, float], ...] = ()
-    """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, at the first azimuth."""
 
     @property
     def channels(self) -> int:
@@ -75,11 +83,15 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
     if isinstance(source, (str, Path)):
         source = read(source)
     rng = np.random.default_rng(seed)
+    told: dict[str, Any] = {}
     if isinstance(source, Measurement):
         name, signed, anisotropic = str(source.path), False, source.data.anisotropic
+        told["quantity"] = source.quantity
         if isinstance(source.data, Grid):
             signed = source.data.signed
             wi, wo, f, solid_angle = _nodes(source.data, pairs, rng)
+            stated = scatter(source, source.data, azimuths(source.data)[:1])
+            told["scatter"] = [(it.theta_i, it.stated, it.integrated) for it in stated]
         else:
             wi, wo, f = source.data.pairs()
             solid_angle = np.ones(len(f))
@@ -109,7 +121,7 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
         raise FitError(f"{name}: only one pair of directions has a value within the cut at {cut:g}°.")
     some, fitted = _halves(some, np.where(usable, f, 0).sum(axis=1)[some] * wi[some, 2], rng)
     return Observations(
-        name=name,
+        file=name,
         wi=wi[some].astype(np.float32),
         wo=wo[some].astype(np.float32),
         f=np.where(usable, f, 0)[some],
@@ -120,20 +132,8 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
         negative=int(negative.sum()),
         missing=int(missing.sum()),
         cut=cut,
-        quantity=source.quantity if isinstance(source, Measurement) else "stated",
-        scatter=_scatter(source) if isinstance(source, Measurement) and isinstance(source.data, Grid) else (),
+        **told,
     )
-
-
-def _scatter(measurement: Measurement) -> tuple[tuple[float, float, float], ...]:
-    """Return the albedos that a file states for its first azimuth of incidence, where it states any."""
-    grid, found = measurement.data, []
-    assert isinstance(grid, Grid)
-    phi = float(grid.axes[grid.coordinates.names.index("phi_i")].nodes[0]) if "phi_i" in grid.coordinates.names else 0
-    for theta, stated in measurement.stated_albedos.items():
-        (values,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
-        found.append((round(float(np.degrees(theta)), 4), float(stated[0]), float(values.mean())))
-    return tuple(found)
 
 
 def _halves(rows: np.ndarray, values: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, int]:
@@ -163,12 +163,9 @@ def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
 
 def _colours(f: np.ndarray, wavelengths: np.ndarray | None) -> tuple[np.ndarray, bool]:
     """Return one channel, or linear sRGB where there are several that have wavelengths, and whether it is converted:
-    then a negative channel is a colour outside sRGB, and a spectrum with a negative value is missing. Of others the
-    mean counts."""
-    if f.shape[1] == 1 or (wavelengths is None and f.shape[1] == 3):
+    then a negative channel is a colour outside sRGB, and a spectrum with a negative value is missing."""
+    if f.shape[1] == 1 or wavelengths is None:
         return f, False
-    if wavelengths is None or np.isnan(wavelengths).any():
-        return f.mean(axis=1, keepdims=True), False
     return np.where(f < 0, np.nan, f) @ to_srgb(wavelengths), True
 
 

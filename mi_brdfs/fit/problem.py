@@ -74,10 +74,7 @@ class Problem:
         found = []
         for m, setting in zip(which, values, strict=True):
             material = self.materials[m]
-            model = np.concatenate([
-                self.lanes.evaluate(setting[None], [(material.wi[batch], material.wo[batch])], derivatives=False)[0]
-                for batch in np.array_split(np.arange(len(material.wi)), -(-len(material.wi) // 65536))
-            ])  # fmt: skip
+            model, _ = self.lanes.evaluate(setting[None], [(material.wi, material.wo)], derivatives=False)
             parts = {"fitted": slice(0, material.fitted), "held_out": slice(material.fitted, None)}
             found.append({
                 name: {part: _Target(material, rows, metric).error(model[rows]) for part, rows in parts.items()}

@@ -158,11 +158,8 @@ class Rendered:
         spp = max(factor * self.spp // 2, 1)
         for sweep in self._sweeps:
             tangent = self._tangent(point, sweep, seed, spp)
-            if len(sweep) == 1:
-                columns[:, sweep[0]] = tangent
-            else:
-                for channel, k in enumerate(sweep):
-                    columns[channel::3, k] = tangent[channel::3]
+            for channel, k in enumerate(sweep):  # of a sweep of one shift, all residuals are its own
+                columns[channel :: len(sweep), k] = tangent[channel :: len(sweep)]
         return columns
 
     def _tangent(self, point: Array, sweep: list[int], seed: int, spp: int) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from statistics import median
 from typing import Any, NamedTuple
@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..measured.measurement import Quantity
 from ..model import EnergyWarning
 from ..parameters.xml import to_xml
 from ..probe.bsdf import BSDFProbe
 from ..probe.directions import direction
 from ..probe.variates import sobol
 from .lanes import rgb_variant
+from .observations import Data
 
 ANGLES = 0, 20, 40, 60, 70, 80
 """The angles at which the albedo is looked at, in degrees."""
@@ -45,12 +45,10 @@ class Starts(NamedTuple):
     """Those that ended within 2 % of the best error."""
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, kw_only=True)
+class Fit(Data):
     """A model fitted to a material."""
 
-    file: str
-    """The file, or "arrays"."""
     model: str
     """The plugin, with the words of its choices that are not the defaults."""
     metric: str
@@ -71,22 +69,11 @@ class Fit:
     starts: Starts
     bic: float
     """n ln(E²) + k ln n, for the error E of the fit, n values and k parameters: the lower, the better."""
-    cut: float
-    """Up to which angle of wi and wo pairs count, in degrees."""
     pairs: int
     """Pairs of directions that were fitted; about as many were held out."""
-    negative: int
-    """Values below 0, which had no weight."""
-    missing: int
-    """Values that are no numbers, which had none either."""
     in_highlight: int
     """The pairs whose value exceeds half of that of the mirror direction."""
-    anisotropic: bool
-    quantity: Quantity = "stated"
-    """What the file holds, by itself or because that was asked for."""
-    scatter: list[tuple[float, float, float]] = field(default_factory=list)
-    """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, where it states any."""
-    fixed: list[str] = field(default_factory=list)
+    fixed: tuple[str, ...] = ()
     """Parameters that isotropic data say nothing about, left at their defaults."""
     flip: float | None = None
     """The FLIP error of a picture of it, where it was looked at: :func:`mi_brdfs.fit.appearance.by_flip`."""
@@ -117,8 +104,8 @@ class Fit:
             probe = BSDFProbe(mi.load_dict(self.bsdf))
             return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
 
-    def remarks(self) -> list[str]:
-        """Return what to know of this fit, in sentences."""
+    def remarks(self, scatter: bool = True) -> list[str]:
+        """Return what to know of this fit, in sentences, with or without those of the ``scatter``."""
         found = []
         if self.albedo > 1:
             found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
@@ -132,7 +119,7 @@ class Fit:
                  if a < b and abs(r) > CORRELATED and a.partition(".")[0] != b.partition(".")[0]]  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(close)}.")
-        for theta, stated, values in self.scatter:
+        for theta, stated, values in self.scatter if scatter else ():
             own = float(np.mean(self.albedos(theta)))
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
@@ -198,13 +185,11 @@ def values(fit: Fit) -> list[tuple[str, float, float | None]]:
 
 def medians(ranked: Sequence[Sequence[Fit]]) -> list[Median]:
     """Return the medians of each model's errors over materials, whose fits are ordered by rank; the best first."""
-    by_model: dict[str, list[Fit]] = {}
-    for own in ranked:
-        for it in own:
-            by_model.setdefault(it.model, []).append(it)
+    fits = [it for own in ranked for it in own]
     winners = [own[0].model for own in ranked]
     found = []
-    for model, own in by_model.items():
+    for model in dict.fromkeys(it.model for it in fits):
+        own = [it for it in fits if it.model == model]
         held_out = median(it.held_out for it in own)
         fitted = median(it.errors[it.metric]["fitted"] for it in own)
         seen = [it.flip for it in own if it.flip is not None]

@@ -38,7 +38,7 @@ def candidates(problem: Problem, material: Observations, rng: np.random.Generato
     for k, unknown in enumerate(unknowns):
         low, high = _spread(unknown)
         u = low + (high - low) * shares[:, first[unknown.name]]
-        if unknown.colour:
+        if unknown.quantity.colour:
             channel = unknown.channel or 0
             x = unknown.from_scale(u) * hue[channel]
             if unknown.name == DIFFUSE:
@@ -53,7 +53,7 @@ def _spread(unknown: Unknown) -> tuple[float, float]:
     low, high = unknown.ends
     if unknown.scale == "logit":
         return max(low, -4), min(high, 3)
-    if unknown.scale == "log" and unknown.colour:
+    if unknown.scale == "log" and unknown.quantity.colour:
         return max(low, np.log(1e-3)), min(high, np.log(1e3))
     if unknown.scale == "turns":
         return -0.25, 0.25

@@ -23,9 +23,6 @@ SMALLEST, LARGEST = 1e-3, 1e6
 EDGE = 1e-5
 """How near to its ends a share is sought, as a part of its range; so near, it counts as at the end."""
 
-FREE = "free"
-"""Given for a parameter that fits do not seek of themselves."""
-
 
 class Scale(NamedTuple):
     """u of x, x of u, and dx/du of x, for numbers with the sum of the ends of their range."""
@@ -52,20 +49,18 @@ SCALES = {
 class Unknown:
     """A number that is sought, within ``low`` and ``high``."""
 
-    name: str
-    """Of the parameter."""
+    quantity: Quantity
+    """The parameter's; of the range of a share, ``low`` and ``high`` leave out ``EDGE``."""
     channel: int | None
     """Of a colour with several channels."""
-    colour: bool
     low: float
     high: float
     scale: str
     """One of ``SCALES``."""
-    default: float | None = None
-    limits: tuple[float, float] = (-math.inf, math.inf)
-    """The ends of the parameter's own range, of which a share is sought up to ``EDGE``."""
-    isotropic_as: str | None = None
-    """As :class:`~mi_brdfs.parameters.Quantity` has it."""
+
+    @property
+    def name(self) -> str:
+        return self.quantity.name
 
     @property
     def label(self) -> str:
@@ -94,7 +89,7 @@ class Unknown:
         if not self.at_end(x):
             return x
         k = int(abs(x - self.high) < abs(x - self.low))
-        return self.limits[k] if self.scale == "logit" else (self.low, self.high)[k]
+        return self.quantity.limits[k] if self.scale == "logit" else (self.low, self.high)[k]
 
     def at_end(self, x: float) -> bool:
         """Return whether a value is at an end of the range."""
@@ -116,9 +111,7 @@ def unknown_of(quantity: Quantity, channel: int | None = None) -> Unknown:
         low, high, scale = max(low, 1 / LARGEST), LARGEST, "log"
     else:
         low, scale = max(low, SMALLEST * min(high, 1)), "log"
-    default = None if quantity.colour else quantity.default
-    kept = quantity.limits, quantity.isotropic_as
-    return Unknown(quantity.name, channel, quantity.colour, low, high, scale, default, *kept)
+    return Unknown(quantity, channel, low, high, scale)
 
 
 @dataclass(frozen=True)
@@ -133,6 +126,8 @@ class Configuration:
     unknowns: tuple[Unknown, ...]
     tied: dict[str, str]
     """Parameters that are equal to another one."""
+    fixed: tuple[str, ...] = ()
+    """Parameters that isotropic materials say nothing about, left at their defaults."""
 
     @property
     def plugin(self) -> str:
@@ -156,7 +151,7 @@ class Configuration:
         return [*dict.fromkeys(unknown.name for unknown in self.unknowns), *self.tied]
 
     def is_colour(self, name: str) -> bool:
-        return self.unknowns[self.indices(name)[0]].colour
+        return self.unknowns[self.indices(name)[0]].quantity.colour
 
     def bsdf(self, x: Array) -> dict[str, Any]:
         """Return the plugin dict for values of the unknowns."""
@@ -168,10 +163,11 @@ class Configuration:
 
     def isotropic(self) -> Configuration:
         """Return it for isotropic materials, without the unknowns that have nothing to say of them."""
-        names = {u.name for u in self.unknowns}
-        tied = {u.name: u.isotropic_as for u in self.unknowns if u.isotropic_as and u.isotropic_as in names}
-        kept = tuple(u for u in self.unknowns if u.isotropic_as != "" and u.name not in tied)
-        return replace(self, unknowns=kept, tied={**self.tied, **tied})
+        likes = {u.name: u.quantity.isotropic_as for u in self.unknowns}
+        tied = {name: like for name, like in likes.items() if like and like in likes}
+        fixed = tuple(name for name, like in likes.items() if like == "")
+        kept = tuple(u for u in self.unknowns if u.name not in {*tied, *fixed})
+        return replace(self, unknowns=kept, tied={**self.tied, **tied}, fixed=fixed)
 
 
 def default_words(model: type[Model]) -> dict[str, Any]:
@@ -191,7 +187,7 @@ def configurations(
 ) -> list[Configuration]:
     """Return a model's configurations: one for each combination of the words of its choices that are given as a tuple,
     with the default of those that are not given. Names that it does not have are left out. Numbers and colours that are
-    ``FREE`` are sought even if fits leave them as they are. Raise a FitError if there is no such word, or nothing is
+    "free" are sought even if fits leave them as they are. Raise a FitError if there is no such word, or nothing is
     left to fit."""
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
@@ -203,7 +199,7 @@ def configurations(
         for word in words[choice]:
             if word not in allowed:
                 raise FitError(f"{name}: {choice} = {word!r} is unknown; it is {listed(map(str, allowed))}.")
-    freed = {key for key, value in given.items() if isinstance(value, str) and value == FREE and key not in words}
+    freed = {key for key, value in given.items() if isinstance(value, str) and value == "free" and key not in words}
     fixed = {key: value for key, value in given.items() if key not in {*words, *freed}}
     implied = {parameter.name: parameter.implied_words for parameter in nested(model.declared())}
     for parameter in model.declared():

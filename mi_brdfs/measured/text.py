@@ -16,8 +16,6 @@ LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""
 NOTED = 1000
 """The characters of a comment that are looked at."""
-OPENING = 1 << 16
-"""The bytes in which the first line that is no comment is looked for, and the words that tell formats apart."""
 
 
 def _foreign(error: UnicodeError) -> tuple[str, int]:
@@ -138,11 +136,9 @@ def shortened(word: str) -> str:
     return repr(word if len(word) <= 24 else word[:20] + "…")
 
 
-def opening(path: Path) -> list[str]:
-    """Return the first lines of a text file, in small letters, as many as a long comment may take."""
-    with path.open("rb") as file:
-        text = decoded(file.read(OPENING))
-    return [line.strip().lower() for line in text.splitlines()]
+def opening(head: bytes) -> list[str]:
+    """Return the first lines of a text file, in small letters."""
+    return [line.strip().lower() for line in decoded(head).splitlines()]
 
 
 def first_words(lines: list[str]) -> list[str]:

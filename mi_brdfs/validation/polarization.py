@@ -55,8 +55,9 @@ def polarization(run: Run) -> Findings:
                     yield Finding("polarization", part.name, "skip", "It returns no Mueller matrices.")
                     return
                 matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
-                back = _of_f(_mueller(bsdf, wo, wi), wi).swapaxes(-1, -2) * BACK * BACK[:, None]
-                others = _others(run, bsdf, wi, wo, matrices) if run.probe.parts else []
+                exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
+                back = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
+                others = _others(run, bsdf, wi, wo, matrices, exchanged) if run.probe.parts else []
         except Exception as error:
             raise Skipped(f"It does not work in {name}: {told(error)}.") from None
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)
@@ -87,9 +88,12 @@ def polarization(run: Run) -> Findings:
     yield outcome.finding("Mueller matrices are physical.")
 
 
-def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[tuple[str, Array, Array, Array]]:
+def _others(
+    run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array, exchanged: Array
+) -> list[tuple[str, Array, Array, Array]]:
     """Return ``(name, wo, elements, those of eval)`` of other methods than ``eval``, of which ``matrices`` are those
-    for ``wo``, and where weights are those of delta functions, none."""
+    for ``wo``, and where weights are those of delta functions, none; and of ``eval`` in the mode Importance, in which
+    light goes from wi to wo, with those of ``exchanged`` directions."""
     context, si, variates = mi.BSDFContext(), interaction(wi), sample_arguments(random(len(wi), SEED))
     pair = bsdf.eval_pdf(context, si, vectors(wo), True)
     triple = bsdf.eval_pdf_sample(context, si, vectors(wo), *variates, True)
@@ -98,7 +102,9 @@ def _others(run: Run, bsdf: Any, wi: Array, wo: Array, matrices: Array) -> list[
     dr.eval(bs, pair, triple, weights)
     drawn = _directions(bs, len(wi))
     of_drawn = _of_f(_mueller(bsdf, wi, drawn), drawn)
+    importance = _of_f(_mueller(bsdf, wi, wo, mi.BSDFContext(mi.TransportMode.Importance)), wo)
     return [
+        ("eval in the mode Importance, for exchanged directions,", wo, importance, exchanged),
         ("eval_pdf", wo, _of_f(pair[0], wo), matrices),
         ("eval_pdf_sample", wo, _of_f(triple[0], wo), matrices),
         ("a sample's weight", drawn, _of_f(weights[0], drawn), of_drawn),
@@ -111,9 +117,9 @@ def _normalized(matrices: Array) -> Array:
     return matrices / np.where(intensity == 0, 1, intensity)
 
 
-def _mueller(bsdf: Any, wi: Array, wo: Array) -> Any:
+def _mueller(bsdf: Any, wi: Array, wo: Array, context: Any = None) -> Any:
     """Return the Mueller matrix of light from wo to wi, in the reference frames that Mitsuba gives these."""
-    return bsdf.eval(mi.BSDFContext(), interaction(wi), vectors(wo), True)
+    return bsdf.eval(context or mi.BSDFContext(), interaction(wi), vectors(wo), True)
 
 
 def _weight(bsdf: Any, wi: Array, wo: Array) -> Any:

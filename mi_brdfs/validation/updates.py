@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.arrays import launched_kernels, numbers
+from ..probe.arrays import Array, launched_kernels, numbers
 from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import angles_of, hemisphere, on_side
 from ..probe.variates import random
@@ -25,8 +25,8 @@ COUNT = 1000
 def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
     value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. And what
-    is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change. For
-    this the BSDF must be given as a dict."""
+    is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change, and
+    of texels and tables no more than with their names. For this the BSDF must be given as a dict."""
     probe, part = run.probe, run.probe.whole
     described = run.described("To load it with another value")
     params, keys, _ = traced_floats(run, "updates")
@@ -38,6 +38,9 @@ def updates(run: Run) -> Findings:
         outcome = Outcome("updates", key)
         with restored(params, key) as original:
             if rest not in ("", "value") or dr.width(original) != 1:
+                _check_taken_up(run, outcome, params, key, wi, wo, u)
+                tried += 1
+                yield outcome.finding("Once it is changed, all of it is taken up.")
                 continue
             value = original * 0.95 + 1e-3
             number = numbers(value, 1)[0]
@@ -85,6 +88,28 @@ def updates(run: Run) -> Findings:
         yield outcome.finding("Set and updated, it acts as loaded.")
     if not tried:
         yield Finding("updates", "whole", "skip", "It has no parameters that could be given as a number or a colour.")
+
+
+def _check_taken_up(
+    run: Run, outcome: Outcome, params: mi.SceneParameters, key: str, wi: Array, wo: Array, u: Array
+) -> None:
+    """Check that new texels or entries of a table, which no dict need give, are all taken up once they are set: then
+    ``parameters_changed`` without names changes nothing more."""
+    probe, part, value = run.probe, run.probe.whole, np.array(params[key])
+    set_value(params, key, value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
+
+    def found() -> tuple[Array, ...]:
+        return probe.eval(part, wi, wo), probe.pdf(part, wi, wo)[:, None], probe.sample(part, wi, u).density[:, None]
+
+    named = found()
+    probe.bsdf.parameters_changed()
+    for name, got, expected in zip(("eval", "pdf", "the density of a sample"), named, found(), strict=True):
+        error = relative(got, expected)
+        why = "after parameters_changed without names: what is kept of it is out of date"
+        outcome.wrong(
+            error * (error > 10 * run.rounding(part)), f"once it is changed, {name}", got, why, wi, wo,
+            expected=expected,
+        )  # fmt: skip
 
 
 def recompiles(run: Run) -> Findings:

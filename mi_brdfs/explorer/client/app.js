@@ -3,7 +3,7 @@ import { byId, element, format } from "./util.js";
 import { LIMITS, VIEWS, WORDS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
 import { connect, post, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
-import { colourOf } from "./drawing.js";
+import { colourOf, isDark } from "./drawing.js";
 import { AXES, drawAlbedo, drawCartesian, drawPolar, table } from "./plots.js";
 import { drawSampler } from "./sampler.js";
 import { drawMaps, mapsImage } from "./maps.js";
@@ -154,8 +154,6 @@ function withOrWithout(views, view) {
   const usual = VIEWS.filter((each) => views.includes(each)).join() === views.join();
   return usual ? VIEWS.filter((each) => each === view || views.includes(each)) : [...views, view];
 }
-
-const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
 
 const setOptions = (field, pairs) => {
   const told = JSON.stringify(pairs);

@@ -2,7 +2,8 @@
 import { PALETTE, clamp, format, largest, shape } from "./util.js";
 import { session } from "./session.js";
 
-export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k];
+export const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
+export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k][Number(isDark())];
 
 /** Return the path through points, without those that cannot be told from the one before. */
 export function path(points) {

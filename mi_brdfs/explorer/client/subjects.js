@@ -59,7 +59,8 @@ export function drawSubjects() {
   if (!subject) return;
   const field = byId("subject-name");
   if (document.activeElement !== field) field.value = subject.name;
-  byId("subject-type").textContent = subject.bsdf.type === "preset" ? `preset ${subject.bsdf.name}` : subject.bsdf.type;
+  const { type, name } = subject.bsdf;
+  byId("subject-type").textContent = type === "preset" ? `preset ${name}` : type === subject.name ? "" : type;
   byId("colour").style.setProperty("--mark", colourOf(session.selected));
   byId("hide").textContent = subject.hidden ? "Show" : "Hide";
   byId("solo").disabled = byId("remove").disabled = subjects.length < 2;

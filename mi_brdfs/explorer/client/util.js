@@ -1,7 +1,15 @@
 // Elements, numbers, scales and colour maps.
 
-/** Colours of the materials, Okabe and Ito's for the colour-blind, and dashes for curves that coincide. */
-export const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"];
+/** Colours of the materials on light and on dark ground, Okabe and Ito's for the colour-blind, on dark ground with those
+ * of reports in front; and dashes for curves that coincide. */
+export const PALETTE = [
+  ["#0072B2", "#56B4E9"],
+  ["#E69F00", "#F0A05A"],
+  ["#009E73", "#3FCF9F"],
+  ["#CC79A7", "#CC79A7"],
+  ["#56B4E9", "#F0E442"],
+  ["#D55E00", "#D55E00"],
+];
 export const DASHES = ["", "7 3", "2 2.5", "9 3 2 3", "12 3", "5 2 1 2 1 2"];
 export const CHANNELS = { red: "#d1495b", green: "#2f9e6d", blue: "#3f7fd6" };
 

@@ -29,7 +29,7 @@ Pair = tuple[SimpleNamespace, SimpleNamespace]
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    return any(line.startswith(("#dim ", "#dim\t", "#param_in", "#alta ")) for line in opening(path))
+    return any(line.startswith(("#dim ", "#dim\t", "#param_in", "#alta ")) for line in opening(head))
 
 
 def read(path: Path, quantity: Quantity) -> Measurement:

@@ -15,7 +15,7 @@ DESCRIPTION = "text: the number of wavelengths, these in nm, then rows of Î¸i, Ï
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path)
+    lines = opening(head)
     words = first_words(lines)
     named = path.suffix.lower() == ".brdf" or any("num wls" in line for line in lines)
     return named and len(words) == 1 and is_number(words[0])

@@ -38,7 +38,7 @@ MOST_VALUES = 1 << 25
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    first = next((line for line in opening(path) if line and not line.startswith("#")), "")
+    first = next((line for line in opening(head) if line and not line.startswith("#")), "")
     return path.suffix.lower() == ".csv" or any(ANGLE.fullmatch(name) for name in split(first, separator(first)))
 
 

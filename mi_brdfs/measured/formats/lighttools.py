@@ -19,7 +19,7 @@ Channel = tuple[int, float]
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path)
+    lines = opening(head)
     return is_table(lines) and has_incidence_lines(lines)
 
 
@@ -37,7 +37,7 @@ def read(path: Path) -> Measurement:
     rows = file.rows()
     header = Header(file, rows)
     content = header.content()
-    symmetry = header.symmetry("PlaneSymmetrical", "Asymmetric", "Asymmetrical")
+    symmetry = header.setting("Symmetry", "PlaneSymmetrical", "Asymmetric", "Asymmetrical")
     radials, azimuths = (header.require(name) for name in ("ScatterRadial", "ScatterAzimuth"))
     table: dict[tuple[float, Channel], tuple[np.ndarray, float]] = {}
     planes = set()

@@ -237,18 +237,17 @@ class TensorFile:
 
 
 def write_tensors(path: Path, fields: dict[str, np.ndarray]) -> None:
-    """Write arrays, each from a multiple of 8 bytes on."""
-    arrays = {name: np.ascontiguousarray(field, field.dtype.newbyteorder("<")) for name, field in fields.items()}
+    """Write arrays, each from a multiple of 8 bytes on. (Mitsuba's own writer does not say why a disk refuses.)"""
     head = struct.pack("<12sBBI", MAGIC, *VERSION, len(fields))
-    offset = len(head) + sum(13 + len(name.encode()) + 8 * field.ndim for name, field in arrays.items())
+    offset = len(head) + sum(13 + len(name.encode()) + 8 * field.ndim for name, field in fields.items())
     types = {dtype: number for number, dtype in TYPES.items()}
-    for name, field in arrays.items():
+    for name, field in fields.items():
         offset += -offset % 8
         head += struct.pack("<H", len(name.encode())) + name.encode()
         head += struct.pack(f"<HBQ{field.ndim}Q", field.ndim, types[field.dtype.str[1:]], offset, *field.shape)
         offset += field.nbytes
     with path.open("wb") as file:
         file.write(head)
-        for field in arrays.values():
+        for field in fields.values():
             file.write(bytes(-file.tell() % 8))
             file.write(field.tobytes())

@@ -39,7 +39,7 @@ LIGHT = re.compile(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ")
 
 
 def recognizes(path: Path, head: bytes) -> bool:
-    lines = opening(path)
+    lines = opening(head)
     return is_table(lines) and not has_incidence_lines(lines)
 
 
@@ -75,7 +75,10 @@ def read(path: Path) -> Measurement:
     rows = file.rows()
     header = Header(file, rows)
     header.angles.setdefault("SampleRotation", np.zeros(1))
-    content, symmetry = header.content(), header.symmetry("PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D")
+    content, symmetry = (
+        header.content(),
+        header.setting("Symmetry", "PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"),
+    )
     shape = [len(header.require(name)) for name in ANGLES]
     count, channels = shape[0] * shape[1], [name.lower() for name in CHANNELS[content]]
     found: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in channels}
@@ -212,15 +215,12 @@ class Header:
             raise self.file.error(f"the data begin, but no {name} was given")
         return self.angles[name]
 
-    def symmetry(self, *known: str) -> str:
-        return self._setting("Symmetry", *known)
-
     def content(self) -> str:
         """Return the SpectralContent, having refused what is no BRDF."""
-        self._setting("ScatterType", "BRDF")
-        return self._setting("SpectralContent", *CHANNELS)
+        self.setting("ScatterType", "BRDF")
+        return self.setting("SpectralContent", *CHANNELS)
 
-    def _setting(self, name: str, *known: str) -> str:
+    def setting(self, name: str, *known: str) -> str:
         given = self.settings.get(name, known[0])
         for word in known:
             if word.lower() == given.lower():

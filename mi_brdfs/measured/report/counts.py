@@ -67,6 +67,11 @@ def census(data: Grid | Samples) -> Census:
     return Census(upper, lower, least, most, theta_i, theta_o)
 
 
+def in_one_plane(data: Grid | Samples) -> bool:
+    """Return whether all pairs of directions are in planes through the normal: beside those, a table only guesses."""
+    return all(np.all(abs(wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]) < 1e-3) for wi, wo, _ in batches(data))
+
+
 def batches(data: Grid | Samples) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     count = data.values[..., 0].size
     for start in range(0, count, AT_ONCE):

@@ -183,7 +183,7 @@ def summarize(measurement: Measurement) -> Summary:
         reciprocal=isinstance(data, Grid) and data.coordinates.reciprocal,
         reciprocity=reciprocity_error(data),
         largest_albedo=_largest(measurement, grid, angles, turns),
-        scatter=_stated(measurement, grid),
+        scatter=scatter(measurement, grid, azimuths(grid)),
         notes=dict(measurement.notes),
     )
 
@@ -258,8 +258,9 @@ def _largest(measurement: Measurement, grid: Grid, angles: np.ndarray, turns: np
     return Albedo(float(values.max()), float(angles[angle]), phi, channel_names(measurement)[channel])
 
 
-def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
-    turns, found = azimuths(grid), []
+def scatter(measurement: Measurement, grid: Grid, turns: np.ndarray) -> list[Scatter]:
+    """Return what a file states for the first of its azimuths of incidence, and what its values add to."""
+    found = []
     given = [
         (theta, phi, one)
         for theta, stated in measurement.stated_albedos.items()
@@ -268,7 +269,7 @@ def _stated(measurement: Measurement, grid: Grid) -> list[Scatter]:
     ]
     for theta, phi, one in thinned(given, FIGURES):
         (integrated,) = albedos(grid, np.array([theta]), phi, extrapolate="zero")
-        found.append(Scatter(one, float(integrated.mean()), *(round(np.degrees(each), 6) for each in (theta, phi))))
+        found.append(Scatter(one, float(integrated.mean()), *(round(float(np.degrees(it)), 6) for it in (theta, phi))))
     return found
 
 
