@@ -347,6 +347,11 @@ def test_the_picture_in_the_readme_has_all_thumbnails():
     assert committed.shape == now.shape and abs(committed - now).max() < 0.02, f"{STALE} all"
 
 
+def test_no_two_portraits_are_alike():
+    pictures = {path.read_bytes() for path in docs.THUMBNAILS.glob("*.png")}
+    assert len(pictures) == len(NAMES)
+
+
 def test_pictures_are_small_and_of_each_model():
     for folder, suffix in (docs.THUMBNAILS, ".png"), (docs.LARGE, ".jpg"), (docs.STRIPS, ".jpg"):
         sizes = {path.stem: path.stat().st_size for path in folder.iterdir() if path.suffix == suffix}

@@ -18,7 +18,7 @@ from mi_brdfs.fit.figures import lobes, probe_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.measured import read
 from mi_brdfs.models.lambert import Lambert
-from mi_brdfs.plot.style import SMALL
+from mi_brdfs.plot.style import COLOURS, INK, SMALL, TEXT, incidence
 from mi_brdfs.rendering.output import denoise, display_image
 from mi_brdfs.validation import check
 from mi_brdfs.validation.pictures import pictures as drawn
@@ -77,11 +77,13 @@ def _fits() -> Image.Image:
     """Two models beside a measurement."""
     fits = fit(MEASURED, ["ward", "walter"], starts=2)
     figure = lobes(read(MEASURED), [probe_of(it) for it in fits], 88)[-1][1]
-    interpolated, data, *lines, _ = figure.axes[0].lines
+    interpolated, data, *lines, mirror = figure.axes[0].lines
     interpolated.remove()
     for k, (line, it) in enumerate(zip(lines, fits, strict=True)):
-        line.set(label=it.bsdf["type"], color=f"C{k}")  # the report's colours are those of its style sheet
-    data.set(label="measured", color="black")
+        line.set(label=it.bsdf["type"], color=COLOURS[k])  # the report's colours are those of its style sheet
+    data.set(label="measured", color=INK)
+    mirror.set(label="mirror direction")
+    figure.axes[0].set_title(incidence(70), fontsize=TEXT, color=INK)
     figure.axes[0].legend(frameon=False, fontsize=9)
     return _image(figure)
 
@@ -105,7 +107,7 @@ def _checker() -> Image.Image:
     """What the sampler of a faulty model draws, what its density expects, and the difference."""
     Faulty.plugins = ("faulty",)
     mi_brdfs.register(Faulty)
-    figure = next(drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0])).drawing
+    _, figure, *_ = next(drawn(check("faulty", only=["chi2"], angles=(40,)).trials[0]))
     figure.set_layout_engine("none")
     figure.set_size_inches(4, 3)
     for ax, place in zip(

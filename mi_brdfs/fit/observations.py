@@ -49,7 +49,7 @@ class Data:
     quantity: Quantity = "stated"
     """What the file holds, by itself or because that was asked for."""
     scatter: list[tuple[float, float, float]] = field(default_factory=list)
-    """``(θi, albedo that the file states, albedo that its values add to)``, θi in degrees, at the first azimuth, where
+    """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, at the first azimuth, where
     it states any."""
 
 

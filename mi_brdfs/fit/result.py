@@ -122,7 +122,7 @@ class Fit(Data):
         for theta, stated, values in self.scatter if scatter else ():
             own = float(np.mean(self.albedos(theta)))
             if abs(own - stated) > 0.1 * stated:
-                told = f"the file states {stated:.3g}, its values add to {values:.3g}"
+                told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
                 found.append(f"At {theta:g}° the albedo is {own:.3g}; {told}.")
         if self.fixed:
             found.append(f"Isotropic data leave at the default: {', '.join(self.fixed)}.")

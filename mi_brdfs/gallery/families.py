@@ -18,7 +18,7 @@ and what is given besides.
 
 Portraits have facets of about α = 0.2 or what comes near (a power of the half vector's cosine is about four times that
 of the mirror direction's), lobes as wide as those of α = 0.15 among the fits to measurements, and what a model is known
-for."""
+for; others where two would look alike."""
 STAGES = {"diffuse": "point", "cartoon": "point"}
 """The stages of families that are not shown in the studio."""
 

@@ -39,6 +39,8 @@ NEAR = 0.5
 PIXELS = 256
 DECADES = 5
 """The most decades of brightness that a slice shows."""
+NODES = 40
+"""About how many nodes are marked on a curve, so that marks stay apart."""
 NODE = {"linestyle": "", "marker": "o", "markersize": 3, "fillstyle": "none", "markeredgewidth": 0.8}
 STATED = {"linestyle": "", "marker": "o", "markersize": 4, "color": INK}
 
@@ -124,7 +126,7 @@ def _draw_lobes(ax: Axes, it: LitTable) -> None:
     calm(ax)
     draw_cartesian(ax, curves, True, False, it.quantity, curves)
     for line, nodes in zip(curves, it.nodes(it.angles), strict=True):
-        ax.plot(*nodes, color=line.look["color"], **NODE)
+        ax.plot(*nodes, color=line.look["color"], **NODE, markevery=max(1, len(nodes.theta) // NODES))
         ax.set_ylim(top=max(ax.get_ylim()[1], 1.3 * largest([nodes.value])))
     marks = [Line2D([], [], linestyle="", color=FAINT, **MIRROR), Line2D([], [], color=FAINT, **NODE)]
     _legend(ax, [*ax.get_lines()[1 : 2 * len(curves) : 2], *marks], [*(c.label for c in curves), "mirror", "nodes"])
