@@ -98,6 +98,11 @@ class Fit(Data):
         """Return the directional albedo of each channel, linear sRGB, at an angle of incidence in degrees."""
         return [float(albedo) for albedo in self._albedos([direction(theta_i, phi_i)])[0]]
 
+    @cached_property
+    def scattered(self) -> list[float]:
+        """Its own albedo at each angle of ``scatter``, the mean of the channels."""
+        return [float(np.mean(self.albedos(theta))) for theta, _, _ in self.scatter]
+
     def _albedos(self, wi: list[np.ndarray]) -> np.ndarray:
         with rgb_variant(), warnings.catch_warnings():
             warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
@@ -119,8 +124,7 @@ class Fit(Data):
                  if a < b and abs(r) > CORRELATED and a.partition(".")[0] != b.partition(".")[0]]  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(close)}.")
-        for theta, stated, values in self.scatter if scatter else ():
-            own = float(np.mean(self.albedos(theta)))
+        for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True) if scatter else ():
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
                 found.append(f"At {theta:g}° the albedo is {own:.3g}; {told}.")
@@ -139,8 +143,8 @@ class Fit(Data):
         }
         row["starts"] = self.starts._asdict()
         row["scatter"] = [
-            {"theta_i": theta, "stated": stated, "values": values, "fit": float(np.mean(self.albedos(theta)))}
-            for theta, stated, values in self.scatter
+            {"theta_i": theta, "stated": stated, "values": values, "fit": own}
+            for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True)
         ]
         return row | {"remarks": self.remarks()}
 
