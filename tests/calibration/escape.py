@@ -292,13 +292,13 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale = np.minimum(1 / (1 - loss), 3)
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
-        mean, second, *colours = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
+        means, *later = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
         weights = 0.02 + lost_at(above, polynomial, bend)
         others = [
             np.linalg.lstsq(above.terms(name) * weights[:, None], values * weights, rcond=None)[0]
-            for name, values in (("second", second), ("schlick", colours[0]), ("dip", colours[1]))
+            for name, values in zip(("second", "schlick", "dip"), later, strict=True)
         ]
-        entries.append(np.concatenate([polynomial, mean, [bend], *others]))
+        entries.append(np.concatenate([polynomial, means, [bend], *others]))
     return entries
 
 
@@ -380,23 +380,28 @@ def after_the_first(
     along one axis alone.
     """
 
-    def at(places: Places, name: str, channel: int = 0) -> np.ndarray:
-        line = walked[name](places.at)
-        return line[..., 0, channel] + places.rho2 * line[..., 1, channel]
+    def at(places: Places, name: str) -> np.ndarray:
+        """Return what a table has at places, a row for each channel."""
+        start, slope = np.moveaxis(walked[name](places.at), 0, -1)
+        return start + places.rho2 * slope
 
-    def mean(values: np.ndarray, weights: np.ndarray) -> float:
-        return np.sum(values * weights) / np.sum(weights)
+    def mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        return np.sum(values * weights, axis=1, keepdims=True) / np.sum(weights)
 
     loss = np.tile(WEIGHTS, 16) / 16 * 2 * everywhere.cos * loss
-    left = loss * at(everywhere, "left")
-    between = [mean(at(everywhere, "between", k), left) for k in range(2)]
+    left = loss * at(everywhere, "left")[0]
+    second, third = mean(at(everywhere, "second"), loss), mean(at(everywhere, "third"), left)
+    between = mean(at(everywhere, "between"), left)
 
-    def later(places: Places, k: int) -> np.ndarray:
-        return TYPICAL * (at(places, "paths", 2 + k) - between[k] * at(places, "paths", 4))
+    def moments(places: Places) -> tuple[np.ndarray, np.ndarray]:
+        """Return those of the first reflection, and what those of later ones differ by from their means."""
+        paths = at(places, "paths")
+        return paths[:2], TYPICAL * (paths[2:4] - between * paths[4])
 
-    colours = [at(places, "paths", k) + later(places, k) - mean(later(everywhere, k), loss) for k in range(2)]
-    means = [np.sqrt(np.sum(loss)), mean(at(everywhere, "second"), loss), mean(at(everywhere, "third"), left), *between]
-    return np.array(means), at(places, "second"), *colours
+    (first, later), (_, later_everywhere) = moments(places), moments(everywhere)
+    colours = first + later - mean(later_everywhere, loss)
+    means = np.concatenate([[np.sqrt(np.sum(loss))], *second, *third, *between])
+    return means, *at(places, "second"), *colours
 
 
 def made(count: int, step: int = 1) -> dict[str, np.ndarray]:
