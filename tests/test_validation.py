@@ -81,13 +81,13 @@ def in_frames_of_the_facet(matrix, light, viewer):
     return mi.mueller.rotate_mueller_basis(matrix, light, frames[0], axes[0], viewer, frames[1], axes[1])
 
 
-FAULTY = [("eval", each) for each in (None, turned, beyond_its_intensity, in_frames_of_the_facet)]
+FAULTY = [
+    *(("eval", each) for each in (None, turned, beyond_its_intensity, in_frames_of_the_facet)),
+    *((method, turned) for method in ("eval_pdf", "sample", "importance")),
+]
 
 
-ONE = ("eval_pdf", turned), ("sample", turned), ("importance", turned)
-
-
-@pytest.mark.parametrize(("method", "fault"), [*FAULTY, *ONE])
+@pytest.mark.parametrize(("method", "fault"), FAULTY)
 def test_mueller_matrices(method, fault):
     """Of a rough conductor, with and without faults of a method, or of ``eval`` in the mode Importance."""
 

@@ -118,14 +118,12 @@ def _check_sum(run: Run, outcome: Outcome) -> None:
         wi = incident.at(lanes)
         whole, density = probe.eval_pdf(probe.whole, wi, wo)
         values, pdfs = zip(*(probe.eval_pdf(part, wi, wo) for part in probe.components), strict=True)
-        error = relative(whole, total := sum(values), 1e-6, unknown=0)
         why = "is what the components add up to"
-        outcome.wrong(error * (error > tolerance), "eval", whole, why, wi, wo, expected=total)
+        outcome.differing(tolerance, "eval", whole, sum(values), why, wi, wo, floor=1e-6, unknown=0)
         # Delta functions take a share of the samples.
         mixed = np.clip(density, 0 if probe.deltas else np.min(pdfs, axis=0), np.max(pdfs, axis=0))
-        error = relative(density, mixed, unknown=0)
         why = "is the nearest that a mixture of the components' can be"
-        outcome.wrong(error * (error > tolerance), "pdf", density, why, wi, wo, expected=mixed)
+        outcome.differing(tolerance, "pdf", density, mixed, why, wi, wo, unknown=0)
 
 
 def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
@@ -145,6 +143,7 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         outcome.wrong(value != 0, "eval", value, why, wi, wo)
         outcome.wrong(density != 0, "pdf", density, why, wi, wo)
         outcome.wrong(samples.weight != 0, "a sample's weight", samples.weight, why, wi, samples.wo, seed=3)
+    tolerance = 10 * run.rounding(probe.whole)
     kinds = [int(probe.bsdf.flags(k)) & every for k in range(probe.bsdf.component_count())]
     absent = every & ~np.bitwise_or.reduce(kinds)
     alone = [(each.flags & every, probe.eval(each, wi, wo)) for each in probe.components]
@@ -154,14 +153,12 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         chosen = part._replace(context=context(mask=mask))
         value = probe.eval(chosen, wi, wo)
         expected = sum((of for it, of in alone if it & mask), np.zeros(value.shape))
-        error = relative(value, expected, 1)
         name, why = f"with the type mask {mask:#x} eval", "is what the components of these types make"
-        outcome.wrong(error * (error > 10 * run.rounding(probe.whole)), name, value, why, wi, wo, expected=expected)
+        outcome.differing(tolerance, name, value, expected, why, wi, wo, floor=1)
         samples = probe.sample(chosen, wi, random(COUNT, 13))
-        error = relative(samples.pdf, samples.density, unknown=0) * samples.lit
         name, why = f"with the type mask {mask:#x} pdf", "is the density that sample states"
-        over = error * (error > 10 * run.rounding(probe.whole))
-        outcome.wrong(over, name, samples.pdf, why, wi, samples.wo, expected=samples.density, seed=13)
+        pair = samples.pdf, samples.density
+        outcome.differing(tolerance, name, *pair, why, wi, samples.wo, unknown=0, where=samples.lit, seed=13)
 
 
 def flags(run: Run) -> Findings:
@@ -181,9 +178,8 @@ def flags(run: Run) -> Findings:
                 sign = 1 if part.has(kinds.Reflection) else -1
                 near = wo @ (wi * [-1, -1, sign]) > np.cos(np.radians(10)) if len(wo) else np.zeros(1)
                 if near.mean() > 0.5:
-                    told = f"for light from {theta}° {near.mean():.0%} of the samples lie within 10°"
-                    told = f"{told} of the mirror direction, but it is flagged diffuse"
-                    outcome.fault(told, near.mean(), wi=wi, seed=2)
+                    told = "of the samples lie within 10° of the mirror direction, but it is flagged diffuse"
+                    outcome.fault(f"for light from {theta}° {near.mean():.0%} {told}", near.mean(), wi=wi, seed=2)
         if part.has(kinds.Reflection) and part.has(kinds.Transmission):
             _check_both_ways(run, outcome, part)
         if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
@@ -234,6 +230,5 @@ def _check_differentials(run: Run, outcome: Outcome, part: Part) -> None:
     si.duv_dx, si.duv_dy = mi.Vector2f(0.3, 0.1), mi.Vector2f(-0.1, 0.2)
     value = numbers(run.probe.bsdf.eval(part.context, si, vectors(wo), True), COUNT)
     without = run.probe.eval(part, wi, wo)
-    error = relative(value, without)
     name, why = "with differentials of uv eval", "without them, but it is not flagged NeedsDifferentials"
-    outcome.wrong(error * (error > 10 * run.rounding(part)), name, value, why, wi, wo, expected=without)
+    outcome.differing(10 * run.rounding(part), name, value, without, why, wi, wo)

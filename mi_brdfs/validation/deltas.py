@@ -57,8 +57,8 @@ def _check_drawn(run: Run, outcome: Outcome, part: Part) -> None:
         error = abs(got - expected)
         if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
             k = int(np.argmax(error))
-            told = f"carry {got[k]:.4g} of the light among those of others, but {expected[k]:.4g} where only these are"
-            outcome.fault(f"{start} {told} drawn", error[k], wi=incident.wi, seed=SEED)
+            told = f"of the light among those of others, but {expected[k]:.4g} where only these are drawn"
+            outcome.fault(f"{start} carry {got[k]:.4g} {told}", error[k], wi=incident.wi, seed=SEED)
 
 
 def _check_paths(run: Run, outcome: Outcome, part: Part) -> None:

@@ -237,9 +237,8 @@ def _check_weight(
     for name, values, right in compared:
         error = min(abs(np.nan_to_num(values) - each).mean() for each in right)
         if error > TOLERANCE * size:
-            words = f"average {abs(values).mean():.3g} in size, but those of eval over pdf {size:.3g}"
-            words = f"the derivatives of {name} {words}, and differ by {error / size:.0%}"
-            outcome.fault(words, error / size)
+            sizes = f"average {abs(values).mean():.3g} in size, but those of eval over pdf {size:.3g}"
+            outcome.fault(f"the derivatives of {name} {sizes}, and differ by {error / size:.0%}", error / size)
 
 
 def _check_way_back(
@@ -286,8 +285,8 @@ def _check_way_back(
     # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump.
     near, nearer = (abs(backward(limit - 0.1 * share * step, (1,))[1][0]).sum() for share in (0.1, 0.001))
     if max(0.3 * near, 1e-6 * len(wi)) < nearer < 3 * near:
-        words = "no derivative leads back: those of the sum of eval and of its negative are 0, but just inside the"
-        outcome.fault(f"{start} {words} limit it is {nearer:.3g}", np.inf)
+        words = f"those of the sum of eval and of its negative are 0, but just inside the limit it is {nearer:.3g}"
+        outcome.fault(f"{start} no derivative leads back: {words}", np.inf)
 
 
 def _edges(part: Part) -> tuple[Array, Array]:

@@ -78,6 +78,26 @@ class Outcome:
         told = f"{name} is {values[channel]:.{digits}g} for light from {angles_of(wi)} towards {angles_of(wo)}, {why}"
         self.fault(told, float(np.sum(lanes)), wi=wi, wo=wo, seed=seed)
 
+    def differing(
+        self,
+        tolerance: float,
+        name: str,
+        got: Array,
+        expected: Array,
+        why: str,
+        wi: Array,
+        wo: Array,
+        *,
+        floor: float = 1e-7,
+        unknown: float = np.inf,
+        where: Array | bool = True,
+        **reproduces: Any,
+    ) -> None:
+        """Add a fault for the lane that differs most from what is ``expected``, if one does by more than a relative
+        tolerance: of those ``where`` it matters, as :func:`relative` has it. All else is as in :meth:`wrong`."""
+        error = relative(got, expected, floor, unknown) * where
+        self.wrong(error * (error > tolerance), name, got, why, wi, wo, expected=expected, **reproduces)
+
     def finding(self, message: str, remark: str = "") -> Finding:
         """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case."""
         remark = f" {remark}" if remark else ""

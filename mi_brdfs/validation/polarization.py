@@ -33,8 +33,9 @@ def polarization(run: Run) -> Findings:
     are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
     NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
     frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
-    ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does. Of delta functions alone, the weights of
-    samples are looked at, and not exchanged. For this the BSDF must be given as a dict."""
+    ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does ``eval`` in the mode
+    Importance, for exchanged directions. Of delta functions alone, the weights of samples are looked at, and not
+    exchanged. For this the BSDF must be given as a dict."""
     part, described = run.probe.whole, run.described("To load it in a polarized variant")
     name = "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if name not in mi.variants():

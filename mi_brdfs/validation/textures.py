@@ -69,9 +69,8 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     error = relative(*_reflected(run.probe.sample(part, wi, u, uv)))
     if np.quantile(error, 0.999) <= tolerance:  # else it is no matter of textures
         rows.append(("the weight times pdf", *_reflected(samples), "is eval"))
-    for name, got, expected, but in rows:
-        error = relative(got, expected)
-        outcome.wrong(error * (error > tolerance), name, got, but, wi, wo, expected=expected, uv=uv)
+    for row in rows:
+        outcome.differing(tolerance, *row, wi, wo, uv=uv)
 
 
 def _reflected(samples: Samples) -> tuple[Array, Array]:

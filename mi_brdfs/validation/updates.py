@@ -38,7 +38,7 @@ def updates(run: Run) -> Findings:
         outcome = Outcome("updates", key)
         with restored(params, key) as original:
             if rest not in ("", "value") or dr.width(original) != 1:
-                _check_taken_up(run, outcome, params, key, wi, wo, u)
+                _check_taken_up(run.probe, outcome, tolerance, params, key, wi, wo, u)
                 tried += 1
                 yield outcome.finding("Once it is changed, all of it is taken up.")
                 continue
@@ -58,19 +58,18 @@ def updates(run: Run) -> Findings:
             once, as_loaded = f"once it is set to {told}, ", "if it is loaded with that"
             shared, unnoticed = "they share something", "parameters_changed without names must take up any change"
             mine, last = (each.eval(part, wi, wo) for each in (probe, fresh))
-            pdf, expected_pdf = (each.pdf(part, wi, wo)[:, None] for each in (probe, fresh))
+            pdf, expected_pdf = (each.pdf(part, wi, wo) for each in (probe, fresh))
             params[key] = original
             probe.bsdf.parameters_changed()
             back = probe.eval(part, wi, wo)
-            for name, got, expected, but in (
+            for row in (
                 (f"{once}eval", mine, last, as_loaded),
                 (f"{once}pdf", pdf, expected_pdf, as_loaded),
                 (f"{once}eval of another that was loaded with that", last, first, f"before: {shared}"),
                 (f"once another is loaded with {told}, eval", after, before, f"before: {shared}"),
                 ("once it is set back, eval", back, before, f"before: {unnoticed}"),
             ):
-                error = relative(got, expected)
-                outcome.wrong(error * (error > tolerance), name, got, but, wi, wo, expected=expected)
+                outcome.differing(tolerance, *row, wi, wo)
             set_value(params, key, value)
             ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
             # What sample keeps of former values shows beside pdf, which has the new ones.
@@ -91,25 +90,30 @@ def updates(run: Run) -> Findings:
 
 
 def _check_taken_up(
-    run: Run, outcome: Outcome, params: mi.SceneParameters, key: str, wi: Array, wo: Array, u: Array
+    probe: BSDFProbe,
+    outcome: Outcome,
+    tolerance: float,
+    params: mi.SceneParameters,
+    key: str,
+    wi: Array,
+    wo: Array,
+    u: Array,
 ) -> None:
     """Check that new texels or entries of a table, which no dict need give, are all taken up once they are set: then
     ``parameters_changed`` without names changes nothing more."""
-    probe, part, value = run.probe, run.probe.whole, np.array(params[key])
+    value = np.array(params[key])
     set_value(params, key, value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
 
-    def found() -> tuple[Array, ...]:
-        return probe.eval(part, wi, wo), probe.pdf(part, wi, wo)[:, None], probe.sample(part, wi, u).density[:, None]
+    def found() -> list[tuple[str, Array, Array]]:
+        samples = probe.sample(probe.whole, wi, u)
+        values, densities = probe.eval(probe.whole, wi, wo), probe.pdf(probe.whole, wi, wo)
+        return [("eval", wo, values), ("pdf", wo, densities), ("a sample's density", samples.wo, samples.density)]
 
     named = found()
     probe.bsdf.parameters_changed()
-    for name, got, expected in zip(("eval", "pdf", "the density of a sample"), named, found(), strict=True):
-        error = relative(got, expected)
-        why = "after parameters_changed without names: what is kept of it is out of date"
-        outcome.wrong(
-            error * (error > 10 * run.rounding(part)), f"once it is changed, {name}", got, why, wi, wo,
-            expected=expected,
-        )  # fmt: skip
+    why = "after parameters_changed without names: what is kept of it is out of date"
+    for (name, towards, got), (_, _, expected) in zip(named, found(), strict=True):
+        outcome.differing(tolerance, f"once it is changed, {name}", got, expected, why, wi, towards, seed=92)
 
 
 def recompiles(run: Run) -> Findings:
