@@ -231,7 +231,7 @@ class Reader:
         found, length, lengths = [first], len(first), sorted(self.lengths, reverse=True) if parts else []
         for part in parts:
             name = next((part[:k] for k in lengths if part[:k] in self.values), "")
-            self.used.add(name)
+            self.used |= {name} if name else set()
             found.append(self.values[name] + part[len(name) :] if name else f"${part}")
             length += len(found[-1])
             if length > LONGEST:

@@ -75,10 +75,8 @@ def read(path: Path) -> Measurement:
     rows = file.rows()
     header = Header(file, rows)
     header.angles.setdefault("SampleRotation", np.zeros(1))
-    content, symmetry = (
-        header.content(),
-        header.setting("Symmetry", "PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D"),
-    )
+    content = header.content()
+    symmetry = header.setting("Symmetry", "PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D")
     shape = [len(header.require(name)) for name in ANGLES]
     count, channels = shape[0] * shape[1], [name.lower() for name in CHANNELS[content]]
     found: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in channels}
