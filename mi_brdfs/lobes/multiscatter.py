@@ -83,7 +83,7 @@ class WalkLobe(MultipleScattering):
     def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
         later, sooner = self.colours
         first, last = (Fresnel.mean(self.fresnel, end.schlick, end.dip) for end in (i, o))
-        return first * last * (later + dr.maximum(i.second - self.mean.second + o.second, 0) * sooner)
+        return first * last * (later + dr.maximum(i.second + o.second, 0) * sooner)
 
 
 class KullaContyLobe(MultipleScattering):

@@ -18,7 +18,7 @@ from harness import parser
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import erfc, erfinv
 
-from mi_brdfs.microfacet.escape import COUNTS, FILE, ROUGHEST, ends
+from mi_brdfs.microfacet.escape import BENDS, COUNTS, FILE, ISOTROPIC, ROUGHEST, SKEW
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip
@@ -33,9 +33,6 @@ WALKS = 1 << 15
 REFLECTIONS = 10
 TYPICAL = 0.85
 """What facets reflect where paths are averaged: as metals do, of which most light is lost at the first reflections."""
-BENDS = {"ggx": ((3, 4), (2.4, 8)), "beckmann": ((5, 4), (4, 2)), "blinn": ((5, 4), (4, 2))}
-"""Numbers c and d of k = c/(1 + d (αu² + αv²)/2), for the separable and the correlated term, by which polynomials of
-low degree do."""
 CORRELATIONS = 0, 0.5
 """The ρ² of nodes; what walks say is nearly linear in it."""
 
@@ -269,9 +266,10 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
     u, v = largest, largest * ratio
     phi = np.zeros(1)
     if ratio < 1:
-        low, high = ends(ratio)
+        low, high = skewed(ratio), skewed(1 / ratio)
         y = low + (high - low) * chebyshev(9)
-        between = np.arccos(np.sqrt(np.clip((0.5 * ratio * y / (1 - y) - ratio**2) / (1 - ratio**2), 0, 1)))
+        along2 = ratio * (1 + SKEW * y) / (1 - y)
+        between = np.arccos(np.sqrt(np.clip((along2 - ratio**2) / (1 - ratio**2), 0, 1)))
         phi = np.append(np.linspace(0, np.pi / 2, 9), between)
     # Half of the places are even in the stretched space, most of which is at grazing where facets are smooth.
     upright = np.cos(np.radians([1, 15, 30, 45, 55, 65, 72, 78, 83, 87]))
@@ -298,8 +296,14 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
             np.linalg.lstsq(above.terms(name) * weights[:, None], values * weights, rcond=None)[0]
             for name, values in zip(("second", "schlick", "dip"), later, strict=True)
         ]
-        entries.append(np.concatenate([polynomial, means, [bend], *others]))
+        second, schlick, dip = others
+        entries.append(np.concatenate([polynomial, means[:1], second, schlick, means[1:3], dip, means[3:]]))
     return entries
+
+
+def skewed(along2: np.ndarray) -> np.ndarray:
+    """Return the second variable of polynomials, for α² over αu αv."""
+    return (along2 - 1) / (along2 + SKEW)
 
 
 def chebyshev(count: int) -> np.ndarray:
@@ -345,13 +349,7 @@ class Places(NamedTuple):
         shortened = 1 / np.sqrt(1 + along2 * tan2)
         at = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
         rho2 = np.maximum(1 - (alpha_u * alpha_v) ** 2 / (along2 * across2), 0)
-        low, high = ends(alpha_v / alpha_u)
-        y = (
-            (along2 / (along2 + 0.5 * alpha_u * alpha_v) - low) / (high - low) * 2 - 1
-            if alpha_u > alpha_v
-            else 0 * along2
-        )
-        return cls(cos, phi, np.stack([shortened, *at], axis=-1), rho2, y)
+        return cls(cos, phi, np.stack([shortened, *at], axis=-1), rho2, skewed(along2 / (alpha_u * alpha_v)))
 
     @classmethod
     def joined(cls, *places: Places) -> Places:
@@ -400,8 +398,8 @@ def after_the_first(
 
     (first, later), (_, later_everywhere) = moments(places), moments(everywhere)
     colours = first + later - mean(later_everywhere, loss)
-    means = np.concatenate([[np.sqrt(np.sum(loss))], *second, *third, *between])
-    return means, *at(places, "second"), *colours
+    means = np.concatenate([[np.sqrt(np.sum(loss))], *third, *between])
+    return means, *(at(places, "second") - 0.5 * second), *colours
 
 
 def made(count: int, step: int = 1) -> dict[str, np.ndarray]:
@@ -412,6 +410,9 @@ def made(count: int, step: int = 1) -> dict[str, np.ndarray]:
     for shape, walk in {**walked, "blinn": walked["beckmann"]}.items():
         ratios = [1.0] if shape == "blinn" else np.maximum(np.linspace(0, 1, RATIOS), 0.1)[::step] ** 4
         rows = np.float16([[fitted(shape, alpha, ratio, walk) for alpha in roughness] for ratio in ratios])
+        if len(ratios) > 1 and ratios[-1] == 1:
+            # Isotropic facets do not tell how what is nearly so depends on the azimuth.
+            rows[-1][..., ~ISOTROPIC] = rows[-2][..., ~ISOTROPIC]
         tables[f"{shape}-separable"], tables[f"{shape}-correlated"] = np.moveaxis(rows, 2, 0)
     return tables
 
