@@ -455,7 +455,8 @@ NAME = "<!--<script> '1' (1) \udcff.bsdf"
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("exported")
     shutil.copy(LOFT, folder / NAME)
-    python, _, code, *words = alone("lambert", NAME, "--exposure", "1.5", "--labels", f"chalk,{NAME}", "--export", "page.html")
+    options = "--exposure", "1.5", "--labels", f"chalk,{NAME}", "--export", "page.html"
+    python, _, code, *words = alone("lambert", NAME, *options)
     few = "import mi_brdfs.explorer.export as export; export.SPP = 4; main()"
     subprocess.run([python, "-c", code.replace("main()", few), *words], check=True, timeout=200, cwd=folder)
     return folder / "page.html"

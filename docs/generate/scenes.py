@@ -10,6 +10,9 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
 from mi_brdfs.gallery.families import year
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
@@ -17,11 +20,6 @@ from mi_brdfs.parameters.xml import to_xml
 from mi_brdfs.rendering.output import denoised, display_image
 from mi_brdfs.rendering.passes import render
 from mi_brdfs.rendering.scene_file import SceneFile
-
-import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
-
-import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 
 from . import labels
 from .labels import labelled, labels_of
