@@ -29,7 +29,7 @@ PAGES: dict[str, tuple[str, list[str]]] = {
     ),
     "measured_paint": (
         "a measured black paint and its fit",
-        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted", "--exposure", "2"],
+        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted walter", "--exposure", "2"],
     ),
 }
 """What each page shows: in words, and as arguments of ``mi-brdfs explore``."""
