@@ -369,6 +369,7 @@ HOSTILE = {
     + "".join(f'<default name="a{k + 1}" value="{f"$a{k}" * 10}"/>' for k in range(9)) + "</scene>",
     "a parameter of many letters, often": f'<scene version="0.6.0"><default name="a" value="{"x" * 90_000}"/>'
     f'<string name="b" value="{"$a" * 40_000}"/></scene>',
+    "no amount": '<scene version="0.2.0"><bsdf type="phong"><float name="diffuseAmount" value=""/></bsdf></scene>',
     "parameter in itself": '<scene version="0.6.0"><default name="a" value="$a"/></scene>',
     "endless spectrum": '<scene version="0.6.0"><bsdf type="diffuse"><spectrum name="reflectance" '
     'filename="/dev/zero"/></bsdf></scene>',
