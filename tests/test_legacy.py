@@ -316,6 +316,13 @@ MISSING = [
 ]  # fmt: skip
 
 
+def test_walls_that_are_turned_inside_out_load_beside_others(load):
+    """Mitsuba merges shapes of equal BSDFs, but not these."""
+    wall = '<shape type="rectangle"><bsdf type="diffuse"/>{}</shape>'
+    scene, _ = load(wall.format('<boolean name="flipNormals" value="true"/>') + 2 * wall.format(""))
+    assert len(scene.shapes()) == 3
+
+
 @pytest.mark.parametrize("old, stand_in", MISSING)
 def test_missing_files(upgraded, old, stand_in):
     old = old.format('<transform name="toWorld"><scale value="2"/></transform><bsdf type="conductor"/>')
