@@ -58,13 +58,6 @@ def test_variant_context():
     assert [isinstance(bsdf, mi.BSDF) for bsdf in (inner, outer, again)] == [False, True, True]
 
 
-def test_known_as_bsdfs_in_every_variant(variant):
-    """An unregistered plugin name would be an unknown plugin, not a BSDF with a wrong parent."""
-    for name in mi_brdfs.list_models():
-        assert isinstance(mi.load_dict({"type": name}), mi.BSDF)
-        assert isinstance(mi.load_string(f'<bsdf type="{name}" version="3.0.0"/>'), mi.BSDF)
-
-
 @pytest.mark.usefixtures("llvm_rgb")
 def test_inside_other_bsdfs():
     flat = {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(mi.TensorXf([0.5, 0.5, 1.0], (1, 1, 3)))}
