@@ -1,6 +1,7 @@
-"""What Mitsuba's tests of its BSDFs (src/bsdfs/tests of 3.9.1) ask of them, asked of the nearest models here."""
+"""What Mitsuba's tests of its BSDFs (src/bsdfs/tests of 3.9.1) ask of them, asked of the nearest models here. Values,
+densities and χ² of single BSDFs, attributes, and what conductors do to polarized light are in test_values,
+test_sampling, test_components, and test_polarization."""
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -10,8 +11,6 @@ GREY = {"type": "lambert", "reflectance": 0.4}
 WHITE = {"type": "lambert", "reflectance": 1.0}
 METAL = {"type": "walter", "alpha": 0.3, "material": "Al"}
 BRUSHED = {"type": "walter", "alpha_u": 0.4, "alpha_v": 0.1, "material": "Al"}
-PLASTIC = {"type": "microfacet", "int_ior": 1.5, "diffuse_reflectance": 0.1, "specular_reflectance": 0.7}
-PAINT = {"type": "burley", "roughness": 0.6, "metallic": 0.4, "anisotropic": 0.4, "clearcoat": 0.8}
 DIAGONAL = np.array([1, 1, 1]) / np.sqrt(3)
 FRONT, BACK = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
 DIFFUSE, GLOSSY = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection
@@ -66,34 +65,9 @@ def test_anisotropy_that_comes_later():
     assert np.ptp(call(given.eval, context(), UP.repeat(2, 0), np.array([[0.6, 0, 0.8], [0, 0.6, 0.8]]))[0]) > 0.01
 
 
-def test_values_of_diffuse():
-    """As test_diffuse: value and density at 20 angles."""
-    wo = quarter_circle()
-    value, pdf = call(mi.load_dict(WHITE).eval_pdf, context(), UP.repeat(20, 0), wo)
-    np.testing.assert_allclose(pdf[:, 0], wo[:, 2] / np.pi, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(value, pdf.repeat(3, 1), rtol=1e-6)
-
-
-@pytest.mark.parametrize("bsdf", [GREY, METAL, BRUSHED, PLASTIC, PAINT, two_sided(METAL), blend(0.2, METAL, GREY)])
-def test_eval_pdf_is_eval_and_pdf(bsdf):
-    """As in test_diffuse, _rough_conductor, _rough_plastic and _principled."""
-    bsdf, wi, wo = mi.load_dict(bsdf), np.tile(DIAGONAL, (20, 1)), quarter_circle()
-    value, pdf = call(bsdf.eval_pdf, context(), wi, wo)
-    np.testing.assert_allclose(value, call(bsdf.eval, context(), wi, wo)[0], rtol=1e-6)
-    np.testing.assert_allclose(pdf, call(bsdf.pdf, context(), wi, wo)[0], rtol=1e-6)
-    assert (value[:-1] > 0).all()
-
-
 GLASS = {"type": "roughdielectric", "alpha": 0.5}
 FACETS = {"type": "microfacet", "material": "Cu", "alpha_u": 0.2, "alpha_v": 0.05}
 SAMPLED = {
-    "diffuse": (GREY, UP[0], {}),
-    "roughconductor, smooth": (METAL | {"alpha": 0.05}, DIAGONAL, {"res": 140, "ires": 32}),
-    "roughconductor, beckmann": (FACETS | {"distribution": "beckmann"}, DIAGONAL, {}),
-    "roughconductor, ggx": (FACETS | {"distribution": "ggx"}, DIAGONAL, {"ires": 8}),
-    "roughplastic, smooth": (PLASTIC | {"alpha": 0.05}, UP[0], {"res": 201}),
-    "roughplastic, rough": (PLASTIC | {"alpha": 0.25}, UP[0], {"ires": 4}),
-    "principled": (PAINT, direction(45), {}),
     "blend": (blend(0.2, GREY, GREY), UP[0], {}),
     "blend with glass": (blend(0.2, GREY, GLASS), UP[0], {}),
     "blend of metal and glass": (blend(0.2, METAL | {"alpha": 0.5}, GLASS), UP[0], {}),
@@ -103,7 +77,7 @@ SAMPLED = {
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("name", SAMPLED)
 def test_samples_have_their_density(name):
-    """As the χ² tests of test_diffuse, _rough_conductor, _rough_plastic, _pplastic, _principled and _blendbsdf."""
+    """As the χ² tests of test_blendbsdf."""
     bsdf, wi, resolution = SAMPLED[name]
     if "glass" in name:  # whose samples may have a density but no weight
         sample, pdf = mi.chi2.BSDFAdapter(bsdf["type"], bsdf, wi=wi)
@@ -111,18 +85,6 @@ def test_samples_have_their_density(name):
     else:
         test = chi_square(mi.load_dict(bsdf), context(), wi, seed=1, **resolution)
     assert test.run(test_count=len(SAMPLED), quiet=True), test.messages
-
-
-@pytest.mark.parametrize("variant_of", ["scalar_rgb", "llvm_ad_rgb"])
-def test_attributes(variant_of):
-    """As test_rough_plastic: reflectance and roughness can be asked for by name."""
-    with mi.variant_context(variant_of):
-        colour = [0.5, 0.6, 0.7]
-        bsdf = mi.load_dict(PLASTIC | {"diffuse_reflectance": {"type": "rgb", "value": colour}, "alpha": 0.4})
-        si = interaction(direction(10))
-        for method in (bsdf.eval_attribute, bsdf.eval_attribute_3):
-            np.testing.assert_allclose(numbers(method("diffuse_reflectance", si, True)).ravel(), colour, rtol=1e-6)
-        assert numbers(bsdf.eval_attribute_1("alpha", si, True)).item() == pytest.approx(0.4)
 
 
 # --- Two sides --------------------------------------------------------------------------------------------------------
@@ -257,51 +219,3 @@ def test_samples_under_bumps_have_their_density():
     assert valid.mean() > 0.5
     np.testing.assert_allclose(density, pdf[valid], rtol=1e-3)
     np.testing.assert_allclose(value, weight[valid] * pdf[valid], rtol=1e-3)
-
-
-# --- Polarized light --------------------------------------------------------------------------------------------------
-
-SILVER = 0.136125, 4.010625
-"""η and k at 636 nm."""
-
-
-@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 1, 0)], ids=["local", "world"])
-def test_silver_polarises_as_a_mirror(normal):
-    """As test_conductor: what a smooth conductor, here one of facets, makes of each state of polarization at 45°, in
-    the frame of the surface and in the world's."""
-    with mi.variant_context("llvm_ad_mono_polarized"):
-        bsdf = mi.load_dict({"type": "walter", "alpha": 1e-3, "eta": SILVER[0], "k": SILVER[1]})
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.n = dr.normalize(mi.Normal3f(*normal))
-        si.sh_frame = mi.Frame3f(si.n)
-        away = dr.normalize(mi.Vector3f(-1, 0, 1)) if normal[2] else mi.Vector3f(1, 0, 0)
-        si.wi = si.to_local(away)
-        mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
-        ctx = mi.BSDFContext(mi.TransportMode.Importance)
-        value = bsdf.eval(ctx, si, mirrored, True)
-        matrix = si.to_world_mueller(value, -si.wi, mirrored)
-        w1, w2 = -away, si.to_world(mirrored)
-        b1, b2 = (dr.normalize(dr.cross(si.n, w)) for w in (w1, w2))
-        matrix = mi.mueller.rotate_mueller_basis(
-            matrix, w1, mi.mueller.stokes_basis(w1), b1, w2, mi.mueller.stokes_basis(w2), b2
-        )
-        mueller = np.array([[numbers(mi.UnpolarizedSpectrum(matrix[i, j])).item() for j in range(4)] for i in range(4)])
-        # Of facets without a tilt the value is F D G / (4 cosθ), of which only F is here.
-        flat = mi.load_dict({"type": "walter", "alpha": 1e-3, "material": "none"}).eval(ctx, si, mirrored, True)
-        mueller /= numbers(mi.UnpolarizedSpectrum(flat[0, 0])).item()
-
-    def reflected(*state):
-        return mueller @ (1, *state)
-
-    cos2, (eta, k) = 0.5, SILVER
-    root = np.sqrt((eta + 1j * k) ** 2 - (1 - cos2))
-    s = abs((np.sqrt(cos2) - root) / (np.sqrt(cos2) + root)) ** 2
-    index = (eta + 1j * k) ** 2
-    p = abs((index * np.sqrt(cos2) - root) / (index * np.sqrt(cos2) + root)) ** 2
-    np.testing.assert_allclose(reflected(0, 0, 0)[0], (s + p) / 2, atol=1e-3)
-    np.testing.assert_allclose(reflected(1, 0, 0), s * np.array([1, 1, 0, 0]), atol=1e-3)
-    np.testing.assert_allclose(reflected(-1, 0, 0), p * np.array([1, -1, 0, 0]), atol=1e-3)
-    for sign in (1, -1):
-        diagonal, circular = reflected(0, sign, 0), reflected(0, 0, sign)
-        assert diagonal[2] * sign < 0 and diagonal[3] * sign > 0  # the other diagonal, and a little circular
-        assert circular[3] * sign < 0  # the other hand
