@@ -80,7 +80,7 @@ def test_area_lights_are_sampled_all_over():
 @pytest.mark.usefixtures("llvm_rgb")
 def test_lights_are_seen_and_cast_shadows():
     """Unless they are asked not to."""
-    before_the_camera = lamp("disk", radiance=3.0, to_world=T())
+    before_the_camera = lamp("disk", radiance=3.0, to_world=T().translate([0, 0, 1]))
     np.testing.assert_allclose(shaded(plate(WHITE, before_the_camera, clamp=False), spp=1), 3, rtol=1e-5)
     roof = {"type": "rectangle", "to_world": T().translate([0, 0, 7]).scale(20), "bsdf": WHITE}
     assert shade(WHITE, SUN, roof) == 0
