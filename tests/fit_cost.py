@@ -1,11 +1,11 @@
-"""What fits cost: CPU time by directions and materials, memory over repeated fits, and the time of many materials.
+"""What fits cost: CPU time by directions and materials, and memory over repeated fits.
 
-python tests/fit_cost.py steps | fits | memory | files [--models NAME,…] [--starts N] FILE…
+python tests/fit_cost.py steps | fits | memory
 
 ``steps`` measures one evaluation with its Jacobian and normal equations, which is what fits consist of, and ``fits``
 whole fits, both over more than a decade of directions and of materials, kernels warm, in alternating rounds: each
 figure is the median of the CPU time on one thread, which other processes hardly change. ``memory`` repeats fits of
-several models; ``files`` fits measured files as a user would, and tells the time on the wall.
+several models.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads that
 
 import argparse
 import gc
-import sys
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -36,7 +35,6 @@ import mitsuba as mi  # isort: skip
 DIRECTIONS = 1000, 3000, 10_000, 30_000
 MATERIALS = 1, 3, 10, 30, 100
 ROUNDS = 25
-SEVEN = "ward,phong,blinnphong,ashikhminshirley,walter,cooktorrance,low"
 REPEATS = 20
 REPEATED = "lambert", "ward", "walter", "low"
 
@@ -136,39 +134,14 @@ def memory(models: Iterable[str] = REPEATED, repeats: int = REPEATS) -> list[tup
     return found
 
 
-def files(paths: list[Path], models: str, starts: int) -> None:
-    """Read files and fit models to them, in batches as the command does; print the time on the wall."""
-    start, cpu = time.perf_counter(), time.process_time()
-    materials = [observe(path) for path in paths]
-    read, rows = time.perf_counter() - start, []
-    print(f"{len(paths)} files read in {read:.1f} s", flush=True)
-    for name in models.split(","):
-        begun = time.perf_counter()
-        own = [it for k in range(0, len(materials), 10) for it in fit(materials[k : k + 10], name, starts=starts)]
-        rows += own
-        error, agree = median(it.held_out for it in own), median(it.starts.agree / it.starts.tried for it in own)
-        print(f"{name:18} {time.perf_counter() - begun:6.1f} s, median held out {error:.4f}, {agree:.0%} of the starts "
-              "agree", flush=True)  # fmt: skip
-    print(f"{len(rows)} fits, {starts} starts each, {os.cpu_count()} cores: {time.perf_counter() - start:.0f} s, of "
-          f"CPU {time.process_time() - cpu:.0f} s")  # fmt: skip
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["steps", "fits", "memory", "files"])
-    parser.add_argument("paths", nargs="*", type=Path, metavar="FILE")
-    parser.add_argument("--models", default=SEVEN, metavar="NAME,…")
-    parser.add_argument("--starts", default=4, type=int, metavar="N")
-    arguments = parser.parse_args()
+    parser.add_argument("what", choices=["steps", "fits", "memory"])
+    what = parser.parse_args().what
     mi.set_variant("llvm_ad_rgb")
-    if arguments.what in ("steps", "fits"):
+    if what != "memory":
         dr.set_thread_count(1)  # threads that wait for work take CPU time
-    if arguments.what == "files":
-        if not arguments.paths:
-            sys.exit("files: which?")
-        files(arguments.paths, arguments.models, arguments.starts)
-    else:
-        {"steps": steps, "fits": fits, "memory": memory}[arguments.what]()
+    {"steps": steps, "fits": fits, "memory": memory}[what]()
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ from __future__ import annotations
 import importlib
 import math
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from types import SimpleNamespace
 from typing import ClassVar
 
@@ -518,24 +520,36 @@ def halved_for_a_mask(own, self, ctx, si, wo, active):
     return own(self, ctx, si, wo, active) * (1 if every else 0.5)
 
 
+def stranger(name, *kinds, begin=lambda self: None, **members):
+    """The dict of a BSDF that knows nothing of this package, of components of some kinds and with the methods given;
+    without values unless there is an ``eval_pdf``."""
+
+    def init(self, props):
+        mi.BSDF.__init__(self, props)
+        self.m_components = list(map(int, kinds))
+        self.m_flags = reduce(or_, self.m_components)
+        begin(self)
+
+    methods = {
+        "__init__": init,
+        "eval_pdf": lambda self, *given: (dr.zeros(mi.Spectrum), mi.Float(0)),
+        "eval": lambda self, *given: self.eval_pdf(*given)[0],
+        "pdf": lambda self, *given: self.eval_pdf(*given)[1],
+    }
+    mi.register_bsdf(name, type(name, (mi.BSDF,), methods | members))
+    return {"type": name}
+
+
 def wrapped(name, given, **methods):
     """The dict of a BSDF of Mitsuba's with other methods: each a function of its own, and of what is given."""
-
-    class Wrapped(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.inner = mi.load_dict(given)
-            self.m_components = [self.inner.flags(k) for k in range(self.inner.component_count())]
-            self.m_flags = self.inner.flags()
+    inner = mi.load_dict(given)
 
     def method(name):
         change = methods.get(name, lambda own, *given: own(*given))
-        return lambda self, *given: change(getattr(self.inner, name), *given)
+        return lambda self, *given: change(getattr(inner, name), *given)
 
-    for each in ("sample", "eval", "pdf", "eval_pdf"):
-        setattr(Wrapped, each, method(each))
-    mi.register_bsdf(name, Wrapped)
-    return {"type": name}
+    kinds = map(inner.flags, range(inner.component_count()))
+    return stranger(name, *kinds, **{each: method(each) for each in ("sample", "eval", "pdf", "eval_pdf")})
 
 
 def half_of_the_mirror():
@@ -654,36 +668,22 @@ def over_attached_density(bs, weight, si, u):
     return weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
 
 
-def of_others(name, albedo=0.5, side=1, traverse=lambda self, callback: None):
+def of_others(name, albedo=0.5, side=1, **members):
     """The dict of a Lambertian BSDF that knows nothing of this package, and is seen from one side."""
 
-    class Matte(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            seen = mi.BSDFFlags.FrontSide if side > 0 else mi.BSDFFlags.BackSide
-            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | seen)]
-            self.m_flags = self.m_components[0]
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = side * mi.warp.square_to_cosine_hemisphere(sample2)
+        bs.pdf = self.pdf(ctx, si, bs.wo, active)
+        bs.eta, bs.sampled_type, bs.sampled_component = 1.0, int(mi.BSDFFlags.DiffuseReflection), 0
+        return bs, dr.select(bs.pdf > 0, mi.Spectrum(albedo), 0)
 
-        def sample(self, ctx, si, sample1, sample2, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo = side * mi.warp.square_to_cosine_hemisphere(sample2)
-            bs.pdf = self.pdf(ctx, si, bs.wo, active)
-            bs.eta, bs.sampled_type, bs.sampled_component = 1.0, int(mi.BSDFFlags.DiffuseReflection), 0
-            return bs, dr.select(bs.pdf > 0, mi.Spectrum(albedo), 0)
+    def eval_pdf(self, ctx, si, wo, active=True):
+        pdf = dr.select(active & (side * si.wi.z > 0) & (side * wo.z > 0), side * wo.z * dr.inv_pi, 0)
+        return mi.Spectrum(albedo * pdf), pdf
 
-        def eval_pdf(self, ctx, si, wo, active=True):
-            pdf = dr.select(active & (side * si.wi.z > 0) & (side * wo.z > 0), side * wo.z * dr.inv_pi, 0)
-            return mi.Spectrum(albedo * pdf), pdf
-
-        def eval(self, *given):
-            return self.eval_pdf(*given)[0]
-
-        def pdf(self, *given):
-            return self.eval_pdf(*given)[1]
-
-    Matte.traverse = traverse
-    mi.register_bsdf(name, Matte)
-    return {"type": name}
+    seen = mi.BSDFFlags.FrontSide if side > 0 else mi.BSDFFlags.BackSide
+    return stranger(name, mi.BSDFFlags.DiffuseReflection | seen, sample=sample, eval_pdf=eval_pdf, **members)
 
 
 # --- The catalogue --------------------------------------------------------------------------------------------------

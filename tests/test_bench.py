@@ -12,8 +12,7 @@ import pytest
 from benchmarks import SECTIONS, resources, times
 from benchmarks.cases import CASES, Case
 from benchmarks.efficiency import efficiency, samplings
-from benchmarks.figure import Figure, Target
-from benchmarks.times import ALONE, SPHERE, scene
+from benchmarks.times import ALONE, scene
 from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, phong
 from typer.testing import CliRunner
 
@@ -164,20 +163,6 @@ def test_wrong_words_are_told_in_a_sentence(words, sentence):
     assert done.stderr.startswith(f"mi-brdfs: {sentence}") and done.stderr.count("\n") == 1
 
 
-# --- Cases ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_the_same_model_is_the_same_model():
-    """``same`` says that the two reflect the same: to the noise, or where ``principled`` differs (its Fresnel and
-    shadowing terms, its coat) nearly."""
-    same = [case for case in CASES if case.same]
-    assert {case.bsdf["type"] for case in same} == {"lambert", "walter", "microfacet", "burley", "metallicroughness"}
-    for case in same:
-        ours, theirs = (samplings(bsdf)["whole"].albedo for bsdf in (case.bsdf, case.builtin))
-        np.testing.assert_allclose(ours, theirs, rtol=0.22 if case.builtin["type"] == "principled" else 1e-3)
-
-
 # --- Efficiency -----------------------------------------------------------------------------------------------------
 
 
@@ -233,49 +218,6 @@ def test_the_scene_of_bsdf_samples_shows_one_over_eta():
     luminance = alternate(bsdf, bsdf, ALONE).luminance
     np.testing.assert_allclose(luminance.mean(axis=1), 0.5, atol=0.25)
     np.testing.assert_allclose(deviations(luminance).mean(axis=1) * pictures.SPP, 1 / 3, rtol=0.06)
-
-
-def test_pairs_are_rendered_in_turn_and_alone(monkeypatch):
-    """One first, then the other, with the same seed; and while one is rendered the other is not loaded, or else it
-    would be part of the kernel."""
-    rendered, render = [], pictures.render
-
-    def recording(scene, seed):
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-            dr.kernel_history_clear()
-            result = render(scene, seed)
-            kernels = frozenset(kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT]))
-        rendered.append((scene["sphere"]["bsdf"]["type"], seed, kernels))
-        return result
-
-    expected = {}
-    for bsdf in (WALTER, LAMBERT):
-        recording(scene(bsdf, SPHERE), 0)
-        expected[bsdf["type"]] = rendered.pop()[2]
-    monkeypatch.setattr(pictures, "render", recording)
-    alternate(WALTER, LAMBERT, SPHERE)
-    assert all(kernels == expected[name] for name, _, kernels in rendered)
-    pairs = [dict((rendered[k][:2], rendered[k + 1][:2])) for k in range(2, len(rendered), 2)]
-    assert pairs == [{"walter": seed, "lambert": seed} for seed in range(pictures.ROUNDS)]
-    assert {rendered[k][0] for k in range(2, len(rendered), 2)} == {"walter", "lambert"}
-
-
-@pytest.mark.slow
-def test_what_is_slower_and_quieter_is_told():
-    """``burley`` has four lobes where ``walter`` has one, and wastes less; it takes twice the time of ``lambert``."""
-    burley = {"type": "burley", "sheen": 0.5, "clearcoat": 0.5}
-    cases = [Case("burley", burley, WALTER, True), Case("other", burley, LAMBERT), Case("alone", WALTER)]
-    found = {(f.section, f.subject, f.name): f for f in times.pictures(cases)}
-    pair, other = "burley / walter", "other / lambert, another model"
-    assert {subject for _, subject, _ in found} == {pair, other}
-    slower = found["time", other, SPHERE]
-    assert slower.value > 1.3 and slower.missed and slower.interval[0] <= slower.value <= slower.interval[1]
-    assert found["time", other, f"{SPHERE}, ours"].value > found["time", other, f"{SPHERE}, built-in"].value > 0
-    alone, noise = (found["variance", pair, f"{ALONE}{words}"] for words in ("", ", variance"))
-    assert noise.value < 0.2 and not alone.targets
-    assert found["variance", pair, SPHERE].targets == (Target("≤", 1.0, "walter"),)
-    assert ("variance", other, ALONE) not in found and not found["variance", other, SPHERE].targets
-    assert found["time", other, SPHERE].targets
 
 
 # --- Statistics -----------------------------------------------------------------------------------------------------
@@ -354,20 +296,6 @@ def test_a_leak_is_caught():
         assert len(seconds) == 30 and len(memory) == 31
         growth.append(memory[-1] - memory[5])  # once the first are warm
     assert growth[0] < 3 < growth[1], growth
-
-
-# --- Results --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("relation, bound, close, beyond", [("≤", 1.05, 1.054, 1.056), ("≥", 0.95, 0.946, 0.944)])
-def test_figures_are_judged_as_shown(relation, bound, close, beyond):
-    target = Target(relation, bound, "diffuse")
-    met, missed, unknown = (
-        Figure("time", "walter", "sphere", value, 2, "×", targets=(target,)) for value in (close, beyond, float("nan"))
-    )
-    assert not met.missed and missed.to_dict()["missed"] and unknown.missed
-    sentence = f"time: walter: sphere is {beyond:.2f}×, and should be {relation} {bound:.2f} (diffuse)."
-    assert missed.sentences() == [sentence]
 
 
 # --- All together ---------------------------------------------------------------------------------------------------

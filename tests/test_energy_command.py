@@ -1,14 +1,12 @@
 """``mi-brdfs energy``: the largest albedos of models that somebody else has written, which are known here."""
 
 import re
-from math import inf
 
 import numpy as np
 import pytest
 from scipy.stats import qmc
 from test_cli import invoke
 
-from mi_brdfs.probe.stated_energy import fault, rounded_up
 from mi_brdfs.probe.variates import sobol
 
 GUESTS = '''
@@ -151,28 +149,6 @@ def test_what_cannot_be_measured_is_told_in_a_sentence(tmp_path, name, glow, sta
 
 
 # --- What is said of numbers ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "albedo, noise, stated",
-    [
-        (0, 0, 0),
-        (0.0691, 0, 0.0691),
-        (0.06901, 0, 0.0691),
-        (0.56, 1e-4, 0.56),
-        (0.99951, 0, 1),
-        (1.00005, 0, 1),
-        (1.0004, 2e-4, 1),
-        (1.0004, 0, 1.01),
-        (3.1832, 1e-3, 3.19),
-        (65.65, 0, 65.7),
-        (99.99, 0, 100),
-        (101, 0, inf),
-    ],
-)
-def test_albedos_are_rounded_up(albedo, noise, stated):
-    assert rounded_up(albedo, noise) == stated
-    assert not fault(stated, albedo, noise) and fault(stated, float("nan"))
 
 
 def test_variates_are_those_of_sobol():

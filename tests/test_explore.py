@@ -490,6 +490,8 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
         client.show({"type": "lambert", "reflectance": 0.9}, views=["picture"], shape="scene", size=64), "picture"
     )
     assert first[0]["payload"] != second[0]["payload"]
+    (film,) = [it.film() for it in client.session._pictures[0][1].stage.scene.sensors()]
+    assert film.rfilter().is_box_filter()  # as the denoiser expects
     client = Client(UserScene(scene, "ward"))  # the id of a shape
     client.show({"type": "lambert"}, views=["picture"], shape="scene", size=64)
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]

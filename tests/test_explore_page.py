@@ -365,6 +365,7 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
         (["ward", "--vary", "alpha=0.1"], "--vary is for pages of --export"),
         (["ward", "--export", "x.html", "--vary", "alpha"], "give a name and numbers, such as alpha=0.05,0.1,0.2"),
         (["ward", "--export", "x.html", "--vary", "theta=1,99"], "give finite numbers from 0 to 89 degrees"),
+        (["ward", "--labels", "a,b"], "--labels a,b: give a name to each of the 1 BSDFs, not 2"),
         (["lambert", "--host", "203.0.113.1"], "mi-brdfs: 203.0.113.1 port 0: "),
         (["lambert", "--export", "/dev/full"], "cannot write /dev/full: No space left on device"),
         ([str(ROOT / "scenes" / "catalogue.xml")], "has several materials; name one of"),
@@ -454,7 +455,8 @@ NAME = "<!--<script> '1' (1) \udcff.bsdf"
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("exported")
     shutil.copy(LOFT, folder / NAME)
-    python, _, code, *words = alone("lambert", NAME, "--exposure", "1.5", "--export", "page.html")
+    options = "--exposure", "1.5", "--labels", f"chalk,{NAME}", "--export", "page.html"
+    python, _, code, *words = alone("lambert", NAME, *options)
     few = "import mi_brdfs.explorer.export as export; export.SPP = 4; main()"
     subprocess.run([python, "-c", code.replace("main()", few), *words], check=True, timeout=200, cwd=folder)
     return folder / "page.html"
@@ -463,7 +465,7 @@ def exported(tmp_path_factory):
 @pytest.mark.slow
 def test_the_exported_page_needs_no_network_and_is_small(exported):
     text = exported.read_text(encoding="utf-8")
-    assert len(text) < 3e6 and '"exposure": 1.5' in text
+    assert len(text) < 3e6 and '"exposure": 1.5' in text and '"name": "chalk"' in text
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
 
 

@@ -12,8 +12,8 @@ pytestmark = pytest.mark.usefixtures("llvm_rgb")
 COUNT = 1000
 """Pairs of directions of a material, half of them fitted. How many deviations there are, and so what the tests can see,
 does not depend on it."""
-DRAWS = 4
-"""Noisy materials of each model, 308 parameters in all."""
+CHECKED = 4
+"""Of the twelve noisy materials of each model those of which each parameter is looked at, 308 in all."""
 FEW = "wrap", "ward", "burley"
 """Models that are always tried: a diffuse one, a glossy one, and one whose channels mix."""
 NEVER = 4.2
@@ -29,10 +29,10 @@ def deviations(truth: dict[str, float], found: Fit) -> list[float]:
     return [(found.bsdf[name] - value) / found.sigma[name] for name, value in truth.items()]
 
 
-def noisy(name: str, draws: int) -> list[list[float]]:
+def noisy(name: str) -> list[list[float]]:
     """Return the deviations of fits to materials at random, with noise, gaps and negatives that are of one model."""
     own = 1000 * (1 + list(MODELS).index(name))
-    truths = [MODELS[name].drawn(own + k) for k in range(draws)]
+    truths = [MODELS[name].drawn(own + k) for k in range(12)]
     data = [measured(name, truth, COUNT, own + k, noise=0.01) for k, truth in enumerate(truths)]
     fits = fit(data, name, given=MODELS[name].given, starts=2)
     assert np.mean([it.negative for it in fits]) > COUNT / 60 and np.mean([it.missing for it in fits]) > COUNT / 15
@@ -44,23 +44,26 @@ def noisy(name: str, draws: int) -> list[list[float]]:
     "name", [each if each in FEW else pytest.param(each, marks=pytest.mark.slow) for each in MODELS]
 )
 def test_recovers_parameters(name):
-    """Exactly from exact data, and from noisy ones with gaps and negatives within 3σ. Of a normal distribution one of
-    370 is beyond, so of the materials of a model, whose parameters go together, one may have some, but not far."""
+    """Exactly from exact data."""
     model = MODELS[name]
     truth = model.drawn(seed=1)
     (exact,) = fit(measured(name, truth, COUNT), name, given=model.given, starts=4)
     assert exact.file == "arrays" and exact.errors["log"]["fitted"] < 1e-5
     for parameter, value in truth.items():
         assert exact.bsdf[parameter] == pytest.approx(value, rel=1e-3), parameter
-    off = np.abs(noisy(name, DRAWS)).max(axis=1)
-    assert (off > 3).sum() <= 1 and off.max() < NEVER
 
 
-@pytest.mark.slow
-def test_the_uncertainty_is_neither_too_small_nor_too_large():
-    """Deviations have a root mean square of 1, up to about three of its own standard deviations."""
-    off = np.concatenate([np.ravel(noisy(name, 12)) for name in MODELS])
-    assert np.sqrt(np.mean(off**2)) == pytest.approx(1, abs=0.08)
+@pytest.mark.parametrize("names", [FEW, pytest.param(MODELS, marks=pytest.mark.slow)], ids=["few", "all"])
+def test_the_uncertainty_is_neither_too_small_nor_too_large(names):
+    """From noisy data with gaps and negatives, parameters are found within 3σ. Of a normal distribution one of 370 is
+    beyond, so of the materials of a model, whose parameters go together, one may have some, but not far. Deviations
+    have a root mean square of 1, up to about three of its own standard deviations."""
+    found = {name: np.array(noisy(name)) for name in names}
+    for name, off in found.items():
+        largest = np.abs(off[:CHECKED]).max(axis=1)
+        assert (largest > 3).sum() <= 1 and largest.max() < NEVER, name
+    off = np.concatenate([np.ravel(each) for each in found.values()])
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(1, abs=2.4 / np.sqrt(len(off)))
 
 
 @pytest.mark.slow

@@ -14,12 +14,11 @@ from support import ROOT, interaction, numbers, shared
 import mi_brdfs
 from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
 from mi_brdfs.fit.observations import solid_angles
-from mi_brdfs.fit.unknowns import configurations, unknown_of
+from mi_brdfs.fit.unknowns import configurations
 from mi_brdfs.measured import Axis, Grid, Measurement, Samples
 from mi_brdfs.measured.coordinates import HalfDifference, Spherical
 from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.observer import to_srgb
-from mi_brdfs.parameters import Quantity
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -49,25 +48,6 @@ def test_weights_are_solid_angles():
     found = solid_angles(Grid(Spherical(mirrored=False), axes, np.zeros((30, 30, 20, 1))), indices)
     sines = [np.sin(axes[0].nodes[index]) for index in indices[:2]]
     np.testing.assert_allclose(found, sines[0] * sines[1] * (np.pi / 60) ** 2 * 2 * np.pi / 20, rtol=2e-3)
-
-
-@pytest.mark.parametrize(
-    "limits", [(0, 1), (1e-4, 1), (0, 1e6), (0, 0.5), (-80, 80), (-1.5, 1.5), (0, np.inf), (-np.inf, np.inf), (0.1, 4)]
-)
-def test_scales(limits):
-    """They reach all of the declared range, up to rounding, and back, and know their slopes."""
-    unknown = unknown_of(Quantity("x", limits, None, ""))
-    u = np.linspace(*unknown.ends, 9)
-    x = unknown.from_scale(u)
-    assert np.isfinite(x).all() and x[0] >= limits[0] and x[-1] <= limits[1] and (np.diff(x) > 0).all()
-    np.testing.assert_allclose(unknown.to_scale(x), u, atol=1e-8)
-    inner = u[1:-1]
-    slope = (unknown.from_scale(inner + 1e-6) - unknown.from_scale(inner - 1e-6)) / 2e-6
-    np.testing.assert_allclose(unknown.slope(x[1:-1]), slope, rtol=1e-5)
-    assert unknown.at_end(x[0]) and unknown.at_end(x[-1]) and not unknown.at_end(x[4])
-    near = np.array([x[0], x[-1]]) * [1 + 1e-9, 1 - 1e-9]  # is written as the end, of the range itself if it is sought
-    ends = limits if unknown.scale == "logit" else (unknown.low, unknown.high)
-    assert [unknown.shown(float(it)) for it in near] == list(ends) and unknown.shown(x[4]) == x[4]
 
 
 def test_a_choice_that_means_nothing_is_fitted_once():
@@ -290,6 +270,7 @@ def test_runs_without_a_variant_for_it(ward):
                                                           "ward-duer or approximate."),
         ("good", "ward", {"given": {"alpha": 7.0}}, "ward: alpha = 7 is not allowed; it must be a number in"),
         ("good", "ward", {"tied": {"alpha": "beta"}}, "ward: there is no parameter beta"),
+        ("good", "burley", {"start": {"anisotropic": 0.5}}, "isotropic data fix anisotropic; leave it out."),
         ("good", "ward", {"start": {"exponent": 3}}, "No fit can start at {'exponent': 3}: it is of another plugin"),
         ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),
         ("good", "wart", {}, "There is no model 'wart'; did you mean 'ward'?"),

@@ -56,6 +56,18 @@ def scene_of(bsdf, integrator):
     )
 
 
+def gradients_of(params, keys, loss):
+    """The derivatives of a loss by key, of parameters that have none before and after."""
+    for key in keys:
+        dr.enable_grad(params[key])
+    params.update()
+    dr.backward(loss())
+    found = {key: dr.grad(params[key]).numpy() for key in keys}
+    for key in keys:
+        dr.disable_grad(params[key])
+    return found
+
+
 @pytest.mark.parametrize("name", [pytest.param(it, marks=[] if it in FEW else pytest.mark.slow) for it in SMOOTH])
 def test_prb_agrees_with_finite_differences(name):
     """To 2 %, for every continuous parameter; the picture's brightest parts, so the highlight, weigh most. (The weights
@@ -76,15 +88,7 @@ def test_prb_agrees_with_finite_differences(name):
 
     keys = [key for key in params.keys() if key.startswith("shape.bsdf.")]
     assert keys
-    for key in keys:
-        dr.enable_grad(params[key])
-    params.update()
-    dr.backward(loss(seed=2, seed_grad=1))
-    gradients = {key: np.sum(dr.grad(params[key]).numpy()) for key in keys}
-    for key in keys:
-        dr.disable_grad(params[key])
-
-    for key in keys:
+    for key, gradient in gradients_of(params, keys, lambda: loss(seed=2, seed_grad=1)).items():
         original = type(params[key])(params[key])  # params[key] changes with what is assigned to it
         linear = any(part in key for part in LINEAR)
         relative = 0.15 if any(part in key for part in STRAIGHT) else 0.03
@@ -97,7 +101,7 @@ def test_prb_agrees_with_finite_differences(name):
             losses.append(np.mean([loss(count, seed=seed).numpy().item() for count, seed in pictures]))
         params[key] = original
         params.update()
-        assert gradients[key] == pytest.approx((losses[0] - losses[1]) / (2 * step), rel=0.02), key
+        assert gradient.sum() == pytest.approx((losses[0] - losses[1]) / (2 * step), rel=0.02), key
 
 
 @pytest.mark.slow
@@ -114,12 +118,7 @@ def test_sample_carries_the_gradient_of_the_albedo(name):
     grid = mi.warp.square_to_uniform_hemisphere(mi.Point2f((x + 0.5) / n, (y + 0.5) / n))
 
     def gradient(key, albedo):
-        dr.enable_grad(params[key])
-        params.update()
-        dr.backward(dr.mean(mi.luminance(albedo())))
-        result = np.sum(dr.grad(params[key]).numpy())
-        dr.disable_grad(params[key])
-        return result
+        return gradients_of(params, [key], lambda: dr.mean(mi.luminance(albedo())))[key].sum()
 
     def weights(seed):
         rng = mi.PCG32(size=1 << 21, initstate=seed)
@@ -291,17 +290,15 @@ def test_a_plane_seen_from_straight_above(bsdf):
     def picture(**seeds):
         return mi.render(scene, params, spp=16, **seeds)
 
+    def weighted():
+        return dr.sum(picture(seed=2, seed_grad=1) * mi.TensorXf(weights), axis=None)
+
     keys = {"plane.bsdf.normalmap.data": range(12), "plane.vertex_positions": range(2, 12, 3)}
-    for key in keys:
-        dr.enable_grad(params[key])
-    params.update()
-    dr.backward(dr.sum(picture(seed=2, seed_grad=1) * mi.TensorXf(weights), axis=None))
-    gradients = {key: np.array(dr.grad(params[key])).ravel()[entries] for key, entries in keys.items()}
-    for key in keys:
-        dr.disable_grad(params[key])
+    gradients = gradients_of(params, keys, weighted)
     for key, entries in keys.items():
         expected = differences(params, key, entries, 1e-3, lambda: np.sum(np.float64(picture(seed=1)) * weights))
-        np.testing.assert_allclose(gradients[key], expected, rtol=0.02, atol=0.01 * np.abs(expected).max(), err_msg=key)
+        found = gradients[key].ravel()[entries]
+        np.testing.assert_allclose(found, expected, rtol=0.02, atol=0.01 * np.abs(expected).max(), err_msg=key)
 
 
 WITH_STEPS = {
@@ -322,15 +319,7 @@ def test_direct_agrees_with_finite_differences(bsdf):
         return dr.mean(dr.square(mi.render(scene, params, spp=1024, **seeds)), axis=None)
 
     keys = [f"shape.bsdf.{name}.value" for name in ("exponent", "beta", "alpha", "gamma") if name in bsdf]
-    for key in keys:
-        dr.enable_grad(params[key])
-    params.update()
-    dr.backward(loss(seed=2, seed_grad=1))
-    gradients = {key: dr.grad(params[key]).numpy().item() for key in keys}
-    for key in keys:
-        dr.disable_grad(params[key])
-    for key in keys:
-        (expected,) = differences(
-            params, key, [0], 0.03 * params[key].numpy().item(), lambda: loss(seed=1).numpy().item()
-        )
-        assert gradients[key] == pytest.approx(expected, rel=0.05), key
+    for key, gradient in gradients_of(params, keys, lambda: loss(seed=2, seed_grad=1)).items():
+        step = 0.03 * params[key].numpy().item()
+        (expected,) = differences(params, key, [0], step, lambda: loss(seed=1).numpy().item())
+        assert gradient.item() == pytest.approx(expected, rel=0.05), key

@@ -316,6 +316,13 @@ MISSING = [
 ]  # fmt: skip
 
 
+def test_walls_that_are_turned_inside_out_load_beside_others(load):
+    """Mitsuba merges shapes of equal BSDFs, but not these."""
+    wall = '<shape type="rectangle"><bsdf type="diffuse"/>{}</shape>'
+    scene, _ = load(wall.format('<boolean name="flipNormals" value="true"/>') + 2 * wall.format(""))
+    assert len(scene.shapes()) == 3
+
+
 @pytest.mark.parametrize("old, stand_in", MISSING)
 def test_missing_files(upgraded, old, stand_in):
     old = old.format('<transform name="toWorld"><scale value="2"/></transform><bsdf type="conductor"/>')
@@ -369,6 +376,7 @@ HOSTILE = {
     + "".join(f'<default name="a{k + 1}" value="{f"$a{k}" * 10}"/>' for k in range(9)) + "</scene>",
     "a parameter of many letters, often": f'<scene version="0.6.0"><default name="a" value="{"x" * 90_000}"/>'
     f'<string name="b" value="{"$a" * 40_000}"/></scene>',
+    "no amount": '<scene version="0.2.0"><bsdf type="phong"><float name="diffuseAmount" value=""/></bsdf></scene>',
     "parameter in itself": '<scene version="0.6.0"><default name="a" value="$a"/></scene>',
     "endless spectrum": '<scene version="0.6.0"><bsdf type="diffuse"><spectrum name="reflectance" '
     'filename="/dev/zero"/></bsdf></scene>',
@@ -452,8 +460,21 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
     assert time.process_time() - start < 20
 
 
-def test_what_is_no_number_is_refused(folder):
-    text = '<scene version="0.6.0"><bsdf type="phong"><float name="exponent" value="nan"/></bsdf></scene>'
+@pytest.mark.parametrize(
+    ("inside", "sentence"),
+    [
+        ('<float name="exponent" value="nan"/>', "float exponent: 'nan' is not a finite number"),
+        ('<float name="exponent" value="1e999"/>', "float exponent: '1e999' is not a finite number"),
+        ('<point name="center" x="nan"/>', "point center: 'nan' is not a finite number"),
+        (
+            '<transform name="toWorld"><matrix value="1 0 0 0"/></transform>',
+            "matrix: '1 0 0 0' is not 16 finite numbers",
+        ),
+        ('<transform name="toWorld"><lookat up="0,1"/></transform>', "lookat: '0,1' is not 3 finite numbers"),
+    ],
+)
+def test_what_is_no_number_is_refused(folder, inside, sentence):
+    text = f'<scene version="0.6.0"><bsdf type="phong">{inside}</bsdf></scene>'
     (folder / "scene.xml").write_text(text)
-    with pytest.raises(ValueError, match="float exponent: 'nan' is not a number"):
+    with pytest.raises(ValueError, match=sentence):
         upgrade(folder / "scene.xml")

@@ -147,16 +147,3 @@ def test_without_the_extra_it_is_warned_of():
     assert run.stderr.count("UserWarning") == run.stderr.count("pip install karellen-llvm-core") == 1
     chosen = python(f"{NO_EXTRA}\nimport mi_brdfs; print(mi_brdfs.mitsuba.llvm.problem())", library=BAD)
     assert f"unset {llvm.VARIABLE}" in chosen.stdout and "pip install karellen-llvm-core" in chosen.stdout
-
-
-@pytest.mark.parametrize(
-    "system, machine, advice",
-    [
-        ("linux", "x86_64", "pip install karellen-llvm-core"),
-        ("linux", "aarch64", "package manager"),
-        ("darwin", "arm64", "metal_ad"),
-        ("win32", "AMD64", "releases"),
-    ],
-)
-def test_advice_suits_the_platform(system, machine, advice):
-    assert advice in llvm.install_advice(system, machine)

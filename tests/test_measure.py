@@ -4,22 +4,8 @@ import numpy as np
 import pytest
 
 from mi_brdfs.probe.chi_square import chi_square
-from mi_brdfs.probe.directions import direction, from_plane, on_side, to_plane
+from mi_brdfs.probe.directions import direction
 from mi_brdfs.probe.partition import partitions
-from mi_brdfs.probe.variates import lattice, sampling_efficiency
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_the_plane_seen_from_the_normal(side):
-    """Seen from above, the light to the left: its mirror direction is on the right, and what is to the right of
-    somebody who looks along the light is further down. Distances from the centre are angles."""
-    wi = direction(40, 70).astype(np.float64)
-    axis = wi[:2] / np.hypot(*wi[:2])
-    right = np.cross(wi * [-1, -1, 0], [0, 0, 1])
-    w = np.stack([wi, wi * [-1, -1, 1], right / np.linalg.norm(right) * np.sin(0.3) + [0, 0, np.cos(0.3)]])
-    x, y = to_plane(on_side(w, side), axis)
-    np.testing.assert_allclose([x, y], [[-40, 40, 0], [0, 0, -np.degrees(0.3)]], atol=1e-5)
-    np.testing.assert_allclose(from_plane(x, y, side, axis), on_side(w, side), atol=1e-6)
 
 
 @pytest.mark.parametrize("width", [1e-3, 0.03, 1])
@@ -57,16 +43,3 @@ def test_chi_square_has_its_distribution():
     for expected in (np.full(300, 50.0), np.geomspace(0.01, 200, 300)):
         p = [chi_square(rng.poisson(expected), expected).p_value for _ in range(500)]
         assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.035)
-
-
-def test_lattices_fill_the_cube():
-    points = lattice(12, 1).astype(np.float64)
-    assert points.shape[1] == 3 and points.min() >= 0 and points.max() < 1
-    product = np.prod(points, axis=1).reshape(16, -1).mean(axis=1)
-    assert abs(product - 1 / 8).max() < 2e-3
-
-
-def test_efficiency():
-    """1 for equal weights, the part of the samples that are not black for equal and black ones, and 0 for none."""
-    weights = np.array([[0.7, 0.7, 0.7, 0.7], [0.7, 0, 0, 0.7], [0, 0, 0, 0], [1, 2, 3, 4]])
-    np.testing.assert_allclose(sampling_efficiency(weights), [1, 0.5, 0, 2.5**2 / 7.5])

@@ -160,7 +160,7 @@ def test_the_command(tmp_path):
     assert status == 0 and "CSV" in text and "% of its peak" in text
     assert run(path, tmp_path / "z.csv")[0] == 0
     for words, answer in (
-        ((path, path), "onto itself"),
+        ((path, path), "the command reads this file; write to another one"),
         ((path, tmp_path / "y.binary", "-D", "alpha=1"), "no parameter but quantity"),
         (("wardd", path), 'did you mean "ward"?'),
         (("ward", tmp_path), "it is a folder"),

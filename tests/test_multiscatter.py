@@ -110,10 +110,15 @@ def test_what_is_smooth_loses_nothing_and_stays_as_it_was():
     np.testing.assert_allclose(compensated, plain, atol=1e-3)
 
 
-@pytest.mark.parametrize("way", ["walk", "kulla-conty", "turquin"])
-@pytest.mark.parametrize("name", ["rough", pytest.param("brushed, rough", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "way"),
+    [
+        *(("rough", way) for way in ("walk", "kulla-conty", "turquin")),
+        pytest.param("brushed, rough", "walk", marks=pytest.mark.slow),
+    ],
+)
 def test_a_checker_finds_nothing(name, way):
-    assert_bsdf(facets(way, ROUGHNESS[name], f0=0.5))
+    assert_bsdf(facets(way, ROUGHNESS[name], f0=0.5), angles=60)
 
 
 @pytest.mark.parametrize("name", ROUGHNESS)
@@ -121,14 +126,6 @@ def test_samples_are_as_good_as_they_were(name):
     """Those of anisotropic facets are worse than .95 where little is lost, too."""
     plain, compensated = (efficiencies(facets(way, ROUGHNESS[name], f0=0.9), (5, 30, 60)) for way in ("none", "walk"))
     assert (compensated > np.minimum(plain, 0.96) - 0.01).all()
-
-
-@pytest.mark.parametrize("given", [
-    {"type": "microfacet", "shadowing": "vcavity"}, {"type": "metallicroughness", "shadowing": "ibl"},
-])  # fmt: skip
-def test_other_shadowing_terms_are_refused(given):
-    with pytest.raises(RuntimeError, match="multiscatter does not belong to shadowing"):
-        mi.load_dict({**given, "multiscatter": "walk"})
 
 
 @pytest.mark.parametrize("given", [

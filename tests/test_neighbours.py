@@ -3,9 +3,6 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
-
-import mi_brdfs
 
 
 def picture(bsdf, folder):
@@ -47,19 +44,6 @@ def test_attributes_of_meshes_are_parameters(plugin, numbers, colours, tmp_path)
     actual, expected, default = (picture({"type": plugin} | given, tmp_path) for given in (of_mesh, uniform, {}))
     np.testing.assert_allclose(actual, expected, atol=1e-5)
     assert abs(default - expected).max() > 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-def test_mitsubas_own_chi2_test_passes():
-    """With its own adapter and grid, for every plugin with its defaults."""
-    angles = (20, 60)
-    for name in mi_brdfs.list_models():
-        for theta in angles:
-            wi = [float(np.sin(np.radians(theta))), 0.0, float(np.cos(np.radians(theta)))]
-            sample, pdf = BSDFAdapter(name, {"type": name}, wi=wi)
-            test = ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, ires=16, seed=theta)
-            assert test.run(test_count=len(angles) * len(mi_brdfs.list_models()), quiet=True), f"{name} at {theta}°"
 
 
 @pytest.mark.slow

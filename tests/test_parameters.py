@@ -7,59 +7,40 @@ from support import call, direction
 
 from mi_brdfs.mitsuba.errors import one_line
 
-NAN, INF = float("nan"), float("inf")
-RGB = {"type": "rgb", "value": [0.1, 0.2, 0.3]}
-SPECTRUM = {"type": "spectrum", "value": [(400, 0.1), (700, 0.9)]}
-
-# plugin, parameters → what the message must contain
+# What values of a wrong kind, or out of range, are told is drawn in test_malformed.
 # ruff: noqa: E501
 REJECTED = [
     ("ward", {"alpha": 2.7}, "ward: alpha = 2.7 is not allowed; it must be a number in [0.0001, 2] or a texture."),
-    ("ward", {"alpha": NAN}, "ward: alpha = nan is not allowed; it must be"),
-    ("ward", {"alpha_v": -INF, "alpha_u": 0.1}, "ward: alpha_v = -inf is not allowed; it must be"),
     ("ward", {"alpha": True}, "ward: alpha = True is a boolean; it must be a number in"),
-    ("ward", {"alpha": "rough"}, 'ward: alpha = "rough" is a string; it must be a number in'),
-    ("ward", {"alpha": RGB}, "is a colour; it must be a number in"),
-    ("ward", {"alpha": SPECTRUM}, "is a spectrum; it must be a number in"),
-    ("ward", {"alpha": {"type": "diffuse"}}, "ward: alpha = SmoothDiffuse is a BSDF; it must be a number in"),
-    ("ward", {"alpha": [1, 2, 3]}, "ward: alpha = [1, 2, 3] is a vector; it must be a number in"),
     ("ward", {"alpha": 0.1, "alpha_u": 0.1}, "ward: alpha excludes alpha_u; give either alpha or alpha_u and alpha_v."),
     ("walter", {"alpha_u": 0.1}, "walter: alpha_u needs alpha_v beside it; give both, or alpha alone."),
     ("ward", {"variant": "wrad"}, 'ward: variant = "wrad" is unknown; it must be one of "balanced", "ward", "ward-duer" or'),
-    ("ward", {"variant": 3}, 'ward: variant = 3 is unknown; it must be one of "balanced"'),
     ("lambert", {"reflectance": 1.5}, "lambert: reflectance = 1.5 is not allowed; it must be a number, rgb or spectrum within [0, 1]"),
-    ("lambert", {"reflectance": {"type": "rgb", "value": [0.1, 2, 0]}}, "lambert: reflectance = [0.1, 2, 0] is not allowed"),
     ("lambert", {"reflectance": {"type": "spectrum", "value": [(400, 0.1), (700, 1.9)]}}, "lambert: reflectance = "),
-    ("lambert", {"reflectance": -0.1}, "lambert: reflectance = -0.1 is not allowed"),
-    ("lambert", {"reflectance": NAN}, "lambert: reflectance = nan is not allowed"),
-    ("lambert", {"reflectance": "red"}, 'lambert: reflectance = "red" is a string; it must be a number, rgb or spectrum'),
     ("ward", {"roughness": 0.1}, "ward: unknown parameter roughness; did you mean alpha?"),
-    ("lambert", {"reflectanse": 0.1}, "lambert: unknown parameter reflectanse; did you mean reflectance?"),
-    ("phong", {"alpha": 0.1}, "phong: unknown parameter alpha; known are diffuse_reflectance, "),
     ("walter", {"f0": 0.04, "int_ior": 1.5}, "walter: f0 excludes int_ior; give one of eta and k, material, f0, int_ior and"),
     ("walter", {"material": "Au", "eta": 1.5, "k": 1.0}, "walter: eta excludes material; give one of"),
     ("walter", {"eta": 1.5}, "walter: eta needs k beside it."),
     ("walter", {"material": "gold"}, 'walter: material = "gold" is unknown; did you mean "Au"? It must be "none", for F = 1, or one of Mitsuba\'s'),
-    ("walter", {"material": "Au_palik"}, 'walter: material = "Au_palik" is unknown; did you mean "Cu_palik"? It must be "none"'),
-    ("walter", {"material": 3}, "walter: material = 3 is a number; it must be a name."),
     ("walter", {"int_ior": "glas"}, 'walter: int_ior = "glas" is unknown; it must be a number or one of vacuum, helium'),
-    ("walter", {"int_ior": 0}, "walter: int_ior = 0 is not allowed; it must be a number in [0.01, 100]"),
-    ("walter", {"rotation": NAN}, "walter: rotation = nan is not allowed"),
     ("kurt", {"alpha_1": 0.1, "alpha_3": 0.1}, "kurt: alpha_3 leaves a gap; number the lobes from 1, so that this one is 2."),
     ("kurt", {"alpha": 0.1, "f0_1": 0.1}, "kurt: alpha excludes f0_1; number the names of all lobes, or of none."),
     ("kurt", {"alpha_u_1": 0.1}, "kurt: alpha_u_1 needs alpha_v_1 beside it; give both, or alpha_1 alone."),
     ("lafortune", {"cx_9": 1.0}, "lafortune: unknown parameter cx_9; did you mean cx_"),
     ("orennayar", {"sigma": 0.3, "alpha": 0.3}, "orennayar: sigma excludes alpha; give either sigma or alpha."),
-    ("orennayar", {"alpha": 3}, "orennayar: alpha = 3 is not allowed; it must be a number in [0, 2.2] or a texture."),
-    ("roughdiffuse", {"use_fast_approx": 1}, "roughdiffuse: use_fast_approx = 1 is a number; it must be true or false."),
     ("microfacet", {"gamma": 2}, 'microfacet: gamma does not belong to distribution = "beckmann", which has alpha, alpha_u and alpha_v of its own.'),
     ("microfacet", {"distribution": "gtr", "alpha_u": 0.1}, 'alpha_u does not belong to distribution = "gtr", which has alpha and gamma'),
     ("microfacet", {"kurt_exponent": 0.2}, 'kurt_exponent does not belong to shadowing = "smith", which has multiscatter of its own.'),
     ("microfacet", {"distribution": "phong"}, 'microfacet: distribution = "phong" is unknown; it must be one of "beckmann", "ggx"'),
     ("microfacet", {"distribution": "abc"}, 'shadowing = "smith" is not known for distribution = "abc"; take it with beckmann, ggx or blinn,'),
     ("microfacet", {"distribution": "hepd", "shadowing": "schlick"}, 'shadowing = "schlick" is not known for distribution = "hepd"; take it with'),
+    ("walter", {"f82": 0.5}, "f82 needs f0 beside it"),
+    ("walter", {"material": "Au", "f90": 0.5}, "excludes f90"),
+    ("walter", {"f0": 0.5, "film_thickness": 300.0}, "film_thickness needs a conductor or a dielectric beside it; give eta and k"),
+    ("microfacet", {"distribution": "abc", "shadowing": "vcavity", "haze": 0.5}, 'haze is not known for distribution = "abc"; take it with'),
+    ("microfacet", {"shadowing": "vcavity", "multiscatter": "walk"}, "multiscatter does not belong to shadowing"),
+    ("metallicroughness", {"shadowing": "ibl", "multiscatter": "walk"}, "multiscatter does not belong to shadowing"),
     ("nishino", {"variant": "dsbrdf", "f0": 0.1}, 'nishino: f0 does not belong to variant = "dsbrdf", which has no parameter of its own.'),
-    ("brady", {"specular_reflectance": -1.0}, "brady: specular_reflectance = -1 is not allowed; it must be a number, rgb or spectrum within [0, ∞)"),
 ]  # fmt: skip
 
 
@@ -144,12 +125,3 @@ def test_rotation_turns_counter_clockwise_from_dp_du(variant):
     tall, wide = {"alpha_u": 0.05, "alpha_v": 0.4}, {"alpha_u": 0.4, "alpha_v": 0.05}
     assert value(20, **tall, rotation=0.25) == pytest.approx(value(20, **wide), rel=1e-4)
     assert value(45, **wide, rotation=0.125) > 10 * value(-45, **wide, rotation=0.125)
-
-
-@pytest.mark.parametrize("material", ["Au", "Cu", "none"])
-def test_materials_are_mitsubas(material, variant):
-    """In spectral and in mono variants, too, where Mitsuba makes something else of the same spectra."""
-    ours = mi.load_dict({"type": "walter", "material": material})
-    theirs = mi.load_dict({"type": "roughconductor", "distribution": "ggx", "material": material})
-    wi, wo, ctx = direction(20)[None], direction(25, 180)[None], mi.BSDFContext()
-    np.testing.assert_allclose(call(ours.eval, ctx, wi, wo)[0], call(theirs.eval, ctx, wi, wo)[0], rtol=1e-4)

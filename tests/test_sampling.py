@@ -6,8 +6,8 @@ import itertools
 import mitsuba as mi
 import numpy as np
 import pytest
-from catalogue import FIRST_ROWS, OTHER_VARIANTS, REPRESENTATIVES, ROWS, mostly_slow
-from support import call, chi_square, context, direction, hemisphere, is_scalar
+from catalogue import REPRESENTATIVES, ROWS, mostly_slow
+from support import call, chi_square, context, direction, hemisphere
 
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
@@ -58,56 +58,6 @@ def test_passes_the_checker(row):
     too."""
     report = check(row.bsdf, angles=(60,), only=EXACT)
     assert report.passed, report
-
-
-ELSEWHERE = [
-    pytest.param(variant.values[0], row, id=f"{variant.values[0]} {row}", marks=pytest.mark.slow)
-    for variant in OTHER_VARIANTS
-    for row in (REPRESENTATIVES if variant.values[0].startswith("scalar") else FIRST_ROWS.values())
-]
-"""Variants other than the checker's, with a row of each plugin, or where nothing has to be compiled of each choice."""
-
-
-@pytest.mark.parametrize("variant_name, row", ELSEWHERE, indirect=["variant_name"], scope="module")
-def test_weights_and_reciprocity(row, variant):
-    """With eval_pdf = (eval, pdf), and eval_pdf_sample both at once; and values are reciprocal where the model is."""
-    bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
-    count = 40 if is_scalar() else 20_000
-    rng = np.random.default_rng(3)
-    wi, other = hemisphere(count, 1), hemisphere(count, 2)
-    u, v = rng.random((count, 1)).astype(np.float32), rng.random((count, 2)).astype(np.float32)
-    wo, pdf, weight = call(bsdf.sample, ctx, wi, u, v)
-    wo = wo.astype(np.float32)
-    value, density = call(bsdf.eval_pdf, ctx, wi, wo)
-    np.testing.assert_allclose(density, pdf, rtol=1e-4, atol=1e-6)
-    drawn = (density > 0).ravel()
-    assert drawn.mean() > 0.3
-    np.testing.assert_allclose(weight[drawn], value[drawn] / density[drawn], rtol=1e-4, atol=1e-7)
-    assert not weight[~drawn].any()
-    np.testing.assert_array_equal(call(bsdf.eval, ctx, wi, wo)[0], value)
-    np.testing.assert_array_equal(call(bsdf.pdf, ctx, wi, wo)[0], density)
-
-    both = call(bsdf.eval_pdf_sample, ctx, wi, other, u, v)
-    np.testing.assert_allclose(both[0], call(bsdf.eval, ctx, wi, other)[0], rtol=1e-5)
-    np.testing.assert_allclose(both[1], call(bsdf.pdf, ctx, wi, other)[0], rtol=1e-5)
-    np.testing.assert_allclose(both[2], wo, atol=1e-6)
-    np.testing.assert_allclose(both[4], weight, rtol=1e-4, atol=1e-7)
-
-    if row.reciprocal:
-        wi, wo = near_mirrors(count)
-        forth, back = call(bsdf.eval, ctx, wi, wo)[0], call(bsdf.eval, ctx, wo, wi)[0]
-        assert forth.max() > 0
-        np.testing.assert_allclose(forth * wi[:, 2:], back * wo[:, 2:], rtol=1e-4, atol=1e-12)
-
-
-@functools.cache
-def near_mirrors(count):
-    """Pairs of directions, half of them near each other's mirror direction, where narrow lobes are."""
-    wi, wo = hemisphere(count, 5), hemisphere(count, 6)
-    near = wo[::2] * 0.03 + wi[::2] * [-1, -1, 1]
-    near[:, 2] = np.maximum(near[:, 2], 0.02)
-    wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
-    return wi, wo
 
 
 @functools.cache

@@ -23,13 +23,10 @@ def named(bsdf):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-def test_pi_belongs_to_the_light_or_to_the_brdf():
+def test_lights_add_up_and_the_sum_is_clamped_or_compressed():
+    """π belongs to the light, or to the BRDF."""
     assert shade(WHITE, SUN) == pytest.approx(ALBEDO, rel=1e-5)
     assert shade(WHITE, SUN, pi_folded=False) == pytest.approx(ALBEDO / np.pi, rel=1e-5)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_lights_add_up_and_the_sum_is_clamped_or_compressed():
     suns = [SUN] * 3
     assert shade(WHITE, *suns, clamp=False) == pytest.approx(3 * ALBEDO, rel=1e-5)
     assert shade(WHITE, *suns) == 1
@@ -81,9 +78,13 @@ def test_area_lights_are_sampled_all_over():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-def test_area_lights_are_seen():
-    before_the_camera = lamp("disk", radiance=3.0, to_world=T())
+def test_lights_are_seen_and_cast_shadows():
+    """Unless they are asked not to."""
+    before_the_camera = lamp("disk", radiance=3.0, to_world=T().translate([0, 0, 1]))
     np.testing.assert_allclose(shaded(plate(WHITE, before_the_camera, clamp=False), spp=1), 3, rtol=1e-5)
+    roof = {"type": "rectangle", "to_world": T().translate([0, 0, 7]).scale(20), "bsdf": WHITE}
+    assert shade(WHITE, SUN, roof) == 0
+    assert shade(WHITE, SUN, roof, shadows=False) == pytest.approx(ALBEDO, rel=1e-5)
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -91,13 +92,6 @@ def test_environments_shine_and_only_their_mean_is_clamped():
     """A single sample is far above 1."""
     sky = {"type": "constant", "radiance": 0.25}
     assert shade(WHITE, sky, spp=20000) == pytest.approx(ALBEDO * np.pi * 0.25, rel=0.02)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_lights_cast_shadows_unless_they_are_asked_not_to():
-    roof = {"type": "rectangle", "to_world": T().translate([0, 0, 7]).scale(20), "bsdf": WHITE}
-    assert shade(WHITE, SUN, roof) == 0
-    assert shade(WHITE, SUN, roof, shadows=False) == pytest.approx(ALBEDO, rel=1e-5)
 
 
 # --- Ambient light --------------------------------------------------------------------------------------------------

@@ -62,14 +62,21 @@ def check_layers():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-def test_layers_add_up():
+def test_what_is_behind_is_seen_through():
+    """Layers of masks, blends with null, masks within a shape group, and a medium, which is left out. Without shadows a
+    veil takes no light away."""
     check_layers()
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_blends_with_null_are_seen_through():
     blended = {"type": "blendbsdf", "weight": 0.5, "a": GREY, "b": {"type": "null"}}
     assert seen(veil(blended))[0] == pytest.approx(through(0.5), rel=1e-5)
+    group = {"type": "shapegroup", "veil": veil(mask(0.3)), "id": "leaves"}
+    instance = {"type": "instance", "group": {"type": "ref", "id": "leaves"}}
+    assert seen(group, instance)[0] == pytest.approx(through(0.3), rel=1e-5)
+    fog = {"type": "homogeneous", "albedo": 0.5, "sigma_t": 1.0}
+    cloud = {"type": "sphere", "radius": 2, "interior": fog, "bsdf": {"type": "null"}}
+    assert seen(cloud)[0] == pytest.approx(BEHIND, rel=1e-5)
+    sensor = {"type": "orthographic", "to_world": from_above(), "film": film(), "medium": fog}
+    assert shaded(plate(WHITE, SUN, sensor=sensor), spp=1).mean() == pytest.approx(BEHIND, rel=1e-5)
+    assert seen(veil(mask(0.3)), shadows=False)[0] == pytest.approx(0.3 * VEIL + 0.7 * BEHIND, rel=1e-5)
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -83,11 +90,6 @@ def test_masks_cut_shapes_out():
     sun = {"type": "directional", "direction": [1, 0, -1], "irradiance": 2**0.5}
     row = shaded(plate(WHITE, sun, leaf, size=8), spp=1)[4, :, 0]
     np.testing.assert_allclose(row, [0.8, 0.8, VEIL, VEIL, 0, 0, 0.8, 0.8], atol=1e-5)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_without_shadows_a_veil_takes_no_light_away():
-    assert seen(veil(mask(0.3)), shadows=False)[0] == pytest.approx(0.3 * VEIL + 0.7 * BEHIND, rel=1e-5)
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -115,22 +117,6 @@ def test_thin_glass_is_seen_through_and_thick_is_not():
     passed = 1 - 2 * once / (1 + once)
     assert seen(veil({"type": "thindielectric"}))[0] == pytest.approx(passed**2 * BEHIND, rel=1e-3)
     assert seen(veil({"type": "dielectric"}))[0] == 0
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_media_are_left_out():
-    fog = {"type": "homogeneous", "albedo": 0.5, "sigma_t": 1.0}
-    cloud = {"type": "sphere", "radius": 2, "interior": fog, "bsdf": {"type": "null"}}
-    assert seen(cloud)[0] == pytest.approx(BEHIND, rel=1e-5)
-    sensor = {"type": "orthographic", "to_world": from_above(), "film": film(), "medium": fog}
-    assert shaded(plate(WHITE, SUN, sensor=sensor), spp=1).mean() == pytest.approx(BEHIND, rel=1e-5)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_a_mask_within_a_shape_group_is_seen_through():
-    group = {"type": "shapegroup", "veil": veil(mask(0.3)), "id": "leaves"}
-    instance = {"type": "instance", "group": {"type": "ref", "id": "leaves"}}
-    assert seen(group, instance)[0] == pytest.approx(through(0.3), rel=1e-5)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

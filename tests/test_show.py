@@ -81,8 +81,14 @@ def test_a_picture_takes_the_place_of_no_file_of_its_scene(folder, command):
     before.write(str(folder / "photo.exr"))
     (folder / "photo.xml").write_text(PICTURED.replace("NAME", "photo.exr"))
     done = run(command, "photo.xml", "--spp", 1)
-    assert done.exit_code == 2 and "photo.exr: the scene reads this file; name another picture with -o" in done.stderr
+    assert done.exit_code == 2 and "photo.exr: the command reads this file; write to another one" in done.stderr
     assert image(folder / "photo.exr").shape == (2, 2, 3) and not (folder / "photo.png").exists()
+
+
+def test_a_seed_that_would_be_another_is_refused():
+    """Passes distinguish 2^32 of them."""
+    done = run("show", "ward", "--seed", 1 << 32)
+    assert done.exit_code == 2 and "'--seed'" in done.stderr
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes here")
@@ -112,7 +118,7 @@ WRONG = [
     (["show", "scene.xml"], "scene.xml has several materials; show one of scene.xml:ball, scene.xml:moon"),
     (["show", "gone.xml"], "gone.xml: no such file"),
     (["show", "gone.xml:a"], "gone.xml:a: "),  # and no emoji
-    ([*RENDER, "--sensor", "2"], "--sensor 2: there is no such sensor; there are 0 (front), 1 (away)"),
+    ([*RENDER, "--sensor", "2"], "--sensor 2: there is no such sensor; the scene's sensors are 0 (front) and 1 (away)"),
     ([*RENDER, "--sensor", "side"], "--sensor side: there is no such sensor"),
     ([*RENDER, "--crop", "1,2,3"], "--crop 1,2,3: write four whole numbers, X,Y,WIDTH,HEIGHT"),
     ([*RENDER, "--crop", "40,0,16,8"], "--crop 40,0,16,8: it is not within the picture, which has 48 x 32 pixels"),

@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, context, direction, sphere
+from support import call, context, direction
 
 SHEET = {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5}
 
@@ -15,24 +15,6 @@ def test_flags(variant):
     assert bsdf.flags(1) == int(flags.DiffuseTransmission | flags.FrontSide | flags.NonSymmetric)
     with pytest.raises(RuntimeError, match="transmission"):
         mi.load_dict({"type": "twosided", "inner": SHEET})
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_each_lobe_has_its_side():
-    """Component and type mask mean the same, and the lobes add up to the whole."""
-    bsdf, flags = mi.load_dict(SHEET), mi.BSDFFlags
-    wo, rng = sphere(20_000, 1), np.random.default_rng(2)
-    wi, u, v = np.tile(direction(40), (20_000, 1)), rng.random((20_000, 1)), rng.random((20_000, 2))
-    lobes = []
-    for component, mask, side in [(0, flags.DiffuseReflection, 1), (1, flags.DiffuseTransmission, -1)]:
-        for ctx in (context(component), context(mask=mask)):
-            value, pdf = call(bsdf.eval_pdf, ctx, wi, wo)
-            assert not value[wo[:, 2] * side < 0].any() and not pdf[wo[:, 2] * side < 0].any()
-            sampled, _, weight = call(bsdf.sample, ctx, wi, u, v)
-            assert (sampled[:, 2] * side > 0).all() and (weight > 0).all()
-        lobes.append(value)
-    np.testing.assert_allclose(call(bsdf.eval, context(), wi, wo)[0], sum(lobes), rtol=1e-5)
-    assert all(lobe.any() for lobe in lobes)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -26,6 +26,7 @@ from mutants import (
     in_spectra,
     lambert,
     of_others,
+    stranger,
     without_fields,
     wrapped,
 )
@@ -35,8 +36,12 @@ from test_cli import invoke
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.validation import CHECKS, check
+from mi_brdfs.validation import run as run_of_checks
+from mi_brdfs.validation.incidents import random_incidents
 from mi_brdfs.validation.runner import ANGLES
 
+DIFFUSE, FRONT = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.FrontSide
+BOTH_SIDES = FRONT | mi.BSDFFlags.BackSide
 QUICK: dict[str, Mutant] = {}
 """A mutant for each check, of Lambert's model if there is one."""
 for each in sorted(MUTANTS, key=lambda it: not issubclass(it.model, Lambert)):
@@ -114,110 +119,84 @@ def test_mueller_matrices(method, fault):
 def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
     """By a density of four steps of the cosine, whose sum is taken where that key is said to have changed."""
 
-    class Steps(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.m_flags = int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide)
-            self.m_components, self.table = [self.m_flags], mi.Float([0.1, 0.4, 0.2, 0.3])
-            self.parameters_changed([])
+    def begin(self):
+        self.table = mi.Float([0.1, 0.4, 0.2, 0.3])
+        self.parameters_changed()
 
-        def traverse(self, callback):
-            callback.put("table", self.table, mi.ParamFlags.Differentiable)
+    def parameters_changed(self, keys=()):
+        if not keys or key in keys:
+            self.mean = dr.mean(self.table)
 
-        def parameters_changed(self, keys=()):
-            if not keys or key in keys:
-                self.mean = dr.mean(self.table)
+    def eval_pdf(self, ctx, si, wo, active=True):
+        step = dr.gather(mi.Float, self.table, mi.UInt(dr.clip(wo.z * 4, 0, 3)))
+        pdf = dr.select(active & (wo.z > 0) & (si.wi.z > 0), step / (dr.two_pi * self.mean), 0)
+        return mi.Color3f(0.5 * pdf), pdf
 
-        def pdf(self, ctx, si, wo, active=True):
-            step = dr.gather(mi.Float, self.table, mi.UInt(dr.clip(wo.z * 4, 0, 3)))
-            return dr.select(active & (wo.z > 0) & (si.wi.z > 0), step / (dr.two_pi * self.mean), 0)
+    def sample(self, ctx, si, u, v, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = mi.warp.square_to_uniform_hemisphere(v)
+        bs.pdf, bs.eta, bs.sampled_type = self.pdf(ctx, si, bs.wo, active), 1, self.m_flags
+        return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
 
-        def eval(self, ctx, si, wo, active=True):
-            return mi.Color3f(0.5 * self.pdf(ctx, si, wo, active))
+    def traverse(self, callback):
+        callback.put("table", self.table, mi.ParamFlags.Differentiable)
 
-        def eval_pdf(self, ctx, si, wo, active=True):
-            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
-
-        def sample(self, ctx, si, u, v, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo = mi.warp.square_to_uniform_hemisphere(v)
-            bs.pdf, bs.eta, bs.sampled_type = self.pdf(ctx, si, bs.wo, active), 1, self.m_flags
-            return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
-
-    mi.register_bsdf("steps", Steps)
-    assert check({"type": "steps"}, only="updates").verdict("updates") == verdict
+    methods = {"parameters_changed": parameters_changed, "traverse": traverse}
+    steps = stranger("steps", DIFFUSE | FRONT, begin=begin, eval_pdf=eval_pdf, sample=sample, **methods)
+    assert check(steps, only="updates").verdict("updates") == verdict
 
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(("says", "bends"), [(0.3, False), (0.7, False), (0.3, True)])
 def test_what_goes_straight_through(says, bends):
-    class Veil(mi.BSDF):
-        """It lets .3 of the light through, and absorbs the rest."""
+    """Of a veil that lets .3 of the light through, and absorbs the rest."""
 
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
-            self.m_components = [int(mi.BSDFFlags.DiffuseReflection | sides), int(mi.BSDFFlags.Null | sides)]
-            self.m_flags = self.m_components[0] | self.m_components[1]
+    def sample(self, ctx, si, u, v, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = mi.Vector3f(si.wi.x, si.wi.y, -si.wi.z) if bends else -si.wi
+        bs.pdf, bs.eta, bs.sampled_component, bs.sampled_type = 1, 1, 1, int(mi.BSDFFlags.Null)
+        return bs, dr.select(active & (u < 0.5), mi.Color3f(0.6), 0)
 
-        def sample(self, ctx, si, u, v, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo = mi.Vector3f(si.wi.x, si.wi.y, -si.wi.z) if bends else -si.wi
-            bs.pdf, bs.eta, bs.sampled_component, bs.sampled_type = 1, 1, 1, int(mi.BSDFFlags.Null)
-            return bs, dr.select(active & (u < 0.5), mi.Color3f(0.6), 0)
+    def eval_null_transmission(self, si, active=True):
+        return mi.Color3f(says)
 
-        def eval_null_transmission(self, si, active=True):
-            return mi.Color3f(says)
-
-    mi.register_bsdf("veil", Veil)
-    assert check({"type": "veil"}, only="null").verdict("null") == ("pass" if says == 0.3 and not bends else "fail")
+    kinds = DIFFUSE | BOTH_SIDES, mi.BSDFFlags.Null | BOTH_SIDES
+    veil = stranger("veil", *kinds, sample=sample, eval_null_transmission=eval_null_transmission)
+    assert check(veil, only="null").verdict("null") == ("pass" if says == 0.3 and not bends else "fail")
 
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
-    ("density", "mirrors", "fails"), [(0.5, (-1, -1), ""), (1, (-1, -1), "deltas"), (0.5, (-1, 1), "deltas")]
+    ("density", "lopsided", "fails"), [(0.5, False, ""), (1, False, "deltas"), (0.5, True, "deltas")]
 )
-def test_mirrors_are_drawn_as_they_say_and_turn_with_the_light(density, mirrors, fails):
-    class Polish(mi.BSDF):
-        """Half of the samples are those of a mirror, the others of a diffuse surface."""
+def test_mirrors_are_drawn_as_they_say_and_turn_with_the_light(density, lopsided, fails):
+    """Half of the samples are those of a mirror, the others of a diffuse surface."""
+    kinds = DIFFUSE, mi.BSDFFlags.DeltaReflection
 
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            kinds = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection
-            self.m_components = [int(kind | mi.BSDFFlags.FrontSide) for kind in kinds]
-            self.m_flags = self.m_components[0] | self.m_components[1]
+    def shares(ctx):
+        own = [ctx.is_enabled(kind, k) for k, kind in enumerate(kinds)]
+        return [it / max(sum(own), 1) for it in own]
 
-        def sample(self, ctx, si, u, v, active=True):
-            bs, (drawn, mirrored) = dr.zeros(mi.BSDFSample3f), self.shares(ctx)
-            mirror = mi.Bool(u >= drawn)
-            reflected = mi.Vector3f(mirrors[0] * si.wi.x, mirrors[1] * si.wi.y, si.wi.z)
-            bs.wo = dr.select(mirror, reflected, mi.warp.square_to_cosine_hemisphere(v))
-            kinds = int(mi.BSDFFlags.DeltaReflection), int(mi.BSDFFlags.DiffuseReflection)
-            bs.sampled_type, bs.eta = dr.select(mirror, *map(mi.UInt32, kinds)), 1
-            bs.sampled_component = dr.select(mirror, mi.UInt32(1), 0)
-            stated = density if drawn else 1
-            bs.pdf = dr.select(mirror, stated, self.pdf(ctx, si, bs.wo))
-            active &= (si.wi.z > 0) & (drawn + mirrored > 0)
-            bs.pdf &= active
-            return bs, dr.select(active, mi.Color3f(0.5 / max(drawn, mirrored, 0.1)), 0)
+    def sample(self, ctx, si, u, v, active=True):
+        bs, (drawn, mirrored) = dr.zeros(mi.BSDFSample3f), shares(ctx)
+        mirror = mi.Bool(u >= drawn)
+        reflected = mi.Vector3f(-si.wi.x, si.wi.y if lopsided else -si.wi.y, si.wi.z)
+        bs.wo = dr.select(mirror, reflected, mi.warp.square_to_cosine_hemisphere(v))
+        bs.sampled_type, bs.eta = dr.select(mirror, *(mi.UInt32(int(kind)) for kind in reversed(kinds))), 1
+        bs.sampled_component = dr.select(mirror, mi.UInt32(1), 0)
+        stated = density if drawn else 1
+        bs.pdf = dr.select(mirror, stated, self.pdf(ctx, si, bs.wo))
+        active &= (si.wi.z > 0) & (drawn + mirrored > 0)
+        bs.pdf &= active
+        return bs, dr.select(active, mi.Color3f(0.5 / max(drawn, mirrored, 0.1)), 0)
 
-        def shares(self, ctx):
-            own = [
-                ctx.is_enabled(kind, k)
-                for k, kind in enumerate((mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.DeltaReflection))
-            ]
-            return [own[k] / max(sum(own), 1) for k in range(2)]
+    def eval_pdf(self, ctx, si, wo, active=True):
+        share = shares(ctx)[0]
+        pdf = dr.select(active & (si.wi.z > 0) & (wo.z > 0), dr.inv_pi * wo.z, 0)
+        return mi.Color3f(0.5 * (share > 0) * pdf), share * pdf
 
-        def eval(self, ctx, si, wo, active=True):
-            f = 0.5 * dr.inv_pi * (self.shares(ctx)[0] > 0)
-            return mi.Color3f(dr.select(active & (si.wi.z > 0) & (wo.z > 0), f * wo.z, 0))
-
-        def pdf(self, ctx, si, wo, active=True):
-            share = self.shares(ctx)[0] * dr.inv_pi
-            return dr.select(active & (si.wi.z > 0) & (wo.z > 0), share * wo.z, 0)
-
-    mi.register_bsdf("polish", Polish)
-    report = check({"type": "polish"}, only=["components", "deltas", "flags", "weight", "pdf"], angles=(60,))
+    polish = stranger("polish", *(kind | FRONT for kind in kinds), sample=sample, eval_pdf=eval_pdf)
+    report = check(polish, only="deltas" if fails else ["components", "deltas", "flags", "weight", "pdf"], angles=60)
     assert {finding.check for finding in report.failures} == set(fails.split()), report
 
 
@@ -231,30 +210,21 @@ def test_wavelengths_in_another_order():
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("behind", [1.0, 0.8])
 def test_light_through_a_sheet_goes_back_as_it_came(behind):
-    class Sheet(mi.BSDF):
-        """It lets half of the light through, evenly; from behind less, or as much."""
+    """Which lets half of the light through, evenly; from behind less, or as much."""
 
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.m_components = [int(mi.BSDFFlags.DiffuseTransmission | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide)]
-            self.m_flags = self.m_components[0]
+    def sample(self, ctx, si, u, v, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        up = mi.warp.square_to_cosine_hemisphere(v)
+        bs.wo = mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, -up.z, up.z))
+        bs.pdf, bs.eta, bs.sampled_type = up.z * dr.inv_pi, 1, int(mi.BSDFFlags.DiffuseTransmission)
+        return bs, self.eval(ctx, si, bs.wo, active) / bs.pdf
 
-        def sample(self, ctx, si, u, v, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            up = mi.warp.square_to_cosine_hemisphere(v)
-            bs.wo = mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, -up.z, up.z))
-            bs.pdf, bs.eta, bs.sampled_type = up.z * dr.inv_pi, 1, int(mi.BSDFFlags.DiffuseTransmission)
-            return bs, self.eval(ctx, si, bs.wo, active) / bs.pdf
+    def eval_pdf(self, ctx, si, wo, active=True):
+        pdf = dr.select(active & (si.wi.z * wo.z < 0), dr.abs(wo.z) * dr.inv_pi, 0)
+        return mi.Color3f(dr.select(si.wi.z > 0, 0.5, 0.5 * behind) * pdf), pdf
 
-        def eval(self, ctx, si, wo, active=True):
-            f = dr.select(si.wi.z > 0, 0.5, 0.5 * behind) * dr.inv_pi
-            return mi.Color3f(dr.select(active & (si.wi.z * wo.z < 0), f * dr.abs(wo.z), 0))
-
-        def pdf(self, ctx, si, wo, active=True):
-            return dr.select(active & (si.wi.z * wo.z < 0), dr.abs(wo.z) * dr.inv_pi, 0)
-
-    mi.register_bsdf("sheet", Sheet)
-    assert check({"type": "sheet"}, only="reciprocity").verdict("reciprocity") == ("pass" if behind == 1 else "fail")
+    sheet = stranger("sheet", mi.BSDFFlags.DiffuseTransmission | BOTH_SIDES, sample=sample, eval_pdf=eval_pdf)
+    assert check(sheet, only="reciprocity").verdict("reciprocity") == ("pass" if behind == 1 else "fail")
 
 
 @pytest.mark.slow
@@ -269,7 +239,6 @@ RIGHT = {
     "phong sharp": {"type": "phong", "exponent": 300.0, **TWO},
     "ward anisotropic": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3},
     "walter": {"type": "walter", "alpha": 0.3, **TWO},
-    "walter sharp": {"type": "walter", "alpha": 1e-3},
     "burley": {"type": "burley", "clearcoat": 0.5, "sheen": 0.5},
     "transmission": {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5},
     "roughconductor sharp": {"type": "roughconductor", "alpha": 1e-3},
@@ -284,7 +253,7 @@ RIGHT = {
 )
 def test_what_is_right_passes(name):
     """The models that the mutants are made of among them."""
-    report = check(RIGHT[name], name=name)
+    report = check(RIGHT[name], name=name, angles=ANGLES if name == "lambert" else 60)
     assert report.passed, report
     assert {finding.check for finding in report.findings} == set(CHECKS)
     judged = {finding.check for finding in report.findings if finding.verdict == "pass"}
@@ -294,9 +263,14 @@ def test_what_is_right_passes(name):
     assert judged >= set(CHECKS) - skipped
 
 
-def case(only, plugin, **given):
-    """The checks to make, and the dict to check."""
-    return only.split(), {"type": plugin, **given}
+def look_at_few_directions(monkeypatch):
+    """Of those at random, beside the angles that are asked for: a suspect one takes up to a second."""
+    monkeypatch.setattr(run_of_checks, "random_incidents", lambda part, count: random_incidents(part, count // 4))
+
+
+def case(only, plugin, angles=ANGLES, **given):
+    """The checks to make, the dict to check, and the angles that show the false alarm."""
+    return {"only": only.split(), "angles": angles}, {"type": plugin, **given}
 
 
 def texels(raw):
@@ -310,15 +284,15 @@ FALSE_ALARMS = {
     "derivatives that cancel": case("active", "ward", rotation=0.3),
     "many turns": case("gradients", "ward", rotation=100.0, alpha_u=0.1, alpha_v=0.4),
     "a narrow round lobe, turned": case("gradients", "ward", alpha_u=1e-4, alpha_v=1e-4, rotation=76.0),
-    "line of ward": case(NARROW, "ward", alpha_u=0.906, alpha_v=0.0003),
+    "line of ward": case(NARROW, "ward", 60, alpha_u=0.906, alpha_v=0.0003),
     "line of walter": case(NARROW, "walter", alpha_u=0.5, alpha_v=0.001),
-    "line at the normal": case(NARROW, "ward", variant="ward", alpha_u=0.00015),
-    "hard edges": case(NARROW, "toon", diffuse_threshold=0.62, specular_reflectance=1.0, specular_smooth=0.0),
+    "line at the normal": case(NARROW, "ward", 0, variant="ward", alpha_u=0.00015),
+    "hard edges": case(NARROW, "toon", 80, diffuse_threshold=0.62, specular_reflectance=1.0, specular_smooth=0.0),
     "a lobe below the horizon": case("chi2 pdf", "lafortune", cx=-0.4, cy=-1.5, cz=-1.5),
     "a black band": case("chi2 pdf", "toon", diffuse_threshold=1.0, diffuse_smooth=0.0),
     "peaks far narrower than steps": case("gradients", "schlick", roughness=1e-6, isotropy=0.01, rotation=0.3),
     "turns that float32 hardly knows": case("gradients", "ward", rotation=1e4, alpha_v=0.01),
-    "lines at the horizon": case("chi2 pdf", "schlick", roughness=1.1e-5, variant="interreflection"),
+    "lines at the horizon": case("chi2 pdf", "schlick", 60, roughness=1.1e-5, variant="interreflection"),
     "beyond what a choice leaves of a range": case("gradients", "cooktorrance", distribution="blinn", alpha=1.5),
     "narrow along and across": case(NARROW, "walter", alpha_u=0.0041, alpha_v=0.00035),
     "diffuse lobe beside facets": case("albedo", "walter", diffuse_reflectance=0.9, f0=0.9),
@@ -327,7 +301,7 @@ FALSE_ALARMS = {
     "gradients of textures": case("textures", "bumpmap", arbitrary=texels(True), a={"type": "diffuse"}),
     "index above one as a colour": case("colours spectral", "low", variant="microfacet", int_ior=1.006),
     "tints": case("colours spectral", "burley", sheen=1.0, sheen_tint=1.0, spec_tint=1.0, base_color=0.5),
-    "a lobe opposite to the normal": case("pdf chi2", "lafortune", cz=-1.5, exponent=0.0, diffuse_reflectance=0.2),
+    "a lobe opposite to the normal": case("pdf chi2", "lafortune", 0, cz=-1.5, exponent=0.0, diffuse_reflectance=0.2),
     "a narrow lobe far below the horizon": case(
         "pdf chi2", "lafortune", cx=1.5, cy=-1.5, cz=-1.5, exponent=11546.6, normalization="none"
     ),
@@ -361,9 +335,11 @@ each finding passes, and none is skipped."""
         for name in FALSE_ALARMS | ALL_PASS
     ],
 )
-def test_no_false_alarm(name):
-    only, given = (FALSE_ALARMS | ALL_PASS)[name]
-    report = check(given, only=only)
+def test_no_false_alarm(name, monkeypatch):
+    asked, given = (FALSE_ALARMS | ALL_PASS)[name]
+    if asked["angles"] is not ANGLES:
+        look_at_few_directions(monkeypatch)
+    report = check(given, **asked)
     assert not report.failures and report.judged, report
     if name in ALL_PASS:
         assert {finding.verdict for finding in report.findings if finding.subject != "wi and wo"} == {"pass"}, report
@@ -489,8 +465,9 @@ def test_the_density_of_roughplastic_goes_below_the_horizon():
     """A fault of Mitsuba 3.9's: its pdf is not cut off at the horizon, and negative there."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
-        assert "raised" not in str(check({"type": "roughplastic"}, only="chi2"))
-    report = check({"type": "roughplastic"}, only=["horizon", "finite", "weight", "eval_pdf", "support", "components"])
+        assert "raised" not in str(check({"type": "roughplastic"}, only="chi2", angles=60))
+    only = ["horizon", "finite", "weight", "eval_pdf", "support", "components"]
+    report = check({"type": "roughplastic"}, only=only, angles=60)
     assert {finding.check for finding in report.failures} == {"horizon", "finite"}
     assert all("pdf is" in finding.message for finding in report.failures)
 
@@ -499,18 +476,18 @@ def test_the_density_of_roughplastic_goes_below_the_horizon():
 @pytest.mark.usefixtures("llvm_rgb")
 def test_directions_beside_those_asked_for_are_looked_at():
     """With Beckmann's distribution Mitsuba approximates the masking in its density: at 82°, by 0.3 %."""
-    report = check({"type": "roughconductor"}, only=["pdf"])
-    (finding,) = report.failures
+    (finding,) = check({"type": "roughconductor"}, only=["pdf"], angles=60).failures
     assert "for light from θ = 81" in finding.message and "more like it" not in finding.message
     assert check({"type": "roughconductor"}, only=["pdf"], angles=(82,)).failures[0].data["82°"]["integral"] < 0.97
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-def test_refraction():
+def test_refraction(monkeypatch):
     """A rough dielectric, whose samples lie on both sides, seen from both."""
+    look_at_few_directions(monkeypatch)
     only = ["finite", "horizon", "support", "eval_pdf", "flags", "components", "pdf", "chi2"]
-    report = check({"type": "roughdielectric", "alpha": 0.3, "distribution": "ggx"}, only=only, angles=(30, 80))
+    report = check({"type": "roughdielectric", "alpha": 0.3, "distribution": "ggx"}, only=only, angles=60)
     assert not [finding for finding in report.failures if finding.subject == "whole"], report
 
 
@@ -549,80 +526,56 @@ def test_delta_functions_carry_what_they_carry_alone():
     ],
 )
 def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
-    class Glass(mi.BSDF):
-        """The smooth surface of glass."""
+    """Of the smooth surface of glass."""
+    kinds = mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.NonSymmetric
 
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
-            kinds = mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.NonSymmetric
-            self.m_components = [int(kind | sides) for kind in kinds]
-            self.m_flags = self.m_components[0] | self.m_components[1]
+    def sample(self, ctx, si, u, v, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        reflects, passes = (
+            ctx.is_enabled(kind, k) for k, kind in enumerate((kinds[0], mi.BSDFFlags.DeltaTransmission))
+        )
+        r, cos, eta, inverse = mi.fresnel(si.wi.z, 1.5)
+        share = r if reflects and passes else mi.Float(1 if reflects else 0)
+        mirrored = mi.Bool(u < share)
+        bs.wo = dr.select(mirrored, mi.reflect(si.wi), mi.refract(si.wi, cos, inverse))
+        bs.eta = dr.select(mirrored, 1, inverse if fault == "eta of the other way" else eta)
+        bs.pdf = dr.select(mirrored, share, 1 - share) & (reflects or passes) & active
+        bs.sampled_component = dr.select(mirrored, mi.UInt32(0), 1)
+        through = kinds[0] if fault == "all reflected" else mi.BSDFFlags.DeltaTransmission
+        bs.sampled_type = dr.select(mirrored, mi.UInt32(int(kinds[0])), mi.UInt32(int(through)))
+        light = dr.select(mirrored, r, (1 - r) * inverse**2) / bs.pdf
+        light *= {"bright": 1.05, "no number": dr.nan}.get(fault, 1)
+        if fault == "darker at grazing":
+            light *= abs(si.wi.z)
+        return bs, dr.select(bs.pdf > 0, mi.Color3f(light), 0)
 
-        def sample(self, ctx, si, u, v, active=True):
-            bs, kinds = dr.zeros(mi.BSDFSample3f), (mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission)
-            reflects, passes = (ctx.is_enabled(kind, k) for k, kind in enumerate(kinds))
-            r, cos, eta, inverse = mi.fresnel(si.wi.z, 1.5)
-            share = r if reflects and passes else mi.Float(1 if reflects else 0)
-            mirrored = mi.Bool(u < share)
-            bs.wo = dr.select(mirrored, mi.reflect(si.wi), mi.refract(si.wi, cos, inverse))
-            bs.eta = dr.select(mirrored, 1, inverse if fault == "eta of the other way" else eta)
-            bs.pdf = dr.select(mirrored, share, 1 - share) & (reflects or passes) & active
-            bs.sampled_component = dr.select(mirrored, mi.UInt32(0), 1)
-            types = [int(kinds[0]), int(kinds[0 if fault == "all reflected" else 1])]
-            bs.sampled_type = dr.select(mirrored, *map(mi.UInt32, types))
-            light = dr.select(mirrored, r, (1 - r) * inverse**2) / bs.pdf
-            light *= {"bright": 1.05, "no number": dr.nan}.get(fault, 1)
-            if fault == "darker at grazing":
-                light *= abs(si.wi.z)
-            return bs, dr.select(bs.pdf > 0, mi.Color3f(light), 0)
+    def eval_pdf(self, ctx, si, wo, active=True):
+        return mi.Color3f(0.1 if fault == "values" else 0), mi.Float(0)
 
-        def eval(self, ctx, si, wo, active=True):
-            return mi.Color3f(0.1 if fault == "values" else 0)
-
-        def pdf(self, ctx, si, wo, active=True):
-            return mi.Float(0)
-
-        def eval_pdf(self, ctx, si, wo, active=True):
-            return self.eval(ctx, si, wo, active), mi.Float(0)
-
-    mi.register_bsdf("glass", Glass)
-    report = check({"type": "glass"}, only=["albedo", "deltas", "active", "calls"])
+    glass = stranger("glass", *(kind | BOTH_SIDES for kind in kinds), sample=sample, eval_pdf=eval_pdf)
+    report = check(glass, only=["albedo", "deltas", "active", "calls"])
     assert report.passed == (not fault) and told in str([it.data for it in report.failures]) + str(report), report
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("circular", "verdict"), [(0.5, "pass"), (1.5, "fail")])
 def test_delta_functions_polarize_no_more_than_fully(circular, verdict):
+    """Of a mirror of the intensity and of a part of the circular polarization."""
+
+    def sample(self, ctx, si, u, v, active=True):
+        bs, matrix = dr.zeros(mi.BSDFSample3f), dr.zeros(mi.Spectrum)
+        bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
+        lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
+        bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
+        if not mi.is_polarized:
+            return bs, dr.select(lit, mi.Spectrum(1), 0)
+        matrix[0, 0], matrix[3, 3] = mi.UnpolarizedSpectrum(1), mi.UnpolarizedSpectrum(circular)
+        return bs, matrix & lit
+
     for variant in ("llvm_ad_spectral_polarized", "llvm_ad_rgb"):  # that of the check, and the usual one
         mi.set_variant(variant)
-
-        class Foil(mi.BSDF):
-            """A mirror of the intensity and of a part of the circular polarization."""
-
-            def __init__(self, props):
-                mi.BSDF.__init__(self, props)
-                self.m_flags = int(mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.FrontSide)
-                self.m_components = [self.m_flags]
-
-            def sample(self, ctx, si, u, v, active=True):
-                bs, matrix = dr.zeros(mi.BSDFSample3f), dr.zeros(mi.Spectrum)
-                bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
-                lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
-                bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
-                if not mi.is_polarized:
-                    return bs, dr.select(lit, mi.Spectrum(1), 0)
-                matrix[0, 0], matrix[3, 3] = mi.UnpolarizedSpectrum(1), mi.UnpolarizedSpectrum(circular)
-                return bs, matrix & lit
-
-            def eval(self, ctx, si, wo, active=True):
-                return dr.zeros(mi.Spectrum)
-
-            def pdf(self, ctx, si, wo, active=True):
-                return mi.Float(0)
-
-        mi.register_bsdf("foil", Foil)
-    assert check({"type": "foil"}, only="polarization").verdict("polarization") == verdict
+        foil = stranger("foil", mi.BSDFFlags.DeltaReflection | FRONT, sample=sample)
+    assert check(foil, only="polarization").verdict("polarization") == verdict
 
 
 @pytest.mark.slow
@@ -687,7 +640,7 @@ def test_loaded_bsdfs_and_reports():
 def test_variants():
     """Spectral variants do; in scalar ones a dict is checked in another, and a loaded BSDF is refused."""
     with mi.variant_context("llvm_ad_spectral"):
-        assert check({"type": "walter", "material": "Au", "alpha": 0.3}).passed
+        assert check({"type": "walter", "material": "Au", "alpha": 0.3}, angles=60).passed
     with mi.variant_context("scalar_rgb"):
         assert check({"type": "ward"}, only=["weight"]).passed and mi.variant() == "scalar_rgb"
         with pytest.raises(ValueError, match="scalar_rgb cannot be checked"):
@@ -726,27 +679,20 @@ def test_command_in_several_processes(tmp_path):
     assert page.count("<section") == 3 and page.count("<image") >= 9
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_the_command_at_once():
-    """Also if only the first of its processes receives the signal."""
-    command = [sys.executable, "-m", "mi_brdfs", "check", "--all", "-j", "2"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(8)
-    process.send_signal(signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=10)
-    assert (process.returncode, stdout, stderr) == (130, "", "Interrupted; nothing was written.\n")
-
-
-@pytest.mark.parametrize("sent", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
-def test_jobs_end_with_a_command_that_is_killed(sent):
-    """They hold its output open."""
+@pytest.mark.parametrize(
+    "sent", [signal.SIGKILL, *(pytest.param(it, marks=pytest.mark.slow) for it in (signal.SIGTERM, signal.SIGINT))]
+)
+def test_jobs_end_with_the_command(sent):
+    """They hold its output open. Ctrl-C, here a signal that only the first of the processes receives, is told of."""
     command = [sys.executable, "-m", "mi_brdfs", "check", "ward", "walter", "-j", "2"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while sum("--multiprocessing-fork" in it.cmdline() for it in psutil.Process(process.pid).children()) < 2:
         time.sleep(0.05)
     process.send_signal(sent)
-    process.communicate(timeout=20)
+    stdout, stderr = process.communicate(timeout=20)
+    if sent == signal.SIGINT:
+        assert (process.returncode, stdout, stderr) == (130, "", "Interrupted; nothing was written.\n")
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from mi_brdfs.probe.arrays import interaction, vectors
 from mi_brdfs.probe.sources import find_sources, shared, split
 from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
-from mi_brdfs.validation.formats import block, junit
+from mi_brdfs.validation.formats import junit
 
 BRIGHT = {"diffuse_reflectance": 0.8, "specular_reflectance": 0.8}
 PHONG = (
@@ -54,7 +54,7 @@ def test_what_gains_energy_in_a_channel_fails():
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_what_gains_as_much_as_its_page_says_is_noted():
-    """Also on two sides. Unless energy is to be conserved."""
+    """Also on two sides. Unless energy is to be conserved. No page says that one of Mitsuba's gains any."""
     words = "It gains energy, as {} says (1.89): light from 89° is reflected 1.19"
     for bsdf, who in ((WHITE, "its page"), ({"type": "twosided", "inner": WHITE}, "the page of burley")):
         found = albedo(bsdf)
@@ -64,15 +64,8 @@ def test_what_gains_as_much_as_its_page_says_is_noted():
     assert (
         "as its page says (no limit)" in albedo({"type": "schlick", "variant": "plain"} | {"roughness": 1e-3}).message
     )
-    assert albedo({"type": "burley"}).verdict == "pass"
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-def test_no_page_says_that_mitsubas_bsdfs_gain():
-    """A gain is not judged where the sampler is at fault: principled's density is not the one that it draws from."""
-    assert albedo({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}}).verdict == "skip"
-    assert albedo({"type": "twosided", "inner": {"type": "diffuse", "reflectance": 1.0}}).verdict == "pass"
+    for keeps in {"type": "burley"}, {"type": "twosided", "inner": {"type": "diffuse", "reflectance": 1.0}}:
+        assert albedo(keeps).verdict == "pass"
 
 
 @pytest.mark.slow
@@ -115,6 +108,7 @@ EXCEEDS = [
         "diffuse_reflectance + specular_reflectance_1 + specular_reflectance_2 = 1.1, but",
     ),
     ({"type": "walter", "diffuse_reflectance": 0.5}, "specular_reflectance = 1.5, but"),
+    ({"type": "phong", "diffuse_reflectance": {"type": "spectrum", "value": 0.9}}, "specular_reflectance = 1.1, but"),
 ]
 HARMLESS = [
     {"type": "phong", "diffuse_reflectance": 0.8},
@@ -240,22 +234,6 @@ def test_junit():
     assert failed[0].text.splitlines() == ["one is 2", "one is 1", "At wi = [0.0, 0.0, 1.0], seed = 11."]
     assert noted[0].tag == "system-out" and skipped[0].get("message") == "It takes\ufffd two < variants."
     assert other.get("failures") == "0"
-
-
-@pytest.mark.parametrize("width", [60, 200])
-def test_a_block_fits_the_terminal(width):
-    """Words stay whole, except an id that is longer than a line."""
-    name = f"scene.xml:{'a' * 100}"
-    lines = [line for line, _ in block(Report(name, FINDINGS), width)]
-    assert max(map(len, lines)) <= width
-    text = "".join(lines[:2] if width < 100 else lines[:1])
-    assert text == f"{name}: FAILED" or text.replace(":FAILED", ": FAILED") == f"{name}: FAILED"
-    words = {word for line in lines for word in line.replace(",", " ").split()}
-    assert {finding.check for finding in FINDINGS} <= words
-    assert " ".join(" ".join(lines).split()).endswith(
-        "weight, whole: one is 2 (and 1 more like it). At wi = [0.0, 0.0, 1.0], seed = 11. "
-        "albedo, whole: It gains energy, as its page says (1.60)."
-    )
 
 
 SCENE = """<scene version="3.0.0"><default name="n" value="10"/>

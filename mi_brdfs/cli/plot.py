@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from .app import command
+from .files import check_output
 from .options import (
     FIGURES,
+    Labels,
     TracingVariant,
     file_option,
     material_argument,
@@ -17,7 +19,7 @@ from .options import (
     set_tracing_variant,
     writing_to,
 )
-from .terminal import Exit, fail, failing, out, stdout_to_stderr
+from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 
 @command(
@@ -53,9 +55,7 @@ def plot(
         bool, typer.Option("--side-by-side", help="Draw each BSDF in a panel of its own, for polar, cartesian.")
     ] = False,
     title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure.")] = None,
-    labels: Annotated[
-        str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
-    ] = None,
+    labels: Labels = None,
     size: Annotated[
         str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels. Default: as needed.")
     ] = None,
@@ -83,8 +83,9 @@ def plot(
             size=asked.size_of(size),
         )
     file = output or asked.default_file(kind, targets)
+    check_output("-o", file)
     set_tracing_variant(variant)
-    with stdout_to_stderr():
+    with stdout_to_stderr(), err.status(f"Drawing {file.name}"):
         with failing(Exit.USAGE):
             bsdfs = asked.asked_for(targets, parameters or [])
             figure = asked.KINDS[kind](*bsdfs, **options)

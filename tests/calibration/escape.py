@@ -3,7 +3,7 @@ quadrature in float64, and what becomes of the rest, by random walks.
 
     python tests/calibration/escape.py [--check]
 
-Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if every fifth row and column made anew, of fewer
+Writes mi_brdfs/microfacet/escape.npz; with --check, exits with 1 if every seventh row and column made anew, of fewer
 walks, differ from it by more than their noise. The walks of Beckmann's facets serve for Blinn's, too, which have about
 the same shapes.
 """
@@ -424,7 +424,7 @@ if __name__ == "__main__":
         np.savez_compressed(FILE, **made(WALKS))
         print(f"{FILE}: {FILE.stat().st_size} bytes")
         sys.exit()
-    wrong, step, first = False, 5, sum(COUNTS["lost"])
+    wrong, step, first = False, 7, sum(COUNTS["lost"])
     with np.load(FILE) as kept:
         for name, table in made(WALKS >> 4, step).items():
             error = abs(table.astype(float) - kept[name][::step, ::step])
