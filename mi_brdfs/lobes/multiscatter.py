@@ -21,22 +21,21 @@ class MultipleScattering(Lobe):
     colour: with C = 1 all that the lobe loses is reflected (C. Kulla and A. Conty, Revisiting physically based shading
     at Imageworks, in: Physically based shading in theory and practice, SIGGRAPH 2017 courses). Reciprocal.
 
-    Draw cos²θ from the density b (1 + b)/(b + cos²θ)²: that is from the cosine on rough surfaces, where b is large, and
-    towards grazing angles on smooth ones, which lose light there.
+    Draw cos²θ from a density ∝ 1/(b + cos²θ): that is from the cosine on rough surfaces, where b is large, and towards
+    grazing angles on smooth ones, which lose light there.
     """
 
-    GRAZING = 12
-    """b over 1 - Ē where that is small: about the best for GGX and Beckmann, of all roughnesses."""
+    GRAZING = 30
+    """b over (1 - Ē)^1.5. A tenth of it costs .1 of the efficiency of this lobe, and three times as much up to .05."""
 
     def __init__(self, lobe: MicrofacetLobe, walks: Walks, uniform: Callable[[str, Any], Any]) -> None:
         self.anisotropic, self.walks, self.mean = lobe.anisotropic, walks, walks.mean
         self.fresnel = uniform("fresnel", lobe.fresnel.combination())
         self.colours = uniform("colours", self.between(lobe.reflectance))
         lost = dr.maximum(self.mean.lost, EPSILON)
-        b, typical = self.GRAZING * lost * (1 + 5 * lost), luminance(self.colour(self.mean, self.mean))
-        self.b, self.norm, self.scale, self.typical = uniform(
-            "lobe", (b, dr.inv_pi * b * (1 + b), dr.inv_pi / lost, typical)
-        )
+        b = self.GRAZING * lost * dr.sqrt(lost)
+        kept = b, dr.log(1 + dr.rcp(b)), dr.inv_pi / lost, luminance(self.colour(self.mean, self.mean))
+        self.b, self.norm, self.scale, self.typical = uniform("lobe", kept)
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         """Return what of the colour is the same for all directions."""
@@ -57,11 +56,11 @@ class MultipleScattering(Lobe):
         i, o = self.walks.of(wi), self.walks.of(wo)
         # What is the same for all directions of wi comes first, so that Dr.Jit computes it once.
         value = self.colour(i, o) * (i.lost * self.scale * (o.lost * wo.z))
-        return value, self.norm * wo.z * dr.square(dr.rcp(self.b + wo.z * wo.z))
+        return value, wo.z * dr.inv_pi / ((self.b + wo.z * wo.z) * self.norm)
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         # The angle is that of visible normals, too, which Dr.Jit computes once.
-        cos2, (sin_phi, cos_phi) = self.b * v.y * dr.rcp(self.b + 1 - v.y), dr.sincos(dr.two_pi * v.x)
+        cos2, (sin_phi, cos_phi) = self.b * (dr.exp(v.y * self.norm) - 1), dr.sincos(dr.two_pi * v.x)
         sin = safe_sqrt(1 - cos2)
         return mi.Vector3f(sin * cos_phi, sin * sin_phi, safe_sqrt(cos2))
 

@@ -276,7 +276,8 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
     above = Places.of(upright, phi, u, v)
     places = Places.joined(above, Places.of(chebyshev(13), phi, u, v, stretched=True))
     stretched = np.arange(len(places.cos)) >= len(above.cos)
-    everywhere = Places.of(NODES, np.pi / 2 * (np.arange(16) + 0.5) / 16, u, v)
+    # Smooth surfaces lose what they lose near the horizon.
+    everywhere = Places.of(NODES**3, np.pi / 2 * (np.arange(16) + 0.5) / 16, u, v)
     losses = np.array([
         blinn_lost(cos, u) if shape == "blinn" else lost(shape, cos, angle, u, v)
         for cos, angle in zip(places.cos, places.phi, strict=True)
@@ -290,6 +291,8 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale = np.minimum(1 / (1 - loss), 3)
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
+        # The lobe that has this loss is divided by its mean: let it be that of what is looked up.
+        polynomial = polynomial.astype(np.float16).astype(float)
         means, *later = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
         weights = 0.02 + lost_at(above, polynomial, bend)
         others = [
@@ -386,7 +389,7 @@ def after_the_first(
     def mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
         return np.sum(values * weights, axis=1, keepdims=True) / np.sum(weights)
 
-    loss = np.tile(WEIGHTS, 16) / 16 * 2 * everywhere.cos * loss
+    loss = np.tile(WEIGHTS * 3 * NODES**2, 16) / 16 * 2 * everywhere.cos * loss
     left = loss * at(everywhere, "left")[0]
     second, third = mean(at(everywhere, "second"), loss), mean(at(everywhere, "third"), left)
     between = mean(at(everywhere, "between"), left)
