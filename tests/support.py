@@ -24,6 +24,8 @@ from mi_brdfs.probe.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
 
 ROOT = Path(__file__).parent.parent
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
+"""A measured file of a paint, of the goniometer at Lund."""
 
 
 def shared(*parts: str) -> Path:
