@@ -265,28 +265,6 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     assert {"index.html", "overview.png", "lambert.png"} <= {path.name for path in folder.iterdir()}
 
 
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize(
-    "arguments, status, text",
-    [
-        (["wrad"], 2, "There is no model 'wrad'; did you mean "),
-        (["ward", "-o", "taken"], 1, "cannot write to the folder taken: "),
-        (["ward", "--variant", "llvm"], 1, "there is no variant llvm"),
-    ],
-)
-def test_an_error_is_one_line(folder, arguments, status, text):
-    (folder / "taken").touch()
-    done = run(*arguments)
-    assert done.exit_code == status and done.stdout == ""
-    assert done.stderr.startswith(f"mi-brdfs: {text}") and done.stderr.count("\n") == 1
-    assert [path.name for path in folder.iterdir()] == ["taken"]
-
-
-def test_a_picture_has_a_largest_size():
-    done = run("ward", "--size", 99999999)
-    assert done.exit_code == 2 and "16384" in done.stderr
-
-
 def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, monkeypatch):
     def refused(dir):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))

@@ -2,8 +2,6 @@
 
 import os
 import re
-import subprocess
-import sys
 import time
 
 import mitsuba as mi
@@ -102,30 +100,6 @@ def test_a_comment_is_not_the_root(folder):
     assert run("show", "ward.xml", "--spp", 1, "--size", 16).exit_code == 0
 
 
-RENDER = "render", "scene.xml", "--variant", "scalar_rgb"
-WRONG = [
-    (["explore", "ward", "--host", ""], "--host: name an address of this machine, or 0.0.0.0 for all of them"),
-    (["show", "wrad"], 'there is no plugin "wrad"; did you mean "ward"?'),
-    (["show", "ward", "--stage", "opera"], "--stage opera: there is no such stage; there are studio, lamp, point"),
-    (["show", "ward", "-Dalpha"], "-D alpha: write -D name=value"),
-    (["show", "ward", "--param", "alpha=7"], "ward: alpha = 7 is not allowed; it must be a number in"),
-    (["show", "scene.xml"], "scene.xml has several materials; show one of scene.xml:ball, scene.xml:moon"),
-    (["show", "gone.xml"], "gone.xml: no such file"),
-    (["show", "gone.xml:a"], "gone.xml:a: "),  # and no emoji
-    ([*RENDER, "--sensor", "2"], "--sensor 2: there is no such sensor; there are 0 (front), 1 (away)"),
-    ([*RENDER, "--sensor", "side"], "--sensor side: there is no such sensor"),
-    ([*RENDER, "--crop", "1,2,3"], "--crop 1,2,3: write four whole numbers, X,Y,WIDTH,HEIGHT"),
-    ([*RENDER, "--crop", "40,0,16,8"], "--crop 40,0,16,8: it is not within the picture, which has 48 x 32 pixels"),
-]
-
-
-@pytest.mark.parametrize("words, text", WRONG)
-def test_it_says_what_is_wrong(folder, words, text):
-    done = run(*words, *["--spp", "1"] * (words[0] != "explore"))
-    assert done.exit_code == 2 and done.stdout == ""
-    assert text in done.stderr and done.stderr.count("\n") == 1, done.stderr
-
-
 def test_a_part_of_the_picture(folder):
     """With as many samples, it is that of the whole, within its noise."""
     words = "render", "scene.xml", "--variant", "llvm_ad_rgb", "--spp", 1024
@@ -179,10 +153,3 @@ def test_denoised_edges_have_no_lines():
     clean = denoise(noise).mean(axis=2)
     assert clean.shape == (45, 90)
     np.testing.assert_allclose([clean[-1].mean(), clean[:, -1].mean()], 1, atol=0.005)
-
-
-def test_the_name_of_the_package_is_the_command():
-    done = subprocess.run(
-        [sys.executable, "-m", "mi_brdfs", "render", "-h"], capture_output=True, text=True, timeout=60
-    )
-    assert done.returncode == 0 and "Usage: mi-brdfs render" in done.stdout, done.stderr

@@ -1,0 +1,38 @@
+"""What users type that is wrong is told in one sentence, before anything is written."""
+
+import shlex
+import shutil
+
+import pytest
+from support import LOFT, ROOT
+from test_cli import invoke
+from test_show import SCENE
+
+ROWS = [
+    line.split(" | ")
+    for line in (ROOT / "tests" / "rows" / "refusals.txt").read_text(encoding="utf-8").splitlines()
+    if not line.startswith("#")
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("refused")
+    (folder / "scene.xml").write_text(SCENE)
+    shutil.copy(ROOT / "scenes" / "cornell_box.xml", folder / "room.xml")
+    shutil.copy(LOFT, folder / "paint.bsdf")
+    (folder / "file").touch()
+    (folder / "taken.png").mkdir()
+    return folder
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("status, words, told", ROWS, ids=lambda it: it)
+def test_what_is_wrong_is_told_in_a_sentence(folder, monkeypatch, status, words, told):
+    monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
+    before = sorted(folder.rglob("*"))
+    done = invoke(*shlex.split(words), cwd=folder)
+    assert (done.exit_code, done.stdout) == (int(status), ""), done.output
+    assert done.stderr.startswith("mi-brdfs: ") and done.stderr.count("\n") == 1
+    assert all(part in done.stderr for part in told.split(" … ")), done.stderr
+    assert sorted(folder.rglob("*")) == before
