@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import tracemalloc
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -37,6 +38,12 @@ def shared(*parts: str) -> Path:
     return path
 
 
+def rows(name: str) -> list[str]:
+    """The rows of a table in ``rows``, without its comments."""
+    text = (ROOT / "tests" / "rows" / name).read_text(encoding="utf-8")
+    return [row for row in text.splitlines() if not row.startswith("# ")]
+
+
 def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     """Uniform directions with cosines of at least ``lowest``, shape (count, 3), float32."""
     return directions.hemisphere(count, seed, lowest)
@@ -64,6 +71,16 @@ def written(folder: Path, name: str, content: str | bytes) -> Path:
     path = folder / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
+
+
+def traced(function) -> tuple:
+    """What a function returns, the bytes that are left of it, and those that it took at most."""
+    tracemalloc.start()
+    try:
+        result = function()
+        return result, *tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
 
 
 class Page(HTMLParser):

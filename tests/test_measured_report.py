@@ -2,13 +2,12 @@
 
 import dataclasses
 import json
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 from merl_tables import centres, lowest, write
-from support import ROOT, spherical
+from support import ROOT, spherical, traced
 from test_cli import invoke
 
 from mi_brdfs import plot
@@ -109,11 +108,7 @@ SCATTERED = Samples(*(spherical(*np.random.default_rng(k).random((2, 20)) * 60) 
     ],
 )
 def test_many_wavelengths_take_little_memory(function, megabytes):
-    tracemalloc.start()
-    function()
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < megabytes * 1e6
+    assert traced(function)[2] < megabytes * 1e6
 
 
 def test_directions_that_are_none_are_refused():
@@ -328,10 +323,3 @@ def test_albedos_are_drawn_beside_those_that_are_stated(lambert):
     curve, stated, _ = lines(plot.measured(goniometer(stated={0.0: [0.7], np.pi / 3: [0.3]})).axes[2])
     assert curve[1][0] == pytest.approx(0.75, rel=0.01) and curve[0][-1] == 60
     np.testing.assert_allclose(stated, [[0, 60], [0.7, 0.3]])
-
-
-def test_several_files_have_a_row_each(lambert):
-    figure = plot.measured(lambert, goniometer())
-    assert [row.get_suptitle() for row in figure.subfigs] == ["lambert.binary", "paint.bsdf"]
-    with pytest.raises(ValueError, match="no measured file"):
-        plot.measured()

@@ -4,15 +4,9 @@ import shlex
 import shutil
 
 import pytest
-from support import LOFT, ROOT
+from support import LOFT, ROOT, rows
 from test_cli import invoke
 from test_show import SCENE
-
-ROWS = [
-    line.split(" | ")
-    for line in (ROOT / "tests" / "rows" / "refusals.txt").read_text(encoding="utf-8").splitlines()
-    if not line.startswith("#")
-]
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +21,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("status, words, told", ROWS, ids=lambda it: it)
+@pytest.mark.parametrize("status, words, told", [row.split(" | ") for row in rows("refusals.txt")], ids=lambda it: it)
 def test_what_is_wrong_is_told_in_a_sentence(folder, monkeypatch, status, words, told):
     monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
     before = sorted(folder.rglob("*"))
