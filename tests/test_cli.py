@@ -19,26 +19,12 @@ from typer.testing import CliRunner
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.mitsuba import llvm
-from mi_brdfs.mitsuba.errors import one_line
 from mi_brdfs.probe.sources import value_of
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
 TURNED = '<rotate y="1" angle="180"/>'
-SCENE = """<scene version="3.0.0">
-  <default name="res" value="24"/>
-  <default name="spp" value="3"/>
-  <default name="material" value="diffuse"/>
-  <integrator type="path"/>
-  <sensor type="perspective">
-    <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
-    <film type="hdrfilm"><integer name="width" value="$res"/><integer name="height" value="$res"/></film>
-    <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
-  </sensor>
-  <shape type="obj" id="sheet"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
-  <emitter type="constant"/>
-</scene>
-"""
+SCENE = (ROOT / "tests" / "rows" / "scenes" / "sheet.xml").read_text()
 
 
 @pytest.fixture
@@ -80,16 +66,11 @@ def test_types_are_listed_and_have_pages():
     assert "alpha_u" in page and "``" not in page
 
 
-def test_help_is_in_panels_with_examples_that_can_be_typed(tmp_path, monkeypatch):
+def test_examples_of_the_help_can_be_typed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    commands = get_command(app).commands
-    panels = [it.rich_help_panel for it in commands.values()]
-    assert list(dict.fromkeys(panels)) == ["Look", "Measure", "Validate", "Develop"] and panels == sorted(
-        panels, key=["Look", "Measure", "Validate", "Develop"].index
-    )
-    for name, it in commands.items():
+    for name, it in get_command(app).commands.items():
         heading, *examples = it.epilog.split("\n\n")
-        assert heading == "Examples:" and examples
+        assert heading == "Examples:" and examples and it.rich_help_panel
         for program, command, *words in map(str.split, examples):
             assert (program, command) == ("mi-brdfs", name)
             it.make_context(name, words)  # refuses what is no option
@@ -115,11 +96,6 @@ def test_words_of_other_programs_lead_to_models(word):
     told = re.search("did you mean '(\\w+)'(?: with (\\w+)=([\\w.]+))?", done.stderr)
     with mi.variant_context("scalar_rgb"):
         mi.load_dict({"type": told[1]} | ({told[2]: value_of(told[3])} if told[2] else {}))
-
-
-def test_nothing_goes_by_a_word():
-    done = invoke("list", "--search", "zzz")
-    assert done.exit_code == 2 and "no model goes by the word zzz" in done.stderr
 
 
 def states(text):
@@ -344,11 +320,8 @@ def interrupted(folder, *arguments, running, times=1):
 
 
 @pytest.mark.usefixtures("ctrl_c")
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", pytest.param("scalar_rgb", marks=pytest.mark.slow)])
-def test_ctrl_c_keeps_what_is_finished(folder, variant):
-    if variant.startswith("llvm") and llvm.version() is None:
-        pytest.skip("no LLVM here")
-    status, out, err = interrupted(folder, *HOURS, "--variant", variant, running=r"[1-9]\d*/1000000")
+def test_ctrl_c_keeps_what_is_finished(folder):
+    status, out, err = interrupted(folder, *HOURS, "--variant", "llvm_ad_rgb", running=r"[1-9]\d*/1000000")
     assert status == 130
     assert out.split() == ["box.exr", "box.png"]
     finished = re.search(r"Interrupted; the image has the (\d+) of 1000000 samples per pixel", err)
@@ -360,25 +333,12 @@ def test_ctrl_c_keeps_what_is_finished(folder, variant):
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_a_second_ctrl_c_aborts_at_once(folder):
-    if llvm.version() is None:
-        pytest.skip("no LLVM here")
     status, out, err = interrupted(
         folder, *HOURS, "--variant", "llvm_ad_rgb", "-Dres=4096", running="Rendering", times=2
     )
     assert status == 130 and out == ""
     assert "Aborted; nothing was written." in err and "Traceback" not in err
     assert not list(folder.glob("*.exr"))
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_a_measurement(folder):
-    if llvm.version() is None:
-        pytest.skip("no LLVM here")
-    words = "energy", "burley", "walter", "--variant", "llvm_ad_rgb"
-    status, out, err = interrupted(folder, *words, running="Measuring burley")
-    assert status == 130 and out == ""
-    assert NOTHING in err and "Traceback" not in err
 
 
 @pytest.mark.usefixtures("ctrl_c")
@@ -425,16 +385,3 @@ def test_ctrl_c_that_a_kernel_wraps_is_no_error(where, arguments, sentence, fold
     monkeypatch.setattr(where, interrupted_in_a_kernel)
     done = invoke(*arguments, cwd=folder / "scenes")
     assert (done.exit_code, done.stderr) == (130, f"{sentence}\n")
-
-
-def test_errors_of_mitsuba_in_one_line():
-    traceback = (
-        '[parser.cpp:1718] At a.xml (line 13, col 6): failed to instantiate bsdf plugin of type "ward": '
-        'Traceback (most recent call last):\n  File "x.py", line 1, in f\nValueError: ward: alpha = 1.7\n is wrong.'
-    )
-    assert one_line(RuntimeError(traceback)) == "a.xml: line 13: ward: alpha = 1.7 is wrong."
-    cause = RuntimeError("render failed")
-    cause.__cause__ = ValueError("the real reason")
-    assert one_line(cause) == "the real reason"
-    assert one_line(KeyError()) == "KeyError"
-    assert "\n" not in one_line(RuntimeError("two\nlines"))
