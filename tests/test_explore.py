@@ -282,7 +282,7 @@ def test_no_kernel_is_compiled_where_a_value_changes(client, name):
                 bsdf = edited(bsdf, [control], rng)
             found = client.show(bsdf, views=views, size=64, theta=40)
             assert of(found, "subject")[0]["error"] is None and of(found, "sampler")
-        history = [it for it in dr.kernel_history() if it["type"] == dr.KernelType.JIT]
+        history = dr.kernel_history([dr.KernelType.JIT])
     assert history and all(it["cache_hit"] for it in history)
 
 
