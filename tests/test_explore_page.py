@@ -168,16 +168,13 @@ REFUSED = [
 
 
 def test_a_malformed_request_is_answered_in_a_sentence(address):
-    from aiohttp import ClientSession
+    async def conversation(page, hello, client):
+        for path, options, status, sentence in REFUSED:
+            method = "POST" if "upload" in path else "GET"
+            async with client.request(method, address + path, **options) as answer:
+                assert answer.status == status and sentence in await answer.text(), path
 
-    async def talk():
-        async with ClientSession() as client:
-            for path, options, status, sentence in REFUSED:
-                method = "POST" if "upload" in path else "GET"
-                async with client.request(method, address + path, **options) as answer:
-                    assert answer.status == status and sentence in await answer.text(), path
-
-    asyncio.run(talk())
+    connected(address, conversation)
 
 
 def test_what_is_no_request_is_refused(address):
@@ -192,35 +189,28 @@ def test_what_is_no_request_is_refused(address):
 
 
 def test_other_pages_of_the_browser_are_refused(address):
-    from aiohttp import ClientSession, WSServerHandshakeError
+    from aiohttp import WSServerHandshakeError
 
-    async def talk():
-        async with ClientSession() as client:
-            for headers in ({"Host": "evil.example"}, {"Origin": "https://evil.example"}):
-                async with client.get(address, headers=headers) as answer:
+    async def conversation(page, hello, client):
+        for headers in ({"Host": "evil.example"}, {"Origin": "https://evil.example"}):
+            for method, path in ("GET", ""), ("POST", "upload"):
+                async with client.request(method, address + path, headers=headers) as answer:
                     assert answer.status == 403
-                async with client.post(f"{address}upload", headers=headers) as answer:
-                    assert answer.status == 403
-                with pytest.raises(WSServerHandshakeError):
-                    await client.ws_connect(f"{address}socket", headers=headers)
-            for path in ("client/../server.py", "client/..%2fserver.py", "client/server.py", "etc/passwd"):
-                async with client.get(address + path) as answer:
-                    assert answer.status == 404
+            with pytest.raises(WSServerHandshakeError):
+                await client.ws_connect(f"{address}socket", headers=headers)
+        for path in ("client/../server.py", "client/..%2fserver.py", "client/server.py", "etc/passwd"):
+            async with client.get(address + path) as answer:
+                assert answer.status == 404
 
-    asyncio.run(talk())
+    connected(address, conversation)
 
 
 def uploaded(address, name, payload):
-    from aiohttp import ClientSession
-
-    async def talk():
-        async with (
-            ClientSession() as client,
-            client.post(f"{address}upload", params={"name": name}, data=payload) as answer,
-        ):
+    async def conversation(page, hello, client):
+        async with client.post(f"{address}upload", params={"name": name}, data=payload) as answer:
             return answer.status, await answer.json()
 
-    return asyncio.run(talk())
+    return connected(address, conversation)
 
 
 def test_an_uploaded_file_of_any_name_is_a_subject(address):
@@ -472,11 +462,11 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     tab.emulate_media(color_scheme="light")
     opened(tab, address)
     assert tab.locator("#chips").inner_text().split() == ["ward", "walter"]
-    assert tab.locator("#view-polar svg path").count() > 1
+    tab.locator("#view-polar .curve").first.wait_for(state="attached")
     assert tab.locator(".pictures canvas").count() == 2
     assert tab.locator("#subject-type").inner_text() == ""  # it has that name
     shown = "document.querySelector('#view-polar .curve').getAttribute('stroke').toLowerCase()"
-    assert tab.evaluate(shown) == light
+    tab.wait_for_function(f"() => {shown} === '{light}'")
     tab.locator("#theme").click()
     tab.wait_for_function(f"() => {shown} === '{dark}'")
     tab.locator("#compare").select_option("wipe")
