@@ -83,7 +83,7 @@ def test_ctrl_c_that_a_kernel_wraps_is_no_failure():
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
     models = "lambert,burley,ashikhminshirley,brady,cooktorrance,kurt,low,nishino,schlick,walter"
-    options = "--model", models, "--starts", 400, "--json", "fits.json", "-o", "fits.html"
+    options = "--model", models, "--starts", 100, "--json", "fits.json", "-o", "fits.html"
     status, out, err = interrupted(tmp_path, "fit", LOFT, *options, running="Fitting burley")
     said = re.search(r"Interrupted; (\d) of 10 fits were finished\.", err)
     assert status == 130 and said and "Traceback" not in err, err

@@ -258,7 +258,7 @@ def test_the_command_prints_a_table(serial, tmp_path):
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_is_finished(tmp_path):
-    options = "--model", "lambert,burley", "--metric", ",".join(METRICS), "--starts", 300, "--workers", 2, "-o", "made"
+    options = "--model", "lambert,burley", "--metric", ",".join(METRICS), "--starts", 100, "--workers", 2, "-o", "made"
     status, out, err = interrupted(tmp_path, "sweep", *LOFT, *options, running=r"[1-9]/36")
     finished = re.search(r"Interrupted; (\d+) of 36 fits are finished: the same command goes on from there\.", err)
     assert status == 130 and finished and "Traceback" not in err
