@@ -4,6 +4,7 @@ import contextlib
 import glob
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -33,7 +34,7 @@ def folder(tmp_path):
     (tmp_path / "scenes").mkdir()
     (tmp_path / "work").mkdir()
     (tmp_path / "scenes" / "box.xml").write_text(SCENE)
-    (tmp_path / "scenes" / "triangle.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")
+    shutil.copy(ROOT / "tests" / "rows" / "scenes" / "triangle.obj", tmp_path / "scenes")
     return tmp_path
 
 
@@ -205,56 +206,6 @@ def test_mitsubas_warnings_go_to_stderr(folder):
     done = run("render", "scenes/box.xml", "--variant", "llvm_ad_mono", cwd=folder)
     assert done.stdout.split() == ["box.exr", "box.png"]
     assert "Monochrome mode" in done.stderr
-
-
-ERRORS = {
-    "missing": (["nowhere.xml"], 1, "nowhere.xml: no such file"),
-    "folder": (["scenes"], 1, "not a file"),
-    "broken": (["scenes/broken.xml"], 1, "scenes/broken.xml: line 2: "),
-    "not a scene": (["scenes/bsdf.xml"], 1, "does not hold a <scene>"),
-    "no sensor": (["scenes/bare.xml"], 1, "no <sensor>"),
-    "unknown plugin": (["scenes/box.xml", "-Dmaterial=wrad"], 1, 'scenes/box.xml: line 11: .*"wrad"'),
-    "our parameter": (["scenes/ward.xml", "-Dalpha=2.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 2.7 .*allowed"),
-    "misspelt parameter": (["scenes/misspelt.xml"], 1, "scenes/misspelt.xml: line 2: .*reflectanse"),
-    "bad value": (["scenes/box.xml", "-Dres=many"], 1, 'scenes/box.xml: line 8: .*"many"'),
-    "no pixels": (["scenes/box.xml", "-Dres=0"], 1, "the film's width is 0; give it at least 1 pixel"),
-    "no such id": (["scenes/box.xml", "--replace", "roof=ward"], 1, "has the id roof; there are sheet"),
-    "no material": (["scenes/box.xml", "--replace", "sheet=wrad"], 2, 'no plugin "wrad"; did you mean "ward"'),
-    "malformed --replace": (["scenes/box.xml", "--replace", "sheet"], 2, "--replace sheet: write ID=MATERIAL"),
-    "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
-    "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
-    "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),
-    "reserved -D": (["scenes/box.xml", "-Dfilename=1"], 2, "-D filename: "),
-    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "-o a.bmp: write a .exr, .png, .jpg or .jpeg"),
-    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 2, "there is no folder gone"),
-    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 2, "-o taken.exr: it is a folder"),
-    "unknown variant": (["scenes/box.xml", "--variant", "llvm"], 1, "no variant llvm; this Mitsuba has scalar_rgb, "),
-}
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("arguments, status, text", ERRORS.values(), ids=ERRORS)
-def test_an_error_is_one_readable_line(folder, arguments, status, text):
-    write = (folder / "scenes").joinpath
-    write("broken.xml").write_text('<scene version="3.0.0">\n<shape></scene>')
-    write("bsdf.xml").write_text('<bsdf version="3.0.0" type="diffuse"/>')
-    write("bare.xml").write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
-    write("misspelt.xml").write_text(
-        '<scene version="3.0.0">\n<bsdf type="diffuse"><float name="reflectanse" value="1"/></bsdf></scene>'
-    )
-    write("ward.xml").write_text(
-        '<scene version="3.0.0"><default name="alpha" value="0.1"/>\n<bsdf type="twosided">\n'
-        '<bsdf type="ward"><float name="alpha" value="$alpha"/></bsdf></bsdf></scene>'
-    )
-    write("no_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
-    (folder / "taken.exr").mkdir()
-    before = sorted(folder.rglob("*"))
-    done = invoke("render", *arguments, cwd=folder)
-    assert done.exit_code == status
-    assert done.stdout == ""
-    assert re.search(text, done.stderr), done.stderr
-    assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
-    assert sorted(folder.rglob("*")) == before
 
 
 @pytest.mark.parametrize(

@@ -142,6 +142,105 @@ def test_a_sweep_sees_that_its_folder_cannot_be_written_to_before_it_fits(tmp_pa
     assert done.exit_code == 1 and f"mi-brdfs: cannot write to {tmp_path}: File exists\n" in done.stderr
 
 
+# --- Files that are read ---------------------------------------------------------------------------------------------
+
+WALL = """<scene version="3.0.0"><default name="tex" value="wall"/><include filename="parts/lamp.inc"/>
+<shape type="sphere"><bsdf type="diffuse" id="wall"><texture type="bitmap" name="reflectance">
+<string name="filename" value="$tex.png"/></texture></bsdf></shape></scene>"""
+INLINE = '<texture type="bitmap"><string name="filename" value="wall.png"/></texture>'
+
+
+@pytest.fixture
+def room(tmp_path, monkeypatch):
+    """Files of all kinds that commands read, of which none may change."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "parts").mkdir()
+    for name in (
+        "m.csv",
+        "m.html",
+        "m.png",
+        "m.xml",
+        "wall.png",
+        "coat.png",
+        "shot-polar.png",
+        "wall_log.jpg",
+        "parts/sky.exr",
+    ):
+        (tmp_path / name).write_text(name)
+    (tmp_path / "room.xml").write_text(WALL)
+    (tmp_path / "shot.xml").write_text(WALL.replace("$tex", "shot-polar"))
+    (tmp_path / "old.xml").write_text(WALL.replace("3.0.0", "0.6.0"))
+    (tmp_path / "parts" / "lamp.inc").write_text(
+        "<scene version='3.0.0'><emitter><s value='sky.exr'/></emitter></scene>"
+    )
+    (tmp_path / "parts" / "link.csv").symlink_to(tmp_path / "m.csv")
+    os.link(tmp_path / "m.csv", tmp_path / "hard.csv")
+    (tmp_path / "guest.py").write_text("import mi_brdfs\nclass Guest(mi_brdfs.Model):\n    'Dull.'\n")
+    files = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+    yield tmp_path
+    assert files == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "measured m.csv --json m.csv", "measured m.html ./m.csv --json parts/../m.csv",
+        "measured m.csv --json parts/link.csv", "measured parts/link.csv --json hard.csv",
+        "measured m.png --plot m.png", "fit m.csv --json m.csv", "fit m.html -o m.html", "plot m.png -o m.png",
+        "plot shot.xml", "plot m.png:quantity=f -o m.png", "plot room.xml:wall -o wall.png",
+        "plot room.xml:wall:tex=coat -o coat.png", "plot ward:alpha=wall.png -o wall.png",
+        "plot ward -D alpha=wall.png,coat.png -o coat.png", f"plot {INLINE.replace(' ', '@')} -o wall.png",
+        "explore m.html --export m.html", "explore --scene room.xml:wall --export room.xml",
+        "explore --environment parts/sky.exr --export parts/sky.exr", "explore --mesh m.csv --export m.csv",
+        "check room.xml --junit room.xml", "check room.xml --html parts/lamp.inc",
+        "check room.xml --json parts/sky.exr", "check ward --against room.xml --json room.xml",
+        "check guest --import guest.py --json guest.py", "bench m.csv --json m.csv", "convert m.csv m.csv",
+        "convert room.xml:wall room.xml", "render room.xml -o wall.exr", "render room.xml -Dtex=coat -o coat.png",
+        "render room.xml -o parts/sky.exr", "render m.xml --replace wall=room.xml:wall -o wall.png",
+        "show room.xml:wall -o wall.png", "sweep wall_log.jpg --model lambert --render -o .",
+        "upgrade old.xml -o old.xml", "upgrade old.xml -o parts/lamp.inc", "upgrade old.xml -o wall.png",
+    ],
+)  # fmt: skip
+def test_no_command_writes_over_what_it_reads(line, room):
+    done = CliRunner().invoke(app, [word.replace("@", " ") for word in line.split()])
+    assert done.exit_code == 2 and done.stdout == "", done.output
+    assert re.search(r"^mi-brdfs: \S+ \S+: the command reads this file( as \S+)?; write to another one$", done.stderr)
+
+
+@pytest.mark.parametrize(
+    "line", ["check ward --json x --html x", "fit m.csv --json b.xml -o ./b.xml", "show ward -o l.png"]
+)
+def test_no_two_outputs_are_one_file(line, room):
+    for name in ("l.png", "l.exr"):
+        (room / name).symlink_to("both.png")
+    done = CliRunner().invoke(app, line.split())
+    assert done.exit_code == 2 and re.search("is the same file; give each its own", done.stderr), done.output
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_what_names_no_file_and_what_is_none_is_written(tmp_path, monkeypatch):
+    """Titles, what swallows all, and plugins."""
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        words = "plot", "lambert", "--kind", "albedo", "--title", "a.png", "--labels", "a.png", "-o", "a.png"
+        assert CliRunner().invoke(app, words).exit_code == 0
+    for file in (os.devnull, os.devnull, "lambert", "lambert"):
+        words = "check", "lambert", "--only", "finite", "--json", file
+        done = CliRunner().invoke(app, [*words, "--junit", file] if file == os.devnull else words)
+        assert done.exit_code == 0, done.stderr
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_folders_of_results_keep_what_is_no_result(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = f"{LOFT.stem}-lambert.xml", "index.html"
+    for name, line in zip(names, (f"fit {LOFT} --model lambert --save .", "gallery lambert -o ."), strict=True):
+        (tmp_path / name).write_text("mine")
+        done = CliRunner().invoke(app, line.split())
+        assert done.exit_code == 2 and f"{name} is there, and no such result; name another folder" in done.stderr
+        assert (tmp_path / name).read_text() == "mine"
+
+
 # --- Names that are not UTF-8 ---------------------------------------------------------------------------------------
 
 BAD = os.fsdecode(b"coat\xff")

@@ -290,6 +290,7 @@ def test_runs_without_a_variant_for_it(ward):
                                                           "ward-duer or approximate."),
         ("good", "ward", {"given": {"alpha": 7.0}}, "ward: alpha = 7 is not allowed; it must be a number in"),
         ("good", "ward", {"tied": {"alpha": "beta"}}, "ward: there is no parameter beta"),
+        ("good", "burley", {"start": {"anisotropic": 0.5}}, "isotropic data fix anisotropic; leave it out."),
         ("good", "ward", {"start": {"exponent": 3}}, "No fit can start at {'exponent': 3}: it is of another plugin"),
         ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),
         ("good", "wart", {}, "There is no model 'wart'; did you mean 'ward'?"),

@@ -447,8 +447,21 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
     assert time.process_time() - start < 20
 
 
-def test_what_is_no_number_is_refused(folder):
-    text = '<scene version="0.6.0"><bsdf type="phong"><float name="exponent" value="nan"/></bsdf></scene>'
+@pytest.mark.parametrize(
+    ("inside", "sentence"),
+    [
+        ('<float name="exponent" value="nan"/>', "float exponent: 'nan' is not a finite number"),
+        ('<float name="exponent" value="1e999"/>', "float exponent: '1e999' is not a finite number"),
+        ('<point name="center" x="nan"/>', "point center: 'nan' is not a finite number"),
+        (
+            '<transform name="toWorld"><matrix value="1 0 0 0"/></transform>',
+            "matrix: '1 0 0 0' is not 16 finite numbers",
+        ),
+        ('<transform name="toWorld"><lookat up="0,1"/></transform>', "lookat: '0,1' is not 3 finite numbers"),
+    ],
+)
+def test_what_is_no_number_is_refused(folder, inside, sentence):
+    text = f'<scene version="0.6.0"><bsdf type="phong">{inside}</bsdf></scene>'
     (folder / "scene.xml").write_text(text)
-    with pytest.raises(ValueError, match="float exponent: 'nan' is not a number"):
+    with pytest.raises(ValueError, match=sentence):
         upgrade(folder / "scene.xml")

@@ -5,18 +5,19 @@ import shutil
 
 import pytest
 from support import LOFT, ROOT, rows
-from test_cli import invoke
-from test_show import SCENE
+from test_cli import SCENE, invoke
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("refused")
-    (folder / "scene.xml").write_text(SCENE)
+    shutil.copytree(ROOT / "tests" / "rows" / "scenes", folder, dirs_exist_ok=True)
     shutil.copy(ROOT / "scenes" / "cornell_box.xml", folder / "room.xml")
     shutil.copy(LOFT, folder / "paint.bsdf")
     (folder / "file").touch()
-    (folder / "taken.png").mkdir()
+    (folder / "gone_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
+    for name in "taken.png", "folder.exr":
+        (folder / name).mkdir()
     return folder
 
 

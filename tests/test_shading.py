@@ -82,7 +82,7 @@ def test_area_lights_are_sampled_all_over():
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_area_lights_are_seen():
-    before_the_camera = lamp("disk", radiance=3.0, to_world=T())
+    before_the_camera = lamp("disk", radiance=3.0, to_world=T().translate([0, 0, 1]))
     np.testing.assert_allclose(shaded(plate(WHITE, before_the_camera, clamp=False), spp=1), 3, rtol=1e-5)
 
 

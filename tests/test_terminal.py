@@ -1,6 +1,7 @@
 """Each command in a terminal of 80 columns: no line is longer, and nothing is cut off."""
 
 import contextlib
+import io
 import os
 import re
 import struct
@@ -9,6 +10,9 @@ import sys
 
 import pytest
 from rich.cells import cell_len
+from test_cli import invoke
+
+from mi_brdfs.cli.terminal import Terminal
 
 fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
 
@@ -76,3 +80,32 @@ def test_it_fits_the_terminal(commands, tmp_path):
         assert not [line for line in wide if "a_material_whose_name" not in line], (command, wide)
         progress = ("Checking", "Rendering", "Measuring")
         assert not [line for line in lines if re.search(r"…\s*│?$", line) and not line.startswith(progress)], command
+
+
+EVIL = "a\x1b[31m\x9b1m\u202eb"
+"""Letters that control a terminal: ESC, a C1 control, one that turns the direction of writing."""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        (f"x{EVIL}",),
+        (f"--{EVIL}",),
+        ("upgrade", EVIL),
+        ("show", f"<bsdf type='{EVIL}'/>"),
+        ("list", "--import", "evil.py"),
+    ],
+)
+def test_no_sentence_controls_the_terminal(words, tmp_path):
+    (tmp_path / "evil.py").write_text(f"raise ValueError({EVIL!r})")
+    done = invoke(*words, cwd=tmp_path)
+    assert done.exit_code == 2 and "31m" in done.stderr
+    assert all(letter.isprintable() or letter == "\n" for letter in done.stderr), done.stderr
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_no_result_controls_the_terminal(is_terminal):
+    """Other programs get it as it is."""
+    out = Terminal(file=io.StringIO(), force_terminal=is_terminal, color_system=None, markup=False, soft_wrap=True)
+    out.print(f"{EVIL}\n")
+    assert out.file.getvalue() == ("a�[31m�1m�b\n\n" if is_terminal else f"{EVIL}\n\n")

@@ -19,7 +19,9 @@ from rich.markup import escape
 from .. import __version__
 from ..mitsuba import guests
 from ..mitsuba.errors import unwrapped_ctrl_c
+from ..parameters.messages import printable
 from ..starting import exit_on_sigterm, raise_on_ctrl_c
+from .files import begin, check_inputs
 from .terminal import Exit, err, fail, out
 
 app = typer.Typer(
@@ -32,7 +34,7 @@ imported: list[str] = []
 
 def main() -> None:
     """Run the command ``mi-brdfs``."""
-    warnings.formatwarning = lambda message, *_: f"mi-brdfs: {message}\n"  # a sentence, as errors are
+    warnings.formatwarning = lambda message, *_: f"mi-brdfs: {printable(str(message))}\n"  # a sentence, as errors are
     if sys.stdout is None:  # a daemon may have closed it
         sys.stdout = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w")
     # Names of files need not be UTF-8, nor need what output goes to, as on Windows.
@@ -65,6 +67,7 @@ def _describe(
     ] = False,
 ) -> None:
     """Classical BRDFs for Mitsuba 3: list and check them, see what works on this machine, render scenes."""
+    begin()
 
 
 def _import(names: list[str] | None) -> None:
@@ -98,6 +101,7 @@ def command(panel: str, *examples: str, name: str | None = None) -> Callable:
                 with unwrapped_ctrl_c():
                     raise_on_ctrl_c()
                     _import(imports)
+                    check_inputs({**kwargs, "imports": imports})
                     return function(*args, **kwargs)
             except KeyboardInterrupt:
                 err.print("Interrupted; nothing was written.")

@@ -11,13 +11,13 @@ from .app import command
 from .options import (
     Parameters,
     TracingVariant,
-    check_output,
     material_argument,
     parameters_of,
     quantity_of,
     set_tracing_variant,
     source_of,
     writing_to,
+    written,
 )
 from .terminal import Exit, err, failing, print_paragraph, stdout_to_stderr
 
@@ -26,7 +26,12 @@ from .terminal import Exit, err, failing, print_paragraph, stdout_to_stderr
 def convert(
     given: Annotated[str, material_argument(metavar="MATERIAL")],
     output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The file to write: .binary (MERL), .bsdf (RGL or Zemax), .csv.")
+        Path,
+        typer.Argument(
+            metavar="OUT",
+            help="The file to write: .binary (MERL), .bsdf (RGL or Zemax), .csv.",
+            callback=written("OUT"),
+        ),
     ],
     parameters: Parameters = None,
     format: Annotated[
@@ -36,7 +41,6 @@ def convert(
     variant: TracingVariant = None,
 ) -> None:
     """Write a measured file in another format, or any BSDF as a table, and say how far the two differ."""
-    check_output("OUT", output)
     from ..measured import convert as converted
     from ..measured import read
     from ..probe.sources import is_measured, split  # imports numpy

@@ -17,6 +17,7 @@ from ..model import Model
 from ..parameters.messages import printable
 from ..probe.sources import value_of
 from .app import command
+from .files import check_output
 from .options import (
     TracingVariant,
     file_option,
@@ -110,6 +111,9 @@ def fit_(
     if save:
         with writing_to(save):
             save.mkdir(parents=True, exist_ok=True)
+        for stem in {_id(file, it.plugins[0]) for file in files for it in models}:
+            for path in {save / f"{stem}.xml", *save.glob(f"{stem}_*.xml")}:  # also with choices
+                check_output("--save", path, mark=f' id="{path.stem}" type=')
     names = [it.plugins[0] for it in models]
     fits: list[Fit] = []
     complete, seen, failed = True, True, 0

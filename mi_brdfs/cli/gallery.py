@@ -8,8 +8,10 @@ from typing import Annotated
 
 import typer
 
+from ..rendering import MOST_PIXELS
 from .app import command
-from .options import MOST_PIXELS, AnyVariant, Types, set_variant
+from .files import check_output
+from .options import AnyVariant, Types, set_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
@@ -34,6 +36,8 @@ def gallery(
     finished pictures."""
     from ..gallery import gallery as render_gallery
 
+    if (page := output / "index.html").exists():
+        check_output("-o", page, mark="<title>What BRDFs look like</title>")
     chosen = set_variant(variant)
     start, finished, total = time.perf_counter(), 0, 0
     with stdout_to_stderr(), progress("Rendering") as bar:
@@ -52,7 +56,7 @@ def gallery(
         except KeyboardInterrupt:
             pass
     if finished:
-        out.print(str(output / "index.html"))
+        out.print(str(page))
     if not finished or finished < total:
         kept = f"it has {finished} of {total} pictures" if finished else "nothing is finished, nothing was written"
         err.print(f"Interrupted; {kept}.")

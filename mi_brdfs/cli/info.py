@@ -6,7 +6,6 @@ import re
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markdown import Markdown
 from rich.markup import escape
 from rich.padding import Padding
@@ -19,7 +18,7 @@ from ..model import EXAMPLE, Plugin
 from ..parameters import nested
 from ..parameters.vocabulary import OTHERS, key
 from .app import command
-from .terminal import Exit, fail, failing, out, print_table
+from .terminal import Exit, Terminal, fail, failing, out, print_table
 
 
 @command("Look", "list", "list --search gold", name="list")
@@ -64,7 +63,7 @@ def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or ali
         out.print(plain_page(type))
         return
     text, heading, example = re.sub(r":\w+:`([^`]+)`", r"\1", plugin.page()).partition(EXAMPLE)
-    terminal = Console(emoji=False, highlight=False)  # which folds lines, unlike the others
+    terminal = Terminal(emoji=False, highlight=False)  # which folds lines, unlike the others
     terminal.print(Markdown(f"{text}{heading}\n```\n{example}\n```" if example else text, "ansi_dark"))
     for title, rows, note in plugin.sections():
         terminal.print(f"\n[bold]{title}")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,9 +14,9 @@ import typer
 from .. import writing
 from ..mitsuba import llvm
 from ..mitsuba.fastest import fastest
-from ..parameters.messages import listed
 from ..starting import signals_held
 from ..variants import is_measurable
+from .files import OUTPUTS, check_output
 from .terminal import Exit, err, fail, failing
 
 if TYPE_CHECKING:
@@ -34,14 +32,20 @@ FIGURES = ".png", ".svg", ".pdf", ".jpg"
 
 
 def file_option(name: str, help: str, metavar: str = "FILE", endings: Sequence[str] = ()) -> Any:
-    """Return an option for a file to be written, which is checked before the work whose result it is to hold."""
+    """Return an option for a file to be written."""
+    names = ["-o", "--output"] if name == "-o" else [name]
+    return typer.Option(*names, metavar=metavar, help=help, callback=written(name, endings))
 
-    def checked(file: Path | None) -> Path | None:
+
+def written(name: str, endings: Sequence[str] = ()) -> Callable:
+    """Return a callback that checks a file to be written before the work whose result it is to hold."""
+
+    def checked(parameter: typer.CallbackParam, file: Path | None) -> Path | None:
+        OUTPUTS.add(parameter.name or "")
         check_output(name, file, endings)
         return file
 
-    names = ["-o", "--output"] if name == "-o" else [name]
-    return typer.Option(*names, metavar=metavar, help=help, callback=checked)
+    return checked
 
 
 def scheduler_option(doing: str) -> Any:
@@ -92,8 +96,6 @@ Lenient = Annotated[
     bool, typer.Option("--lenient", help="Put cubes and grey in the place of meshes and textures that old scenes lack.")
 ]
 """The option of commands that upgrade scenes."""
-MOST_PIXELS = 16384
-"""The largest width and height of a picture."""
 KINDS = {
     "": "a vectorized and unpolarized variant",
     "_rgb": "an rgb variant",
@@ -141,25 +143,6 @@ def source_of(word: str, parameters: dict[str, str], verb: str = "name") -> BSDF
         words = ", ".join(it.word for it in (source, *others))
         fail(f"{word} has several materials; {verb} one of {words}", Exit.USAGE)
     return source
-
-
-def check_output(option: str, file: Path | None, endings: Sequence[str] = ()) -> None:
-    """Fail if a file cannot be written, or its name has none of some endings."""
-    if file is None:
-        return
-    if endings and file.suffix.lower() not in endings:
-        fail(f"{option} {file}: write a {listed(endings)}", Exit.USAGE)
-    if not file.absolute().parent.is_dir():
-        fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
-    if file.is_dir():
-        fail(f"{option} {file}: it is a folder", Exit.USAGE)
-    try:
-        if file.is_file():
-            file.open("ab").close()
-        if file.is_file() or not file.exists():
-            tempfile.TemporaryFile(dir=os.path.dirname(os.path.realpath(file))).close()
-    except OSError as error:
-        fail(f"{option} {file}: it cannot be written: {error.strerror}", Exit.USAGE)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,21 +16,23 @@ import mitsuba as mi
 import typer
 from rich.progress import TextColumn
 
-from .options import check_output, writing_to
+from .files import check_output
+from .options import file_option, writing_to
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..rendering.passes import Picture
-    from ..rendering.scene_file import SceneFile
+
+PICTURES = ".exr", ".png", ".jpg", ".jpeg"
 
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", help="An .exr, .png or .jpg; the EXR and a display image are always both written."),
+    file_option("-o", "An .exr, .png or .jpg; the EXR and a display image are always both written.", "PATH", PICTURES),
 ]
 Seconds = Annotated[
     float | None, typer.Option("--time", metavar="SECONDS", min=0, help="End with the pass in which this time is over.")
 ]
-Seed = Annotated[int, typer.Option(min=0, help="A different seed gives different noise.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="A different seed gives different noise.")]
 Denoise = Annotated[
     bool, typer.Option("--denoise", help="Use a box filter, and denoise the picture with Open Image Denoise.")
 ]
@@ -41,17 +43,8 @@ def output_files(output: Path) -> tuple[Path, Path]:
     is_exr = output.suffix.lower() == ".exr"
     files = (output, output.with_suffix(".png")) if is_exr else (output.with_suffix(".exr"), output)
     for file in files:
-        check_output("-o", file, (".exr", ".png", ".jpg", ".jpeg"))
+        check_output("-o", file, PICTURES)
     return files
-
-
-def refuse_to_overwrite(files: Iterable[Path], scene: SceneFile) -> None:
-    """Fail if a picture would take the place of a file that its scene is read from."""
-    there = [file for file in files if file.exists()]
-    read = scene.files()[0] if there else []  # which parses the scene
-    for file in there:
-        if any(os.path.samefile(file, path) for path in read):
-            fail(f"{file}: the scene reads this file; name another picture with -o", Exit.USAGE)
 
 
 def render_to(

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .app import command
+from .files import check_output
 from .options import (
     FIGURES,
     TracingVariant,
@@ -17,7 +18,7 @@ from .options import (
     set_tracing_variant,
     writing_to,
 )
-from .terminal import Exit, fail, failing, out, stdout_to_stderr
+from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
 
 
 @command(
@@ -83,8 +84,9 @@ def plot(
             size=asked.size_of(size),
         )
     file = output or asked.default_file(kind, targets)
+    check_output("-o", file)
     set_tracing_variant(variant)
-    with stdout_to_stderr():
+    with stdout_to_stderr(), err.status(f"Drawing {file.name}"):
         with failing(Exit.USAGE):
             bsdfs = asked.asked_for(targets, parameters or [])
             figure = asked.KINDS[kind](*bsdfs, **options)

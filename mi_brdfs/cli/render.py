@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import mitsuba as mi
 import typer
 
+from ..parameters.messages import listed
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
 from .options import AnyVariant, Lenient, parameters_of, parameters_option, scheduler_option, set_variant, source_of
-from .picture import Denoise, Output, Seconds, Seed, output_files, refuse_to_overwrite, render_to
+from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing, stdout_to_stderr
 
 if TYPE_CHECKING:
@@ -69,7 +70,6 @@ def render(
 
     def load() -> tuple[mi.Scene, int]:
         loaded = _load(file)
-        refuse_to_overwrite(files, file)
         index = _index(loaded, sensor)
         if window:
             from ..rendering.passes import crop  # imports numpy
@@ -103,6 +103,8 @@ def _replaced(options: list[str]) -> dict[str, BSDFSource]:
         id, equals, word = option.partition("=")
         if not (id and equals and word):
             fail(f"--replace {option}: write ID=MATERIAL, as in floor=burley:roughness=.2", Exit.USAGE)
+        if id in found:
+            fail(f"--replace {option}: {id} is given twice", Exit.USAGE)
         found[id] = source_of(word, {})
     return found
 
@@ -112,8 +114,9 @@ def _index(scene: mi.Scene, sensor: str) -> int:
     if sensor in ids:
         return ids.index(sensor)
     if not sensor.isdecimal() or int(sensor) >= len(ids):
-        known = ", ".join(f"{k} ({name})" if name else str(k) for k, name in enumerate(ids))
-        fail(f"--sensor {sensor}: there is no such sensor; there are {known}", Exit.USAGE)
+        known = listed((f"{k} ({name})" if name else str(k) for k, name in enumerate(ids)), "and")
+        have = f"sensors are {known}" if len(ids) > 1 else f"only sensor is {known}"
+        fail(f"--sensor {sensor}: there is no such sensor; the scene's {have}", Exit.USAGE)
     return int(sensor)
 
 

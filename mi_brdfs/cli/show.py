@@ -10,10 +10,10 @@ import mitsuba as mi
 import typer
 
 from ..preview import STAGES, preview_scene
-from ..rendering.scene_file import SceneFile
+from ..rendering import MOST_PIXELS
 from .app import command
-from .options import MOST_PIXELS, AnyVariant, Parameters, material_argument, parameters_of, set_variant, source_of
-from .picture import Denoise, Output, Seconds, Seed, output_files, refuse_to_overwrite, render_to
+from .options import AnyVariant, Parameters, material_argument, parameters_of, set_variant, source_of
+from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing
 
 
@@ -43,8 +43,6 @@ def show(
     def load() -> tuple[mi.Scene, int]:
         with failing(Exit.USAGE):
             source = source_of(material, given, "show")
-            if source.source.endswith(".xml"):
-                refuse_to_overwrite(files, SceneFile(source.source, {**source.parameters}))
             scene = preview_scene(source.load(), stage)
         film = scene["sensor"]["film"]
         film |= {"width": size, "height": size}

@@ -13,6 +13,7 @@ import typer
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
+from .files import check_output
 from .fit import Cut, Files, Models, Starts
 from .options import TracingVariant, scheduler_option, set_tracing_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
@@ -77,6 +78,8 @@ def sweep(
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         fail(f"{output}: {error.strerror}")
+    for file in output.glob("wall_*.jpg") if render else ():
+        check_output("-o", file)
     complete, errors, wall = True, list[str](), None
     with stdout_to_stderr():
         try:

@@ -11,14 +11,29 @@ from enum import IntEnum
 from typing import NoReturn
 
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+from rich.segment import Segment
 from rich.table import Table
+from typer import rich_utils
 
 from ..mitsuba.errors import one_line, unwrapped_ctrl_c
+from ..parameters.messages import printable
 
-out = Console(markup=False, emoji=False, highlight=False, soft_wrap=True)
-err = Console(markup=False, emoji=False, highlight=False, soft_wrap=True, stderr=True)
+
+class Terminal(Console):
+    """A console that no text controls, as text of files and arguments might. What is no terminal gets results as they
+    are, with the names of files that programs need."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        for it in super().render(renderable, options):
+            is_raw = it.control or not (self.stderr or self.is_terminal)
+            yield it if is_raw else it._replace(text="\n".join(map(printable, it.text.split("\n"))))
+
+
+out = Terminal(markup=False, emoji=False, highlight=False, soft_wrap=True)
+err = Terminal(markup=False, emoji=False, highlight=False, soft_wrap=True, stderr=True)
+rich_utils.Console = Terminal  # type: ignore[misc]  # where Typer tells what is wrong with arguments
 
 
 class Exit(IntEnum):
@@ -32,7 +47,7 @@ class Exit(IntEnum):
 
 def print_table(table: Table) -> None:
     """Print a table, with each row on one line where another program reads it."""
-    console = Console(markup=False, emoji=False, highlight=False, width=None if out.is_terminal else 400)
+    console = Terminal(markup=False, emoji=False, highlight=False, width=None if out.is_terminal else 400)
     console.print(table)
 
 
@@ -52,7 +67,7 @@ def progress(doing: str, count: ProgressColumn | None = None) -> Progress:
 
 
 def fail(text: str, status: Exit = Exit.ERROR) -> NoReturn:
-    err.print(f"mi-brdfs: {text}")
+    err.print(f"mi-brdfs: {printable(text)}")
     raise typer.Exit(status)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..measured import FileError
 from ..mitsuba.registry import find_model
+from ..parameters.messages import listed
 from ..writing import write_text
 from .engine import fit_configuration
 from .lanes import rgb_variant
@@ -116,11 +117,16 @@ def fit(
         for kind in dict.fromkeys((it.channels, it.anisotropic) for it in materials):
             alike = [k for k, it in enumerate(materials) if (it.channels, it.anisotropic) == kind]
             for each in models:
-                todo += [(it, alike) for it in configurations(each, given or {}, tied or {}, lobes, *kind)]
+                found = configurations(each, given or {}, tied or {}, lobes, *kind)
+                todo += [(it if kind[1] else it.isotropic(), alike) for it in found]
         for each_start in given_starts:
+            alikes = [it for it, _ in todo if each_start.get("type", it.plugin) in it.model.plugins]
+            if fixed := sorted({name for it in alikes for name in it.fixed} & each_start.keys()):
+                named = listed(fixed, "and")
+                raise FitError(f"No fit can start at {each_start}: isotropic data fix {named}; leave it out.")
             if not any(warm(configuration, each_start) for configuration, _ in todo):
                 raise FitError(f"No fit can start at {each_start}: it is of another plugin, or has other parameters.")
-        ended, found = 0, []
+        ended, ranked = 0, []
         total = sum(len(alike) for _, alike in todo) * (starts + len(given_starts))
 
         def advance(count: int) -> None:
@@ -131,11 +137,9 @@ def fit(
 
         for configuration, alike in todo:
             own = [materials[k] for k in alike]
-            if not own[0].anisotropic:
-                configuration = configuration.isotropic()
             fits = fit_configuration(configuration, own, metric, starts, given_starts, seed, advance)
-            found += list(zip(alike, fits, strict=True))
-    return [it for _, it in sorted(found, key=lambda pair: (pair[0], pair[1].held_out))]
+            ranked += list(zip(alike, fits, strict=True))
+    return [it for _, it in sorted(ranked, key=lambda pair: (pair[0], pair[1].held_out))]
 
 
 def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[Fit]:

@@ -78,14 +78,16 @@ class Element:
     def label(self) -> str:
         return self.name or self.type or self.tag
 
-    def numbers(self, *counts: int) -> list[float]:
-        """Return the numbers in its value, of which there are as many as one of the counts says, if there are any."""
+    def numbers(self, *counts: int, name: str = "value") -> list[float]:
+        """Return the finite numbers of an attribute, as many as one of the counts says, if there are any."""
+        text = self.attributes.get(name, "")
         with suppress(ValueError):
-            numbers = floats(self.value)
-            if not any(map(math.isnan, numbers)) and (not counts or len(numbers) in counts):
+            numbers = floats(text)
+            if all(map(math.isfinite, numbers)) and (not counts or len(numbers) in counts):
                 return numbers
-        wanted = {(): "a list of numbers", (1,): "a number"}.get(counts, f"{' or '.join(map(str, counts))} numbers")
-        raise self.error(f"{self.value!r} is not {wanted}")
+        words = {(): "a list of finite numbers", (1,): "a finite number"}
+        wanted = words.get(counts, f"{' or '.join(map(str, counts))} finite numbers")
+        raise self.error(f"{text!r} is not {wanted}")
 
     def to_world(self) -> Element:
         """Return its transform, which it is given if it has none."""
@@ -95,7 +97,7 @@ class Element:
 
     def error(self, text: str) -> ValueError:
         """Return an error that says what is wrong with it."""
-        return ValueError(f"{self.place}: {self.tag} {self.type or self.name}: {text}.")
+        return ValueError(f"{self.place}: {f'{self.tag} {self.type or self.name}'.strip()}: {text}.")
 
     def copy(self, name: str) -> Element:
         """Return a copy with another name and without an id, which stays with the original."""

@@ -21,6 +21,11 @@ from .spectra import rgb_of
 from .tables import PLUGINS
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
+PLACES = ("point", "vector", "transform")
+COUNTS: dict[str, tuple[int, ...]] = {
+    **dict.fromkeys(("x", "y", "z", "angle"), (1,)), **dict.fromkeys(("origin", "target", "up"), (3,)), "value": (),
+}  # fmt: skip
+"""How many numbers the attributes of these have; a matrix has 16."""
 COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
 NUMBERS = ("alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight")
 """Properties that Mitsuba 3 reads of a texture as numbers."""
@@ -191,6 +196,9 @@ class Work:
         if element.tag in ("float", "integer"):
             element.numbers(1)
             element.value = element.value.strip(", \t\n")
+        for it in element.walk() if element.tag in PLACES else ():
+            for name in it.attributes.keys() & COUNTS.keys():
+                it.numbers(*((16,) if (it.tag, name) == ("matrix", "value") else COUNTS[name]), name=name)
         if element.tag in PROPERTIES:
             return element
         if element.tag not in PLUGINS:

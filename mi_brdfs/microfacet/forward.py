@@ -61,7 +61,7 @@ class ForwardDirections:
         slopes2 = [alpha2 * (slope2 / along) for alpha2 in alphas2]
         z2 = dr.square(dr.maximum(wi.z, 1e-3))
         cos2 = z2 + slope2 / (1 + dr.maximum(*slopes2))
-        low = z2 / cos2
+        low = dr.minimum(z2 / cos2, 1)  # a GPU's quotients are rounded up, too
         return cls(fresnel, wi, dr.sqrt(low) * (1 - low), cos2, slopes2)
 
     def draw(self, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:

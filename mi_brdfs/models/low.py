@@ -102,7 +102,7 @@ class SmoothLobe(Lobe):
         d, z = dr.sqrt(self.law.inverse(0.75 * self.law.norm)), dr.maximum(wi.z, 1e-3)
         z2 = z * z + 0.3 * abs(dr.square(self.fresnel.eta) - 1)
         cos2 = z2 + d * (1 - 0.25 * d)
-        low = z2 / cos2
+        low = dr.minimum(z2 / cos2, 1)  # a GPU's quotients are rounded up, too
         return ForwardDirections(self.fresnel, wi, low * dr.sqrt(low) * (1 - low), cos2)
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:

@@ -163,9 +163,8 @@ class HighlightLobe(Lobe):
         """Return ``(sinθ_ring, visible)``, with the fraction of the ring at A = 1 - versine >= 0 above the horizon."""
         sin = safe_sqrt(versine * (2 - versine))
         rise, height = frame.sin * sin, frame.axis.z * (1 - versine)
-        cut = height < rise
-        below = dr.acos(dr.select(cut, height, 0) / dr.select(cut, rise, 1)) * dr.inv_pi
-        return sin, dr.select(cut, 1 - below, 1)
+        below = dr.atan2(safe_sqrt((rise - height) * (rise + height)), height) * dr.inv_pi
+        return sin, 1 - below
 
     def _pair(self, excess: mi.Float, visible: mi.Float) -> tuple[mi.Float, mi.Float]:
         """Return what the visible parts of the rings of A and -A reflect, from the excess of A."""

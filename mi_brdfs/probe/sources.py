@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from .. import loading
-from ..names import tabulated
+from ..names import check_name, tabulated
 from ..parameters import published
 from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load
@@ -77,6 +77,8 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     word, own = split(word)
     parameters = {**(parameters or {}), **own}
     is_data = is_measured(word)
+    if not is_data:
+        check_name(word)
     file, ending, wanted = ("", "", "") if is_data else _parted(word)
     path = Path(f"{file}{ending}" if wanted else word)
     is_text = word.startswith("<") and not is_data and not os.path.isfile(path)

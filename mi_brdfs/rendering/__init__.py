@@ -11,3 +11,6 @@ From Python::
     write(picture.bitmap, "scene.exr")
     write(display_image(picture.bitmap), "scene.png")
 """
+
+MOST_PIXELS = 16384
+"""The largest width and height of a picture."""

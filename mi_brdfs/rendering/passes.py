@@ -18,6 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..variants import is_scalar
+from . import MOST_PIXELS
 
 Passes = Callable[["mi.Scene", int, Iterable[tuple[int, int]]], Generator[Any, None, None]]
 
@@ -80,6 +81,10 @@ def render(
     # Mitsuba's own handler cuts a pass of a scalar variant short.
     cut_short = is_scalar() and isinstance(source, FilmPasses) and not passes
     own_count = sampler.sample_count()
+    if max(film.crop_size()) > MOST_PIXELS:
+        across, down = film.crop_size()
+        problem = f"the film has {across} x {down} pixels, more than {MOST_PIXELS} across or down"
+        raise ValueError(f"{problem}; give it fewer, or render parts of it (--crop)")
 
     def here(scene: mi.Scene, sensor: int, jobs: Iterable[tuple[int, int]]) -> Generator[Any, None, None]:
         return (source.sums(scene, camera, seed=seed, spp=count) for seed, count in jobs)

@@ -57,9 +57,13 @@ class SceneFile:
 
     def copied(self) -> SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
-        paths, named, text = self.files()
+        with looking_in(Path(self.path).parent):
+            config = mi.parser.ParserConfig(mi.variant())
+            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
+            found = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in file_names(state)}
+        named = {name: path for name, path in found.items() if os.path.isfile(path)}
         names = {name: _rootless(path) for name, path in named.items()}
-        contents = {_rootless(path): Path(path).read_bytes() for path in paths}
+        contents = {_rootless(it): Path(it).read_bytes() for it in (self.path, *map(str, state.files), *named.values())}
         parameters = self.parameters
         if text is not None:
             contents[_rootless(self.path)], parameters = text.encode(), {}
@@ -67,16 +71,6 @@ class SceneFile:
         return replace(
             self, path=path, parameters=parameters, lenient=False, contents=contents, names=names, folder=folder
         )
-
-    def files(self) -> tuple[list[str], dict[str, str], str | None]:
-        """Return the files that the scene is read from, those among them that it names by these names, and the text of
-        an upgraded one."""
-        with looking_in(Path(self.path).parent):
-            config = mi.parser.ParserConfig(mi.variant())
-            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
-            found = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in file_names(state)}
-        named = {name: path for name, path in found.items() if os.path.isfile(path)}
-        return [self.path, *map(str, state.files), *named.values()], named, text
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         config = mi.parser.ParserConfig(mi.variant())

@@ -36,7 +36,7 @@ def read(path: Path) -> Measurement:
     file = TextFile(path)
     rows = file.rows()
     header = Header(file, rows)
-    content = header.content()
+    content = header.content("Monochrome", "XYZ")
     symmetry = header.setting("Symmetry", "PlaneSymmetrical", "Asymmetric", "Asymmetrical")
     radials, azimuths = (header.require(name) for name in ("ScatterRadial", "ScatterAzimuth"))
     table: dict[tuple[float, Channel], tuple[np.ndarray, float]] = {}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...parameters.messages import listed
 from ..arrays import stacked
 from ..coordinates import SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
@@ -75,7 +76,7 @@ def read(path: Path) -> Measurement:
     rows = file.rows()
     header = Header(file, rows)
     header.angles.setdefault("SampleRotation", np.zeros(1))
-    content = header.content()
+    content = header.content(*CHANNELS)
     symmetry = header.setting("Symmetry", "PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D")
     shape = [len(header.require(name)) for name in ANGLES]
     count, channels = shape[0] * shape[1], [name.lower() for name in CHANNELS[content]]
@@ -213,17 +214,18 @@ class Header:
             raise self.file.error(f"the data begin, but no {name} was given")
         return self.angles[name]
 
-    def content(self) -> str:
-        """Return the SpectralContent, having refused what is no BRDF."""
+    def content(self, *known: str) -> str:
+        """Return the SpectralContent, having refused what is no BRDF, and what is none of those that are known."""
         self.setting("ScatterType", "BRDF")
-        return self.setting("SpectralContent", *CHANNELS)
+        return self.setting("SpectralContent", *known)
 
     def setting(self, name: str, *known: str) -> str:
         given = self.settings.get(name, known[0])
         for word in known:
             if word.lower() == given.lower():
                 return word
-        raise FileError(f"{self.file.path}: its {name} is {shortened(given)}; only {', '.join(known)} can be read.")
+        problem = f"{self.file.path}: its {name} is {shortened(given)}, which cannot be read"
+        raise FileError(f"{problem}; export it as {listed(known)}.")
 
     def ordered(self, name: str, most: float) -> tuple[Axis, np.ndarray]:
         """Return angles as an increasing axis in radians, and where its nodes are in the file."""
