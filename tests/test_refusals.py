@@ -16,7 +16,7 @@ def folder(tmp_path_factory):
     shutil.copy(LOFT, folder / "paint.bsdf")
     (folder / "file").touch()
     (folder / "gone_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
-    for name in "taken.png", "folder.exr":
+    for name in "taken.png", "folder.exr", "nook":
         (folder / name).mkdir()
     return folder
 
