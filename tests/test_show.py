@@ -64,8 +64,14 @@ def test_a_picture_takes_the_place_of_no_file_of_its_scene(folder, command):
     before.write(str(folder / "photo.exr"))
     (folder / "photo.xml").write_text(PICTURED.replace("NAME", "photo.exr"))
     done = run(command, "photo.xml", "--spp", 1)
-    assert done.exit_code == 2 and "photo.exr: the scene reads this file; name another picture with -o" in done.stderr
+    assert done.exit_code == 2 and "photo.exr: the command reads this file; write to another one" in done.stderr
     assert image(folder / "photo.exr").shape == (2, 2, 3) and not (folder / "photo.png").exists()
+
+
+def test_a_seed_that_would_be_another_is_refused():
+    """Passes distinguish 2^32 of them."""
+    done = run("show", "ward", "--seed", 1 << 32)
+    assert done.exit_code == 2 and "'--seed'" in done.stderr
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes here")
