@@ -19,10 +19,9 @@ import matplotlib.pyplot as plt
 __all__ = ["FOLDER", "NOTEBOOKS", "code_cells", "read_notebook", "run_notebook"]
 
 
-SHOWN = "anatomy_of_a_microfacet_brdf", "from_a_goniometer_to_a_picture", "meet_the_models"
-"""Notebooks whose renderings are to be looked at; others fit them and compare them."""
 SAMPLES = 16
-"""Samples per pixel of these renderings in a test."""
+"""Samples per pixel, in a test, of renderings that take theirs from the scene: these are to be looked at, and others
+are fitted and compared."""
 
 
 def run_notebook(path: Path) -> dict[str, Any]:
@@ -32,7 +31,7 @@ def run_notebook(path: Path) -> dict[str, Any]:
     folder = os.getcwd()
     os.chdir(path.parent)
     try:
-        with mi.variant_context("llvm_ad_rgb"), patch("mitsuba.render", noisy if path.stem in SHOWN else mi.render):
+        with mi.variant_context("llvm_ad_rgb"), patch("mitsuba.render", noisy):
             for cell in code_cells(read_notebook(path)):
                 exec(compile("".join(cell["source"]), f"{path.name}: {cell['id']}", "exec"), names)
     finally:
@@ -41,6 +40,6 @@ def run_notebook(path: Path) -> dict[str, Any]:
     return names
 
 
-def noisy(scene, render=mi.render, spp=None):
-    """``mi.render`` with few samples."""
-    return render(scene, spp=SAMPLES)
+def noisy(scene, *args, render=mi.render, spp=SAMPLES, **options):
+    """``mi.render`` with few samples, unless it is told their number."""
+    return render(scene, *args, spp=spp, **options)

@@ -462,6 +462,8 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     shown = {"views": ["picture"], "shape": "scene", "size": 64}
     pictures = [of(client.show({"type": "lambert", "reflectance": it}, **shown), "picture")[0] for it in (0.1, 0.9)]
     assert pictures[0]["payload"] != pictures[1]["payload"]
+    (film,) = [it.film() for it in client.session._pictures[0][1].stage.scene.sensors()]
+    assert film.rfilter().is_box_filter()  # as the denoiser expects
     client = Client(UserScene(scene, "ward"))  # the id of a shape
     client.show({"type": "lambert"}, **shown)
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]

@@ -654,11 +654,11 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     """It is small and needs no network."""
     exported, name, requests = tmp_path / "page.html", "<!--<script> '1' (1) \udcff.bsdf", []
     shutil.copy(LOFT, tmp_path / name)
-    options = "--exposure", "1.5", "--vary", "theta=0,45,85", "--export", "page.html"
+    options = "--exposure", "1.5", "--labels", f"chalk,{name}", "--vary", "theta=0,45,85", "--export", "page.html"
     command = alone("lambert", name, *options, first=FEW)
     subprocess.run(command, check=True, timeout=200, cwd=tmp_path)
     text = exported.read_text(encoding="utf-8")
-    assert len(text) < 3e6 and '"exposure": 1.5' in text
+    assert len(text) < 3e6 and '"exposure": 1.5' in text and '"name": "chalk"' in text
     assert not re.search(r"""(src|href)=["'](?!data:|#)""", text) and "import " not in text.split("exported")[0]
     tab.on("request", lambda request: requests.append(request.url))
     tab.goto(exported.as_uri())

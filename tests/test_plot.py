@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib import pyplot, rcParams
-from support import LOFT, call, context, direction
+from support import LOFT, ROOT, call, context, direction
 from test_cli import invoke
 
 from mi_brdfs import plot
@@ -21,6 +21,7 @@ MIRROR = {"type": "walter", "alpha": 0.01}
 PHONG = {"type": "phong", "exponent": 2000, "diffuse_reflectance": 0, "specular_reflectance": 0.4}
 SHEET = {"type": "wrap", "domain": "sphere", "reflectance": 0.6}
 COLOURED = {"type": "lambert", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}
+AEROGLAZE = str(ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf")
 LUMINANCE = 0.2126 * 0.2 + 0.7152 * 0.5 + 0.0722 * 0.8
 
 
@@ -310,6 +311,14 @@ def test_gaps_of_measured_files_are_gaps():
     assert np.isfinite(held[1]).all() and np.interp(-60, *held) > 0
     (picture,) = maps(plot.hemisphere(str(LOFT), angles=(60,), resolution=40))
     assert np.isnan(picture[20, 2]) and picture[20, 33] > 0  # 79° on the side of wi, and near the mirror direction
+
+
+def test_zeros_of_a_measured_file_are_gaps():
+    """This one has zeros beyond 80°: its curves end there and do not fall."""
+    theta, value = curve(plot.cartesian(AEROGLAZE, angles=(10,), scale="log"))
+    theta, value = theta[np.isfinite(value)], value[np.isfinite(value)]
+    assert [theta[0], theta[-1]] == pytest.approx([-80, 80], abs=1)
+    assert (abs(np.diff(np.log(value))) < 0.2).all()  # by 0.07 at most for each degree that it is measured
 
 
 def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):

@@ -85,7 +85,7 @@ def test_the_front_page_leads_to_pages_of_the_explorer(site):
         page = site / f"{name}.html"
         text = page.read_text(encoding="utf-8")
         assert page.name in front and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
-        assert ('"name": "walter, fitted"' in text) == (name == "measured_paint") and '"name": "fit.json' not in text
+        assert ('"name": "fitted walter"' in text) == (name == "measured_paint") and '"name": "fit.json' not in text
 
 
 @pytest.mark.slow

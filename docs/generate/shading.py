@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import mi_brdfs  # noqa: F401
-from mi_brdfs.rendering.output import display_image
+from mi_brdfs.rendering.output import denoise, display_image
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
@@ -20,18 +20,18 @@ from .scenes import sources
 
 SCENES = sorted((ROOT / "scenes" / "shading").glob("*.xml"))
 PICTURES = ROOT / "docs" / "scenes" / "shading"
-LARGER, FINER, SAMPLES, QUALITY = 2, 3, 256, 88
+LARGER, FINER, SAMPLES, QUALITY = 2, 3, 64, 88
 
 
 def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
-    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one, with labels, for which
-    both are larger than the scene says."""
+    """Return the shaded scene, supersampled 3 × 3 for smooth edges, above the path-traced one, denoised, with labels,
+    for which both are larger than the scene says."""
     width, height = (LARGER * int(size) for size in mi.load_file(str(path)).sensors()[0].film().size())
     scene = mi.load_file(str(path), width=str(width), height=str(height))
     fine = mi.load_file(str(path), width=str(FINER * width), height=str(FINER * height))
     shaded = np.array(mi.render(fine, spp=1)).reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
     traced = np.array(mi.render(scene, integrator=mi.load_dict({"type": "path", "max_depth": 5}), spp=spp))
-    image = Image.fromarray(np.array(display_image(mi.Bitmap(np.concatenate([shaded, traced])))))
+    image = Image.fromarray(np.array(display_image(mi.Bitmap(np.concatenate([shaded, denoise(traced)])))))
     names = [label._replace(y=label.y / 2) for label in labels_of(path)]
     halves = [Label(text, 0, y, False) for text, y in (("shaded", 0), ("path-traced", 0.5))]
     if np.array(image)[0].mean() < 128:
@@ -40,7 +40,11 @@ def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
 
 
 def pictures() -> list[Picture]:
-    return [Picture(PICTURES / f"{path.stem}.jpg", partial(sources, path), partial(_draw, path)) for path in SCENES]
+    return [Picture(PICTURES / f"{path.stem}.jpg", partial(_sources, path), partial(_draw, path)) for path in SCENES]
+
+
+def _sources(path: Path) -> list[str | bytes]:
+    return [*sources(path), repr(SAMPLES)]
 
 
 def _draw(scene: Path, path: Path) -> None:

@@ -25,7 +25,7 @@ SETTINGS = {
     "version": mi_brdfs.__version__,
     "release": mi_brdfs.__version__,
     "extensions": ["myst_parser", "website.mathml", "website.finish"],
-    "myst_enable_extensions": ["colon_fence", "dollarmath"],
+    "myst_enable_extensions": ["attrs_inline", "colon_fence", "dollarmath"],
     "myst_heading_anchors": 3,
     "html_theme": "furo",
     "html_title": "mi_brdfs",

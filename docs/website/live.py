@@ -19,16 +19,20 @@ from mi_brdfs.cli import app
 MEASURED = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
 COPPER = ("-Dalpha_v=0.3", "-Ddiffuse_reflectance=0.02", "-Dspecular_reflectance=#f9cfc0")
 PAGES: dict[str, tuple[str, list[str]]] = {
-    "brushed_copper": ("brushed copper", ["ward", *COPPER, "--vary", "alpha_u=0.03,0.1,0.3"]),
+    "brushed_copper": (
+        "brushed copper",
+        ["ward", "--labels", "brushed copper", *COPPER, "--vary", "alpha_u=0.03,0.1,0.3"],
+    ),
     "rough_plaster": (
         "smooth and rough plaster",
         ["lambert", "orennayar", "-Dreflectance=#d8c8b0", "--vary", "sigma=0.1,0.3,0.5"],
     ),
-    "measured_paint": ("a measured black paint and its fit", [MEASURED.name, "fit.json:walter", "--exposure", "2"]),
+    "measured_paint": (
+        "a measured black paint and its fit",
+        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted walter", "--exposure", "2"],
+    ),
 }
 """What each page shows: in words, and as arguments of ``mi-brdfs explore``."""
-NAMES = {MEASURED.name: "measured", "fit.json:walter": "walter, fitted"}
-"""What pages call materials, in place of the words of the command."""
 
 
 def links() -> str:
@@ -49,11 +53,7 @@ def write_pages(folder: Path) -> None:
             for name, (_, words) in PAGES.items():
                 file = Path(f"{name}.html")
                 _run("explore", *words, "--export", str(file))
-                page = file.read_text(encoding="utf-8")
-                for word, told in NAMES.items():
-                    page = page.replace(f'"name": "{word}"', f'"name": "{told}"')
-                file.write_text(page, encoding="utf-8")
-                file.with_suffix(".jpg").write_bytes(_picture(page))
+                file.with_suffix(".jpg").write_bytes(_picture(file.read_text(encoding="utf-8")))
         for used in ("fit.json", MEASURED.name):
             Path(used).unlink()
     finally:

@@ -9,6 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from generate.notebooks import WIDTH
+from PIL import Image
+
 
 def markdown(path: Path, pictures: Path) -> str:
     """Return a notebook in Markdown, with solutions folded; write its pictures into a folder, a sibling of the page."""
@@ -47,6 +50,8 @@ def _output(output: dict[str, Any], drawn: Iterator[Path]) -> str:
         path = next(drawn).with_suffix(f".{kind.removeprefix('image/')}")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(base64.b64decode("".join(data[kind])))
-        return f"![](/notebooks/{path.parent.name}/{path.name})"
+        with Image.open(path) as image:
+            strip = "{.strip}" if image.width >= WIDTH else ""  # phones scroll through those that were reduced
+        return f"![](/notebooks/{path.parent.name}/{path.name}){strip}"
     text = "".join(output.get("text", data.get("text/plain", ""))).rstrip()
     return f"```text\n{text}\n```" if text else ""

@@ -142,7 +142,7 @@ def _scene(path: Path) -> str:
     lines = "\n".join(f"* {line}" for line in others)
     large = f"../docs/scenes/large/{path.stem}.jpg"
     picture = f"[![{path.stem}]({large})]({large})"
-    command = f"```sh\nmi-brdfs render scenes/{path.name}\n```"
+    command = f"```sh\n{scenes.command(path)}\n```"
     return "\n\n".join(filter(None, [f"## {path.stem}", picture, first, lines, command]))
 
 

@@ -16,6 +16,7 @@ import typer
 
 from .app import command, imported
 from .options import (
+    Labels,
     Parameters,
     TracingVariant,
     file_option,
@@ -42,6 +43,7 @@ def explore(
     mesh: Annotated[
         Path | None, typer.Option(metavar="FILE.ply|obj", help="Show the pictures on this mesh, whose y axis is up.")
     ] = None,
+    labels: Labels = None,
     exposure: Annotated[float, typer.Option(min=-10, max=10, help="Brighten the pictures, in stops.")] = 0,
     export: Annotated[
         Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
@@ -85,6 +87,10 @@ def explore(
     if user.scene and not user.scene.is_file():
         fail(f"--scene {user.scene}: no such file", Exit.USAGE)
     sources, subjects = _subjects(targets or ["walter"], given)
+    if labels:
+        if (names := labels.count(",") + 1) != len(subjects):
+            fail(f"--labels {labels}: give a name to each of the {len(subjects)} BSDFs, not {names}", Exit.USAGE)
+        subjects = [each | {"name": name} for each, name in zip(subjects, labels.split(","), strict=True)]
     state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body", "exposure": exposure}
     if any(is_measured(it.word) and in_one_plane(read(it.word).data) for it in sources):
         state["views"] = ["picture", "polar", "cartesian", "albedo"]  # a lobe would be mostly guessed

@@ -82,6 +82,10 @@ Types = Annotated[
     list[str] | None, typer.Argument(metavar="TYPE…", help="Types or aliases, as `list` shows them. Default: all.")
 ]
 
+Labels = Annotated[
+    str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
+]
+
 AnyVariant = Annotated[
     str | None,
     typer.Option(help="Default: cuda_ad_rgb, metal_ad_rgb or llvm_ad_rgb, whichever works, else scalar_rgb."),

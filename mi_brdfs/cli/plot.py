@@ -11,6 +11,7 @@ from .app import command
 from .files import check_output
 from .options import (
     FIGURES,
+    Labels,
     TracingVariant,
     file_option,
     material_argument,
@@ -54,9 +55,7 @@ def plot(
         bool, typer.Option("--side-by-side", help="Draw each BSDF in a panel of its own, for polar, cartesian.")
     ] = False,
     title: Annotated[str | None, typer.Option(metavar="TEXT", help="Above the figure.")] = None,
-    labels: Annotated[
-        str | None, typer.Option(metavar="NAME,…", help="The names of the materials, in place of what was typed.")
-    ] = None,
+    labels: Labels = None,
     size: Annotated[
         str | None, typer.Option(metavar="WxH", help="In inches, of 200 pixels. Default: as needed.")
     ] = None,

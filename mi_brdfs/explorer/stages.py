@@ -16,13 +16,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .. import loading
 from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
 from ..rendering.output import denoiser, tonemap
 from ..rendering.passes import pass_source
+from ..rendering.scene_file import SceneFile
 from ..srgb import encoded_8bit
 from .state import INCIDENCE, SHAPES, Bsdf, State
 
@@ -218,7 +218,7 @@ def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
-    scene = loading.load(Path(str(user.scene)), {})
+    scene = SceneFile(str(user.scene), box_filter=True).load()  # as the denoiser expects
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
     shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]

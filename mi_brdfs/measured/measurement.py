@@ -311,6 +311,15 @@ class Measurement:
         object.__setattr__(self, "notes", {printable(name): printable(text) for name, text in lines.items()})
 
 
+def seen(data: Grid | Samples, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """Return whether directions were measured, and a table's value there is of no node that is missing or 0, unless all
+    are: files have zeros where an instrument saw nothing."""
+    lit = np.nan_to_num(data.values).any(axis=-1, keepdims=True)
+    if isinstance(data, Samples) or not lit.any():
+        return data.measured(wi, wo)
+    return data.measured(wi, wo) & (replace(data, values=lit.astype(float)).evaluate(wi, wo)[..., 0] > 1 - MARGIN)
+
+
 def usable(values: np.ndarray) -> np.ndarray:
     """Return values with 0 in place of negative, infinite and missing ones."""
     return np.where(np.isfinite(values) & (values > 0), values, 0)

@@ -4,10 +4,10 @@
  * of reports in front; and dashes for curves that coincide. */
 export const PALETTE = [
   ["#0072B2", "#56B4E9"],
-  ["#E69F00", "#F0A05A"],
+  ["#B97F00", "#F0A05A"],
   ["#009E73", "#3FCF9F"],
   ["#CC79A7", "#CC79A7"],
-  ["#56B4E9", "#F0E442"],
+  ["#3A9BD4", "#F0E442"],
   ["#D55E00", "#D55E00"],
 ];
 export const DASHES = ["", "7 3", "2 2.5", "9 3 2 3", "12 3", "5 2 1 2 1 2"];
