@@ -664,7 +664,7 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     tab.goto(exported.as_uri())
     drawn(tab)
     assert tab.locator("#view-polar svg path").count() > 1
-    assert tab.locator(".chip").all_inner_texts() == ["lambert", name]
+    assert tab.locator(".chip").all_inner_texts() == ["chalk", name]
     assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [exported.as_uri()]
     lobe = "document.querySelector('#view-lobe canvas').toDataURL()"
     before = tab.evaluate(lobe)
