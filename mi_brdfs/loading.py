@@ -32,6 +32,8 @@ def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> An
     with looking_in(path.parent):
         config = mi.parser.ParserConfig(mi.variant())
         state, upgraded = parsed(config, path, lenient, parameters)
+        # Mitsuba merges what is turned inside out with what is not, and fails.
+        config.merge_meshes = "flip_normals" not in (upgraded or "")
         try:
             mi.parser.transform_all(config, state)
             return mi.parser.instantiate(config, state)

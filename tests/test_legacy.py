@@ -311,6 +311,13 @@ MISSING = [
 ]  # fmt: skip
 
 
+def test_walls_that_are_turned_inside_out_load_beside_others(load):
+    """Mitsuba merges shapes of equal BSDFs, but not these."""
+    wall = '<shape type="rectangle"><bsdf type="diffuse"/>{}</shape>'
+    scene, _ = load(wall.format('<boolean name="flipNormals" value="true"/>') + 2 * wall.format(""))
+    assert len(scene.shapes()) == 3
+
+
 @pytest.mark.parametrize("old, stand_in", MISSING)
 def test_missing_files(upgraded, old, stand_in):
     old = old.format('<transform name="toWorld"><scale value="2"/></transform><bsdf type="conductor"/>')
@@ -364,6 +371,7 @@ HOSTILE = {
     + "".join(f'<default name="a{k + 1}" value="{f"$a{k}" * 10}"/>' for k in range(9)) + "</scene>",
     "a parameter of many letters, often": f'<scene version="0.6.0"><default name="a" value="{"x" * 90_000}"/>'
     f'<string name="b" value="{"$a" * 40_000}"/></scene>',
+    "no amount": '<scene version="0.2.0"><bsdf type="phong"><float name="diffuseAmount" value=""/></bsdf></scene>',
     "parameter in itself": '<scene version="0.6.0"><default name="a" value="$a"/></scene>',
     "endless spectrum": '<scene version="0.6.0"><bsdf type="diffuse"><spectrum name="reflectance" '
     'filename="/dev/zero"/></bsdf></scene>',

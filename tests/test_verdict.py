@@ -115,6 +115,7 @@ EXCEEDS = [
         "diffuse_reflectance + specular_reflectance_1 + specular_reflectance_2 = 1.1, but",
     ),
     ({"type": "walter", "diffuse_reflectance": 0.5}, "specular_reflectance = 1.5, but"),
+    ({"type": "phong", "diffuse_reflectance": {"type": "spectrum", "value": 0.9}}, "specular_reflectance = 1.1, but"),
 ]
 HARMLESS = [
     {"type": "phong", "diffuse_reflectance": 0.8},

@@ -28,8 +28,7 @@ def upgrade(
         fail(f"{old}: no such file", Exit.USAGE)
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
-    for line in [*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]:
-        err.print(line)
+    err.print("\n".join([*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]))
     if output:
         write_text(output, new.xml)
     else:

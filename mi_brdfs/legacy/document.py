@@ -1,7 +1,8 @@
-"""Scene files as Mitsuba 0.6 read them: elements with their lines, includes, and parameters."""
+"""Scene files as Mitsuba 0.6 read them: elements with their lines, colours, includes, and parameters."""
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 import re
@@ -12,21 +13,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
-from .tables import PLUGINS
+import numpy as np
 
-OBJECTS = {*PLUGINS, "camera", "luminaire"}
-"""The elements that are plugins; the last two are those of 0.3."""
+from ..srgb import decoded
+from .tables import PLUGINS, Entry
 
-MOST_ELEMENTS, DEEPEST, LONGEST, MOST_FILES = 1_000_000, 60, 100_000, 1000
-"""Bounds of the number of elements, of their nesting, of the length of an attribute, and of the files read, which
-includes and parameters may multiply."""
-
-
-def _attribute(name: str) -> property:
-    return property(
-        lambda self: self.attributes.get(name, ""), lambda self, value: self.attributes.update({name: value})
-    )
+MOST_ELEMENTS, DEEPEST, MOST_FILES, LONGEST, MOST_PARAMETERS = 1_000_000, 60, 1000, 100_000, 100
+"""Bounds of what includes and parameters may multiply: elements, their nesting, the files read, the letters of an
+attribute, and the parameters in it."""
 
 
 @dataclass(eq=False)
@@ -35,16 +31,16 @@ class Element:
 
     tag: str
     attributes: dict[str, str] = field(default_factory=dict)
+    """Those beside the following four, which are empty where they are not given."""
     children: list[Element] = field(default_factory=list)
+    type: str = ""
+    id: str = ""
+    name: str = ""
+    value: str = ""
     place: str = ""
     """The file and the line that it comes from."""
     scale: list[float] = field(default_factory=lambda: [1.0])
     """Of a texture, what it is multiplied by, which Mitsuba 3 has no plugin for."""
-
-    type, name, value = _attribute("type"), _attribute("name"), _attribute("value")
-
-    def __contains__(self, name: str) -> bool:
-        return any(child.name == name for child in self.children)
 
     def __getitem__(self, name: str) -> Element | None:
         """Return the property of a name, of several the last, as 0.6 does."""
@@ -72,26 +68,26 @@ class Element:
     def number(self, name: str, default: float) -> float:
         """Return the value of a number, and the default for a texture."""
         found = self[name]
-        return float(found.value if found and found.tag in ("float", "integer") else default)
+        return found.numbers(1)[0] if found and found.tag in ("float", "integer") else default
 
     @property
-    def label(self) -> str:
-        return self.name or self.type or self.tag
+    def entry(self) -> Entry:
+        """What its plugin is in Mitsuba 3."""
+        return PLUGINS.get(self.tag, {}).get(self.type, Entry("", ""))
 
-    def numbers(self, *counts: int, name: str = "value") -> list[float]:
-        """Return the finite numbers of an attribute, as many as one of the counts says, if there are any."""
-        text = self.attributes.get(name, "")
+    def numbers(self, *counts: int, text: str = "") -> list[float]:
+        """Return the finite numbers in its value, or in another text, as many as one of the counts says, if any."""
+        text = text or self.value
         with suppress(ValueError):
             numbers = floats(text)
             if all(map(math.isfinite, numbers)) and (not counts or len(numbers) in counts):
                 return numbers
-        words = {(): "a list of finite numbers", (1,): "a finite number"}
-        wanted = words.get(counts, f"{' or '.join(map(str, counts))} finite numbers")
-        raise self.error(f"{text!r} is not {wanted}")
+        wanted = f"{' or '.join(map(str, counts)) or 'a list of'} finite numbers"
+        raise self.error(f"{text!r} is not {'a finite number' if counts == (1,) else wanted}")
 
     def to_world(self) -> Element:
         """Return its transform, which it is given if it has none."""
-        transform = self["to_world"] or Element("transform", {"name": "to_world"})
+        transform = self["to_world"] or Element("transform", name="to_world")
         self.put(transform)
         return transform
 
@@ -101,9 +97,7 @@ class Element:
 
     def copy(self, name: str) -> Element:
         """Return a copy with another name and without an id, which stays with the original."""
-        given = {**self.attributes, "name": name}
-        kept = {key: value for key, value in given.items() if value and (key != "id" or self.tag == "ref")}
-        return replace(self, attributes=kept, children=[*self.children])
+        return replace(self, name=name, id=self.id if self.tag == "ref" else "", children=[*self.children])
 
     def of(self, *tags: str) -> list[Element]:
         """Return the children of some tags."""
@@ -115,27 +109,23 @@ class Element:
         for child in self.children:
             yield from child.walk()
 
-    def to_xml(self) -> str:
+    def to_xml(self, margin: str = "") -> str:
         """Return it as XML."""
-        root = self._tree()
-        ET.indent(root, "    ")
-        return ET.tostring(root, encoding="unicode") + "\n"
-
-    def _tree(self) -> ET.Element:
-        tree = ET.Element(self.tag, self.attributes)
-        tree.extend([child._tree() for child in self.children])
-        return tree
+        given = {"type": self.type, "id": self.id, "name": self.name, "value": self.value} | self.attributes
+        start = margin + "<" + " ".join([self.tag, *(f"{key}={quoteattr(it)}" for key, it in given.items() if it)])
+        inner = "".join(child.to_xml(margin + "    ") for child in self.children)
+        return f"{start}>\n{inner}{margin}</{self.tag}>\n" if inner else f"{start}/>\n"
 
 
 def prop(name: str, value: Any) -> Element:
     """Return a property of the type that its value has; a list is a colour."""
     tags = {bool: "boolean", int: "integer", float: "float", str: "string", list: "rgb"}
-    return Element(tags[type(value)], {"name": name, "value": written(value)})
+    return Element(tags[type(value)], name=name, value=written(value))
 
 
 def plugin(kind: str, type: str, *children: Element, **properties: Any) -> Element:
     """Return a plugin with some properties."""
-    return Element(kind, {"type": type}, [*(prop(*it) for it in properties.items()), *children])
+    return Element(kind, type=type, children=[*(prop(*it) for it in properties.items()), *children])
 
 
 def floats(text: str) -> list[float]:
@@ -151,6 +141,47 @@ def written(value: Any) -> str:
     return ", ".join(map(written, value)) if isinstance(value, list) else str(value)
 
 
+def rgb_of(element: Element, folder: Path) -> list[float]:
+    """Return the channels of an ``<rgb>``, ``<srgb>``, ``<spectrum>`` or ``<blackbody>``, one if all are the same."""
+    text, light = element.value.strip(", \t\n"), None
+    try:
+        if element.tag == "blackbody":
+            kelvin = float(element.attributes.get("temperature", "").strip().rstrip("Kk"))
+            light = _blackbody(kelvin, float(element.attributes.get("scale", 1)))
+        elif "filename" in element.attributes:
+            if not (path := folder / element.attributes["filename"]).is_file():  # a pipe would never end
+                raise ValueError(f"there is no file {path}")
+            light = np.loadtxt(path, usecols=(0, 1), ndmin=2, encoding="utf-8").T
+        elif ":" in text:
+            pairs = [pair.split(":") for pair in re.split(r"[,\s]+(?=\S)", re.sub(r"\s*:\s*", ":", text))]
+            light = np.array(pairs, float).T
+        elif re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+            rgb = [byte / 255 for byte in bytes.fromhex(text[1:])]
+        else:
+            rgb = floats(text)
+        if light is not None:  # linear between its wavelengths in nm and 0 beyond; Y is the mean under the observer's
+            if not (np.diff(light[0]) > 0).all():
+                raise ValueError("wavelengths must increase")
+            scalar = importlib.import_module("mitsuba.scalar_rgb")  # whose functions compute without kernels
+            rgb = [float(v) for v in scalar.spectrum_list_to_srgb(*light, bounded=False, d65=False)]
+    except (ValueError, OSError, RuntimeError) as error:
+        raise element.error(f"it has no colour that can be read: {error}") from None
+    if len(rgb) not in (1, 3) or not np.isfinite(rgb).all():
+        raise element.error(f"{element.value!r} has not one or three numbers")
+    return decoded(rgb).tolist() if element.tag == "srgb" else rgb
+
+
+def _blackbody(kelvin: float, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return wavelengths in nm and Planck's radiance in W/(m² sr nm)."""
+    h, c, k = 6.62607015e-34, 299792458.0, 1.380649e-23
+    if not kelvin > 0:
+        raise ValueError("its temperature must be above 0 K")
+    wavelengths = np.arange(360.0, 831.0)
+    metres = wavelengths * 1e-9
+    with np.errstate(over="ignore"):  # of the cold ones, whose light is 0
+        return wavelengths, scale * 1e-9 * 2 * h * c**2 / (metres**5 * np.expm1(h * c / (metres * k * kelvin)))
+
+
 def root_of(path: Path) -> tuple[str, dict[str, str]]:
     """Return the tag and the attributes of a file's root, nothing if it is no XML."""
     with open(path, "rb") as file, suppress(ET.ParseError, LookupError, ValueError):
@@ -164,21 +195,12 @@ class Reader:
 
     def __init__(self, scene: Path, values: Mapping[str, str], lenient: bool) -> None:
         self.scene, self.values, self.lenient = scene, dict(values), lenient
-        self.lengths = set(map(len, values))
-        """Of the parameters' names."""
-        self.missing: list[Element] = []
-        """Includes whose files are missing, if ``lenient``."""
         self.used: set[str] = set()
         self.count = self.files = 0
         self.reading: list[Path] = []
 
     def read(self, path: Path) -> Element:
-        """Return the ``<scene>`` of a file, with its includes in their places and the values of its parameters.
-
-        Raises:
-            ValueError: if it is none, in a sentence that names file and line.
-            OSError: if a file cannot be read.
-        """
+        """Return the ``<scene>`` of a file, with its includes in their places and the values of its parameters."""
         if path.resolve() in self.reading:
             raise ValueError(f"{path}: the file includes itself.")
         self.reading.append(path.resolve())
@@ -193,24 +215,22 @@ class Reader:
             self.count += 1
             if self.count > MOST_ELEMENTS or len(open_) > DEEPEST:
                 raise ValueError(f"{place}: the scene has more than {MOST_ELEMENTS} elements, or {DEEPEST} in another.")
-            attributes = {name: self._substituted(value, place) for name, value in attributes.items()}
-            element = Element({"lookAt": "lookat"}.get(tag, tag), attributes, place=place)
-            if "name" in attributes and tag not in ("default", "scene"):
-                element.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", element.name.strip()).lower()  # intIOR: int_ior
-            if tag in OBJECTS:
-                element.type = element.type.strip().lower()
+            given = {name: self._substituted(value, place) for name, value in attributes.items()}
+            type, id, name, value = (given.pop(key, "") for key in ("type", "id", "name", "value"))
+            if tag != "default":  # intIOR is int_ior
+                name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.strip()).lower()
+            element = Element(tag.replace("lookAt", "lookat"), given, [], type.strip().lower(), id, name, value, place)
             open_[-1].children.append(element)
             open_.append(element)
 
         def end(tag: str) -> None:
-            element = open_.pop()
+            element, siblings = open_.pop(), open_[-1].children
             if tag == "default":
+                siblings.pop()
                 self.values.setdefault(element.name, element.value)
-                self.lengths.add(len(element.name))
             elif tag == "include" and (found := self._found(element, path)):
-                open_[-1].children += self.read(found).children
-            if tag in ("default", "include"):
-                open_[-1].children.remove(element)
+                siblings.pop()
+                siblings += self.read(found).children
 
         def refuse(*_: Any) -> None:
             raise ValueError(f"{path}: a scene has no DOCTYPE; take it out.")
@@ -229,28 +249,23 @@ class Reader:
 
     def _substituted(self, value: str, place: str) -> str:
         """Return an attribute with the values of the parameters, the longest name first."""
-        first, *parts = value.split("$")
-        found, length, lengths = [first], len(first), sorted(self.lengths, reverse=True) if parts else []
-        for part in parts:
-            name = next((part[:k] for k in lengths if part[:k] in self.values), "")
-            self.used |= {name} if name else set()
-            found.append(self.values[name] + part[len(name) :] if name else f"${part}")
-            length += len(found[-1])
-            if length > LONGEST:
-                break
-        if length > LONGEST:
-            raise ValueError(f"{place}: an attribute has more than {LONGEST} letters.")
-        value = "".join(found)
-        if (missing := re.search(r"\$(\w+)", value)) and "[" not in value:  # as labels of films have it
-            raise ValueError(f"{place}: the parameter {missing[1]} has no value; give it one (-D {missing[1]}=VALUE).")
+
+        def valued(found: re.Match) -> str:
+            rest = found[1]
+            if name := next((rest[:k] for k in range(len(rest), 0, -1) if rest[:k] in self.values), ""):
+                self.used.add(name)
+            elif (word := re.match(r"\w+", rest)) and "[" not in value:  # as labels of films have it
+                raise ValueError(f"{place}: the parameter {word[0]} has no value; give it one (-D {word[0]}=VALUE).")
+            return self.values[name] + rest[len(name) :] if name else found[0]
+
+        few = value.count("$") <= MOST_PARAMETERS and len(value) <= LONGEST
+        if not few or len(value := re.sub(r"\$([^$]{1,99})", valued, value)) > LONGEST:
+            raise ValueError(f"{place}: an attribute has more than {LONGEST} letters, or {MOST_PARAMETERS} parameters.")
         return value
 
     def _found(self, include: Element, path: Path) -> Path | None:
         name = include.attributes.get("filename", "")
-        for folder in (self.scene.parent, path.parent):
-            if name and os.path.isfile(folder / name):
-                return folder / name
-        if not self.lenient:
+        found = [it for folder in (self.scene.parent, path.parent) if name and os.path.isfile(it := folder / name)]
+        if not found and not self.lenient:
             raise ValueError(f"{include.place}: there is no file {name} to include.")
-        self.missing.append(include)
-        return None
+        return next(iter(found), None)

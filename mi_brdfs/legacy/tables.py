@@ -5,28 +5,21 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 
 class Entry:
     """A plugin of Mitsuba 3."""
 
     def __init__(self, type: str, words: str) -> None:
+        found = re.findall(r"(?:(\w+\*?)>)?(<?\w+>?)(?:=(\S+)|@(\S+)\.\.(\S+)|\|(\S+))?", words)
         self.type = type
-        self.known: set[str] = set()
+        self.known = {name for _, name, *_ in found}
         """Its properties, and the kinds that it holds, as ``<kind>``."""
-        self.renamed: dict[str, str] = {}
+        self.renamed = {old: name for old, name, *_ in found if old}
         """Those with another name in 0.6, and with a * those of 0.2 and 0.3."""
-        self.supplied: dict[str, Any] = {}
-        self.limits: dict[str, tuple[float, float]] = {}
-        for old, name, value, low, high in re.findall(r"(?:(\w+\*?)>)?(<?\w+>?)(?:=(\S+))?(?:@(\S+)\.\.(\S+))?", words):
-            self.known.add(name)
-            if old:
-                self.renamed[old] = name
-            if value:
-                self.supplied[name] = json.loads(value)
-            if low:
-                self.limits[name] = float(low), float(high)
+        self.supplied = {name: json.loads(value) for _, name, value, *_ in found if value}
+        self.limits = {name: (float(low), float(high)) for _, name, _, low, high, _ in found if low}
+        self.words = {name: words.split("|") for _, name, *_, words in found if words}
 
 
 PLUGINS: dict[str, dict[str, Entry]] = {}

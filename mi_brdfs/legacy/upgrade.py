@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 import xml.etree.ElementTree as ET
@@ -14,25 +13,21 @@ from typing import Any, Literal, NamedTuple, get_args
 import mitsuba as mi
 import numpy as np
 
-from .document import OBJECTS, Element, Reader, plugin, prop, root_of
-from .rules import RULES, colours
-from .sheets import modernize
-from .spectra import rgb_of
+from .document import Element, Reader, plugin, prop, rgb_of, root_of, written
+from .rules import RULES, colours, modernize
 from .tables import PLUGINS
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
-PLACES = ("point", "vector", "transform")
-COUNTS: dict[str, tuple[int, ...]] = {
-    **dict.fromkeys(("x", "y", "z", "angle"), (1,)), **dict.fromkeys(("origin", "target", "up"), (3,)), "value": (),
-}  # fmt: skip
-"""How many numbers the attributes of these have; a matrix has 16."""
+COUNTS: dict[str, tuple[int, ...]] = {"matrix": (16,), **dict.fromkeys(("origin", "target", "up"), (3,))}
+COUNTS |= dict.fromkeys(("float", "integer", "x", "y", "z", "angle"), (1,))
+COUNTS |= dict.fromkeys(("point", "vector", "scale", "translate", "rotate"), ())
+"""How many numbers the values of these elements have, if it is fixed, and attributes of these names."""
 COLOURS = ("rgb", "srgb", "spectrum", "blackbody")
 NUMBERS = ("alpha", "alpha_u", "alpha_v", "exponent", "opacity", "weight")
 """Properties that Mitsuba 3 reads of a texture as numbers."""
 STAND_INS = {"shape": "cube", "emitter": "constant", "volume": "constvolume", "texture": "grey"}
 """What takes the place of plugins whose files are missing."""
 Kind = Literal["changed", "approximated", "dropped", "replaced"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class Change(NamedTuple):
@@ -57,8 +52,8 @@ class Upgraded:
 
     def summary(self) -> str:
         """Return how many changes of each kind there are."""
-        counts = {kind: sum(change.kind == kind for change in self.changes) for kind in KINDS}
-        return ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "nothing changed"
+        counts = [(sum(change.kind == kind for change in self.changes), kind) for kind in get_args(Kind)]
+        return ", ".join(f"{count} {kind}" for count, kind in counts if count) or "nothing changed"
 
     def report(self) -> str:
         """Return the changes, one a line, those that are the same together, with their places."""
@@ -89,12 +84,11 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     if is_new(path):
         try:
             text = path.read_text(encoding="utf-8")
-            tree = ET.fromstring(text.encode())
+            new = ET.fromstring(text.encode())
         except (ET.ParseError, LookupError, ValueError) as error:
             raise ValueError(f"{path}: no well-formed XML in UTF-8: {error}.") from None
-        version = tree.get("version", "").strip()
-        if tree.tag != "scene" or not re.fullmatch(r"[\d.]+", version):
-            raise ValueError(f"{path}: the file has a <{tree.tag}> of version {version!r}, no scene of Mitsuba.")
+        if not re.fullmatch(r"\s*[\d.]+\s*", version := new.get("version", "")) or new.tag != "scene":
+            raise ValueError(f"{path}: the file has a <{new.tag}> of version {version!r}, no scene of Mitsuba.")
         return Upgraded("3", text)
     reader = Reader(path, {name: str(value) for name, value in parameters.items()}, lenient)
     root = reader.read(path)
@@ -105,10 +99,7 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
     if not (found := re.fullmatch(r"0\.([0-6])(\.\d+)*", version)):
         raise ValueError(f"{path}: version {version} is none of 0.2 to 0.6.")
     work = Work(path, lenient, Path(folder) if folder is not None else path.parent)
-    for include in reader.missing:
-        work.dropped(include, f"the include {include.attributes.get('filename', '')}, which is missing")
-    scene = work.scene(root, int(found[1]))
-    return Upgraded(version, scene.to_xml(), work.changes)
+    return Upgraded(version, work.scene(root, int(found[1])).to_xml(), work.changes)
 
 
 def is_new(path: Path) -> bool:
@@ -126,7 +117,6 @@ class Work:
         self.ids: dict[str, Element | None] = {}
         """What became of the elements with an id; None of those that were left out."""
         self.missing: list[str] = []
-        self.has_media = False
 
     def said(self, kind: Kind, element: Element, text: str) -> None:
         self.changes.append(Change(element.place or self.path.name, kind, text))
@@ -137,50 +127,46 @@ class Work:
 
     def resolved(self, element: Element) -> Element:
         """Return what a reference refers to, or the element itself."""
-        return (element.tag == "ref" and self.ids.get(element.attributes.get("id", ""))) or element
+        return (element.tag == "ref" and self.ids.get(element.id)) or element
 
     def scene(self, root: Element, minor: int) -> Element:
         modernize(root, minor, self.changed)
         self._complete(root)
         self.has_media = any(it.tag == "medium" for it in root.walk())
         scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
-        used = {it.attributes.get("id") for it in scene.walk() if it.tag == "ref"}
-        for texture in scene.of("texture"):
-            if texture.type == "checkerboard" and texture.attributes.get("id") not in used:
-                scene.children.remove(texture)  # whose colours may be above 1
-                self.changed(texture, "a checkerboard is written where it is used, if it is")
-        for extra in scene.of(*PROPERTIES):
-            scene.children.remove(extra)
-            self.dropped(extra, f"{extra.name} of the scene, which Mitsuba 3 does not have")
-        if len(sensors := scene.of("sensor")) > 1:
-            scene.children.remove(sensors[-1])
-            scene.children.insert(scene.children.index(sensors[0]), sensors[-1])
-            self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
         if self.missing:
             first = self.missing[0] + f", and {len(self.missing) - 1} more" * (len(self.missing) > 1)
             raise ValueError(f"{first}; put the files there, or let stand-ins take their place (--lenient).")
+        self._leave_out(scene, scene.of(*PROPERTIES), "of the scene, which Mitsuba 3 does not have")
+        scene.children = [it for it in scene.children if not colours(it)]  # which are written where they are used
+        if len(sensors := scene.of("sensor")) > 1:
+            scene.children.sort(key=lambda it: it is not sensors[-1])
+            self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
         return scene
+
+    def _leave_out(self, parent: Element, children: list[Element], why: str) -> None:
+        parent.children = [it for it in parent.children if it not in children]
+        for child in children:
+            self.dropped(child, f"{child.name or child.type or child.tag} {why}")
 
     def _complete(self, root: Element) -> None:
         """Add what 0.6 supplies by itself."""
         if not root.of("integrator"):
             root.children.insert(0, plugin("integrator", "direct"))
             self.changed(root, "a scene without an integrator has direct")
-        for extra in root.of("integrator")[:-1]:
-            root.children.remove(extra)
-            self.dropped(extra, "an integrator before another one")
+        self._leave_out(root, root.of("integrator")[:-1], "before another integrator")
         if not root.of("sensor"):
             self.dropped(root, "a scene without a sensor has none: 0.6 sees all of it along z")
         if not any(it.tag == "emitter" for it in root.walk()):
-            turn = Element("transform", {"name": "to_world"}, [Element("rotate", {"y": "1", "angle": "-120"})])
-            root.children.append(plugin("emitter", "sunsky", turn, scale=2.0))
+            root.children.append(sky := plugin("emitter", "sunsky", scale=2.0))
+            sky.to_world().children.append(Element("rotate", {"y": "1", "angle": "-120"}))
             self.changed(root, "a scene without an emitter has sun and sky")
 
     def _parts(self, element: Element) -> list[Element]:
         return [it for child in element.children if (it := self._part(child)) is not None]
 
     def _part(self, element: Element) -> Element | None:
-        id, name = element.attributes.get("id", ""), element.name
+        id, name = element.id, element.name
         if element.tag in ("null", "alias"):
             self.ids[element.attributes.get("as", id)] = self.ids.get(id)
             return None
@@ -192,45 +178,38 @@ class Work:
             return replace(prop(name, rgb_of(element, self.path.parent)), place=element.place)
         if element.tag == "animation":
             self.approximated(element, "an animated transform is its first one")
-            return next((replace(it, attributes={"name": name}) for it in element.of("transform")), None)
-        if element.tag in ("float", "integer"):
-            element.numbers(1)
-            element.value = element.value.strip(", \t\n")
-        for it in element.walk() if element.tag in PLACES else ():
-            for name in it.attributes.keys() & COUNTS.keys():
-                it.numbers(*((16,) if (it.tag, name) == ("matrix", "value") else COUNTS[name]), name=name)
+            return next((replace(it, name=name, attributes={}) for it in element.of("transform")), None)
         if element.tag in PROPERTIES:
+            for it in element.walk():
+                for kind, text in ((it.tag, it.value), *it.attributes.items()):
+                    if kind in COUNTS and (text or COUNTS[kind]):
+                        it.numbers(*COUNTS[kind], text=text)
+            element.value = element.value.strip(", \t\n")
             return element
         if element.tag not in PLUGINS:
-            self.dropped(element, f"<{element.tag}>, which Mitsuba does not have")
+            shown = " ".join([element.tag, *element.attributes.values()])
+            self.dropped(element, f"<{shown}>, which is missing or unknown")
             return None
         result = self._object(element)
         if result is not element:  # which may be in it
-            element.attributes.pop("id", None)
-            element.attributes.pop("name", None)
+            element.id = element.name = ""
         if id:
             self.ids[id] = result and self.resolved(result)
-        if result is None or (result.tag in COLOURS and not name):  # a colour that only references need
-            return None
-        if id and result.tag in OBJECTS:
-            result.attributes.setdefault("id", id)
-        if name:
-            result.name = name
+        if result:
+            result.id = result.id or (id if not colours(result) else "")
+            result.name = name or result.name
         return result
 
     def _reference(self, element: Element) -> Element | None:
-        id = element.attributes.get("id", "")
-        if id not in self.ids:
-            raise element.error(f"there is no {id!r} before this reference")
-        target = self.ids[id]
-        if target is None:
+        if element.id not in self.ids:
+            raise element.error(f"there is no {element.id!r} before this reference")
+        if (target := self.ids[element.id]) is None:
             self.dropped(element, "references to what has no successor")
             return None
-        # What became a colour has no id, and what is scaled differs from what others refer to.
-        if target.tag not in OBJECTS or target.scale != [1.0]:
+        # Colours have no id, and what is scaled differs from what others refer to.
+        if colours(target) or target.scale != [1.0]:
             return target.copy(element.name)
-        name = {"name": element.name} if element.name else {}
-        element.attributes = {"id": target.attributes["id"]} | name
+        element.id = target.id
         return element
 
     def _object(self, element: Element) -> Element | None:
@@ -242,47 +221,40 @@ class Work:
             if element.tag == "texture":
                 return prop(element.name, [0.5])
             element.type = STAND_INS[element.tag]
+        supplied = element.entry.supplied
         if (element.tag, element.type) not in RULES and (succeeded := self._succeeded(element)) is not element:
             return succeeded
-        rule = RULES.get((element.tag, element.type))
+        rule = RULES.get((element.tag, element.type)) or RULES.get(("", element.tag))
         result = (rule(self, element) if rule else None) or element
-        entries = [PLUGINS[element.tag].get(type) for type in (was, element.type)]
-        supplied = next((it.supplied for it in entries if it and it.type == element.type), {})
-        for name in [name for name in supplied if name not in element]:
-            element.set(name, supplied[name])
+        for name, value in (supplied | element.entry.supplied).items():
+            if not element[name]:
+                element.set(name, value)
         held = {self.resolved(it).tag for it in element.children}
         if element.tag == "shape" and "medium" in held and not held & {"bsdf", "emitter"}:
             element.children.append(plugin("bsdf", "null"))
-        if element.tag == "sensor" and "to_world" in element:
-            _normalize(element.to_world())
         for it in result.walk():
-            self._clean(it, was)
+            self._fit(it, was)
         return result
 
     def _sort_names(self, element: Element) -> None:
-        """Give properties their names in Mitsuba 3, and leave out those that a later one of the same name replaces, or
-        a texture at any place."""
-        entry = PLUGINS[element.tag].get(element.type)
-        names = entry.renamed if entry else {}
-        for child in element.of(*PROPERTIES, *COLOURS, "texture", "ref", "volume"):
-            if child.name in names:
-                self.changed(child, f"{child.name} of {element.type} is {names[child.name]}")
-                if names[child.name] in element and child.tag not in ("texture", "ref"):  # which counts, in any order
-                    element.children.remove(child)
-                    element.children.insert(0, child)
-                child.name = names[child.name]
-        named = [it for it in element.children if it.name and self.resolved(it).tag in (*PROPERTIES, "rgb", "texture")]
-        last = {it.name: it for it in sorted(named, key=lambda it: it.tag in ("texture", "ref"))}
-        for extra in (it for it in named if it is not last[it.name]):
-            element.children.remove(extra)
-            self.dropped(extra, f"{extra.name} of {element.type}, which is given twice")
-        for child in last.values():
-            checks = colours(self.resolved(child))
-            if child.name in NUMBERS and len(checks) == 2:
-                # Mitsuba 3 swaps the two where it reads a checkerboard as a number, up to 3.9 at least.
-                swapped = self.resolved(child).copy(child.name)
-                for name, it in zip(("color1", "color0"), checks, strict=True):
-                    swapped.set(name, float(np.mean(it.numbers())))
+        """Give properties their names in Mitsuba 3, and leave out those for which 0.6 takes another of the same name: a
+        texture at any place, a colour under the name that is still used, or else a later one."""
+        names = element.entry.renamed
+        kinds = (*PROPERTIES, "rgb", "texture", "volume")
+        named = [it for it in element.children if it.name and self.resolved(it).tag in kinds]
+        named.sort(key=lambda it: 2 if it.tag in ("texture", "ref") else it.name not in names)
+        last = {names.get(it.name, it.name): it for it in named}
+        for child in named:
+            if new := names.get(child.name):
+                self.changed(child, f"{child.name} of {element.type} is {new}")
+                child.name = new
+            if child is not last[child.name]:
+                self._leave_out(element, [child], f"of {element.type}, which is given twice")
+            elif child.name in NUMBERS and child.type == "checkerboard":
+                # Mitsuba 3 swaps the two colours where it reads a checkerboard as a number, up to 3.9 at least.
+                swapped = child.copy(child.name)
+                for it in colours(child):
+                    swapped.set({"color0": "color1", "color1": "color0"}[it.name], float(np.mean(it.numbers())))
                 element.put(swapped)
 
     def _succeeded(self, element: Element) -> Element | None:
@@ -296,9 +268,7 @@ class Work:
             inner, text = next(iter(element.of("rgb")), prop("", [0.5])), "a constant colour; it has no successor"
         if inner:
             self.approximated(element, f"the {kind} {was} is {text}")
-            for child in element.children:
-                if child is not inner:
-                    self.dropped(child, f"{child.label} of {was}")
+            self._leave_out(element, [it for it in element.children if it is not inner], f"of {was}")
             return inner
         if new is None:
             self.dropped(element, f"the {kind} {was} has no successor")
@@ -307,20 +277,37 @@ class Work:
         self.approximated(element, f"the {kind} {was} is {element.type}")
         return element
 
-    def _clean(self, element: Element, was: str) -> None:
-        """Leave out the properties that a plugin does not have in Mitsuba 3."""
-        entry = PLUGINS.get(element.tag, {}).get(element.type)
-        for child in [*element.children] if entry else ():
-            if entry and not {child.name, f"<{self.resolved(child).tag}>"} & entry.known:
-                element.children.remove(child)
-                if child.name != "ensure_energy_conservation":
-                    self.dropped(child, f"{child.label} of {was}, which Mitsuba 3 does not have")
-            elif child.scale != [1.0]:
+    def _fit(self, element: Element, was: str) -> None:
+        """Leave out the properties that a plugin does not have in Mitsuba 3, and limit the values of the others."""
+        if not (entry := element.entry).type:
+            return
+        pair = [name for name in ("alpha_u", "alpha_v") if name in entry.known]
+        missing = [name for name in pair if not element[name]]
+        if len(missing) < len(pair) and (missing or element["alpha"]):
+            alpha = element.pop("alpha") or prop("alpha", 0.1)
+            element.children += [alpha.copy(name) for name in missing]
+            self.changed(element, f"alpha of {element.type} is what alphaU and alphaV are where they are not given")
+        element.pop("ensure_energy_conservation")
+        unknown = [it for it in element.children if not {it.name, f"<{self.resolved(it).tag}>"} & entry.known]
+        self._leave_out(element, unknown, f"of {was}, which Mitsuba 3 does not have")
+        for child in [*element.children]:
+            if child.scale != [1.0]:
                 self.approximated(child, "the texture scale of a bitmap has no successor; it is left out")
                 element.children[element.children.index(child)] = replace(child, scale=[1.0])
+            elif limits := entry.limits.get(child.name):
+                for it in colours(self.resolved(child)):
+                    if (limited := np.clip(it.numbers(), *limits).tolist()) != it.numbers():
+                        self.approximated(it, f"{child.name} of {was} is {written(limited)} in place of {it.value}")
+                        it.value = written(limited)
+            elif child.name in entry.words:
+                words = {it.replace("_", ""): it for it in entry.words[child.name]}  # luminanceAlpha: luminance_alpha
+                old, word = child.value, child.value.strip().lower().replace("_", "")
+                child.value = words.get(word.split(",")[0], entry.words[child.name][-1])
+                if word not in words:
+                    self.approximated(child, f"{child.name} of {was} is {child.value} in place of {old}")
 
     def _is_missing(self, element: Element) -> bool:
-        """Write the name of a plugin's file as Mitsuba 3 finds it, or leave out what a stand-in has not."""
+        """Write the name of a plugin's file as Mitsuba 3 finds it, and return whether there is none."""
         given = element["filename"]
         if given is None or element.tag not in STAND_INS:
             return False
@@ -337,7 +324,7 @@ class Work:
 
     def maxima(self, texture: Element) -> np.ndarray:
         """Return the largest value in each channel, as 0.6 knows it."""
-        if constants := colours(texture):
+        if constants := colours(texture := self.resolved(texture)):
             return np.max([np.broadcast_to(it.numbers(1, 3), 3) for it in constants], axis=0)
         most: Any = 1.0
         if texture.type == "bitmap" and (name := texture["filename"]):
@@ -349,19 +336,3 @@ class Work:
             linear = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=bitmap.srgb_gamma() and raw)
             most = np.maximum(np.array(linear)[..., :3].max(axis=(0, 1)), 0)
         return np.broadcast_to(most * np.array(texture.scale), 3)
-
-
-def _normalize(transform: Element) -> None:
-    """Take the scale out of the transform of a sensor, in place, which Mitsuba 3 refuses."""
-    if not transform.of("scale", "matrix"):
-        return
-    importlib.import_module("mitsuba.scalar_rgb")  # which knows what a transform is
-    text = Element("scene", {"version": "3.0.0"}, [plugin("shape", "sphere", transform)]).to_xml()
-    try:
-        parsed = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), text)
-        matrix = np.array(parsed.nodes[1].props["to_world"].matrix)
-        u, _, v = np.linalg.svd(matrix[:3, :3])
-    except (RuntimeError, np.linalg.LinAlgError):
-        raise transform.error("it is no transform, or looks nowhere") from None
-    matrix[:3, :3] = u @ v
-    transform.children = [Element("matrix", {"value": " ".join(f"{v:.9g}" for v in matrix.ravel())})]

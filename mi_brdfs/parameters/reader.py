@@ -79,7 +79,8 @@ class PropertyReader:
         values: list[Any] | None = [default]
         if name in self and (values := self.colour_values(name)) is not None:
             self._check(name, values, limits, allowed)
-        if values is not None and not (name in self and self.props.type(name) == mi.Properties.Type.Spectrum):
+        spectral = name in self and self.props.type(name) == mi.Properties.Type.Spectrum
+        if values is not None and not (spectral and len(values) > 1):
             self.constants[name] = values
         bounded = limits[1] <= 1
         return (self.props.get_texture if bounded else self.props.get_unbounded_texture)(name, default)
