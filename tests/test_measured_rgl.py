@@ -15,6 +15,7 @@ from support import context, interaction, numbers, pairs, shared, traced
 from mi_brdfs.measured import FileError, convert, read
 from mi_brdfs.measured.arrays import DRJIT, NUMPY, components
 from mi_brdfs.measured.formats import rgl
+from mi_brdfs.measured.measurement import seen
 from mi_brdfs.measured.source import Source
 from mi_brdfs.probe.arrays import WAVELENGTHS, luminance, vectors
 from mi_brdfs.probe.bsdf import BSDFProbe
@@ -135,6 +136,14 @@ def test_directions_are_where_they_are_located(tmp_path, kind):
     found = np.array(grid.coordinates.locate(wi, wo, NUMPY))
     assert seen.mean() > 0.6
     np.testing.assert_allclose(found[:, seen], places[:, seen], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["isotropic", "anisotropic"])
+def test_all_that_has_no_zero_is_seen(tmp_path, kind):
+    """Though coordinates have a scale: where normals are many, places are close."""
+    grid, directions = read(written(tmp_path, material(**KINDS[kind]))).data, tried(3000)
+    assert (grid.values > 0).all()
+    np.testing.assert_array_equal(seen(grid, *directions), grid.measured(*directions))
 
 
 def test_two_azimuths_that_differ_are_interpolated(tmp_path):

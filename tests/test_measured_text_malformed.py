@@ -152,7 +152,7 @@ def test_memory(tmp_path, text, ending):
     [
         ("# light " + "1" * 50_000 + "\n" + ZEMAX, "bsdf", ""),
         ("# A" + " " * 50_000 + "b\n" + ZEMAX, "bsdf", ""),
-        ("theta_i_deg,theta_o_deg,phi_o_deg,450" + " " * 50_000 + "x\n0,0,0,1\n", "csv", "is no angle, no wavelength"),
+        ("theta_i_deg,theta_o_deg,phi_o_deg,450" + " " * 50_000 + "x\n0,0,0,1\n", "csv", "is no angle such as"),
         ("NVIDIA ARC MBSDF V1\n" + "\n" * 1_000_000, "mbsdf", "more than 10,000 lines of text"),
     ],
     ids=["digits", "spaces", "spaces in a name", "lines"],

@@ -16,7 +16,7 @@ from .metrics import METRICS, Metric, find_metric
 from .observations import CUT, PAIRS, FitError, Observations, Source, observe
 from .pictures import ImageFit, images
 from .result import Fit, Starts
-from .starts import warm
+from .starts import CANDIDATES, warm
 from .unknowns import check_names, configurations
 
 __all__ = [
@@ -85,7 +85,7 @@ def fit(
         tied: parameters that equal another one, as ``{"cy": "cx"}``.
         start: a plugin dict to start from, besides others, or several. No fit is worse than any of them.
         lobes: the number of lobes of models that have several of a kind.
-        starts: the number of the other starts.
+        starts: the number of the other starts, at most 256.
         seed: of the choice of pairs and of the random starts.
         cut: the largest angle of wi and wo to the normal, in degrees.
         pairs: the most pairs of directions of a material, fitted and held out.
@@ -104,6 +104,8 @@ def fit(
     sources: list[Any] = list(data) if several else [data]  # type: ignore[arg-type]
     if not sources:
         raise FitError("There are no data to fit.")
+    if starts > CANDIDATES:
+        raise FitError(f"A fit has at most {CANDIDATES} starts, not {starts}; try another seed.")
     if starts < 0 or lobes < 1 or pairs < 2 or not 0 < cut <= 90:
         raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2 and a cut in (0, 90] degrees.")
     models = [find_model(name) for name in ([model] if isinstance(model, str) else model)]
