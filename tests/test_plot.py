@@ -269,10 +269,11 @@ def test_a_sweep_is_named_by_what_differs():
     assert len(looks) == 3
     first, second, _ = (np.hypot(*xy).max() for xy in curves(figure).values())
     assert first > 3 * second
-    several = [{"type": "phong", "exponent": n, "specular_reflectance": f} for n, f in ((9, 0.1), (9, 0.2), (20, 0.2))]
-    assert legend(plot.albedo(*several)) == [
-        f"phong exponent={n} specular_reflectance={f}" for n, f in ((9, 0.1), (9, 0.2), (20, 0.2))
-    ]
+    several = [{"type": kind, "exponent": n, "specular_reflectance": 0.1}
+               for kind, n in (("phong", 9), ("phong", 20), ("blinnphong", 9))]  # fmt: skip
+    figure = plot.albedo(*several)
+    assert legend(figure) == ["phong exponent=9", "phong exponent=20", "blinnphong exponent=9"]
+    assert figure.legends[0].get_title().get_text() == "phong, blinnphong with specular_reflectance=0.1"
 
 
 @pytest.mark.slow

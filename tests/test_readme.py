@@ -171,11 +171,12 @@ def test_noise_and_speed():
     bench = json.loads((ROOT / "docs" / "bench.json").read_text(encoding="utf-8"))
     same = {f"{it['name']} / {it['builtin']['type']}" for it in bench["cases"].values() if it["same"]}
     paragraph = README.split("## Noise and speed\n")[1].split("\n## ")[0]
-    said = [tuple(map(float, pair)) for pair in re.findall(r"([\d.]+) to ([\d.]+) times", paragraph)]
+    said = re.search(r"from (\d+) times as fast to (\d+) % slower.*?(\d+) to (\d+) times slower", paragraph, re.DOTALL)
     compared = [f for f in bench["figures"] if f["section"] == "variance" and f["subject"] in same]
     noise = [f["value"] for f in compared if f["name"] in ("sphere", "Cornell box")]
     scalar = [f["value"] for f in bench["figures"] if f["section"] == "scalar" and f["targets"]]
-    assert said == [(round(min(noise), 1), round(max(noise), 1)), (round(min(scalar)), round(max(scalar)))]
+    expected = 1 / min(noise), 100 * (max(noise) - 1), min(scalar), max(scalar)
+    assert [*map(int, said.groups())] == [*map(round, expected)]
 
 
 def test_citation():
