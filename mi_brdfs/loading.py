@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import mitsuba as mi
 
 from .legacy import is_new, root_of, upgrade
+from .mentioned import mentioned
 from .names import check_name
 
 
@@ -47,14 +48,15 @@ def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> An
 def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
     """Return a scene file as Mitsuba's parser has it, and the text of an upgraded one."""
     check_name(str(path))
+    for it in mentioned([str(path)], values=parameters).values():
+        if not os.path.isfile(it):  # Mitsuba would wait for it
+            raise ValueError(f"{it}: it is a pipe or a device; name a file.")
     if is_new(path):
         tag, attributes = root_of(path)
-        _refuse_pipes(re.findall(rb"<include[^>]*filename\s*=\s*[\"']([^\"']+)", path.read_bytes()))
         if not tag or "version" in attributes:
             state = mi.parser.parse_file(config, str(path), **parameters)
         else:
             state = mi.parser.parse_string(config, versioned(path.read_text(encoding="utf-8-sig")), **parameters)
-        _refuse_pipes([props[key] for props, key in file_names(state)])
         return state, None
     new = upgrade(path, lenient=lenient, **parameters)
     warnings.warn(
@@ -67,14 +69,6 @@ def file_names(state: Any) -> list[tuple[mi.Properties, str]]:
     """Return where a parsed scene names files: the strings of properties that are called so."""
     properties = [(node.props, key) for node in state.nodes for key in node.props.keys() if "file" in key]
     return [(props, key) for props, key in properties if isinstance(props[key], str)]
-
-
-def _refuse_pipes(names: Iterable[str | bytes]) -> None:
-    """Raise a ValueError for a named pipe or a device among files: Mitsuba would wait for it."""
-    for name in map(os.fsdecode, names):
-        path = str(mi.file_resolver().resolve(name))
-        if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
-            raise ValueError(f"{path}: it is a pipe or a device; name a file.")
 
 
 def versioned(text: str) -> str:

@@ -19,16 +19,18 @@ SIZE = 256
 PICTURE, CURVES = ["picture"], ["lobe", "polar", "albedo"]
 
 
-def alone(*arguments: str) -> list[str]:
-    """The command of the explorer where no other extra is installed."""
+def alone(*arguments: str, first: str = "pass") -> list[str]:
+    """The command of the explorer where no other extra is installed, after some other code."""
     others = ["matplotlib", "PIL", "jinja2", "flip_evaluator", "distributed", "pyarrow", "scipy"]
-    code = f"import sys; sys.modules.update(dict.fromkeys({others})); from mi_brdfs.cli import main; main()"
+    code = f"import sys; sys.modules.update(dict.fromkeys({others})); from mi_brdfs.cli import main; {first}; main()"
     return [sys.executable, "-c", code, "explore", *arguments]
 
 
-def serving(*arguments: str, stderr: int | IO = subprocess.DEVNULL) -> tuple[subprocess.Popen, str]:
+def serving(
+    *arguments: str, first: str = "pass", stderr: int | IO = subprocess.DEVNULL
+) -> tuple[subprocess.Popen, str]:
     """Start the explorer on a free port, and return its process and address."""
-    command = alone("--no-browser", "--port", "0", *arguments)
+    command = alone("--no-browser", "--port", "0", *arguments, first=first)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
     return process, process.stdout.readline().strip()
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import os
+import tracemalloc
+from html.parser import HTMLParser
 from pathlib import Path
 
 import drjit as dr
@@ -24,6 +26,8 @@ from mi_brdfs.probe.variates import lattice, sampling_efficiency
 from mi_brdfs.variants import is_scalar as is_scalar
 
 ROOT = Path(__file__).parent.parent
+LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
+"""A measured file of a paint, of the goniometer at Lund."""
 
 
 def shared(*parts: str) -> Path:
@@ -32,6 +36,12 @@ def shared(*parts: str) -> Path:
     if not path.exists():
         pytest.skip(f"there is no {path}; set MI_BRDFS_DATA to a folder with {'/'.join(parts)}")
     return path
+
+
+def rows(name: str) -> list[str]:
+    """The rows of a table in ``rows``, without its comments."""
+    text = (ROOT / "tests" / "rows" / name).read_text(encoding="utf-8")
+    return [row for row in text.splitlines() if not row.startswith("# ")]
 
 
 def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
@@ -61,6 +71,64 @@ def written(folder: Path, name: str, content: str | bytes) -> Path:
     path = folder / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path
+
+
+def traced(function) -> tuple:
+    """What a function returns, the bytes that are left of it, and those that it took at most."""
+    tracemalloc.start()
+    try:
+        result = function()
+        return result, *tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+
+class Page(HTMLParser):
+    """What a browser would make of a page, whose elements have ends."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.open, self.elements, self.text = [], [], ""
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.handle_startendtag(tag, attributes)
+        if tag not in ("br", "hr", "img", "input", "link", "meta", "source", "wbr"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        assert len(dict(attributes)) == len(attributes), "an attribute is given twice"
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+    def attributes(self, name: str) -> list[str]:
+        return [attributes[name] for _, attributes in self.elements if name in attributes]
+
+    def pictures(self) -> list[str]:
+        """The descriptions of all pictures."""
+        return [attributes["aria-label"] for tag, attributes in self.elements if attributes.get("role") == "img"]
+
+
+def von_mises_fisher(axis: np.ndarray, width: float, count: int):
+    """Samples of a lobe on the whole sphere about an axis, and their density."""
+    axis, kappa, rng = np.float64(axis), width**-2, np.random.default_rng(1)
+    versine = -np.log1p(rng.random(count) * np.expm1(-2 * kappa)) / kappa
+    phi, sin = rng.uniform(0, 2 * np.pi, count), np.sqrt(versine * (2 - versine))
+    across = np.cross(axis, [0, 0, 1])
+    across /= np.linalg.norm(across)
+    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), 1 - versine], axis=-1) @ [across, np.cross(axis, across), axis]
+
+    def pdf(wo):
+        return np.exp(-kappa * 0.5 * ((wo - axis) ** 2).sum(axis=1)) * kappa / (2 * np.pi * -np.expm1(-2 * kappa))
+
+    return w, pdf
 
 
 def observed() -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ import contextlib
 import glob
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,26 +20,12 @@ from typer.testing import CliRunner
 import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.mitsuba import llvm
-from mi_brdfs.mitsuba.errors import one_line
 from mi_brdfs.probe.sources import value_of
 
 BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
 TURNED = '<rotate y="1" angle="180"/>'
-SCENE = """<scene version="3.0.0">
-  <default name="res" value="24"/>
-  <default name="spp" value="3"/>
-  <default name="material" value="diffuse"/>
-  <integrator type="path"/>
-  <sensor type="perspective">
-    <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
-    <film type="hdrfilm"><integer name="width" value="$res"/><integer name="height" value="$res"/></film>
-    <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
-  </sensor>
-  <shape type="obj" id="sheet"><string name="filename" value="triangle.obj"/><bsdf type="$material"/></shape>
-  <emitter type="constant"/>
-</scene>
-"""
+SCENE = (ROOT / "tests" / "rows" / "scenes" / "sheet.xml").read_text()
 
 
 @pytest.fixture
@@ -47,7 +34,7 @@ def folder(tmp_path):
     (tmp_path / "scenes").mkdir()
     (tmp_path / "work").mkdir()
     (tmp_path / "scenes" / "box.xml").write_text(SCENE)
-    (tmp_path / "scenes" / "triangle.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")
+    shutil.copy(ROOT / "tests" / "rows" / "scenes" / "triangle.obj", tmp_path / "scenes")
     return tmp_path
 
 
@@ -80,16 +67,11 @@ def test_types_are_listed_and_have_pages():
     assert "alpha_u" in page and "``" not in page
 
 
-def test_help_is_in_panels_with_examples_that_can_be_typed(tmp_path, monkeypatch):
+def test_examples_of_the_help_can_be_typed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    commands = get_command(app).commands
-    panels = [it.rich_help_panel for it in commands.values()]
-    assert list(dict.fromkeys(panels)) == ["Look", "Measure", "Validate", "Develop"] and panels == sorted(
-        panels, key=["Look", "Measure", "Validate", "Develop"].index
-    )
-    for name, it in commands.items():
+    for name, it in get_command(app).commands.items():
         heading, *examples = it.epilog.split("\n\n")
-        assert heading == "Examples:" and examples
+        assert heading == "Examples:" and examples and it.rich_help_panel
         for program, command, *words in map(str.split, examples):
             assert (program, command) == ("mi-brdfs", name)
             it.make_context(name, words)  # refuses what is no option
@@ -115,11 +97,6 @@ def test_words_of_other_programs_lead_to_models(word):
     told = re.search("did you mean '(\\w+)'(?: with (\\w+)=([\\w.]+))?", done.stderr)
     with mi.variant_context("scalar_rgb"):
         mi.load_dict({"type": told[1]} | ({told[2]: value_of(told[3])} if told[2] else {}))
-
-
-def test_nothing_goes_by_a_word():
-    done = invoke("list", "--search", "zzz")
-    assert done.exit_code == 2 and "no model goes by the word zzz" in done.stderr
 
 
 def states(text):
@@ -231,59 +208,6 @@ def test_mitsubas_warnings_go_to_stderr(folder):
     assert "Monochrome mode" in done.stderr
 
 
-ERRORS = {
-    "missing": (["nowhere.xml"], 1, "nowhere.xml: no such file"),
-    "folder": (["scenes"], 1, "not a file"),
-    "broken": (["scenes/broken.xml"], 1, "scenes/broken.xml: line 2: "),
-    "not a scene": (["scenes/bsdf.xml"], 1, "does not hold a <scene>"),
-    "no sensor": (["scenes/bare.xml"], 1, "no <sensor>"),
-    "unknown plugin": (["scenes/box.xml", "-Dmaterial=wrad"], 1, 'scenes/box.xml: line 11: .*"wrad"'),
-    "our parameter": (["scenes/ward.xml", "-Dalpha=2.7"], 1, r"scenes/ward.xml: line 3: ward: alpha = 2.7 .*allowed"),
-    "misspelt parameter": (["scenes/misspelt.xml"], 1, "scenes/misspelt.xml: line 2: .*reflectanse"),
-    "bad value": (["scenes/box.xml", "-Dres=many"], 1, 'scenes/box.xml: line 8: .*"many"'),
-    "no pixels": (["scenes/box.xml", "-Dres=0"], 1, "the film's width is 0; give it at least 1 pixel"),
-    "no such id": (["scenes/box.xml", "--replace", "roof=ward"], 1, "has the id roof; there are sheet"),
-    "no material": (["scenes/box.xml", "--replace", "sheet=wrad"], 2, 'no plugin "wrad"; did you mean "ward"'),
-    "two for an id": (["scenes/box.xml", "--replace", "sheet=ward", "--replace", "sheet=lambert"], 2, "sheet is given"),
-    "one sensor": (["scenes/box.xml", "--sensor", "-1"], 2, "no such sensor; the scene's only sensor is 0"),
-    "a large film": (["scenes/box.xml", "-Dres=60000"], 1, "the film has 60000 x 60000 pixels, more than 16384"),
-    "malformed --replace": (["scenes/box.xml", "--replace", "sheet"], 2, "--replace sheet: write ID=MATERIAL"),
-    "missing mesh": (["scenes/no_mesh.xml"], 1, "gone.obj"),
-    "unknown -D": (["scenes/box.xml", "-Dnope=1"], 1, "-D nope: the scene has no <default>"),
-    "malformed -D": (["scenes/box.xml", "-Dres"], 2, "-D res: write -D name=value"),
-    "reserved -D": (["scenes/box.xml", "-Dfilename=1"], 2, "-D filename: "),
-    "unknown format": (["scenes/box.xml", "-o", "a.bmp"], 2, "-o a.bmp: write a .exr, .png, .jpg or .jpeg"),
-    "no output folder": (["scenes/box.xml", "-o", "gone/a.png"], 2, "there is no folder gone"),
-    "output is a folder": (["scenes/box.xml", "-o", "taken.exr"], 2, "-o taken.exr: it is a folder"),
-    "unknown variant": (["scenes/box.xml", "--variant", "llvm"], 1, "no variant llvm; this Mitsuba has scalar_rgb, "),
-}
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("arguments, status, text", ERRORS.values(), ids=ERRORS)
-def test_an_error_is_one_readable_line(folder, arguments, status, text):
-    write = (folder / "scenes").joinpath
-    write("broken.xml").write_text('<scene version="3.0.0">\n<shape></scene>')
-    write("bsdf.xml").write_text('<bsdf version="3.0.0" type="diffuse"/>')
-    write("bare.xml").write_text('<scene version="3.0.0"><shape type="sphere"/></scene>')
-    write("misspelt.xml").write_text(
-        '<scene version="3.0.0">\n<bsdf type="diffuse"><float name="reflectanse" value="1"/></bsdf></scene>'
-    )
-    write("ward.xml").write_text(
-        '<scene version="3.0.0"><default name="alpha" value="0.1"/>\n<bsdf type="twosided">\n'
-        '<bsdf type="ward"><float name="alpha" value="$alpha"/></bsdf></bsdf></scene>'
-    )
-    write("no_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
-    (folder / "taken.exr").mkdir()
-    before = sorted(folder.rglob("*"))
-    done = invoke("render", *arguments, cwd=folder)
-    assert done.exit_code == status
-    assert done.stdout == ""
-    assert re.search(text, done.stderr), done.stderr
-    assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
-    assert sorted(folder.rglob("*")) == before
-
-
 @pytest.mark.parametrize(
     "words, status, told",
     [
@@ -347,11 +271,8 @@ def interrupted(folder, *arguments, running, times=1):
 
 
 @pytest.mark.usefixtures("ctrl_c")
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", pytest.param("scalar_rgb", marks=pytest.mark.slow)])
-def test_ctrl_c_keeps_what_is_finished(folder, variant):
-    if variant.startswith("llvm") and llvm.version() is None:
-        pytest.skip("no LLVM here")
-    status, out, err = interrupted(folder, *HOURS, "--variant", variant, running=r"[1-9]\d*/1000000")
+def test_ctrl_c_keeps_what_is_finished(folder):
+    status, out, err = interrupted(folder, *HOURS, "--variant", "llvm_ad_rgb", running=r"[1-9]\d*/1000000")
     assert status == 130
     assert out.split() == ["box.exr", "box.png"]
     finished = re.search(r"Interrupted; the image has the (\d+) of 1000000 samples per pixel", err)
@@ -363,25 +284,12 @@ def test_ctrl_c_keeps_what_is_finished(folder, variant):
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_a_second_ctrl_c_aborts_at_once(folder):
-    if llvm.version() is None:
-        pytest.skip("no LLVM here")
     status, out, err = interrupted(
         folder, *HOURS, "--variant", "llvm_ad_rgb", "-Dres=4096", running="Rendering", times=2
     )
     assert status == 130 and out == ""
     assert "Aborted; nothing was written." in err and "Traceback" not in err
     assert not list(folder.glob("*.exr"))
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_a_measurement(folder):
-    if llvm.version() is None:
-        pytest.skip("no LLVM here")
-    words = "energy", "burley", "walter", "--variant", "llvm_ad_rgb"
-    status, out, err = interrupted(folder, *words, running="Measuring burley")
-    assert status == 130 and out == ""
-    assert NOTHING in err and "Traceback" not in err
 
 
 @pytest.mark.usefixtures("ctrl_c")
@@ -428,16 +336,3 @@ def test_ctrl_c_that_a_kernel_wraps_is_no_error(where, arguments, sentence, fold
     monkeypatch.setattr(where, interrupted_in_a_kernel)
     done = invoke(*arguments, cwd=folder / "scenes")
     assert (done.exit_code, done.stderr) == (130, f"{sentence}\n")
-
-
-def test_errors_of_mitsuba_in_one_line():
-    traceback = (
-        '[parser.cpp:1718] At a.xml (line 13, col 6): failed to instantiate bsdf plugin of type "ward": '
-        'Traceback (most recent call last):\n  File "x.py", line 1, in f\nValueError: ward: alpha = 1.7\n is wrong.'
-    )
-    assert one_line(RuntimeError(traceback)) == "a.xml: line 13: ward: alpha = 1.7 is wrong."
-    cause = RuntimeError("render failed")
-    cause.__cause__ = ValueError("the real reason")
-    assert one_line(cause) == "the real reason"
-    assert one_line(KeyError()) == "KeyError"
-    assert "\n" not in one_line(RuntimeError("two\nlines"))

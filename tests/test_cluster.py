@@ -20,7 +20,7 @@ import numpy as np
 import psutil
 import pytest
 from cluster_tasks import last_breath, powers, work
-from support import ROOT
+from support import LOFT, ROOT
 from test_cli import invoke
 
 import mi_brdfs
@@ -35,19 +35,7 @@ from mi_brdfs.rendering.scene_file import SceneFile
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
-SCENE = """<scene version="3.0.0">
-    <default name="radius" value="1"/>
-    <include filename="parts/material.xml"/>
-    <integrator type="INTEGRATOR"/>
-    <emitter type="constant"/>
-    <sensor type="perspective">
-        <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
-        <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film>
-        <sampler type="independent"><integer name="sample_count" value="32"/></sampler>
-    </sensor>
-    <shape type="sphere"><float name="radius" value="$radius"/><ref id="checked"/></shape>
-</scene>"""
-LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
+SCENE = (ROOT / "tests" / "rows" / "scenes" / "parts.xml").read_text()
 MATERIAL = """<scene version="3.0.0"><bsdf type="MODEL" id="checked">
     <texture type="bitmap" name="reflectance"><string name="filename" value="textures/checks.png"/></texture>
 </bsdf></scene>"""
@@ -292,17 +280,14 @@ NO_SCHEDULER = (
 )
 
 
-@pytest.mark.parametrize(
-    "scheduler, sentence",
-    [
+def test_a_wrong_address_is_one_sentence(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(client, "CONNECTING", 1)
+    for scheduler, sentence in [
         ("tcp://127.0.0.1:1", NO_SCHEDULER.format("tcp://127.0.0.1:1")),
         ("nonsense", "nonsense is not the address of a scheduler; write tcp://HOST:PORT."),
-    ],
-)
-def test_a_wrong_address_is_one_sentence(scheduler, sentence, scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(client, "CONNECTING", 1)
-    done = invoke("render", scene, "--scheduler", scheduler, "-o", tmp_path / "x.exr")
-    assert done.exit_code == 1 and done.stderr == f"mi-brdfs: {sentence}\n"
+    ]:
+        done = invoke("render", scene, "--scheduler", scheduler, "-o", tmp_path / "x.exr")
+        assert done.exit_code == 1 and done.stderr == f"mi-brdfs: {sentence}\n"
 
 
 class Silent(BaseRequestHandler):
@@ -371,10 +356,3 @@ def test_what_is_finished_when_the_scheduler_goes_is_kept(scene):
     left = 0
     with pytest.raises(PassesError):
         render(loaded, spp=32, passes=passes)
-
-
-def test_without_the_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    assert dict(run(powers, {"a": (2, 1)})).keys() == {"a"}
-    with pytest.raises(ImportError, match=r'^workers need the extra "cluster": pip install "mi_brdfs\[cluster\]"$'):
-        run(powers, {"a": (2, 1)}, workers=2)

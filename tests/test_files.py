@@ -16,16 +16,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from support import ROOT
+from support import LOFT
 from test_cli import SCENE, command
 from typer.testing import CliRunner
 
+import mi_brdfs
 from mi_brdfs.cli import app, main, options
+from mi_brdfs.mentioned import mentioned
 from mi_brdfs.plot.command import write as write_figure
 from mi_brdfs.rendering.output import write
 from mi_brdfs.sweep import Sweep, plan, store
 
-LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 FITTED = "--model", "lambert", "--starts", "1"
 
 
@@ -105,12 +106,6 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
     assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
 
 
-@pytest.mark.parametrize("arguments", [("list", "--import", LONG + ".py"), ("plot", "ward", "-o", LONG + ".png")])
-def test_a_name_that_is_too_long_gets_a_sentence(arguments):
-    done = subprocess.run(command(*arguments), capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (1, f"mi-brdfs: {arguments[-1]}: File name too long\n")
-
-
 def test_letters_that_the_output_cannot_have_are_replaced():
     done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
@@ -127,15 +122,10 @@ def test_a_sweep_tells_of_a_full_disk(tmp_path, monkeypatch):
 
     monkeypatch.setattr(store.parquet, "write_table", write_table)
     done = swept(tmp_path / "made")
-    assert (
-        done.exit_code == 1
-        and done.stdout == ""
-        and done.stderr.splitlines()
-        == [
-            f"mi-brdfs: cannot write to {tmp_path / 'made'}: No space left on device",
-            "0 of 1 fits are finished; the same command tries the others again.",
-        ]
-    )
+    assert (done.exit_code, done.stdout, done.stderr.splitlines()) == (1, "", [
+        f"mi-brdfs: cannot write to {tmp_path / 'made'}: No space left on device",
+        "0 of 1 fits are finished; the same command tries the others again.",
+    ])  # fmt: skip
     assert not list((tmp_path / "made" / "results").iterdir())
 
 
@@ -156,7 +146,7 @@ def test_a_sweep_sees_that_its_folder_cannot_be_written_to_before_it_fits(tmp_pa
 
 # --- Files that are read ---------------------------------------------------------------------------------------------
 
-WALL = """<scene version="3.0.0"><default name="tex" value="wall"/><include filename="parts/lamp.inc"/>
+WALL = """<scene version="3.0.0"><default name="tex" value="wall"/><include filename="parts/lamp.xml"/>
 <shape type="sphere"><bsdf type="diffuse" id="wall"><texture type="bitmap" name="reflectance">
 <string name="filename" value="$tex.png"/></texture></bsdf></shape></scene>"""
 INLINE = '<texture type="bitmap"><string name="filename" value="wall.png"/></texture>'
@@ -167,26 +157,17 @@ def room(tmp_path, monkeypatch):
     """Files of all kinds that commands read, of which none may change."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "parts").mkdir()
-    for name in (
-        "m.csv",
-        "m.html",
-        "m.png",
-        "m.xml",
-        "wall.png",
-        "coat.png",
-        "shot-polar.png",
-        "wall_log.jpg",
-        "parts/sky.exr",
-    ):
+    names = "m.csv m.json m.html m.png m.xml wall.png coat.png shot-polar.png wall_log.jpg parts/sky.exr"
+    for name in names.split():
         (tmp_path / name).write_text(name)
     (tmp_path / "room.xml").write_text(WALL)
     (tmp_path / "shot.xml").write_text(WALL.replace("$tex", "shot-polar"))
     (tmp_path / "old.xml").write_text(WALL.replace("3.0.0", "0.6.0"))
-    (tmp_path / "parts" / "lamp.inc").write_text(
+    (tmp_path / "parts" / "lamp.xml").write_text(
         "<scene version='3.0.0'><emitter><s value='sky.exr'/></emitter></scene>"
     )
-    (tmp_path / "parts" / "link.csv").symlink_to(tmp_path / "m.csv")
-    os.link(tmp_path / "m.csv", tmp_path / "hard.csv")
+    (tmp_path / "parts" / "link.json").symlink_to(tmp_path / "m.json")
+    os.link(tmp_path / "m.json", tmp_path / "hard.json")
     (tmp_path / "guest.py").write_text("import mi_brdfs\nclass Guest(mi_brdfs.Model):\n    'Dull.'\n")
     files = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
     yield tmp_path
@@ -196,21 +177,20 @@ def room(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "line",
     [
-        "measured m.csv --json m.csv", "measured m.html ./m.csv --json parts/../m.csv",
-        "measured m.csv --json parts/link.csv", "measured parts/link.csv --json hard.csv",
-        "measured m.png --plot m.png", "fit m.csv --json m.csv", "fit m.html -o m.html", "plot m.png -o m.png",
+        "measured m.json --json m.json", "measured m.html ./m.json --json parts/../m.json",
+        "measured m.json --json parts/link.json", "measured parts/link.json --json hard.json",
+        "measured m.png --plot m.png", "fit m.json --json m.json", "fit m.html -o m.html", "plot m.png -o m.png",
         "plot shot.xml", "plot m.png:quantity=f -o m.png", "plot room.xml:wall -o wall.png",
         "plot room.xml:wall:tex=coat -o coat.png", "plot ward:alpha=wall.png -o wall.png",
         "plot ward -D alpha=wall.png,coat.png -o coat.png", f"plot {INLINE.replace(' ', '@')} -o wall.png",
-        "explore m.html --export m.html", "explore --scene room.xml:wall --export room.xml",
-        "explore --environment parts/sky.exr --export parts/sky.exr", "explore --mesh m.csv --export m.csv",
-        "check room.xml --junit room.xml", "check room.xml --html parts/lamp.inc",
-        "check room.xml --json parts/sky.exr", "check ward --against room.xml --json room.xml",
-        "check guest --import guest.py --json guest.py", "bench m.csv --json m.csv", "convert m.csv m.csv",
+        "explore m.html --export m.html", "explore --environment m.html --export m.html",
+        "explore --mesh m.html --export m.html",
+        "check room.xml --junit room.xml", "check room.xml --junit parts/lamp.xml",
+        "check ward --against room.xml --junit room.xml", "bench m.json --json m.json", "convert m.csv m.csv",
         "convert room.xml:wall room.xml", "render room.xml -o wall.exr", "render room.xml -Dtex=coat -o coat.png",
         "render room.xml -o parts/sky.exr", "render m.xml --replace wall=room.xml:wall -o wall.png",
         "show room.xml:wall -o wall.png", "sweep wall_log.jpg --model lambert --render -o .",
-        "upgrade old.xml -o old.xml", "upgrade old.xml -o parts/lamp.inc", "upgrade old.xml -o wall.png",
+        "upgrade old.xml -o old.xml", "upgrade old.xml -o parts/lamp.xml",
     ],
 )  # fmt: skip
 def test_no_command_writes_over_what_it_reads(line, room):
@@ -220,10 +200,10 @@ def test_no_command_writes_over_what_it_reads(line, room):
 
 
 @pytest.mark.parametrize(
-    "line", ["check ward --json x --html x", "fit m.csv --json b.xml -o ./b.xml", "show ward -o l.png"]
+    "line", ["check ward --json l.json --junit l.xml", "fit m.csv --json l.json -o ./l.xml", "show ward -o l.png"]
 )
 def test_no_two_outputs_are_one_file(line, room):
-    for name in ("l.png", "l.exr"):
+    for name in ("l.png", "l.exr", "l.json", "l.xml"):
         (room / name).symlink_to("both.png")
     done = CliRunner().invoke(app, line.split())
     assert done.exit_code == 2 and re.search("is the same file; give each its own", done.stderr), done.output
@@ -236,7 +216,7 @@ def test_what_names_no_file_and_what_is_none_is_written(tmp_path, monkeypatch):
     for _ in range(2):
         words = "plot", "lambert", "--kind", "albedo", "--title", "a.png", "--labels", "a.png", "-o", "a.png"
         assert CliRunner().invoke(app, words).exit_code == 0
-    for file in (os.devnull, os.devnull, "lambert", "lambert"):
+    for file in (os.devnull, os.devnull, "lambert.json", "lambert.json"):
         words = "check", "lambert", "--only", "finite", "--json", file
         done = CliRunner().invoke(app, [*words, "--junit", file] if file == os.devnull else words)
         assert done.exit_code == 0, done.stderr
@@ -245,12 +225,80 @@ def test_what_names_no_file_and_what_is_none_is_written(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("llvm_rgb")
 def test_folders_of_results_keep_what_is_no_result(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    names = f"{LOFT.stem}-lambert.xml", "index.html"
-    for name, line in zip(names, (f"fit {LOFT} --model lambert --save .", "gallery lambert -o ."), strict=True):
+    fitted, drawn, refused = (
+        f"fit {LOFT} --model lambert --save .",
+        "gallery lambert -o .",
+        "is there, and no such result",
+    )
+    for name, line, sentence in (
+        (f"{LOFT.stem}-lambert.xml", fitted, refused), ("index.html", drawn, refused),
+        ("lambert.png", drawn, "it has other pictures"),
+    ):  # fmt: skip
         (tmp_path / name).write_text("mine")
         done = CliRunner().invoke(app, line.split())
-        assert done.exit_code == 2 and f"{name} is there, and no such result; name another folder" in done.stderr
+        assert done.exit_code == 2 and sentence in done.stderr
         assert (tmp_path / name).read_text() == "mine"
+        (tmp_path / name).unlink()
+
+
+@pytest.mark.parametrize("line", [
+    "measured --json m.csv m.csv", "fit --json m.csv", "bench --json m.csv lambert", "check --json m.xml lambert",
+    "check --junit m.csv lambert", "check --html m.csv lambert", "explore --export m.csv m.csv",
+    "upgrade -o m.csv old.xml",
+])  # fmt: skip
+def test_a_name_that_was_forgotten_costs_no_file(line, room):
+    done = CliRunner().invoke(app, line.split())
+    assert done.exit_code == 2 and re.fullmatch(r"mi-brdfs: \S+ m\.\w+: write a \.[^\n]+\n", done.stderr), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("before", "encoding"), [("", "utf-16"), ("", "utf-16-be"), ("", "utf-32"), ("\n" * 120, "utf-8")]
+)
+def test_scenes_are_read_in_all_encodings_before_pictures_take_places(before, encoding, room):
+    scene = room / "coded.xml"
+    scene.write_bytes((before + WALL).encode(encoding))
+    done = CliRunner().invoke(app, ["render", "coded.xml", "-o", "wall.png"])
+    scene.unlink()
+    assert done.exit_code == 2 and "the command reads this file" in done.stderr
+
+
+def test_comments_and_defaults_name_no_file(room):
+    """A command may be given again that wrote what they name."""
+    scene = room / "shot.xml"
+    scene.write_text(
+        f'<!-- render -o="m.png" -->{WALL}'.replace("<include", '<default name="out" value="m.png"/><include')
+    )
+    assert str(room / "m.png") not in map(os.path.realpath, mentioned([str(scene)]).values())
+    assert str(room / "wall.png") in map(os.path.realpath, mentioned([str(scene)]).values())
+    scene.write_text(WALL.replace("$tex", "shot-polar"))
+
+
+@pytest.mark.parametrize("include", ['<include filename="first.xml"/>',
+                                     '<default name="x" value="pipe"/><include filename="$x"/>'])  # fmt: skip
+def test_pipes_are_refused_wherever_they_are_named(include, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "first.xml").write_text('<scene version="3.0.0"><include filename="pipe"/></scene>')
+    (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{include}</scene>')
+    with pytest.raises(ValueError, match="pipe: it is a pipe or a device; name a file"):
+        mi_brdfs.load_legacy(tmp_path / "scene.xml")
+    with pytest.raises(ValueError, match="it is a pipe or a device"):
+        mi_brdfs.load_legacy("/dev/zero")
+
+
+@pytest.mark.parametrize(("words", "sentence"), [
+    (["room.xml", "-Dtex=coat"], "-D tex=coat: room.xml is a scene of Mitsuba 3, which stays as it is"),
+    (["room.xml", "-o", "parts/room.xml"], "finds its files in its folder; stay there"),
+])  # fmt: skip
+def test_scenes_that_are_not_upgraded_stay_where_they_are(words, sentence, room):
+    done = CliRunner().invoke(app, ["upgrade", *words])
+    assert done.exit_code == 2 and sentence in done.stderr
+
+
+def test_a_model_that_ends_the_process_ends_no_command_well(tmp_path):
+    (tmp_path / "leaver.py").write_text("import sys\nimport mi_brdfs\nclass Leaver(mi_brdfs.Model):\n    'Leaves.'\n"
+                                        "    def lobes(self, p):\n        sys.exit(0)\n")  # fmt: skip
+    done = CliRunner().invoke(app, ["check", "leaver", "--only", "finite", "--import", str(tmp_path / "leaver.py")])
+    assert done.exit_code != 0, done.output
 
 
 # --- Names that are not UTF-8 ---------------------------------------------------------------------------------------
@@ -292,6 +340,12 @@ def called(monkeypatch, capfdbinary):
 
 def slow(*values):
     return pytest.param(*values, marks=pytest.mark.slow)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("words", [("list", "--import", LONG + ".py"), ("plot", "ward", "-o", LONG + ".png")])
+def test_a_name_that_is_too_long_gets_a_sentence(called, words):
+    assert called(*words) == (1, b"", f"mi-brdfs: {words[-1]}: File name too long\n")
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -119,7 +119,7 @@ def near_normal(rng, count):
 
 
 def grazing(rng, count):
-    cos = magnitudes(rng.choice([1e-20, 1e-7], count), 0.1, rng, count)
+    cos = magnitudes(1e-7, 0.1, rng, count)
     return directions(cos, np.sqrt(1 - cos * cos), rng)
 
 

@@ -78,7 +78,7 @@ def drawn(monkeypatch, tmp_path):
     return Picture(tmp_path / "picture.png", lambda: sources, lambda path: path.write_bytes(b"drawn")), sources
 
 
-def test_a_picture_is_stale_until_it_is_made(drawn):
+def test_pictures_and_pages_are_stale_until_they_are_made(drawn):
     picture, sources = drawn
     assert picture.is_stale()
     picture.make()
@@ -90,17 +90,12 @@ def test_a_picture_is_stale_until_it_is_made(drawn):
     picture.path.unlink()
     assert picture.is_stale()
     picture.make()
-    made.write_digests(made.read_digests() | {"gone.png": "0"})
-    assert set(made.read_digests()) == {"picture.png"}
-
-
-def test_a_page_is_stale_until_it_is_made(tmp_path):
-    page = Page(tmp_path / "page.md", lambda: "now")
+    page = Page(picture.path.with_name("page.md"), lambda: "now")
     assert page.is_stale()
     page.make()
     assert not page.is_stale()
-    page.path.write_text("then")
-    assert page.is_stale()
+    made.write_digests(made.read_digests() | {"gone.png": "0"})
+    assert set(made.read_digests()) == {"picture.png"}
 
 
 def test_scenes_are_read_without_comments_and_with_their_files(tmp_path):

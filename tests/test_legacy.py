@@ -19,7 +19,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 import reference
-from support import ROOT, context, direction, hemisphere, interaction, numbers
+from support import context, direction, hemisphere, interaction, numbers, rows
 
 from mi_brdfs import load_legacy
 from mi_brdfs.legacy import Upgraded, upgrade
@@ -54,11 +54,6 @@ TEXTURES = {
     "half": (SCALE.format(0.5, CHECKS.format(0.1, 0.9)), 0.05, 0.45),
 }
 """Textures, the values at ``UV``, and the largest of each channel."""
-
-
-def rows(name):
-    """The lines of a table."""
-    return [row for row in (ROOT / "tests" / "rows" / name).read_text().splitlines() if not row.startswith("#")]
 
 
 def as_floats(text):

@@ -23,7 +23,8 @@ from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
 
 FEW = "lambert", "ward", "cooktorrance", "lafortune"
-"""The models that are tried by default: pairs, words, conductors and lobes are among their parameters."""
+"""The models that are tried by default, and more often: pairs, words, conductors and lobes are among their
+parameters."""
 MODELS = pytest.mark.parametrize(
     "model",
     [pytest.param(model, marks=() if model.plugins[0] in FEW else pytest.mark.slow) for model in own_models()],
@@ -50,13 +51,8 @@ def usual(options):
 
 def neither_numbers_nor_textures():
     plugins = ("constant", "sphere", "diffuse", "ward", "hdrfilm", "independent", "path", "isotropic", "box")
-    others = [
-        mi.ScalarTransform4f(),
-        [0.1, 0.2, 0.3],
-        mi.ScalarPoint2f(1, 2),
-        mi.Float(0.5),
-        mi.Bitmap(np.zeros((2, 2))),
-    ]
+    others = [mi.ScalarTransform4f(), [0.1, 0.2, 0.3], mi.ScalarPoint2f(1, 2), mi.Float(0.5)]
+    others.append(mi.Bitmap(np.zeros((2, 2))))
     texts = st.sampled_from(["", "\0", "\x1b[31m", "x" * 10_000]) | st.text().map("?{}".format)
     return st.sampled_from([{"type": plugin} for plugin in plugins] + others) | texts
 
@@ -98,7 +94,7 @@ def test_values(model):
             wrong.setdefault(name, wrong_word([other.words.get(name) for other in known]))
         given_beside = {name: usual(options) for name in usual(options)} | given_beside
 
-    @examples(30, st.fixed_dictionaries(wrong))
+    @examples(30 if plugin in FEW else 8, st.fixed_dictionaries(wrong))
     def fuzz(values):
         for name, value in values.items():
             sentence = refusal(mi.load_dict, {"type": plugin, **given_beside[name], name: value})
@@ -130,10 +126,8 @@ def misspelt(draw, names):
     name = draw(st.sampled_from(names))
     k = draw(st.integers(0, len(name) - 1))
     letter = draw(st.sampled_from("aeiou_xyz1"))
-    wrong = draw(
-        st.sampled_from([name[k + 1 :], letter + name[k:], letter + name[k + 1 :], name[k::-1] + name[k + 1 :]])
-    )
-    return name, name[:k] + wrong
+    ends = name[k + 1 :], letter + name[k:], letter + name[k + 1 :], name[k::-1] + name[k + 1 :]
+    return name, name[:k] + draw(st.sampled_from(ends))
 
 
 @MODELS
@@ -142,7 +136,7 @@ def test_unknown_names(model):
     """Messages name a known one that is near or longer, if there is any; whatever the name is."""
     plugin, known = model.plugins[0], [name for parameter in model.declared() for name in parameter.names]
 
-    @examples(30, st.tuples(misspelt(known), st.text(min_size=1)))
+    @examples(30 if plugin in FEW else 8, st.tuples(misspelt(known), st.text(min_size=1)))
     def fuzz(names):
         (name, wrong), text = names
         assume(wrong not in [*known, "type", "id", ""] and text not in known)
@@ -283,7 +277,7 @@ def test_failures_leave_no_model_behind():
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
 @pytest.mark.usefixtures("llvm_rgb")
 def test_failures_keep_no_memory():
-    """Five hundred, each with a texture of 48 kB, would keep 24 MB each time. Pools that memory is kept in grow at
+    """Three hundred, each with a texture of 48 kB, would keep 14 MB each time. Pools that memory is kept in grow at
     first, so one round of four that leaves less than 5 MB behind will do."""
 
     def resident():
@@ -292,6 +286,6 @@ def test_failures_keep_no_memory():
 
     levels = [resident()]
     for _ in range(4):
-        failures(500)
+        failures(300)
         levels.append(resident())
     assert min(np.diff(levels)) < 5

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import von_mises_fisher
 
 from mi_brdfs.probe.chi_square import chi_square
 from mi_brdfs.probe.directions import direction
@@ -13,19 +14,11 @@ def test_partitions_integrate_densities_of_any_width(width):
     """Here a von Mises-Fisher density about a direction at 60°, cut off at the horizon, to 1e-4 of its integral on a
     fine grid in its own angles; and its cells hold what they should of its own samples."""
     axis, count = direction(60, 20).astype(np.float64), 200_000
-    kappa = 1 / width**2
-    rng = np.random.default_rng(1)
-    versine = -np.log1p(-rng.random(2 * count) * -np.expm1(-2 * kappa)) / kappa
-    phi, sin = rng.uniform(0, 2 * np.pi, 2 * count), np.sqrt(versine * (2 - versine))
-    side = np.cross(axis, [0, 0, 1])
-    side /= np.linalg.norm(side)
-    frame = np.stack([side, np.cross(axis, side), axis])
-    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), 1 - versine], axis=-1) @ frame
+    w, density = von_mises_fisher(axis, width, 2 * count)
     pilot, samples = w[:count], w[count:]
 
     def pdf(wo):
-        versine = 0.5 * ((wo - axis) ** 2).sum(axis=1)
-        return np.where(wo[:, 2] > 0, np.exp(-kappa * versine) * kappa / (2 * np.pi * -np.expm1(-2 * kappa)), 0)
+        return np.where(wo[:, 2] > 0, density(wo), 0)
 
     (cells,) = partitions(lambda _, wo: pdf(wo), [pilot[pilot[:, 2] > 0]], [axis], count)
     above = samples[samples[:, 2] > 0]
@@ -33,7 +26,8 @@ def test_partitions_integrate_densities_of_any_width(width):
     assert cells.integrals.sum() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / len(w)) + 1e-4)
     test = chi_square(cells.histogram(above), count * cells.integrals)
     assert test.p_value > 1e-3 and test.degrees > 500
-    shifted = chi_square(cells.histogram(above + 0.1 * width * side), count * cells.integrals)
+    side = np.cross(axis, [0, 0, 1])
+    shifted = chi_square(cells.histogram(above + 0.1 * width * side / np.linalg.norm(side)), count * cells.integrals)
     assert shifted.p_value < 1e-6
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import re
 import struct
-import tracemalloc
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 from mitsuba import tensor_io
-from support import context, interaction, numbers, pairs, shared
+from support import context, interaction, numbers, pairs, shared, traced
 
 from mi_brdfs.measured import FileError, convert, read
 from mi_brdfs.measured.arrays import DRJIT, NUMPY, components
 from mi_brdfs.measured.formats import rgl
+from mi_brdfs.measured.measurement import seen
 from mi_brdfs.measured.source import Source
 from mi_brdfs.probe.arrays import WAVELENGTHS, luminance, vectors
 from mi_brdfs.probe.bsdf import BSDFProbe
@@ -138,6 +138,14 @@ def test_directions_are_where_they_are_located(tmp_path, kind):
     np.testing.assert_allclose(found[:, seen], places[:, seen], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["isotropic", "anisotropic"])
+def test_all_that_has_no_zero_is_seen(tmp_path, kind):
+    """Though coordinates have a scale: where normals are many, places are close."""
+    grid, directions = read(written(tmp_path, material(**KINDS[kind]))).data, tried(3000)
+    assert (grid.values > 0).all()
+    np.testing.assert_array_equal(seen(grid, *directions), grid.measured(*directions))
+
+
 def test_two_azimuths_that_differ_are_interpolated(tmp_path):
     """Normals stay relative to wi: turning both directions about the normal changes the share of the two alone."""
     fields = material(phi_i=(-np.pi, np.pi))
@@ -193,11 +201,7 @@ PATCHED = {
     "no magic": (0, b"tenser", "no known format"),
     "version": (12, b"\2", "at byte 12, the version is 2.0"),
     "long name": (18, b"\xff\xff", "at byte 20, 65,535 bytes of a field's name"),
-    "65535 dimensions": (
-        FIRST,
-        b"\xff\xff",
-        "at byte 18, field 'description' has 65535 dimensions; there are at most 8",
-    ),
+    "65535 dimensions": (FIRST, b"\xff\xff", "field 'description' has 65535 dimensions; there are at most 8"),
     "type": (FIRST + 2, b"\x0c", "at byte 18, field 'description' is of the unknown type 12"),
     "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "at byte 18, field 'description' should have"),
     "overlap": (FIRST + 3, struct.pack("<Q", 100), "'description' starts, but the table of contents reaches to byte"),
@@ -259,7 +263,6 @@ def test_missing_values_are_kept(tmp_path):
 # --- Writing --------------------------------------------------------------------------------------------------------
 
 MODELS = {
-    "lambert": {"type": "diffuse"},
     "walter, narrow": {"type": "walter", "alpha": 0.02},
     "ward": {"type": "ward", "alpha": 0.2},
     "walter, anisotropic": {"type": "walter", "alpha_u": 0.1, "alpha_v": 0.3},
@@ -354,10 +357,7 @@ def test_an_unstated_wavelength_is_grey(tmp_path):
 def test_reading_takes_little_memory_beyond_the_result(tmp_path):
     path = tmp_path / "written.bsdf"
     rgl.write(path, Source(lambda wi, wo: np.full((len(wi), 3), 0.2)))
-    tracemalloc.start()
-    measurement = read(path)
-    kept, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
+    measurement, kept, peak = traced(lambda: read(path))
     assert measurement.data.values.nbytes < kept
     assert peak - kept < 2 * path.stat().st_size
 

@@ -4,7 +4,6 @@ import importlib.util
 import re
 import subprocess
 import sys
-from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import mitsuba as mi
@@ -12,7 +11,7 @@ import pytest
 import typer
 from generate import models
 from generate.made import ROOT
-from generate.notebooks import NOTEBOOKS
+from support import Page
 from typer.testing import CliRunner
 from website import live
 from website.__main__ import main
@@ -38,42 +37,32 @@ def site(tmp_path_factory):
     return folder
 
 
-class Page(HTMLParser):
-    """The links, the files that a page loads, and its anchors."""
+def read(path):
+    return Page(path.read_text(encoding="utf-8"))
 
-    def __init__(self, path):
-        super().__init__()
-        self.links, self.loads, self.anchors, self.text = [], [], {""}, []
-        self.feed(path.read_text(encoding="utf-8"))
 
-    def handle_starttag(self, tag, attributes):
-        given = dict(attributes)
-        self.anchors.add(given.get("id") or "")
-        if tag == "a" and given.get("href"):
-            self.links.append(given["href"])
-        if tag in ("img", "script", "link", "iframe", "source"):
-            self.loads += [given[name] for name in ("src", "href") if given.get(name)]
-
-    def handle_data(self, data):
-        self.text.append(data)
+def links(page):
+    return [given["href"] for tag, given in page.elements if tag == "a" and given.get("href")]
 
 
 @pytest.mark.slow
 def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
-    pages = {path: Page(path) for path in site.rglob("*.html")}
+    pages = {path: read(path) for path in site.rglob("*.html")}
+    anchors = {path: {"", *page.attributes("id")} for path, page in pages.items()}
     assert len(pages) > 45
     for path, page in pages.items():
-        for target in set(page.loads) - {"#"}:
+        loaders = [given for tag, given in page.elements if tag in ("img", "script", "link", "iframe", "source")]
+        for target in {given.get(name) for given in loaders for name in ("src", "href")} - {"#", "", None}:
             assert target.startswith("data:") or not re.match(r"\w+:|//", target), (path, target)
             assert target.startswith("data:") or (path.parent / target.split("?")[0]).is_file(), (path, target)
-        for target in page.links:
+        for target in links(page):
             if re.match(r"\w+:", target):
                 assert target.startswith(("https://", "http://")), (path, target)
                 continue
             file, _, anchor = unquote(target).partition("#")
             to = (path.parent / file).resolve() if file else path
             assert to.is_file(), (path, target)
-            assert to.suffix != ".html" or anchor in pages.get(to, page).anchors, (path, target)
+            assert to.suffix != ".html" or anchor in anchors[to], (path, target)
 
 
 @pytest.mark.slow
@@ -89,24 +78,13 @@ def test_every_page_has_its_source(tmp_path):
 
 
 @pytest.mark.slow
-def test_every_part_is_there(site):
-    for name in (*(model.plugins[0] for model in own_models()), "tabulated", "shading"):
-        assert (site / "reference" / f"{name}.html").is_file()
-    for path in NOTEBOOKS:
-        page = (site / "notebooks" / f"{path.stem}.html").read_text(encoding="utf-8")
-        assert page.count("<details>") >= 2 and "<img" in page
-    for name in "index", "gallery", "scenes", "shading", "folklore", "bench", "extending", "development":
-        assert (site / f"{name}.html").is_file()
-
-
-@pytest.mark.slow
 def test_the_front_page_leads_to_pages_of_the_explorer(site):
     """They are small and have scrubbers."""
-    links = Page(site / "index.html").links
+    front = links(read(site / "index.html"))
     for name in live.PAGES:
         page = site / f"{name}.html"
         text = page.read_text(encoding="utf-8")
-        assert page.name in links and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
+        assert page.name in front and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
         assert ('"name": "fitted walter"' in text) == (name == "measured_paint") and '"name": "fit.json' not in text
 
 
@@ -136,7 +114,7 @@ def test_reference_pages_are_the_manual_pages(site):
     """Word for word, apart from the formulas, which are the same ones in MathML."""
     for model in own_models():
         path = site / "reference" / f"{model.plugins[0]}.html"
-        shown = re.sub(r"\s+", " ", "".join(Page(path).text)).replace("’", "'")
+        shown = re.sub(r"\s+", " ", read(path).text).replace("’", "'")
         for row in models.own_rows(model)[1:]:
             assert all(cell in shown for cell in row[:4]), row
         words = re.findall(r"[A-Za-z]{4,}", mi_brdfs.info(model.plugins[0]).split("\nParameters\n")[0])

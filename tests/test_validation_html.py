@@ -4,12 +4,12 @@ import base64
 import math
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from mutants import MUTANTS
+from support import Page, von_mises_fisher
 
 from mi_brdfs.probe.directions import direction, on_side
 from mi_brdfs.probe.partition import partitions
@@ -22,54 +22,11 @@ from mi_brdfs.validation.trial import COUNT, Trial
 HOSTILE = """</h2><script>alert("1")</script> 'x' & <b"""
 
 
-class Page(HTMLParser):
-    """What a browser would make of a page."""
-
-    def __init__(self, text: str):
-        super().__init__()
-        self.open, self.elements, self.text = [], [], ""
-        self.feed(text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag, attributes):
-        self.handle_startendtag(tag, attributes)
-        if tag != "meta":
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.elements.append((tag, dict(attributes)))
-        assert len(dict(attributes)) == len(attributes), "an attribute is given twice"
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text += data
-
-    def attributes(self, name: str) -> list[str]:
-        return [attributes[name] for _, attributes in self.elements if name in attributes]
-
-    def pictures(self) -> list[str]:
-        """The descriptions of all pictures."""
-        return [attributes["aria-label"] for tag, attributes in self.elements if attributes.get("role") == "img"]
-
-
 def lobe(width: float, turn: float = 0, theta: float = 60, side: int = 1) -> tuple[Trial, np.ndarray]:
     """The trial of a von Mises-Fisher lobe about the mirror direction of light from 60°, or turned from it, and the
     samples. Pilot and samples are the same: this is no test of a sampler."""
     wi = direction(60, 20)
-    axis, kappa = on_side(direction(theta, 200 + turn), side).astype(np.float64), width**-2
-    rng = np.random.default_rng(1)
-    versine = -np.log1p(rng.random(COUNT) * np.expm1(-2 * kappa)) / kappa
-    phi, sin = rng.uniform(0, 2 * np.pi, COUNT), np.sqrt(versine * (2 - versine))
-    across = np.cross(axis, [0, 0, 1])
-    across /= np.linalg.norm(across)
-    w = np.stack([sin * np.cos(phi), sin * np.sin(phi), 1 - versine], axis=-1) @ [across, np.cross(axis, across), axis]
-
-    def pdf(wo):
-        return np.exp(-kappa * 0.5 * ((wo - axis) ** 2).sum(axis=1)) * kappa / (2 * np.pi * -np.expm1(-2 * kappa))
-
+    w, pdf = von_mises_fisher(on_side(direction(theta, 200 + turn), side), width, COUNT)
     (cells,) = partitions(lambda _, wo: pdf(wo), [w], [wi], COUNT)
     return Trial("whole", Incident("60°", wi), cells, cells.histogram(w)), w
 

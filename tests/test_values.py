@@ -36,3 +36,20 @@ def test_matches_the_reference(row):
         rounded = [row.reference(wi[other], wo[other] + [0, 0, error]) for error in (-ROUNDING, ROUNDING)]
         sensitivity = abs(rounded - expected[other]).max(axis=0)
         np.testing.assert_array_less(abs(value - expected)[other], 1e-4 * expected[other] + sensitivity)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("row", mostly_slow(EXTREME))
+def test_finite_at_grazing_and_normal_incidence(row):
+    bsdf, ctx = mi.load_dict(row.bsdf), mi.BSDFContext()
+    special = [[0, 0, 1], [1, 0, 1e-7], [0, -1, 1e-4], [0.6, 0.8, 1e-20], [1e-20, 0, 1], [0.6, 0, 0.8]]
+    special = np.concatenate([np.array(special, np.float32), (sphere if row.transmits else hemisphere)(200, 3, 0)])
+    wi, wo = (np.repeat(special, len(special), axis=0), np.tile(special, (len(special), 1)))
+    value, pdf = call(bsdf.eval_pdf, ctx, wi, wo)
+    assert np.isfinite(value).all() and np.isfinite(pdf).all() and (value >= 0).all() and (pdf >= 0).all()
+    uniform = np.array([[0, 0, 0], [0, 0, 1 - 2**-24], [0, 1 - 2**-24, 0], [1 - 2**-24] * 3, [0.5, 0.5, 0.5]])
+    uniform = np.concatenate([uniform, np.random.default_rng(4).random((100, 3))])
+    wi, samples = np.repeat(special, len(uniform), axis=0), np.tile(uniform, (len(special), 1))
+    wo, pdf, weight = call(bsdf.sample, ctx, wi, samples[:, :1], samples[:, 1:])
+    assert np.isfinite(wo).all() and np.isfinite(pdf).all() and np.isfinite(weight).all() and (weight >= 0).all()
+    np.testing.assert_allclose(np.linalg.norm(wo, axis=1), 1, atol=1e-5)

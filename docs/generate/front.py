@@ -114,7 +114,13 @@ def _checker() -> Image.Image:
         figure.axes, ((0, 0.58, 0.36, 0.36), (0, 0.06, 0.36, 0.36), (0.4, 0.1, 0.6, 0.8)), strict=True
     ):
         ax.set_position(place)
-    figure.axes[0].set_title("drawn", loc="left", fontsize=SMALL, pad=3)
+    drawn_, _, difference = figure.axes
+    drawn_.set_title("drawn", loc="left", fontsize=SMALL, pad=3)
+    difference.set_title("red: drawn too often\nblue: too rarely", loc="left", fontsize=SMALL, pad=3)
+    for place, text in ((-40, "wi"), (40, "mirror")):
+        difference.annotate(
+            text, (place, 0), (0, 7), textcoords="offset points", color="white", fontsize=SMALL, ha="center"
+        )
     return _image(figure)
 
 

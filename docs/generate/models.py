@@ -40,11 +40,11 @@ INTRODUCTION = """\
 Directions are unit vectors away from the surface: wi is the given one (towards the viewer), wo the sampled one
 (towards the light), n the normal, h the half vector; cosθ_i, cosθ_o and cosθ_h are their cosines to n. f is the BRDF.
 Every colour and every number is a texture slot; a literal outside its range is an error, and a textured or optimised
-value is clamped to the range where it is evaluated. In polarized variants a model that depolarises reflects light of
-any polarization as unpolarized light. Pictures show the models of a family in one colour, each with what it is known
+value is clamped to the range where it is evaluated. In polarised variants a model that depolarises reflects light of
+any polarisation as unpolarised light. Pictures show the models of a family in one colour, each with what it is known
 for, strips the effect of one parameter; they are larger behind their links, and `mi-brdfs gallery` renders all of them.
-Diffuse and cartoon models stand under a point light: the curve below a picture of a strip is the luminance across its
-middle, beside that of the first one in orange.
+Diffuse and cartoon models stand under a point light: below each picture of a strip is the luminance along its middle
+line, beside that of the first picture in orange.
 """
 
 

@@ -90,5 +90,7 @@ def _reduced(encoded: str) -> str:
     if image.width > WIDTH:
         image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
     buffer = io.BytesIO()
-    image.quantize(COLOURS, kmeans=1).save(buffer, "png", optimize=True)
+    palette = image.quantize(COLOURS, kmeans=1)
+    # Dithered: otherwise smooth shading has rings.
+    image.quantize(palette=palette).save(buffer, "png", optimize=True)
     return base64.b64encode(buffer.getvalue()).decode()

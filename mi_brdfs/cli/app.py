@@ -20,7 +20,7 @@ from .. import __version__
 from ..mitsuba import guests
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.messages import printable
-from ..starting import exit_on_sigterm, raise_on_ctrl_c
+from ..starting import Terminated, exit_on_sigterm, raise_on_ctrl_c
 from .files import begin, check_inputs
 from .terminal import Exit, err, fail, out
 
@@ -106,6 +106,10 @@ def command(panel: str, *examples: str, name: str | None = None) -> Callable:
             except KeyboardInterrupt:
                 err.print("Interrupted; nothing was written.")
                 raise typer.Exit(Exit.INTERRUPTED) from None
+            except SystemExit as error:
+                if isinstance(error, Terminated):
+                    raise
+                fail(f"code of a model ended the command: SystemExit: {error}")
             except ImportError as error:
                 if error.name:  # a module is broken; what an extra brings is told without one
                     raise

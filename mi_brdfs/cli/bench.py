@@ -24,7 +24,9 @@ from .terminal import Exit, err, failing, print_table, progress, stdout_to_stder
 def bench(
     targets: Annotated[list[str], material_argument("One or two.")],
     parameters: Parameters = None,
-    json_file: Annotated[Path | None, file_option("--json", "Also write all figures to this file.")] = None,
+    json_file: Annotated[
+        Path | None, file_option("--json", "Also write all figures to this file.", endings=[".json"])
+    ] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Compare two BSDFs: the efficiency of their samplers, the time of calls and pictures, noise. One alone shows its

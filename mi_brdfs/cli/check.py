@@ -24,6 +24,7 @@ from ..parameters.messages import printable
 from ..validation import CHECKS
 from .app import command, imported
 from .options import (
+    PAGES,
     Parameters,
     TracingVariant,
     file_option,
@@ -70,9 +71,15 @@ def check(
         float | None,
         typer.Option(metavar="P", help="How probable it is that a right BSDF fails a statistical test. Default: 0.01."),
     ] = None,
-    html_file: Annotated[Path | None, file_option("--html", "Also write a page with pictures (extra report).")] = None,
-    json_file: Annotated[Path | None, file_option("--json", "Also write all findings to this file.")] = None,
-    junit_file: Annotated[Path | None, file_option("--junit", "Also write all findings as JUnit's XML.")] = None,
+    html_file: Annotated[
+        Path | None, file_option("--html", "Also write a page with pictures (extra report).", endings=PAGES)
+    ] = None,
+    json_file: Annotated[
+        Path | None, file_option("--json", "Also write all findings to this file.", endings=[".json"])
+    ] = None,
+    junit_file: Annotated[
+        Path | None, file_option("--junit", "Also write all findings as JUnit's XML.", endings=[".xml"])
+    ] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Check this many BSDFs in parallel.")] = 1,
     variant: TracingVariant = None,
 ) -> None:

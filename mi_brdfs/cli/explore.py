@@ -16,6 +16,7 @@ import typer
 
 from .app import command, imported
 from .options import (
+    PAGES,
     Labels,
     Parameters,
     TracingVariant,
@@ -46,7 +47,7 @@ def explore(
     labels: Labels = None,
     exposure: Annotated[float, typer.Option(min=-10, max=10, help="Brighten the pictures, in stops.")] = 0,
     export: Annotated[
-        Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html")
+        Path | None, file_option("--export", "Write a page that needs no server, and end.", "FILE.html", PAGES)
     ] = None,
     vary: Annotated[
         list[str] | None,

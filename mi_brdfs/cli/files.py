@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import html
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+from ..mentioned import identity, mentioned
 from ..parameters.messages import listed
 from .terminal import Exit, fail
 
 OUTPUTS = {"title", "labels"}
 """The names of the arguments that name no files to be read: those of files to be written, and free texts."""
-
-LONGEST = 4096
-"""No name of a file has as many letters."""
 
 _written: dict[object, tuple[str, Path]] = {}
 _words: list[str] = []
@@ -38,7 +34,7 @@ def check_output(option: str, file: Path | None, endings: Sequence[str] = (), ma
     results have, the command reads it, or writes it for another option, too."""
     if file is None:
         return
-    if endings and file.suffix.lower() not in endings:
+    if endings and file.suffix.lower() not in endings and file.parent != Path("/dev"):
         fail(f"{option} {file}: write a {listed(endings)}", Exit.USAGE)
     if not file.absolute().parent.is_dir():
         fail(f"{option} {file}: there is no folder {file.parent}", Exit.USAGE)
@@ -54,7 +50,7 @@ def check_output(option: str, file: Path | None, endings: Sequence[str] = (), ma
     except OSError as error:
         fail(f"{option} {file}: it cannot be written: {error.strerror}", Exit.USAGE)
     if file.is_file() or not file.exists():  # no device
-        other = _written.setdefault(_identity(file), (option, file))
+        other = _written.setdefault(identity(file), (option, file))
         if other != (option, file):
             fail(f"{option} {file}: {other[0]} {other[1]} is the same file; give each its own", Exit.USAGE)
         _refuse_to_overwrite(option, file)
@@ -72,36 +68,20 @@ def check_inputs(arguments: Mapping[str, object]) -> None:
 
 
 def _refuse_to_overwrite(option: str, file: Path) -> None:
-    if file.is_file() and (path := _files_read().get(_identity(file))):
+    if file.is_file() and (path := _files_read().get(identity(file))):
         same = "" if os.path.abspath(path) == os.path.abspath(file) else f" as {os.path.normpath(path)}"
         fail(f"{option} {file}: the command reads this file{same}; write to another one", Exit.USAGE)
-
-
-def _identity(path: str | Path) -> object:
-    """Return what is the same for all names of a file, also of links."""
-    try:
-        status = os.stat(path)
-        return status.st_dev, status.st_ino
-    except OSError:  # it is not there
-        return os.path.normcase(os.path.realpath(path))
 
 
 @cache
 def _files_read() -> dict[object, str]:
     """Return the files that the words name, and those that are named in these, at any depth."""
-    values = dict(pair for word in _words for pair in re.findall(r"(\w+)=([^,]*)", word))
-    found: dict[object, str] = {}
-    texts = [(word, [""]) for word in _words if word.startswith("<")]
+    names: list[str] = []
     for word in _words:
         module = getattr(sys.modules.get(word), "__file__", None)
-        names = [module] if module else [it for it in _names(word) if re.search(r"[./\\]", it)]  # others are plugins
-        texts += _found(names, [""], found)
-    while texts:
-        text, folders = texts.pop()
-        mentioned = _named(text, values)
-        inner = [path for name in mentioned for folder in folders if os.path.isdir(path := os.path.join(folder, name))]
-        texts += _found(mentioned, list(dict.fromkeys([*folders, *map(os.path.realpath, inner)])), found)
-    return found
+        names += [module] if module else [it for it in _names(word) if re.search(r"[./\\]", it)]  # others are plugins
+    values = dict(pair for word in _words for pair in re.findall(r"(\w+)=([^,]*)", word))
+    return mentioned(names, [word for word in _words if word.startswith("<")], values)
 
 
 def _names(word: str) -> Iterator[str]:
@@ -111,32 +91,3 @@ def _names(word: str) -> Iterator[str]:
         yield from (text, re.split(r"(?<=\.xml):|(?<=\.json):|:(?=[A-Za-z_]\w*=)", text)[0])
     for value in re.findall(r"\w=(.*?)(?=,\w+=|$)", word, re.DOTALL):
         yield from (value, *value.split(","))
-
-
-def _found(names: Iterable[str], folders: list[str], found: dict[object, str]) -> Iterator[tuple[str, list[str]]]:
-    """Add the files of these names in some folders to those that are found, and yield the texts of new ones, with the
-    folders of what is named there."""
-    for path in (os.path.join(folder, name) for name in names for folder in folders):
-        if os.path.isfile(path) and (identity := _identity(path)) not in found:
-            found[identity] = path
-            with suppress(OSError), open(path, "rb") as file:
-                start = file.read(99).lstrip(b"\xef\xbb\xbf \t\r\n")
-                text = start + file.read() if start.startswith(b"<") or path.endswith(".json") else b""
-                is_latin = re.match(rb"<\?xml[^>]+(latin-?1|8859-1)", text, re.IGNORECASE)
-                decoded = text.decode("latin-1" if is_latin else "utf-8", "surrogateescape")
-                yield decoded, list(dict.fromkeys([*folders, os.path.dirname(path)]))
-
-
-def _named(text: str, values: dict[str, str]) -> set[str]:
-    """Return what may be the names of files and folders in a scene, a material or fits: what stands in quotes, with the
-    values of parameters, to which its defaults are added. They are more than Mitsuba reads, but no less, of any version
-    and without an error."""
-    for tag in re.findall(r"<default[^>]+", text):
-        it = {key: value for key, _, value in re.findall(r"""(name|value)\s*=\s*(["'])(.*?)\2""", tag)}
-        values.setdefault(it.get("name", ""), it.get("value", "")[:LONGEST])
-    known = "|".join(sorted(map(re.escape, values), key=len, reverse=True))
-    names = {html.unescape(it) for _, it in re.findall(r"""[=:]\s*(["'])(.+?)\1""", text, re.DOTALL)}
-    for _ in range(2):  # a default may have another one in it
-        short = [name for name in names if len(name) < LONGEST]
-        names = {re.sub(rf"\$\{{?({known})\}}?", lambda it: values.get(it[1], it[0]), name) for name in short}
-    return names | {name.replace("\\", "/") for name in names}

@@ -77,7 +77,9 @@ def fit_(
     save: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Also write each fit there: FILE-MODEL.xml.")
     ] = None,
-    json_file: Annotated[Path | None, file_option("--json", "Also write all fits to this file.")] = None,
+    json_file: Annotated[
+        Path | None, file_option("--json", "Also write all fits to this file.", endings=[".json"])
+    ] = None,
     variant: TracingVariant = None,
 ) -> None:
     """Fit models to measured BRDFs, and rank them by their error on directions that were not fitted. Ctrl-C keeps what

@@ -38,6 +38,8 @@ def gallery(
 
     if (page := output / "index.html").exists():
         check_output("-o", page, mark="<title>What BRDFs look like</title>")
+    elif any(it.suffix in (".png", ".jpg") for it in output.glob("*")):
+        fail(f"-o {output}: it has other pictures; name a folder of the gallery's own", Exit.USAGE)
     chosen = set_variant(variant)
     start, finished, total = time.perf_counter(), 0, 0
     with stdout_to_stderr(), progress("Rendering") as bar:

@@ -27,7 +27,9 @@ def measured(
     parameters: Annotated[
         list[str] | None, parameters_option("What files hold that do not state it: f or f cos.", "quantity=NAME")
     ] = None,
-    json_file: Annotated[Path | None, file_option("--json", "Also write all findings to this file.")] = None,
+    json_file: Annotated[
+        Path | None, file_option("--json", "Also write all findings to this file.", endings=[".json"])
+    ] = None,
 ) -> None:
     """Tell what files with measured BRDFs hold: grid, range and symmetry, how much is negative or missing, errors of
     reciprocity, albedos."""

@@ -14,6 +14,7 @@ import typer
 from .. import writing
 from ..mitsuba import llvm
 from ..mitsuba.fastest import fastest
+from ..names import check_name
 from ..starting import signals_held
 from ..variants import is_measurable
 from .files import OUTPUTS, check_output
@@ -27,6 +28,7 @@ def parameters_option(help: str, metavar: str = "name=value") -> Any:
     return typer.Option("-D", "--param", metavar=metavar, help=help)
 
 
+PAGES = ".html", ".htm"
 FIGURES = ".png", ".svg", ".pdf", ".jpg"
 """The endings of files with drawings."""
 
@@ -115,6 +117,8 @@ def parameters_of(definitions: list[str] | None) -> dict[str, str]:
         name, equals, value = definition.partition("=")
         if not equals or not name:
             fail(f"-D {definition}: write -D name=value", Exit.USAGE)
+        with failing(Exit.USAGE, ValueError):
+            check_name(definition)
         parameters[name] = value
     return parameters
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -16,16 +17,21 @@ from .terminal import Exit, err, fail, failing, out
 def upgrade(
     old: Annotated[Path, typer.Argument(metavar="OLD.xml", help="A scene of Mitsuba 0.2 to 0.6.")],
     output: Annotated[
-        Path | None, file_option("-o", "The scene of Mitsuba 3 to write. Default: the standard output.", "NEW.xml")
+        Path | None,
+        file_option("-o", "The scene of Mitsuba 3 to write. Default: the standard output.", "NEW.xml", [".xml"]),
     ] = None,
     lenient: Lenient = False,
     define: Annotated[list[str] | None, parameters_option("Set a <default> parameter of the scene.")] = None,
 ) -> None:
     """Write an old scene as one of Mitsuba 3, and say what changed, line by line."""
-    from ..legacy import upgrade  # imports numpy
+    from ..legacy import is_new, upgrade  # imports numpy
 
     if not old.is_file():
         fail(f"{old}: no such file", Exit.USAGE)
+    if is_new(old) and define:
+        fail(f"-D {define[0]}: {old} is a scene of Mitsuba 3, which stays as it is", Exit.USAGE)
+    if is_new(old) and output and not os.path.samefile(output.absolute().parent, old.absolute().parent):
+        fail(f"-o {output}: {old} is a scene of Mitsuba 3, and finds its files in its folder; stay there", Exit.USAGE)
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
     err.print("\n".join([*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]))

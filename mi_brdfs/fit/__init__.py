@@ -85,7 +85,7 @@ def fit(
         tied: parameters that equal another one, as ``{"cy": "cx"}``.
         start: a plugin dict to start from, besides others, or several. No fit is worse than any of them.
         lobes: the number of lobes of models that have several of a kind.
-        starts: the number of the other starts.
+        starts: the number of the other starts, of which no more than 256 are tried.
         seed: of the choice of pairs and of the random starts.
         cut: the largest angle of wi and wo to the normal, in degrees.
         pairs: the most pairs of directions of a material, fitted and held out.

@@ -169,7 +169,7 @@ class Median(NamedTuple):
 def notes(fit: Fit) -> str:
     """Return what of a fit calls for caution, in words."""
     words = ["albedo above 1"] * (fit.albedo > 1) + ["unresolved"] * (not fit.resolved)
-    return ", ".join(words + ([f"at an end: {', '.join(fit.bounds)}"] if fit.bounds else []))
+    return ", ".join(words + ([f"at its limit: {', '.join(fit.bounds)}"] if fit.bounds else []))
 
 
 def number(value: float | None) -> str:

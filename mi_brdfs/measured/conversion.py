@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import CENTRE, Array
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, load
 from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
@@ -119,7 +119,7 @@ def _probe(bsdf: mi.BSDF | dict[str, Any]) -> BSDFProbe:
     variant = mi.variant()
     if not is_measurable(variant) or not mi.is_rgb:
         raise ValueError(f"a BSDF is written in a vectorized rgb variant such as llvm_ad_rgb, not {variant or 'none'}")
-    loaded = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    loaded = load(bsdf) if isinstance(bsdf, dict) else bsdf
     if not isinstance(loaded, mi.BSDF):
         raise ValueError(f"{type(loaded).__name__} is not a BSDF of {variant}")
     return BSDFProbe(loaded)

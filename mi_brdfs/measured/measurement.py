@@ -314,10 +314,12 @@ class Measurement:
 def seen(data: Grid | Samples, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """Return whether directions were measured, and a table's value there is of no node that is missing or 0, unless all
     are: files have zeros where an instrument saw nothing."""
-    lit = np.nan_to_num(data.values).any(axis=-1, keepdims=True)
+    lit = np.nan_to_num(data.values).any(axis=-1)
     if isinstance(data, Samples) or not lit.any():
         return data.measured(wi, wo)
-    return data.measured(wi, wo) & (replace(data, values=lit.astype(float)).evaluate(wi, wo)[..., 0] > 1 - MARGIN)
+    values = np.stack([lit, np.ones_like(lit)], axis=-1).astype(float)  # coordinates may have a scale
+    found, all_lit = np.moveaxis(replace(data, values=values).evaluate(wi, wo), -1, 0)
+    return data.measured(wi, wo) & (found > (1 - MARGIN) * all_lit)
 
 
 def usable(values: np.ndarray) -> np.ndarray:

@@ -94,20 +94,15 @@ def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool =
 
 
 def constants(bsdfs: Sequence[Any]) -> list[str]:
-    """Return what dicts of the same type have in common, a line for each type: their labels tell the rest."""
-    return [_told(f"{kind} with", same) for kind, same in _common(bsdfs).items() if same]
+    """Return a line with what all dicts have in common, if anything: their labels tell the rest."""
+    kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
+    return [_told(f"{', '.join(kinds)} with", same)] if (same := _common(bsdfs)) else []
 
 
-def _common(bsdfs: Sequence[Any]) -> dict[Any, dict[str, str]]:
-    """Return the parameters that all dicts of a type share, by the type; none if there is only one of it."""
-    kinds: dict[Any, list[dict[str, str]]] = {}
-    for given in bsdfs:
-        if isinstance(given, dict):
-            kinds.setdefault(given.get("type"), []).append(_parameters(given))
-    return {
-        kind: {n: v for n, v in first.items() if others and all(values.get(n) == v for values in others)}
-        for kind, (first, *others) in kinds.items()
-    }
+def _common(bsdfs: Sequence[Any]) -> dict[str, str]:
+    """Return the parameters that all dicts share; none if there is only one."""
+    first, *others = [_parameters(given) for given in bsdfs if isinstance(given, dict)] or [{}]
+    return {name: value for name, value in first.items() if others and all(it.get(name) == value for it in others)}
 
 
 def _parameters(given: dict) -> dict[str, str]:
@@ -136,14 +131,12 @@ def _probe(given: Any) -> BSDFProbe:
 
 
 def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:
-    """Return a label for each dict, by its identity: the type, and the parameters that not all dicts of this type
-    share. The only one of its type shows them all."""
+    """Return a label for each dict, by its identity: the type, and the parameters that not all dicts share."""
     labels, common = {}, _common(bsdfs)
     for given in bsdfs:
         if isinstance(given, dict):
-            kind = given.get("type")
-            own = {name: value for name, value in _parameters(given).items() if name not in common[kind]}
-            labels[id(given)] = _told(str(kind), own)
+            own = {name: value for name, value in _parameters(given).items() if name not in common}
+            labels[id(given)] = _told(str(given.get("type")), own)
     return labels
 
 

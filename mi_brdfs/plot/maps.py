@@ -69,7 +69,7 @@ def hemisphere(
         ax.set_title(incidence(theta), fontsize=TEXT, color=INK)
     if title or len(rows) == 1:
         style.set_title(figure, style.plain(title) if title else found[0].label)
-    style.add_bar(ScalarMappable(norm, "viridis"), axes, quantity(QUANTITY), shrink=0.8)
+    style.add_bar(ScalarMappable(norm, "viridis"), axes, quantity(QUANTITY), shrink=0.8, extend="min")
     marks = [Line2D([], [], linestyle="", color=INK, **mark) for mark in (WI, MIRROR)]
     style.add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
     return figure

@@ -155,7 +155,7 @@ def _planar(
         for s, name in enumerate(scales):
             ax = axes[k // columns * len(scales) + s, k % columns] if beside else axes[k, s]
             style.calm(ax)
-            draw(ax, curves, name == "log", whole, text, everything if beside else curves)
+            draw(ax, curves, name == "log", whole, text, everything if beside or name == "log" else curves)
             if len(panels) > 1 and not (beside and s):
                 ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=10)
             if beside and k % columns:

@@ -42,7 +42,9 @@ class _Figure(Figure):
 def new_figure(width: float, height: float, size: tuple[float, float] | None = None) -> Figure:
     """Return a figure of a width and a height in inches, or of the size that is asked for."""
     width, height = size or (width, height)
-    return _Figure(figsize=(width, height), dpi=144, layout="constrained", facecolor="white")
+    figure = _Figure(figsize=(width, height), dpi=144, layout="constrained", facecolor="white")
+    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.08 / height))  # titles otherwise touch the edge
+    return figure
 
 
 def calm(ax: Axes) -> None:

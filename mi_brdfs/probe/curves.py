@@ -64,9 +64,9 @@ def largest(values: Iterable[Array]) -> float:
 
 def decades(values: Iterable[Array], peak: float) -> tuple[int, float]:
     """Return the decade where a logarithmic scale begins, and the logarithm of its largest value. The scale shows nine
-    tenths of the values above 0 in each array, but at least two decades and at most six."""
+    tenths of the values above 0 in each array, but at least two decades and at most five."""
     high = float(np.log10(peak))
-    return int(np.floor(np.clip(np.log10(dim(values)), high - 6, high - 2))), high
+    return int(np.floor(np.clip(np.log10(dim(values)), high - 5, high - 2))), high
 
 
 def dim(values: Iterable[Array]) -> float:

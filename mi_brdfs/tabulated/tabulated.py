@@ -20,7 +20,9 @@ class Tabulated(Model):
     """A measured BRDF from a file.
 
     Reads MERL's ``.binary`` and every other format that ``mi-brdfs measured -h`` lists; which one, it finds from what
-    the file contains. A relative name is looked for where Mitsuba looks for textures: beside the scene.
+    the file contains. A CSV of your own begins with a header such as ``theta_i_deg,theta_o_deg,delta_phi_deg,f``, in
+    1/sr, with delta_phi = 180° on the side of the mirror direction. A relative name is looked for where Mitsuba looks
+    for textures: beside the scene.
 
         f(wi, wo) = s T(wi, wo)
 

@@ -133,13 +133,13 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
     every = int(mi.BSDFFlags.All)
     kind = part.flags & every
     for words, excluding in (
-        (f"{part.name} of a type mask without its type", context(part.component, every & ~kind)),
+        (f"a type mask that leaves {part.name.replace('whole', 'it')} out", context(part.component, every & ~kind)),
         ("a component that does not exist", context(probe.bsdf.component_count() + 7)),
     ):
         nothing = part._replace(context=excluding)
         value, density = probe.eval_pdf(nothing, wi, wo)
         samples = probe.sample(nothing, wi, random(COUNT, 3))
-        why = f"for {words}, where all must be black"
+        why = f"with {words}, where all must be black"
         outcome.wrong(value != 0, "eval", value, why, wi, wo)
         outcome.wrong(density != 0, "pdf", density, why, wi, wo)
         outcome.wrong(samples.weight != 0, "a sample's weight", samples.weight, why, wi, samples.wo, seed=3)

@@ -18,6 +18,9 @@ export function path(points) {
   return text;
 }
 
+/** The width of a letter of labels, about. */
+export const LETTER = 7;
+
 export const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
 export const label = (x, y, text, anchor = "middle", kind = "tick") =>
   shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
@@ -86,12 +89,15 @@ export function axes(width, height, across, scale, what, unit = "°") {
   for (const [value, text] of scale.marks) {
     svg.append(line(left, y(value), width - right, y(value), "grid"), label(left - 6, y(value) + 4, text, "end"));
   }
-  for (const value of across.marks) {
-    svg.append(
-      line(x(value), top, x(value), height - bottom, "grid"),
-      label(x(value), height - bottom + 17, `${format(value)}${unit}`),
-    );
-  }
+  const texts = across.marks.map((value) => `${format(value)}${unit}`);
+  const apart = (x(across.high) - x(across.low)) / (texts.length - 1);
+  // As many labels as there is room for, counted from 0.
+  const step = Math.ceil((LETTER * Math.max(...texts.map(({ length }) => length + 1))) / apart);
+  const zero = Math.max(across.marks.indexOf(0), 0);
+  across.marks.forEach((value, k) => {
+    svg.append(line(x(value), top, x(value), height - bottom, "grid"));
+    if ((k - zero) % step === 0) svg.append(label(x(value), height - bottom + 17, texts[k]));
+  });
   svg.append(line(left, height - bottom, width - right, height - bottom, "axis"));
   const at = (place) =>
     clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);

@@ -2,7 +2,7 @@
 import { CHANNELS, DASHES, clamp, degrees, format, interpolate, largest, radians, shape, valueScale } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
+import { LETTER, attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
 
 /** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
 function curvesOf(view) {
@@ -96,11 +96,15 @@ export function drawPolar() {
     const around = `M${x} ${y}a${r} ${r} 0 0 1 ${2 * r} 0` + (whole ? `a${r} ${r} 0 0 1 ${-2 * r} 0` : "");
     return shape("path", { d: around, class: kind });
   };
+  let taken = 0;
   for (const [value, text] of scale.marks) {
     const reach = scale.of(value);
     if (reach <= 0.02) continue;
     svg.append(ring(reach, "grid"));
-    if (reach > 0.14) svg.append(label(middle[0] + radius * reach, middle[1] + 14, text));
+    const half = (LETTER * (text.length + 1)) / 2;
+    if (reach <= 0.14 || radius * reach - half < taken) continue;
+    svg.append(label(middle[0] + radius * reach, middle[1] + 14, text));
+    taken = radius * reach + half;
   }
   svg.append(ring(1, "rim"));
   for (let angle = whole ? -180 : -90; angle < (whole ? 180 : 91); angle += 30) {

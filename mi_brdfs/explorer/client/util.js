@@ -65,7 +65,7 @@ export function largest(arrays) {
 }
 
 /** Return the exponents at which a logarithmic scale begins and ends: it shows nine tenths of the positive values of
- * each array, but at least two decades and at most six. */
+ * each array, but at least two decades and at most five. */
 export function decades(arrays, peak) {
   const high = Math.log10(peak);
   let dim = peak;
@@ -75,7 +75,7 @@ export function decades(arrays, peak) {
       .sort();
     if (positive.length) dim = Math.min(dim, positive[Math.floor(0.1 * positive.length)]);
   }
-  return [Math.floor(clamp(Math.log10(dim), high - 6, high - 2)), high];
+  return [Math.floor(clamp(Math.log10(dim), high - 5, high - 2)), high];
 }
 
 /** Return round numbers between two limits, about `count` of them. */

@@ -135,7 +135,8 @@ class Columns:
                 found[kind] = k
                 cosines.add(bool(cos))
             else:
-                raise file.error(f"the column {shortened(name)} is no angle, no wavelength, and none of f, r, g, b")
+                others = "no angle such as theta_i_deg or delta_phi_deg, no wavelength, and none of f, r, g, b"
+                raise file.error(f"the column {shortened(name)} is {others}")
         for name in ("theta_i", "theta_o"):
             if name not in self.angles:
                 raise file.error(f"the header has no column {name}, as theta_i_deg, theta_o_deg, phi_o_deg, f")

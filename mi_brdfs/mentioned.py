@@ -1,0 +1,78 @@
+"""The files that words, scenes and materials name, and those that these name, at any depth."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+
+LONGEST = 4096
+"""No name of a file has as many letters."""
+
+
+def identity(path: str | os.PathLike) -> object:
+    """Return what is the same for all names of a file, also of links."""
+    try:
+        status = os.stat(path)
+        return status.st_dev, status.st_ino
+    except OSError:  # it is not there
+        return os.path.normcase(os.path.realpath(path))
+
+
+def mentioned(names: Iterable[str], texts: Iterable[str] = (), values: Mapping[str, str] | None = None) -> dict:
+    """Return the paths of what is there, but for folders, by their identities: of some names, of what is named in these
+    files and in some texts, and so on. Parameters have ``values``. What stands in quotes is taken for a name: that is
+    more than Mitsuba reads, but no less, of any version and without an error."""
+    known, found = dict(values or {}), dict[object, str]()
+    todo = [*((text, [""]) for text in texts), *_new(names, [""], found)]
+    while todo:
+        text, folders = todo.pop()
+        inside = _named(text, known)
+        inner = [path for name in inside for folder in folders if os.path.isdir(path := os.path.join(folder, name))]
+        todo += _new(inside, list(dict.fromkeys([*folders, *map(os.path.realpath, inner)])), found)
+    return found
+
+
+def _new(names: Iterable[str], folders: list[str], found: dict[object, str]) -> Iterator[tuple[str, list[str]]]:
+    """Add what these names are in some folders to what is found, and yield the texts of new ones, with the folders of
+    what is named there."""
+    for path in (os.path.join(folder, name) for name in names for folder in folders):
+        if os.path.exists(path) and not os.path.isdir(path) and (it := identity(path)) not in found:
+            found[it] = path
+            if os.path.isfile(path) and (text := _text(path)):
+                yield text, list(dict.fromkeys([*folders, os.path.dirname(path)]))
+
+
+def _text(path: str) -> str:
+    """Return the text of XML or JSON in the encodings that a parser may take it to have, without its comments; nothing
+    of another file."""
+    with suppress(OSError), open(path, "rb") as file:
+        data = file.read(1 << 16)
+        declared = re.search(rb"<\?xml[^>]+?encoding\s*=\s*[\"']([\w.-]+)", data)
+        errors: dict[str, str] = {"utf-8": "surrogateescape", json.detect_encoding(data): "replace"}
+        errors |= {declared[1].decode("ascii", "replace"): "replace"} if declared else {}
+        texts = []
+        for encoding, way in errors.items():
+            with suppress(LookupError):
+                if data.decode(encoding, way).lstrip("\ufeff \t\r\n").startswith("<") or path.endswith(".json"):
+                    data += file.read()
+                    texts.append(re.sub("<!--.*?-->", "", data.decode(encoding, way), flags=re.DOTALL))
+        return "\n".join(texts)
+    return ""
+
+
+def _named(text: str, values: dict[str, str]) -> set[str]:
+    """Return what may be names in a text, with the values of parameters, to which its defaults are added."""
+    default = r"<default[^>]+>"
+    for tag in re.findall(default, text):
+        it = {key: value for key, _, value in re.findall(r"""(name|value)\s*=\s*(["'])(.*?)\2""", tag)}
+        values.setdefault(it.get("name", ""), it.get("value", "")[:LONGEST])
+    known = "|".join(sorted(map(re.escape, values), key=len, reverse=True))
+    quoted = {it for _, it in re.findall(r"""[=:]\s*(["'])(.+?)\1""", re.sub(default, "", text), re.DOTALL)}
+    names = {html.unescape(it) for it in quoted if len(it) < LONGEST and re.search(r"[^\d\s.,eE+-]", it)}
+    for _ in range(2):  # a default may have another one in it
+        names = {re.sub(rf"\$\{{?({known})\}}?", lambda it: values.get(it[1], it[0]), name) for name in names}
+    return names | {name.replace("\\", "/") for name in names}
