@@ -291,8 +291,6 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale = np.minimum(1 / (1 - loss), 3)
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
-        # The lobe that has this loss is divided by its mean: let it be that of what is looked up.
-        polynomial = polynomial.astype(np.float16).astype(float)
         means, *later = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
         weights = 0.02 + lost_at(above, polynomial, bend)
         others = [
@@ -315,8 +313,9 @@ def chebyshev(count: int) -> np.ndarray:
 
 
 def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Return the coefficients with the least largest error in some scale, lowered to where they add at most BRIGHTER
-    light, besides where the scale is below 1."""
+    """Return the coefficients with the least largest error in some scale, of 16 bits: the mean that the lobe is divided
+    by must be that of what is looked up. They are lowered to where they add at most BRIGHTER light, and no more than
+    is lost, besides where the scale is below 1."""
     weights, best, least = np.ones(len(loss)), np.zeros(terms.shape[1]), np.inf
     for _ in range(25):
         k = np.linalg.lstsq(terms * (weights * scale)[:, None], loss * weights * scale, rcond=None)[0]
@@ -325,7 +324,10 @@ def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.n
             best, least = k, error.max()
         weights *= np.sqrt(0.3 + error / error.mean())
         weights /= weights.mean()
-    best[0] -= max((terms @ best - loss)[scale >= 1].max() - BRIGHTER, 0)
+    best = best.astype(np.float16).astype(float)
+    excess = (terms @ best - loss - np.minimum(loss, BRIGHTER))[scale >= 1].max()
+    if excess > 0:
+        best[0] = np.nextafter(np.float16(best[0] - excess), np.float16(-1))
     return best
 
 
