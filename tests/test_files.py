@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.cli import app, main, options
+from mi_brdfs.loading import versioned
 from mi_brdfs.mentioned import mentioned
 from mi_brdfs.plot.command import write as write_figure
 from mi_brdfs.rendering.output import write
@@ -271,6 +272,22 @@ def test_comments_and_defaults_name_no_file(room):
     assert str(room / "m.png") not in map(os.path.realpath, mentioned([str(scene)]).values())
     assert str(room / "wall.png") in map(os.path.realpath, mentioned([str(scene)]).values())
     scene.write_text(WALL.replace("$tex", "shot-polar"))
+
+
+@pytest.mark.parametrize("text", ["<!--" * 100_000, "<default " * 50_000])
+def test_what_is_never_closed_takes_no_time(text, tmp_path):
+    (tmp_path / "open.xml").write_text(f'<scene version="3.0.0">{text}')
+    start = time.process_time()
+    with pytest.raises((ValueError, RuntimeError)):
+        mi_brdfs.load_legacy(tmp_path / "open.xml")
+    assert versioned("<!-- a -->" * 40) == "<!-- a -->" * 40
+    assert time.process_time() - start < 10
+
+
+def test_files_of_the_folder_of_merl_are_kept(room, monkeypatch):
+    monkeypatch.setenv("MI_BRDFS_MERL_DIR", str(room / "parts"))
+    done = CliRunner().invoke(app, ["convert", "merl:filename=sky.exr", "parts/sky.exr"])
+    assert done.exit_code == 2 and "the command reads this file" in done.stderr
 
 
 @pytest.mark.parametrize("include", ['<include filename="first.xml"/>',
