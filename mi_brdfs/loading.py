@@ -73,7 +73,7 @@ def file_names(state: Any) -> list[tuple[mi.Properties, str]]:
 
 def versioned(text: str) -> str:
     """Return XML with a version in its root, as Mitsuba 3 demands; as it is if it has one."""
-    root = re.match(r"\s*((<!--.*?-->|<[?!].*?>)\s*)*<[\w:]+", text, re.DOTALL)
+    root = re.match(r"\s*((<!--(?:(?!-->).)*-->|<[?!](?!--)[^>]*>)\s*)*<[\w:]+", text, re.DOTALL)
     if not root or "version=" in text[root.end() :].partition(">")[0]:
         return text
     return f'{text[: root.end()]} version="3.0.0"{text[root.end() :]}'

@@ -27,7 +27,8 @@ def mentioned(names: Iterable[str], texts: Iterable[str] = (), values: Mapping[s
     files and in some texts, and so on. Parameters have ``values``. What stands in quotes is taken for a name: that is
     more than Mitsuba reads, but no less, of any version and without an error."""
     known, found = dict(values or {}), dict[object, str]()
-    todo = [*((text, [""]) for text in texts), *_new(names, [""], found)]
+    start = list(dict.fromkeys(["", os.environ.get("MI_BRDFS_MERL_DIR", "")]))
+    todo = [*((text, start) for text in texts), *_new(names, start, found)]
     while todo:
         text, folders = todo.pop()
         inside = _named(text, known)
@@ -59,14 +60,15 @@ def _text(path: str) -> str:
             with suppress(LookupError):
                 if data.decode(encoding, way).lstrip("\ufeff \t\r\n").startswith("<") or path.endswith(".json"):
                     data += file.read()
-                    texts.append(re.sub("<!--.*?-->", "", data.decode(encoding, way), flags=re.DOTALL))
+                    start, *rest = data.decode(encoding, way).split("<!--")
+                    texts.append(start + "".join(it.partition("-->")[2] for it in rest))
         return "\n".join(texts)
     return ""
 
 
 def _named(text: str, values: dict[str, str]) -> set[str]:
     """Return what may be names in a text, with the values of parameters, to which its defaults are added."""
-    default = r"<default[^>]+>"
+    default = r"<default[^<>]+>"
     for tag in re.findall(default, text):
         it = {key: value for key, _, value in re.findall(r"""(name|value)\s*=\s*(["'])(.*?)\2""", tag)}
         values.setdefault(it.get("name", ""), it.get("value", "")[:LONGEST])

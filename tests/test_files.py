@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from support import LOFT
-from test_cli import SCENE, command
-from typer.testing import CliRunner
+from test_cli import SCENE, command, invoke
 
 import mi_brdfs
-from mi_brdfs.cli import app, main, options
+from mi_brdfs.cli import main, options
+from mi_brdfs.loading import versioned
 from mi_brdfs.mentioned import mentioned
 from mi_brdfs.plot.command import write as write_figure
 from mi_brdfs.rendering.output import write
@@ -112,7 +112,7 @@ def test_letters_that_the_output_cannot_have_are_replaced():
 
 
 def swept(folder):
-    return CliRunner().invoke(app, ["sweep", str(LOFT), *FITTED, "--workers", "0", "-o", str(folder)])
+    return invoke("sweep", LOFT, *FITTED, "--workers", "0", "-o", folder)
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -194,7 +194,7 @@ def room(tmp_path, monkeypatch):
     ],
 )  # fmt: skip
 def test_no_command_writes_over_what_it_reads(line, room):
-    done = CliRunner().invoke(app, [word.replace("@", " ") for word in line.split()])
+    done = invoke(*(word.replace("@", " ") for word in line.split()))
     assert done.exit_code == 2 and done.stdout == "", done.output
     assert re.search(r"^mi-brdfs: \S+ \S+: the command reads this file( as \S+)?; write to another one$", done.stderr)
 
@@ -205,7 +205,7 @@ def test_no_command_writes_over_what_it_reads(line, room):
 def test_no_two_outputs_are_one_file(line, room):
     for name in ("l.png", "l.exr", "l.json", "l.xml"):
         (room / name).symlink_to("both.png")
-    done = CliRunner().invoke(app, line.split())
+    done = invoke(*line.split())
     assert done.exit_code == 2 and re.search("is the same file; give each its own", done.stderr), done.output
 
 
@@ -215,10 +215,10 @@ def test_what_names_no_file_and_what_is_none_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for _ in range(2):
         words = "plot", "lambert", "--kind", "albedo", "--title", "a.png", "--labels", "a.png", "-o", "a.png"
-        assert CliRunner().invoke(app, words).exit_code == 0
+        assert invoke(*words).exit_code == 0
     for file in (os.devnull, os.devnull, "lambert.json", "lambert.json"):
         words = "check", "lambert", "--only", "finite", "--json", file
-        done = CliRunner().invoke(app, [*words, "--junit", file] if file == os.devnull else words)
+        done = invoke(*words, *(["--junit", file] if file == os.devnull else []))
         assert done.exit_code == 0, done.stderr
 
 
@@ -235,7 +235,7 @@ def test_folders_of_results_keep_what_is_no_result(tmp_path, monkeypatch):
         ("lambert.png", drawn, "it has other pictures"),
     ):  # fmt: skip
         (tmp_path / name).write_text("mine")
-        done = CliRunner().invoke(app, line.split())
+        done = invoke(*line.split())
         assert done.exit_code == 2 and sentence in done.stderr
         assert (tmp_path / name).read_text() == "mine"
         (tmp_path / name).unlink()
@@ -247,7 +247,7 @@ def test_folders_of_results_keep_what_is_no_result(tmp_path, monkeypatch):
     "upgrade -o m.csv old.xml",
 ])  # fmt: skip
 def test_a_name_that_was_forgotten_costs_no_file(line, room):
-    done = CliRunner().invoke(app, line.split())
+    done = invoke(*line.split())
     assert done.exit_code == 2 and re.fullmatch(r"mi-brdfs: \S+ m\.\w+: write a \.[^\n]+\n", done.stderr), done.stderr
 
 
@@ -257,7 +257,7 @@ def test_a_name_that_was_forgotten_costs_no_file(line, room):
 def test_scenes_are_read_in_all_encodings_before_pictures_take_places(before, encoding, room):
     scene = room / "coded.xml"
     scene.write_bytes((before + WALL).encode(encoding))
-    done = CliRunner().invoke(app, ["render", "coded.xml", "-o", "wall.png"])
+    done = invoke("render", "coded.xml", "-o", "wall.png")
     scene.unlink()
     assert done.exit_code == 2 and "the command reads this file" in done.stderr
 
@@ -271,6 +271,22 @@ def test_comments_and_defaults_name_no_file(room):
     assert str(room / "m.png") not in map(os.path.realpath, mentioned([str(scene)]).values())
     assert str(room / "wall.png") in map(os.path.realpath, mentioned([str(scene)]).values())
     scene.write_text(WALL.replace("$tex", "shot-polar"))
+
+
+@pytest.mark.parametrize("text", ["<!--" * 100_000, "<default " * 50_000])
+def test_what_is_never_closed_takes_no_time(text, tmp_path):
+    (tmp_path / "open.xml").write_text(f'<scene version="3.0.0">{text}')
+    start = time.process_time()
+    with pytest.raises((ValueError, RuntimeError)):
+        mi_brdfs.load_legacy(tmp_path / "open.xml")
+    assert versioned("<!-- a -->" * 40) == "<!-- a -->" * 40
+    assert time.process_time() - start < 10
+
+
+def test_files_of_the_folder_of_merl_are_kept(room, monkeypatch):
+    monkeypatch.setenv("MI_BRDFS_MERL_DIR", str(room / "parts"))
+    done = invoke("convert", "merl:filename=sky.exr", "parts/sky.exr")
+    assert done.exit_code == 2 and "the command reads this file" in done.stderr
 
 
 @pytest.mark.parametrize("include", ['<include filename="first.xml"/>',
@@ -290,14 +306,14 @@ def test_pipes_are_refused_wherever_they_are_named(include, tmp_path):
     (["room.xml", "-o", "parts/room.xml"], "finds its files in its folder; stay there"),
 ])  # fmt: skip
 def test_scenes_that_are_not_upgraded_stay_where_they_are(words, sentence, room):
-    done = CliRunner().invoke(app, ["upgrade", *words])
+    done = invoke("upgrade", *words)
     assert done.exit_code == 2 and sentence in done.stderr
 
 
 def test_a_model_that_ends_the_process_ends_no_command_well(tmp_path):
     (tmp_path / "leaver.py").write_text("import sys\nimport mi_brdfs\nclass Leaver(mi_brdfs.Model):\n    'Leaves.'\n"
                                         "    def lobes(self, p):\n        sys.exit(0)\n")  # fmt: skip
-    done = CliRunner().invoke(app, ["check", "leaver", "--only", "finite", "--import", str(tmp_path / "leaver.py")])
+    done = invoke("check", "leaver", "--only", "finite", "--import", tmp_path / "leaver.py")
     assert done.exit_code != 0, done.output
 
 

@@ -15,7 +15,6 @@ from support import context, interaction, numbers, pairs, shared, traced
 from mi_brdfs.measured import FileError, convert, read
 from mi_brdfs.measured.arrays import DRJIT, NUMPY, components
 from mi_brdfs.measured.formats import rgl
-from mi_brdfs.measured.measurement import seen
 from mi_brdfs.measured.source import Source
 from mi_brdfs.probe.arrays import WAVELENGTHS, luminance, vectors
 from mi_brdfs.probe.bsdf import BSDFProbe
@@ -143,7 +142,7 @@ def test_all_that_has_no_zero_is_seen(tmp_path, kind):
     """Though coordinates have a scale: where normals are many, places are close."""
     grid, directions = read(written(tmp_path, material(**KINDS[kind]))).data, tried(3000)
     assert (grid.values > 0).all()
-    np.testing.assert_array_equal(seen(grid, *directions), grid.measured(*directions))
+    np.testing.assert_array_equal(grid.seen(*directions), grid.measured(*directions))
 
 
 def test_two_azimuths_that_differ_are_interpolated(tmp_path):

@@ -43,7 +43,7 @@ def output_files(output: Path) -> tuple[Path, Path]:
     is_exr = output.suffix.lower() == ".exr"
     files = (output, output.with_suffix(".png")) if is_exr else (output.with_suffix(".exr"), output)
     for file in files:
-        check_output("-o", file, PICTURES)
+        check_output("-o", file)
     return files
 
 

@@ -28,10 +28,13 @@ def upgrade(
 
     if not old.is_file():
         fail(f"{old}: no such file", Exit.USAGE)
-    if is_new(old) and define:
-        fail(f"-D {define[0]}: {old} is a scene of Mitsuba 3, which stays as it is", Exit.USAGE)
-    if is_new(old) and output and not os.path.samefile(output.absolute().parent, old.absolute().parent):
-        fail(f"-o {output}: {old} is a scene of Mitsuba 3, and finds its files in its folder; stay there", Exit.USAGE)
+    if is_new(old):
+        if define:
+            fail(f"-D {define[0]}: {old} is a scene of Mitsuba 3, which stays as it is", Exit.USAGE)
+        if output and not os.path.samefile(output.absolute().parent, old.absolute().parent):
+            fail(
+                f"-o {output}: {old} is a scene of Mitsuba 3, and finds its files in its folder; stay there", Exit.USAGE
+            )
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))
     err.print("\n".join([*new.report().splitlines(), f"Mitsuba {new.version}: {new.summary()}"]))

@@ -150,6 +150,21 @@ class Grid:
             nearest.append(axis.steps(place, "nearest")[0][0])
         return inside & self._known[tuple(nearest)]
 
+    def seen(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        """Return whether directions were measured, and the value there is of no node that is missing or 0, unless all
+        are: files have zeros where an instrument saw nothing."""
+        measured = self.measured(wi, wo)
+        if self._lit is None:
+            return measured
+        lit, all_lit = np.moveaxis(self._lit.evaluate(wi, wo), -1, 0)
+        return measured & (lit > (1 - MARGIN) * all_lit)
+
+    @cached_property
+    def _lit(self) -> Grid | None:
+        """1 where nodes have a value that is not 0, and beside it 1 everywhere, as coordinates may have a scale."""
+        lit = np.nan_to_num(self.values).any(axis=-1)
+        return replace(self, values=np.stack([lit, np.ones_like(lit)], axis=-1).astype(float)) if lit.any() else None
+
     @cached_property
     def _known(self) -> np.ndarray:
         """Which nodes have values in all channels."""
@@ -272,6 +287,9 @@ class Samples:
         above = (theta_i < np.pi / 2) & (theta_o < np.pi / 2)
         return above & (within(theta_i, theta_o) | within(theta_o, theta_i))
 
+    seen = measured
+    """Samples are no table that has zeros where nothing was measured."""
+
     @cached_property
     def _ranges(self) -> list[tuple[float, float]]:
         """The ends of the polar angles of wi and of wo, and a little more."""
@@ -309,17 +327,6 @@ class Measurement:
         object.__setattr__(self, "material", brief(self.material))
         lines = {name: " ".join(text.split()) for name, text in self.notes.items()}
         object.__setattr__(self, "notes", {printable(name): printable(text) for name, text in lines.items()})
-
-
-def seen(data: Grid | Samples, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    """Return whether directions were measured, and a table's value there is of no node that is missing or 0, unless all
-    are: files have zeros where an instrument saw nothing."""
-    lit = np.nan_to_num(data.values).any(axis=-1)
-    if isinstance(data, Samples) or not lit.any():
-        return data.measured(wi, wo)
-    values = np.stack([lit, np.ones_like(lit)], axis=-1).astype(float)  # coordinates may have a scale
-    found, all_lit = np.moveaxis(replace(data, values=values).evaluate(wi, wo), -1, 0)
-    return data.measured(wi, wo) & (found > (1 - MARGIN) * all_lit)
 
 
 def usable(values: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..given import load_described
 from ..measured import read
-from ..measured.measurement import Grid, Samples, seen
+from ..measured.measurement import Grid, Samples
 from ..parameters.messages import brief
 from ..probe.arrays import CENTRE, Array
 from ..probe.bsdf import BSDFProbe, Part
@@ -37,7 +37,7 @@ class MeasuredProbe(BSDFProbe):
     data: Grid | Samples = field(kw_only=True)
 
     def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
-        return np.where(seen(self.data, wi, wo)[:, None], super().eval(part, wi, wo, uv), np.nan)
+        return np.where(self.data.seen(wi, wo)[:, None], super().eval(part, wi, wo, uv), np.nan)
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:

@@ -18,7 +18,7 @@ from matplotlib.patches import Rectangle
 from ..measured import Measurement, Samples, read
 from ..measured.arrays import components, stacked
 from ..measured.coordinates import HalfDifference, polar_angle, spherical
-from ..measured.measurement import seen, usable
+from ..measured.measurement import usable
 from ..measured.report.albedo import albedos
 from ..measured.report.counts import batches, census
 from ..measured.report.summary import azimuths, ends
@@ -196,8 +196,8 @@ class LitTable:
         peaks = [end + near * side for end in (-theta_i, theta_i) for side in (-1, 1)]
         theta = np.unique(np.concatenate([np.linspace(-90, 90, 361), *peaks]))
         curve = refined(lambda t: luminance(np.maximum(self.grid.evaluate(wi, toward(t)), 0)), theta[abs(theta) < 90])
-        drawn = seen(self.measurement.data, wi, toward(curve.theta))
-        return curve._replace(value=np.where(drawn, curve.value, np.nan))
+        seen = self.measurement.data.seen(wi, toward(curve.theta))
+        return curve._replace(value=np.where(seen, curve.value, np.nan))
 
     def nodes(self, angles: Sequence[float] | np.ndarray) -> list[Curve]:
         """Return what the table has near the plane of incidence, for each of some angles of incidence."""

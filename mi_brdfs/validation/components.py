@@ -133,7 +133,7 @@ def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
     every = int(mi.BSDFFlags.All)
     kind = part.flags & every
     for words, excluding in (
-        (f"a type mask that leaves {part.name.replace('whole', 'it')} out", context(part.component, every & ~kind)),
+        ("a type mask that leaves it out", context(part.component, every & ~kind)),
         ("a component that does not exist", context(probe.bsdf.component_count() + 7)),
     ):
         nothing = part._replace(context=excluding)
