@@ -106,6 +106,15 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
     assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")
+def test_a_working_folder_that_is_gone_gets_a_sentence(tmp_path):
+    done = subprocess.run(
+        command("--version"), cwd=tmp_path, preexec_fn=tmp_path.rmdir, stderr=subprocess.PIPE, text=True
+    )
+    assert done.returncode == 1
+    assert done.stderr == "mi-brdfs: the working folder is gone; change to one that is there\n"
+
+
 def test_letters_that_the_output_cannot_have_are_replaced():
     done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
