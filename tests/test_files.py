@@ -298,6 +298,19 @@ def test_files_of_the_folder_of_merl_are_kept(room, monkeypatch):
     assert done.exit_code == 2 and "the command reads this file" in done.stderr
 
 
+def test_scenes_that_include_each_other_take_little_time(tmp_path):
+    """A third of a second, not five as when each of their parameters was looked for."""
+    names = [f"scene{k}.xml" for k in range(60)]
+    for k, name in enumerate(names):
+        others = (
+            f'<default name="p{k}_{j}" value="{it}"/><include filename="$p{k}_{j}"/>' for j, it in enumerate(names)
+        )
+        (tmp_path / name).write_text(f'<scene version="3.0.0">{"".join(others)}</scene>')
+    start = time.process_time()
+    assert len(mentioned([str(tmp_path / names[0])])) == 60
+    assert time.process_time() - start < 2
+
+
 @pytest.mark.parametrize("include", ['<include filename="first.xml"/>',
                                      '<default name="x" value="pipe"/><include filename="$x"/>'])  # fmt: skip
 def test_pipes_are_refused_wherever_they_are_named(include, tmp_path):
