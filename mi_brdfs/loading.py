@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,10 @@ from .names import check_name
 
 MESHES = ("ply", "serialized")
 """The shapes whose faces Mitsuba takes as they are."""
+NEEDED = {"bitmap": ("filename", "bitmap", "data", "texture"), "blendbsdf": ("weight",)}
+"""Of plugins whose absence ends the process: properties of which they need one."""
+DEEPEST = 16
+"""How many BSDFs may be in one another: each with two sides doubles what Mitsuba visits."""
 
 
 def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters: Any) -> Any:
@@ -78,14 +82,32 @@ def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]
 
 
 def instantiated(config: Any, state: Any) -> Any:
-    """Return what a parsed scene describes. Raise a ValueError as :func:`checked_mesh` does."""
-    for node in state.nodes:
+    """Return what a parsed scene describes. Raise a ValueError where that would end the process or never end: as
+    :func:`check_plugin` and :func:`checked_mesh` do, and for BSDFs that are nested too deeply."""
+    bsdfs = dict[int, list[int]]()
+    for k, node in enumerate(state.nodes):
         props = mi.Properties(node.props)  # a copy: Mitsuba complains of what was never read in its own
-        if props.plugin_name() in MESHES:
-            given = {key: props[key] for key in ("filename", "shape_index") if key in props}
+        kind, values = props.plugin_name(), {key: props[key] for key in props.keys()}
+        check_plugin(kind, values)
+        if node.type == mi.ObjectType.BSDF:
+            bsdfs[k] = [it.index() for it in values.values() if isinstance(it, mi.Properties.ResolvedReference)]
+        if kind in MESHES:
+            given = {key: values[key] for key in ("filename", "shape_index") if key in values}
             with suppress(RuntimeError):  # Mitsuba says it again, with the line
-                checked_mesh({"type": props.plugin_name(), **given})
+                checked_mesh({"type": kind, **given})
+    inner = set(bsdfs)
+    for _ in range(DEEPEST):
+        inner = {it for outer in inner for it in bsdfs[outer] if it in bsdfs}
+    if inner:
+        raise ValueError(f"More than {DEEPEST} BSDFs are in one another; nest fewer.")
     return mi.parser.instantiate(config, state)
+
+
+def check_plugin(kind: str, given: Iterable[str]) -> None:
+    """Raise a ValueError unless one of the properties is given without which Mitsuba would end the process."""
+    needed = NEEDED.get(kind, ())
+    if needed and not set(needed) & set(given):
+        raise ValueError(f"{kind}: give it a {needed[0]}.")
 
 
 def checked_mesh(shape: Mapping[str, Any]) -> mi.Shape:

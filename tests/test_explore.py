@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import subprocess
+from contextlib import suppress
 
 import drjit as dr
 import mitsuba as mi
@@ -25,7 +26,7 @@ from mi_brdfs.explorer.state import StateError, checked, parse
 from mi_brdfs.explorer.tours import parse as parse_tour
 from mi_brdfs.explorer.tours import tours
 from mi_brdfs.mitsuba.registry import find_model
-from mi_brdfs.probe.sources import find_sources
+from mi_brdfs.probe.sources import BSDFSource, find_sources
 
 STAGES = ["studio", "lamp", "point"]
 LOFT = str(FILE)
@@ -467,6 +468,19 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     client = Client(UserScene(scene, "ward"))  # the id of a shape
     client.show({"type": "lambert"}, **shown)
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]
+
+
+def test_values_of_a_material_are_its_own(llvm_rgb, tmp_path):
+    """Files are kept loaded: what one subject changes, another one does not see."""
+    path = tmp_path / "metal.xml"
+    path.write_text('<bsdf version="3.0.0" type="roughconductor"><float name="alpha" value="0.25"/></bsdf>')
+    materials = Materials({"metal.xml": BSDFSource(str(path), "metal.xml", str(path))})
+    usual = {"type": "given", "file": "metal.xml"}
+    found = []
+    for values in {}, {"alpha": 0.5}, {"alpha": 0.75, "eta": "dark"}, {}:
+        with suppress(StateError), materials.loaded(usual | values) as loaded:
+            found.append(float(mi.traverse(loaded)["alpha.value"][0]))
+    assert found == [0.25, 0.5, 0.25]
 
 
 def test_camera_and_light_are_moved_and_come_back(client, tmp_path):

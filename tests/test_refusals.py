@@ -46,6 +46,9 @@ def folder(tmp_path_factory):
         scene = SCENE.replace('"obj"', f'"{kind}"').replace("triangle.obj", f"torn.{kind}")
         (folder / f"torn_{kind}.xml").write_text(scene)
     (folder / "deep.json").write_text("[" * 100_000)
+    (folder / "empty.hdr").write_text("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n")
+    sides = '<bsdf type="twosided">' * 17 + '<bsdf type="diffuse"/>' + "</bsdf>" * 17
+    (folder / "onion.xml").write_text(f'<scene version="3.0.0">{sides}</scene>')
     for name in "taken.png", "folder.exr", "nook", "hall":
         (folder / name).mkdir()
     (folder / "hall" / "wall_log.jpg").touch()

@@ -95,7 +95,12 @@ class Materials:
                     if source.word not in self._loaded:
                         found = source.load()
                         self._loaded[source.word] = mi.load_dict(found) if isinstance(found, dict) else found
-                    yield _with_values(self._loaded[source.word], values)
+                    kept = self._loaded[source.word]
+                    usual = _set(kept, values)
+                    try:
+                        yield kept
+                    finally:
+                        mi.traverse(kept).update(usual)
                 elif kind == MEASURED:
                     measured: Any = self._source(bsdf).load()
                     yield mi.load_dict({**measured, **properties(values)})
@@ -205,18 +210,25 @@ def _built_in(kind: str, values: Bsdf) -> mi.BSDF:
     try:
         return mi.load_dict({"type": kind, **properties(values)})
     except RuntimeError as error:
+        loaded = mi.load_dict({"type": kind})
         try:
-            return _with_values(mi.load_dict({"type": kind}), values)
+            _set(loaded, values)
         except TypeError:  # a parameter, with a value that is none of its
             raise error from None
+        return loaded
 
 
-def _with_values(bsdf: mi.BSDF, values: Bsdf) -> mi.BSDF:
+def _set(bsdf: mi.BSDF, values: Bsdf) -> dict[str, Any]:
+    """Give a BSDF values, and return those that it had, by their keys."""
     params = mi.traverse(bsdf)
     keys = {controls.key_to_name(key): key for key, _ in params}
-    for name, value in values.items():
+    for name in values:
         if name not in keys:
             raise StateError(f"There is no value {name}; there are {listed(keys, 'and')}.")
-        params[keys[name]] = mi.Color3f(value) if isinstance(value, list) else value
-    params.update()
-    return bsdf
+    usual = {keys[name]: type(params[keys[name]])(params[keys[name]]) for name in values}
+    try:
+        params.update({keys[name]: mi.Color3f(it) if isinstance(it, list) else it for name, it in values.items()})
+    except TypeError:  # perhaps not at the first one
+        params.update(usual)
+        raise
+    return usual

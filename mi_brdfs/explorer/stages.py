@@ -189,8 +189,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
     lights = "point" if setting.stage == INCIDENCE else "studio" if environment else setting.stage
     scene = preview_scene(mi.load_dict({"type": "diffuse"}), lights)
     if environment:
-        scene["studio"] |= {"filename": linked(str(environment))}
-        del scene["studio"]["bitmap"]
+        scene["studio"]["bitmap"] = _environment(setting.stage, environment)
     if setting.stage == INCIDENCE:
         scene["light"] = {"type": "directional", "irradiance": IRRADIANCE}
     scene["sensor"]["film"] |= {"width": setting.size, "height": setting.size, "rfilter": {"type": "box"}}
@@ -202,6 +201,16 @@ def load(setting: Setting, user: UserScene) -> Stage:
     loaded = mi.load_dict(scene)
     bodies = [shape for shape in loaded.shapes() if shape.id() == "body"]
     return Stage(loaded, bodies, loaded.emitters()[0] if setting.stage == INCIDENCE else None)
+
+
+def _environment(name: str, path: Path) -> mi.Bitmap:
+    """Return the pixels of an environment map. Raise a ValueError where Mitsuba would end the process or the picture be
+    without light."""
+    bitmap = mi.Bitmap(linked(str(path)))
+    pixels = np.array(bitmap)
+    if not (pixels.size and np.isfinite(pixels).all() and pixels.max() > 0):
+        raise ValueError(f"{name}: it has no light, or pixels that are not finite; write those as numbers.")
+    return bitmap
 
 
 def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:

@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..loading import check_plugin
 from .arrays import (
     CENTRE,
     WAVELENGTHS,
@@ -218,12 +219,13 @@ class BSDFProbe:
 def load(given: Mapping[str, Any]) -> Any:
     """Load a plugin dict that may be loaded again. In spectral variants Mitsuba writes the coefficients of spectra into
     the bitmaps that it is given, and a second time those of the coefficients: give it copies. Raise a ValueError for a
-    None, at which Mitsuba would end the process."""
+    None or what is missing, at which Mitsuba would end the process."""
     return mi.load_dict(_copied(given))
 
 
 def _copied(given: Any) -> Any:
     if isinstance(given, Mapping):
+        check_plugin(given.get("type", ""), given)
         for name, value in given.items():
             if value is None:
                 raise ValueError(f"{name} is None; leave it out, or give it a value.")
