@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
 import numpy as np
@@ -23,10 +23,13 @@ from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
 from ..probe.bsdf import BSDFProbe
-from ..probe.sources import BSDFSource
+from ..probe.sources import BSDFSource, data_of
 from . import controls
 from .controls import Control
 from .state import GIVEN, MEASURED, PRESET, Bsdf, StateError
+
+if TYPE_CHECKING:
+    from ..measured import Grid, Samples
 
 BUILT_IN = (
     "conductor", "dielectric", "diffuse", "plastic", "principled", "principledthin", "roughconductor",
@@ -45,6 +48,8 @@ class Materials:
     files: Mapping[str, BSDFSource] = field(default_factory=dict)
     _loaded: dict[str, mi.BSDF] = field(default_factory=dict)
     """Materials of XML files, which take long to load."""
+    _data: dict[str, Grid | Samples | None] = field(default_factory=dict)
+    """What measured files hold, by their paths and quantities."""
 
     def forget(self) -> None:
         """Load the materials of XML files again, as models have changed."""
@@ -105,6 +110,16 @@ class Materials:
                     yield _built_in(kind, values)
         except (RuntimeError, ValueError, TypeError) as error:
             raise StateError(one_line(error)) from None
+
+    def data(self, bsdf: Bsdf) -> Grid | Samples | None:
+        """Return what the file of an expanded plugin dict holds, if there is one and nothing says how it goes on."""
+        if bsdf["type"] != MEASURED:
+            return None
+        given = {**bsdf, "filename": self._source(bsdf).path}
+        key = repr(sorted(given.items()))
+        if key not in self._data:
+            self._data[key] = data_of(given)
+        return self._data[key]
 
     def controls(self, bsdf: Bsdf) -> list[Control]:
         """Return the controls of an expanded plugin dict."""

@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -21,6 +21,9 @@ from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load
 from .directions import direction, on_side
 from .variates import random
+
+if TYPE_CHECKING:
+    from ..measured import Grid, Samples
 
 RESERVED = ("path", "string", "parallel", "optimize")
 """The arguments of Mitsuba's functions that load XML, which no parameter of it may be called."""
@@ -61,6 +64,16 @@ class BSDFSource(NamedTuple):
         if self.source.startswith("<"):
             return mi.load_string(loading.versioned(self.source), **self.parameters)
         return {"type": self.source} | values
+
+
+def data_of(given: Mapping[str, Any]) -> Grid | Samples | None:
+    """Return what the file of a ``tabulated`` plugin dict holds, and None for any other, or one that says how to
+    extrapolate, as that is to be seen, or is turned, of which tables know nothing."""
+    if given["type"] != "tabulated" or given.keys() & {"extrapolate", "rotation"}:
+        return None
+    from ..measured import read  # on first use: the readers take time
+
+    return read(given["filename"], given.get("quantity", "stated")).data
 
 
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
