@@ -10,11 +10,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
+from ..measured import Grid, Samples, read
 from ..mitsuba.errors import one_line
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
 from ..model import EnergyWarning
@@ -23,13 +24,10 @@ from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
 from ..probe.bsdf import BSDFProbe
-from ..probe.sources import BSDFSource, data_of
+from ..probe.sources import BSDFSource, measured_file
 from . import controls
 from .controls import Control
 from .state import GIVEN, MEASURED, PRESET, Bsdf, StateError
-
-if TYPE_CHECKING:
-    from ..measured import Grid, Samples
 
 BUILT_IN = (
     "conductor", "dielectric", "diffuse", "plastic", "principled", "principledthin", "roughconductor",
@@ -48,7 +46,7 @@ class Materials:
     files: Mapping[str, BSDFSource] = field(default_factory=dict)
     _loaded: dict[str, mi.BSDF] = field(default_factory=dict)
     """Materials of XML files, which take long to load."""
-    _data: dict[str, Grid | Samples | None] = field(default_factory=dict)
+    _data: dict[tuple[str, Any], Grid | Samples] = field(default_factory=dict)
     """What measured files hold, by their paths and quantities."""
 
     def forget(self) -> None:
@@ -113,13 +111,11 @@ class Materials:
 
     def data(self, bsdf: Bsdf) -> Grid | Samples | None:
         """Return what the file of an expanded plugin dict holds, if there is one and nothing says how it goes on."""
-        if bsdf["type"] != MEASURED:
+        if bsdf["type"] != MEASURED or not (file := measured_file(bsdf | {"filename": self._source(bsdf).path})):
             return None
-        given = {**bsdf, "filename": self._source(bsdf).path}
-        key = repr(sorted(given.items()))
-        if key not in self._data:
-            self._data[key] = data_of(given)
-        return self._data[key]
+        if file not in self._data:
+            self._data[file] = read(*file).data
+        return self._data[file]
 
     def controls(self, bsdf: Bsdf) -> list[Control]:
         """Return the controls of an expanded plugin dict."""

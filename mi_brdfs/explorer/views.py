@@ -6,12 +6,13 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..measured import Grid, Samples
 from ..measured.coordinates import HalfDifference
 from ..probe import curves as lobes
 from ..probe.arrays import CENTRE, Array, luminance
@@ -19,9 +20,6 @@ from ..probe.bsdf import BSDFProbe, Part
 from ..probe.directions import direction
 from ..probe.variates import lattice, sampling_efficiency
 from .state import State
-
-if TYPE_CHECKING:
-    from ..measured import Grid, Samples
 
 Frame = str | bytes
 """A text or a binary frame of the websocket."""

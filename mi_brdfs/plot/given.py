@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 
 from ..given import load_described
+from ..measured import read
 from ..parameters.messages import brief
 from ..probe.bsdf import BSDFProbe
-from ..probe.sources import data_of, find_sources, name_of
+from ..probe.sources import find_sources, measured_file, name_of
 from ..variants import is_measurable
 from .style import plain
 
@@ -107,7 +108,8 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe
 
 
 def _probe(given: Any) -> BSDFProbe:
-    return BSDFProbe(load_described(given), data=data_of(given) if isinstance(given, dict) else None)
+    file = measured_file(given) if isinstance(given, dict) else None
+    return BSDFProbe(load_described(given), data=read(*file).data if file else None)
 
 
 def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:

@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -21,9 +21,6 @@ from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load
 from .directions import direction, on_side
 from .variates import random
-
-if TYPE_CHECKING:
-    from ..measured import Grid, Samples
 
 RESERVED = ("path", "string", "parallel", "optimize")
 """The arguments of Mitsuba's functions that load XML, which no parameter of it may be called."""
@@ -66,14 +63,12 @@ class BSDFSource(NamedTuple):
         return {"type": self.source} | values
 
 
-def data_of(given: Mapping[str, Any]) -> Grid | Samples | None:
-    """Return what the file of a ``tabulated`` plugin dict holds, and None for any other, or one that says how to
-    extrapolate, as that is to be seen, or is turned, of which tables know nothing."""
+def measured_file(given: Mapping[str, Any]) -> tuple[str, Any] | None:
+    """Return the path and the quantity of the file of a ``tabulated`` dict, and None for any other, or one that says
+    how to extrapolate, as that is to be seen, or is turned, of which tables know nothing."""
     if given["type"] != "tabulated" or given.keys() & {"extrapolate", "rotation"}:
         return None
-    from ..measured import read  # on first use: the readers take time
-
-    return read(given["filename"], given.get("quantity", "stated")).data
+    return given["filename"], given.get("quantity", "stated")
 
 
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
