@@ -7,9 +7,9 @@ shows a material. :func:`presets` names published materials, :func:`preset` retu
 ``load_legacy`` loads a scene of Mitsuba 0.2 to 0.6.
 """
 
-from .starting import end_on_ctrl_c
+from .starting import prepare_command
 
-end_on_ctrl_c()  # before what takes time
+prepare_command()  # before what takes time
 
 import importlib  # noqa: E402
 import re  # noqa: E402

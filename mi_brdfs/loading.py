@@ -6,15 +6,19 @@ import os
 import re
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from .legacy import is_new, root_of, upgrade
 from .mentioned import mentioned
 from .names import check_name
+
+MESHES = ("ply", "serialized")
+"""The shapes whose faces Mitsuba takes as they are."""
 
 
 def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters: Any) -> Any:
@@ -37,12 +41,20 @@ def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> An
         config.merge_meshes = "flip_normals" not in (upgraded or "")
         try:
             mi.parser.transform_all(config, state)
-            return mi.parser.instantiate(config, state)
+            return instantiated(config, state)
         except RuntimeError as error:  # of a file that was given a version
             place = "string" if upgraded else str(path)
             raise RuntimeError(
                 str(error).replace("loading string (line", f"loading {place} (line")
             ) from error.__cause__
+
+
+def load_text(text: str, parameters: Mapping[str, str]) -> Any:
+    """Load what XML of Mitsuba 3 describes, with a version or without."""
+    config = mi.parser.ParserConfig(mi.variant())
+    state = mi.parser.parse_string(config, versioned(text), **parameters)
+    mi.parser.transform_all(config, state)
+    return instantiated(config, state)
 
 
 def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
@@ -63,6 +75,31 @@ def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]
         f"{path} is a scene of Mitsuba {new.version} ({new.summary()}); mi-brdfs upgrade says what.", stacklevel=3
     )
     return mi.parser.parse_string(config, new.xml), new.xml
+
+
+def instantiated(config: Any, state: Any) -> Any:
+    """Return what a parsed scene describes. Raise a ValueError as :func:`checked_mesh` does."""
+    for node in state.nodes:
+        props = mi.Properties(node.props)  # a copy: Mitsuba complains of what was never read in its own
+        if props.plugin_name() in MESHES:
+            given = {key: props[key] for key in ("filename", "shape_index") if key in props}
+            with suppress(RuntimeError):  # Mitsuba says it again, with the line
+                checked_mesh({"type": props.plugin_name(), **given})
+    return mi.parser.instantiate(config, state)
+
+
+def checked_mesh(shape: Mapping[str, Any]) -> mi.Shape:
+    """Return a shape, a mesh without normals at its vertices. Raise a ValueError if one of its faces has a vertex that
+    is not there: computing normals, and the scene, would end the process."""
+    mesh = mi.load_dict({**shape, "face_normals": True} if shape["type"] in MESHES else shape)
+    if isinstance(mesh, mi.Mesh) and mesh.face_count():
+        wrong = dr.compress(mesh.faces_buffer() >= mesh.vertex_count())
+        if len(wrong):
+            raise ValueError(
+                f"{shape['filename']}: face {wrong[0] // 3 + 1:,} has a vertex that is not among the "
+                f"{mesh.vertex_count():,} of the mesh; export it again."
+            )
+    return mesh
 
 
 def file_names(state: Any) -> list[tuple[mi.Properties, str]]:

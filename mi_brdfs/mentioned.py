@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
+from functools import cache
 
 LONGEST = 4096
 """No name of a file has as many letters."""
@@ -27,13 +28,14 @@ def mentioned(names: Iterable[str], texts: Iterable[str] = (), values: Mapping[s
     files and in some texts, and so on. Parameters have ``values``. What stands in quotes is taken for a name: that is
     more than Mitsuba reads, but no less, of any version and without an error."""
     known, found = dict(values or {}), dict[object, str]()
+    folder_at = cache(lambda path: os.path.realpath(path) if os.path.isdir(path) else None)  # most are asked for often
     start = list(dict.fromkeys(["", os.environ.get("MI_BRDFS_MERL_DIR", "")]))
     todo = [*((text, start) for text in texts), *_new(names, start, found)]
     while todo:
         text, folders = todo.pop()
         inside = _named(text, known)
-        inner = [path for name in inside for folder in folders if os.path.isdir(path := os.path.join(folder, name))]
-        todo += _new(inside, list(dict.fromkeys([*folders, *map(os.path.realpath, inner)])), found)
+        inner = [it for name in inside for folder in folders if (it := folder_at(os.path.join(folder, name)))]
+        todo += _new(inside, list(dict.fromkeys([*folders, *inner])), found)
     return found
 
 
@@ -72,9 +74,15 @@ def _named(text: str, values: dict[str, str]) -> set[str]:
     for tag in re.findall(default, text):
         it = {key: value for key, _, value in re.findall(r"""(name|value)\s*=\s*(["'])(.*?)\2""", tag)}
         values.setdefault(it.get("name", ""), it.get("value", "")[:LONGEST])
-    known = "|".join(sorted(map(re.escape, values), key=len, reverse=True))
     quoted = {it for _, it in re.findall(r"""[=:]\s*(["'])(.+?)\1""", re.sub(default, "", text), re.DOTALL)}
     names = {html.unescape(it) for it in quoted if len(it) < LONGEST and re.search(r"[^\d\s.,eE+-]", it)}
     for _ in range(2):  # a default may have another one in it
-        names = {re.sub(rf"\$\{{?({known})\}}?", lambda it: values.get(it[1], it[0]), name) for name in names}
+        names = {re.sub(r"\$\{?([^${}]+)(\}?)", lambda it: _filled(it, values), name) for name in names}
     return names | {name.replace("\\", "/") for name in names}
+
+
+def _filled(reference: re.Match[str], values: Mapping[str, str]) -> str:
+    """Return the value of the longest parameter that a reference begins with, as Mitsuba takes it, and what follows."""
+    word, end = reference.groups()
+    k = next((k for k in range(len(word), 0, -1) if word[:k] in values), 0)
+    return values[word[:k]] + (word[k:] and word[k:] + end) if k else reference[0]

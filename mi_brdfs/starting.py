@@ -16,14 +16,20 @@ class Terminated(SystemExit):
     """SIGTERM was received."""
 
 
-def end_on_ctrl_c() -> None:
-    """In the command's process, let Ctrl-C end it in a sentence: the compiled modules that are imported first make any
-    exception of it, or none."""
+def prepare_command() -> None:
+    """In the command's process, let Ctrl-C end it in a sentence, and end it if its folder is gone: the compiled modules
+    that are imported first make any exception of Ctrl-C, or none, and abort in such a folder."""
     words = sys.orig_argv  # of this process; the others of a pool have sys.argv, too
     is_command = Path(sys.argv[0]).stem == "mi-brdfs" and sys.argv[0] in words
     is_module = ("-m", "mi_brdfs") in pairwise(words)
-    if (is_command or is_module) and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if not (is_command or is_module):
+        return
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _end)
+    try:
+        os.getcwd()
+    except OSError:
+        sys.exit("mi-brdfs: the working folder is gone; change to one that is there")
 
 
 def raise_on_ctrl_c() -> None:

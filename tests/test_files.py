@@ -106,6 +106,15 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
     assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")
+def test_a_working_folder_that_is_gone_gets_a_sentence(tmp_path):
+    done = subprocess.run(
+        command("--version"), cwd=tmp_path, preexec_fn=tmp_path.rmdir, stderr=subprocess.PIPE, text=True
+    )
+    assert done.returncode == 1
+    assert done.stderr == "mi-brdfs: the working folder is gone; change to one that is there\n"
+
+
 def test_letters_that_the_output_cannot_have_are_replaced():
     done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
@@ -287,6 +296,19 @@ def test_files_of_the_folder_of_merl_are_kept(room, monkeypatch):
     monkeypatch.setenv("MI_BRDFS_MERL_DIR", str(room / "parts"))
     done = invoke("convert", "merl:filename=sky.exr", "parts/sky.exr")
     assert done.exit_code == 2 and "the command reads this file" in done.stderr
+
+
+def test_scenes_that_include_each_other_take_little_time(tmp_path):
+    """A third of a second, not five as when each of their parameters was looked for."""
+    names = [f"scene{k}.xml" for k in range(60)]
+    for k, name in enumerate(names):
+        others = (
+            f'<default name="p{k}_{j}" value="{it}"/><include filename="$p{k}_{j}"/>' for j, it in enumerate(names)
+        )
+        (tmp_path / name).write_text(f'<scene version="3.0.0">{"".join(others)}</scene>')
+    start = time.process_time()
+    assert len(mentioned([str(tmp_path / names[0])])) == 60
+    assert time.process_time() - start < 2
 
 
 @pytest.mark.parametrize("include", ['<include filename="first.xml"/>',

@@ -2,10 +2,35 @@
 
 import shlex
 import shutil
+import struct
+import zlib
 
 import pytest
 from support import LOFT, ROOT, rows
 from test_cli import SCENE, invoke
+
+PLY = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+3 0 1 2
+3 0 1 3
+"""
+"""A mesh whose second face has a fourth vertex."""
+SERIALIZED = (
+    struct.pack("<HH", 0x041C, 4)
+    + zlib.compress(struct.pack("<I2s2Q9f6I", 0x1000, b"m", 3, 2, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 2, 0, 1, 3))
+    + struct.pack("<QI", 0, 1)
+)
+"""The same mesh: the version, the mesh (float32; its name; counts; positions; faces), and the list of meshes."""
 
 
 @pytest.fixture(scope="module")
@@ -16,8 +41,14 @@ def folder(tmp_path_factory):
     shutil.copy(LOFT, folder / "paint.bsdf")
     (folder / "file").touch()
     (folder / "gone_mesh.xml").write_text(SCENE.replace("triangle.obj", "gone.obj"))
-    for name in "taken.png", "folder.exr", "nook":
+    for kind, mesh in ("ply", PLY.encode()), ("serialized", SERIALIZED):
+        (folder / f"torn.{kind}").write_bytes(mesh)
+        scene = SCENE.replace('"obj"', f'"{kind}"').replace("triangle.obj", f"torn.{kind}")
+        (folder / f"torn_{kind}.xml").write_text(scene)
+    (folder / "deep.json").write_text("[" * 100_000)
+    for name in "taken.png", "folder.exr", "nook", "hall":
         (folder / name).mkdir()
+    (folder / "hall" / "wall_log.jpg").touch()
     return folder
 
 

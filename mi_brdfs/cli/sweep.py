@@ -80,6 +80,8 @@ def sweep(
         fail(f"{output}: {error.strerror}")
     for file in output.glob("wall_*.jpg") if render else ():
         check_output("-o", file)
+        if not (output / "pictures").is_dir():
+            fail(f"-o: {file} is there, and no such result; name another folder", Exit.USAGE)
     complete, errors, wall = True, list[str](), None
     with stdout_to_stderr():
         try:

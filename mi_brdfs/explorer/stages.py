@@ -16,6 +16,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..loading import checked_mesh
 from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
@@ -196,7 +197,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
     if setting.shape != "body":
         mesh = user.meshes.get(setting.shape)
         shape = {"type": mesh.suffix[1:].lower(), "filename": linked(str(mesh))} if mesh else {"type": "sphere"}
-        to_world = _placed(setting.shape, mi.load_dict(shape))
+        to_world = _placed(setting.shape, checked_mesh(shape))
         scene["body"] = {**shape, "to_world": to_world, "bsdf": scene["body"].bsdf()}
     loaded = mi.load_dict(scene)
     bodies = [shape for shape in loaded.shapes() if shape.id() == "body"]

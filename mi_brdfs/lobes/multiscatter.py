@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, expm1, log1p, luminance, safe_sqrt
+from ..math import EPSILON, Spectrum, luminance, safe_sqrt
 from ..microfacet.escape import Escape, MeanEscape, Walks, table
 from ..microfacet.shadowing import Smith
 from ..microfacet.terms import Fresnel
@@ -33,8 +33,9 @@ class MultipleScattering(Lobe):
         self.fresnel = uniform("fresnel", lobe.fresnel.combination())
         self.colours = uniform("colours", self.between(lobe.reflectance))
         lost = dr.maximum(self.mean.lost, EPSILON)
-        b, typical = self.GRAZING * lost * dr.sqrt(lost), luminance(self.colour(self.mean, self.mean))
-        self.b, self.norm, self.scale, self.typical = uniform("lobe", (b, log1p(dr.rcp(b)), dr.inv_pi / lost, typical))
+        b = self.GRAZING * lost * dr.sqrt(lost)
+        kept = b, dr.log(1 + dr.rcp(b)), dr.inv_pi / lost, luminance(self.colour(self.mean, self.mean))
+        self.b, self.norm, self.scale, self.typical = uniform("lobe", kept)
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         """Return what of the colour is the same for all directions."""
@@ -59,7 +60,7 @@ class MultipleScattering(Lobe):
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         # The angle is that of visible normals, too, which Dr.Jit computes once.
-        cos2, (sin_phi, cos_phi) = self.b * expm1(v.y * self.norm), dr.sincos(dr.two_pi * v.x)
+        cos2, (sin_phi, cos_phi) = self.b * (dr.exp(v.y * self.norm) - 1), dr.sincos(dr.two_pi * v.x)
         sin = safe_sqrt(1 - cos2)
         return mi.Vector3f(sin * cos_phi, sin * sin_phi, safe_sqrt(cos2))
 
@@ -76,12 +77,12 @@ class WalkLobe(MultipleScattering):
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         between, third = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip), self.mean.third
         later = between * third / (1 - between * (1 - third))
-        return reflectance, later, 1 - later
+        return reflectance * later, reflectance * (1 - later)
 
     def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
-        reflectance, later, sooner = self.colours
+        later, sooner = self.colours
         first, last = (Fresnel.mean(self.fresnel, end.schlick, end.dip) for end in (i, o))
-        return reflectance * first * last * (later + dr.maximum(i.second - self.mean.second + o.second, 0) * sooner)
+        return first * last * (later + dr.maximum(i.second + o.second, 0) * sooner)
 
 
 class KullaContyLobe(MultipleScattering):

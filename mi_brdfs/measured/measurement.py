@@ -22,6 +22,8 @@ Quantity = Literal["stated", "f", "f cos"]
 """What a file holds: what it states, or f or f cosθo where it states nothing."""
 MOST = 1e36
 """The largest value: float32 holds it times a solid angle."""
+LEAST_NM = 12.0
+"""In nm, between the 10.6 µm of carbon dioxide lasers and the 13.5 nm of extreme ultraviolet light."""
 
 
 class FileError(ValueError):
@@ -336,7 +338,8 @@ def usable(values: np.ndarray) -> np.ndarray:
 
 def representable(measurement: Measurement) -> Measurement:
     """Return a measurement that can be rendered, with NaN in place of values beyond ``MOST``, infinite ones among them.
-    Raise a FileError if no value is left that is positive, or wavelengths are too many, no numbers or the same."""
+    Raise a FileError if no value is left that is positive, or wavelengths are too many, no numbers, the same or in
+    micrometres."""
     values, nm = measurement.data.values, measurement.wavelengths
     if values.shape[-1] > MOST_CHANNELS:
         raise FileError(
@@ -345,6 +348,9 @@ def representable(measurement: Measurement) -> Measurement:
         )
     if nm is not None and len(nm) > 1 and not np.all((np.diff(nm) > 0) & np.isfinite(nm[1:])):
         raise FileError(f"{measurement.path}: its wavelengths must be numbers that differ.")
+    if nm is not None and nm[-1] < LEAST_NM:
+        numbers = f"{nm[0]:g} to {nm[-1]:g}" if len(nm) > 1 else f"{nm[0]:g}"
+        raise FileError(f"{measurement.path}: wavelengths of {numbers} look like micrometres; write nm.")
     values[~((values >= -MOST) & (values <= MOST))] = np.nan
     # Samples with a missing channel are left out where others are interpolated.
     kept = values if isinstance(measurement.data, Grid) else values[np.isfinite(values).all(axis=1)]

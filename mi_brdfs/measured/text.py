@@ -62,7 +62,7 @@ class TextFile:
     def numbers(self, words: Sequence[str], what: str = "a number") -> np.ndarray:
         """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
         try:
-            return np.array(words, dtype=np.float64)
+            return np.array(floats(words))
         except ValueError:
             bad = next(word for word in words if not is_number(word))
             raise self.error(f"{shortened(bad)} should be {what}") from None
@@ -79,7 +79,7 @@ class TextFile:
             if len(words) < columns or (len(words) > columns and not more):
                 raise self.error(f"there are {len(words)} numbers, but should be {columns}: {what}")
             try:
-                numbers.extend(map(float, words[:columns]))
+                numbers.extend(floats(words[:columns]))
             except ValueError:
                 self.numbers(words)
             self.row_lines.append(self.line)
@@ -118,9 +118,16 @@ def decoded(data: bytes) -> str:
     return data.decode(encoding(data[:4]), errors=FOREIGN)
 
 
+def floats(words: Sequence[str]) -> list[float]:
+    """Return words as Python reads them, but without the underscores that it lets digits have."""
+    if "_" in "".join(words):
+        raise ValueError
+    return list(map(float, words))
+
+
 def is_number(word: str) -> bool:
     try:
-        float(word)
+        floats([word])
     except ValueError:
         return False
     return True

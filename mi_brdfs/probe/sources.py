@@ -59,7 +59,7 @@ class BSDFSource(NamedTuple):
             loaded = loading.load(Path(self.source), self.parameters)
             return loaded if self.material is None else _materials(loaded)[self.material]
         if self.source.startswith("<"):
-            return mi.load_string(loading.versioned(self.source), **self.parameters)
+            return loading.load_text(self.source, self.parameters)
         return {"type": self.source} | values
 
 
@@ -276,7 +276,7 @@ def _fits(path: Path) -> list[dict[str, Any]]:
         words = [word for it in rows for word in (it["bsdf"]["type"], it["model"], it["file"])]
         if words and all(isinstance(word, str) and word for word in words):
             return rows
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         pass
     raise ValueError(f"{path}: it holds no fits, as mi-brdfs fit --json writes them")
 

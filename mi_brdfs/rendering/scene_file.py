@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 import mitsuba as mi
 
 from ..legacy import upgrade
-from ..loading import file_names, looking_in, parsed, versioned
+from ..loading import file_names, instantiated, load_text, looking_in, parsed
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
@@ -85,7 +85,7 @@ class SceneFile:
                 _replace(state, id, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
             if self.box_filter:
                 _set_box_filters(state)
-            return mi.parser.instantiate(config, state)
+            return instantiated(config, state)
 
 
 def _check_films(state: Any) -> None:
@@ -142,7 +142,7 @@ def with_material(path: Path, id: str, xml: str) -> str:
             raise ValueError(f"{path}: the shape {id} has no BSDF to be replaced; give it one.")
         place = inside[0]
     usual = by_id[place.getAttribute("id")] if place.nodeName == "ref" else place
-    if usual.getAttribute("type") == "twosided" and not _is_seen_from_behind(mi.load_string(versioned(xml))):
+    if usual.getAttribute("type") == "twosided" and not _is_seen_from_behind(load_text(xml, {})):
         xml = f'<bsdf type="twosided">\n{indent(xml, "    ")}\n</bsdf>'
     margin = getattr(place.previousSibling, "data", "").rpartition("\n")[2]
     indented = xml.replace("\n", f"\n{margin if margin.isspace() else ''}")

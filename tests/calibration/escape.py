@@ -18,7 +18,7 @@ from harness import parser
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import erfc, erfinv
 
-from mi_brdfs.microfacet.escape import COUNTS, FILE, ROUGHEST, ends
+from mi_brdfs.microfacet.escape import BENDS, COUNTS, FILE, ISOTROPIC, ROUGHEST, SKEW
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip
@@ -33,9 +33,6 @@ WALKS = 1 << 15
 REFLECTIONS = 10
 TYPICAL = 0.85
 """What facets reflect where paths are averaged: as metals do, of which most light is lost at the first reflections."""
-BENDS = {"ggx": ((3, 4), (2.4, 8)), "beckmann": ((5, 4), (4, 2)), "blinn": ((5, 4), (4, 2))}
-"""Numbers c and d of k = c/(1 + d (αu² + αv²)/2), for the separable and the correlated term, by which polynomials of
-low degree do."""
 CORRELATIONS = 0, 0.5
 """The ρ² of nodes; what walks say is nearly linear in it."""
 
@@ -269,16 +266,18 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
     u, v = largest, largest * ratio
     phi = np.zeros(1)
     if ratio < 1:
-        low, high = ends(ratio)
+        low, high = skewed(ratio), skewed(1 / ratio)
         y = low + (high - low) * chebyshev(9)
-        between = np.arccos(np.sqrt(np.clip((0.5 * ratio * y / (1 - y) - ratio**2) / (1 - ratio**2), 0, 1)))
+        along2 = ratio * (1 + SKEW * y) / (1 - y)
+        between = np.arccos(np.sqrt(np.clip((along2 - ratio**2) / (1 - ratio**2), 0, 1)))
         phi = np.append(np.linspace(0, np.pi / 2, 9), between)
     # Half of the places are even in the stretched space, most of which is at grazing where facets are smooth.
     upright = np.cos(np.radians([1, 15, 30, 45, 55, 65, 72, 78, 83, 87]))
     above = Places.of(upright, phi, u, v)
     places = Places.joined(above, Places.of(chebyshev(13), phi, u, v, stretched=True))
     stretched = np.arange(len(places.cos)) >= len(above.cos)
-    everywhere = Places.of(NODES, np.pi / 2 * (np.arange(16) + 0.5) / 16, u, v)
+    # Smooth surfaces lose what they lose near the horizon.
+    everywhere = Places.of(NODES**3, np.pi / 2 * (np.arange(16) + 0.5) / 16, u, v)
     losses = np.array([
         blinn_lost(cos, u) if shape == "blinn" else lost(shape, cos, angle, u, v)
         for cos, angle in zip(places.cos, places.phi, strict=True)
@@ -298,8 +297,14 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
             np.linalg.lstsq(above.terms(name) * weights[:, None], values * weights, rcond=None)[0]
             for name, values in zip(("second", "schlick", "dip"), later, strict=True)
         ]
-        entries.append(np.concatenate([polynomial, means, [bend], *others]))
+        second, schlick, dip = others
+        entries.append(np.concatenate([polynomial, means[:1], second, schlick, means[1:3], dip, means[3:]]))
     return entries
+
+
+def skewed(along2: np.ndarray) -> np.ndarray:
+    """Return the second variable of polynomials, for α² over αu αv."""
+    return (along2 - 1) / (along2 + SKEW)
 
 
 def chebyshev(count: int) -> np.ndarray:
@@ -308,8 +313,9 @@ def chebyshev(count: int) -> np.ndarray:
 
 
 def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Return the coefficients with the least largest error in some scale, lowered to where they add at most BRIGHTER
-    light, besides where the scale is below 1."""
+    """Return the coefficients with the least largest error in some scale, of 16 bits: the mean that the lobe is divided
+    by must be that of what is looked up. They are lowered to where they add at most BRIGHTER light, and no more than
+    is lost, besides where the scale is below 1."""
     weights, best, least = np.ones(len(loss)), np.zeros(terms.shape[1]), np.inf
     for _ in range(25):
         k = np.linalg.lstsq(terms * (weights * scale)[:, None], loss * weights * scale, rcond=None)[0]
@@ -318,7 +324,10 @@ def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.n
             best, least = k, error.max()
         weights *= np.sqrt(0.3 + error / error.mean())
         weights /= weights.mean()
-    best[0] -= max((terms @ best - loss)[scale >= 1].max() - BRIGHTER, 0)
+    best = best.astype(np.float16).astype(float)
+    excess = (terms @ best - loss - np.minimum(loss, BRIGHTER))[scale >= 1].max()
+    if excess > 0:
+        best[0] = np.nextafter(np.float16(best[0] - excess), np.float16(-1))
     return best
 
 
@@ -345,13 +354,7 @@ class Places(NamedTuple):
         shortened = 1 / np.sqrt(1 + along2 * tan2)
         at = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
         rho2 = np.maximum(1 - (alpha_u * alpha_v) ** 2 / (along2 * across2), 0)
-        low, high = ends(alpha_v / alpha_u)
-        y = (
-            (along2 / (along2 + 0.5 * alpha_u * alpha_v) - low) / (high - low) * 2 - 1
-            if alpha_u > alpha_v
-            else 0 * along2
-        )
-        return cls(cos, phi, np.stack([shortened, *at], axis=-1), rho2, y)
+        return cls(cos, phi, np.stack([shortened, *at], axis=-1), rho2, skewed(along2 / (alpha_u * alpha_v)))
 
     @classmethod
     def joined(cls, *places: Places) -> Places:
@@ -388,7 +391,7 @@ def after_the_first(
     def mean(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
         return np.sum(values * weights, axis=1, keepdims=True) / np.sum(weights)
 
-    loss = np.tile(WEIGHTS, 16) / 16 * 2 * everywhere.cos * loss
+    loss = np.tile(WEIGHTS * 3 * NODES**2, 16) / 16 * 2 * everywhere.cos * loss
     left = loss * at(everywhere, "left")[0]
     second, third = mean(at(everywhere, "second"), loss), mean(at(everywhere, "third"), left)
     between = mean(at(everywhere, "between"), left)
@@ -400,8 +403,8 @@ def after_the_first(
 
     (first, later), (_, later_everywhere) = moments(places), moments(everywhere)
     colours = first + later - mean(later_everywhere, loss)
-    means = np.concatenate([[np.sqrt(np.sum(loss))], *second, *third, *between])
-    return means, *at(places, "second"), *colours
+    means = np.concatenate([[np.sqrt(np.sum(loss))], *third, *between])
+    return means, *(at(places, "second") - 0.5 * second), *colours
 
 
 def made(count: int, step: int = 1) -> dict[str, np.ndarray]:
@@ -412,6 +415,9 @@ def made(count: int, step: int = 1) -> dict[str, np.ndarray]:
     for shape, walk in {**walked, "blinn": walked["beckmann"]}.items():
         ratios = [1.0] if shape == "blinn" else np.maximum(np.linspace(0, 1, RATIOS), 0.1)[::step] ** 4
         rows = np.float16([[fitted(shape, alpha, ratio, walk) for alpha in roughness] for ratio in ratios])
+        if len(ratios) > 1 and ratios[-1] == 1:
+            # Isotropic facets do not tell how what is nearly so depends on the azimuth.
+            rows[-1][..., ~ISOTROPIC] = rows[-2][..., ~ISOTROPIC]
         tables[f"{shape}-separable"], tables[f"{shape}-correlated"] = np.moveaxis(rows, 2, 0)
     return tables
 

@@ -51,8 +51,8 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     The other columns are ``r``, ``g``, ``b`` in linear sRGB, wavelengths in nm (``450``, ``450nm``), or a single ``f``,
     whose wavelength a comment can give: ``# wavelength: 650``. Names with ``_cos`` behind them, or a comment
     ``# quantity: f cos``, mean f cosθo, and ``# quantity: f`` means f; without these the ``quantity`` asked for counts,
-    which is f by default. An empty field is a missing value. Commas, semicolons (with decimal points or commas), tabs
-    or white space separate.
+    which is f by default. An empty field is a missing value. Semicolons or tabs (with decimal points or commas),
+    commas or white space separate.
 
     Rows that cross all angles become a grid, others samples: see :func:`mi_brdfs.measured.rows.arranged`.
 
@@ -187,7 +187,7 @@ def fields(file: TextFile) -> Iterator[list[str]]:
         elif text:
             mark = separator(text) if mark == "" else mark
             row = split(text, mark)
-            yield [field.replace(",", ".") for field in row] if mark == ";" else row
+            yield [field.replace(",", ".") for field in row] if mark in (";", "\t") else row
 
 
 def separator(text: str) -> str | None:
