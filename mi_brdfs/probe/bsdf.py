@@ -25,7 +25,7 @@ from .arrays import (
 )
 
 if TYPE_CHECKING:
-    from ..measured import Grid, Samples
+    from .. import measured
     from ..model import Model
 
 
@@ -88,7 +88,7 @@ class BSDFProbe:
     """Whether lanes have wavelengths of their own in spectral variants, from the whole visible range."""
     turned: bool = field(default=False, kw_only=True)
     """Whether the surface is turned in the world; directions are local, and stay."""
-    data: Grid | Samples | None = field(default=None, kw_only=True)
+    data: measured.Grid | measured.Samples | None = field(default=None, kw_only=True)
     """What a measured file holds: values of ``eval`` are NaN where that has none."""
 
     @cached_property
