@@ -414,6 +414,15 @@ NAMES = [
 ]  # fmt: skip
 
 
+def test_views_say_nothing_where_nothing_was_measured(with_file):
+    """As figures do, unless a parameter says how values go on."""
+    subject = {"type": "tabulated", "file": LOFT}
+    for given, is_whole in ((subject, False), (subject | {"extrapolate": "hold"}, True)):
+        (curve,) = of(with_file.show(given, views=["polar"]), "polar")[0]["curves"]
+        known = dict(zip(curve["x"], (it is not None for it in curve["y"]), strict=True))
+        assert known[0] and known[min(known)] is is_whole
+
+
 def test_what_is_copied_names_a_file_of_any_name(llvm_rgb, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words, commands = [], []

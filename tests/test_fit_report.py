@@ -14,8 +14,12 @@ from PIL import Image
 from support import LOFT, ROOT, Page
 from test_cli import invoke
 
-from mi_brdfs.fit import FitError, appearance, fit, report
+from mi_brdfs.fit import FitError, appearance, fit, observe, report
+from mi_brdfs.fit.figures import Residuals
 from mi_brdfs.fit.html import Card, Section
+from mi_brdfs.fit.result import whole
+from mi_brdfs.measured import read
+from mi_brdfs.probe.bsdf import BSDFProbe
 
 MEASURED = ROOT / "scenes" / "measured"
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -35,7 +39,7 @@ def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / HOSTILE).write_bytes(LOFT.read_bytes())
     options = "--model", "lambert,ward", "-D", "variant=balanced,ward-duer", "-D", "alpha=0.4", "--starts", 2
-    outputs = "--image", "-o", "r.html", "--json", "r.json"
+    outputs = "--image", "--html", "r.html", "--json", "r.json"
     with mi.variant_context("llvm_ad_rgb"), pytest.MonkeyPatch.context() as patch:
         make_small(patch)
         done = invoke("fit", HOSTILE, *options, *outputs, cwd=folder)
@@ -151,6 +155,26 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     second = replace(fits[1], model="second", bic=bic, errors={"log": {"held_out": error}})
     verdict = Section("f", [Card(first), Card(second)]).verdict
     assert verdict == f"first comes nearest to the data. {told} {first.starts.agree} of 1 starts of first agree."
+
+
+def test_how_far_a_fit_is_from_the_data_is_told(fits):
+    """By the light that it lacks, here half of it and at grazing angles more, and where that is worst."""
+    pairs = observe(read(LOFT))
+    wi, wo = pairs.wi, pairs.wo
+    grazing = (wi[:, 2] < 0.5) & (wo[:, 2] < 0.5)
+    f = np.where(grazing, 4, 2)[:, None] / np.pi * np.ones(pairs.channels)
+    white = {"type": "lambert", "reflectance": {"type": "rgb", "value": [1, 1, 1]}}
+    probe = BSDFProbe(mi.load_dict(white))
+    light = pairs.solid_angle * wo[:, 2] * wi[:, 2] * np.where(grazing, 4, 2)
+    lacks = 100 * (0.5 + 0.25 * light[grazing].sum() / light.sum())
+    told = Residuals(replace(pairs, f=f, usable=f > 0), replace(fits[0], metric="log"), probe).told
+    assert told.startswith(f"It differs from the data by {lacks:.2g} % of the light that they reflect; most for light")
+    assert int(re.search(r"from about (\d+)°", told)[1]) >= 60 and "0.25 times as bright" in told
+
+
+def test_colours_are_named_once():
+    """With the channels that a remark is about, unless it is about all."""
+    assert whole(["kd.r", "ks.r", "ks.g", "ks.b", "alpha"]) == "kd (r), ks, alpha"
 
 
 @pytest.mark.slow

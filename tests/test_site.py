@@ -79,11 +79,12 @@ def test_every_page_has_its_source(tmp_path):
 
 @pytest.mark.slow
 def test_the_front_page_leads_to_pages_of_the_explorer(site):
-    """They are small and have scrubbers."""
+    """They are small, have scrubbers, and lead back."""
     front = links(read(site / "index.html"))
     for name in live.PAGES:
         page = site / f"{name}.html"
         text = page.read_text(encoding="utf-8")
+        assert '<h1><a href="index.html"' in text
         assert page.name in front and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
         assert ('"name": "fitted walter"' in text) == (name == "measured_paint") and '"name": "fit.json' not in text
 

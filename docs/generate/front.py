@@ -18,6 +18,7 @@ from mi_brdfs.fit.figures import lobes, probe_of
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.measured import read
 from mi_brdfs.models.lambert import Lambert
+from mi_brdfs.pages.figures import DIFFERENCE
 from mi_brdfs.plot.style import COLOURS, INK, SMALL, TEXT, incidence
 from mi_brdfs.rendering.output import denoise, display_image
 from mi_brdfs.validation import check
@@ -26,6 +27,8 @@ from mi_brdfs.validation.pictures import pictures as drawn
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -111,7 +114,7 @@ def _checker() -> Image.Image:
     figure.set_layout_engine("none")
     figure.set_size_inches(4, 3)
     for ax, place in zip(
-        figure.axes, ((0, 0.58, 0.36, 0.36), (0, 0.06, 0.36, 0.36), (0.4, 0.1, 0.6, 0.8)), strict=True
+        figure.axes, ((0, 0.58, 0.36, 0.36), (0, 0.06, 0.36, 0.36), (0.4, 0.17, 0.6, 0.7)), strict=True
     ):
         ax.set_position(place)
     drawn_, _, difference = figure.axes
@@ -121,6 +124,9 @@ def _checker() -> Image.Image:
         difference.annotate(
             text, (place, 0), (0, 7), textcoords="offset points", color="white", fontsize=SMALL, ha="center"
         )
+    scale, colours = figure.add_axes((0.55, 0.09, 0.3, 0.03)), ScalarMappable(Normalize(-5, 5), DIFFERENCE)
+    figure.colorbar(colours, cax=scale, orientation="horizontal", ticks=(-5, 0, 5), format="%dσ")
+    scale.tick_params(labelsize=SMALL, length=0)
     return _image(figure)
 
 

@@ -76,5 +76,5 @@ def _box(draw: ImageDraw.ImageDraw, label: Label, font: ImageFont.ImageFont, str
 
 
 def _touch(a: Box, b: Box) -> bool:
-    gap = 3
+    gap = 12
     return a[0] < b[2] + gap and b[0] < a[2] + gap and a[1] < b[3] and b[1] < a[3]

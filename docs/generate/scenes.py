@@ -36,7 +36,7 @@ CARD = ROOT / "docs" / "pictures" / "card.jpg"
 CARD_SIZE = 1200, 630
 CARD_WORDS = "mi_brdfs", "The classical BRDFs\nas plugins for Mitsuba 3"
 WIDTH, QUALITY = 400, 88
-SPP, FIRST_LIGHT_SPP = 64, 32
+SPP, FIRST_LIGHT_SPP = 256, 32
 """As in the commands beside the pictures and in README.md's, which denoise."""
 
 INTRODUCTION = """\

@@ -53,11 +53,17 @@ def write_pages(folder: Path) -> None:
             for name, (_, words) in PAGES.items():
                 file = Path(f"{name}.html")
                 _run("explore", *words, "--export", str(file))
+                file.write_text(_linked(file.read_text(encoding="utf-8")), encoding="utf-8")
                 file.with_suffix(".jpg").write_bytes(_picture(file.read_text(encoding="utf-8")))
         for used in ("fit.json", MEASURED.name):
             Path(used).unlink()
     finally:
         os.chdir(before)
+
+
+def _linked(page: str) -> str:
+    """Return an exported page whose name leads to the site."""
+    return re.sub(r"<h1>mi_brdfs", '<h1><a href="index.html" style="color: inherit">mi_brdfs</a>', page, count=1)
 
 
 def _picture(page: str) -> bytes:

@@ -72,7 +72,8 @@ def fit_(
         bool, typer.Option("--image", help="Rank by FLIP, the error of a rendered picture as an eye sees it.")
     ] = False,
     output: Annotated[
-        Path | None, file_option("-o", "Also write a page with pictures, or the best fit.", "FILE.html|FILE.xml")
+        Path | None,
+        file_option("-o", "Also write a page with pictures, or the best fit.", "FILE.html|FILE.xml", (), "--html"),
     ] = None,
     save: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Also write each fit there: FILE-MODEL.xml.")

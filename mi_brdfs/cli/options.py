@@ -33,10 +33,10 @@ FIGURES = ".png", ".svg", ".pdf", ".jpg"
 """The endings of files with drawings."""
 
 
-def file_option(name: str, help: str, metavar: str = "FILE", endings: Sequence[str] = ()) -> Any:
-    """Return an option for a file to be written."""
+def file_option(name: str, help: str, metavar: str = "FILE", endings: Sequence[str] = (), *also: str) -> Any:
+    """Return an option for a file to be written, which may have other names, too."""
     names = ["-o", "--output"] if name == "-o" else [name]
-    return typer.Option(*names, metavar=metavar, help=help, callback=written(name, endings))
+    return typer.Option(*names, *also, metavar=metavar, help=help, callback=written(name, endings))
 
 
 def written(name: str, endings: Sequence[str] = ()) -> Callable:

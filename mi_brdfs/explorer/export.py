@@ -138,7 +138,7 @@ class _Baked:
                 shown = [replace(self.state, theta=theta) for theta in self.vary["theta"]]
                 is_same = len({view.depends(it) for it in shown}) == 1
                 for theta, state in enumerate(shown[:1] if is_same else shown):
-                    for frame in frames(name, loaded, state, 0, k):
+                    for frame in frames(name, loaded, self.materials.data(bsdf), state, 0, k):
                         yield at(None if is_same else theta), frame if isinstance(frame, str) else _rounded(frame)
         progress = self.scenes.progress(stages.Setting.of(self.state))
         while progress.spp < SPP:

@@ -15,6 +15,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ..measured import Grid, Samples, read
 from ..mitsuba.errors import one_line
 from ..mitsuba.registry import DATA, MODELS, all_models, is_own
 from ..model import EnergyWarning
@@ -23,7 +24,7 @@ from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
 from ..probe.bsdf import BSDFProbe
-from ..probe.sources import BSDFSource
+from ..probe.sources import BSDFSource, measured_file
 from . import controls
 from .controls import Control
 from .state import GIVEN, MEASURED, PRESET, Bsdf, StateError
@@ -45,6 +46,8 @@ class Materials:
     files: Mapping[str, BSDFSource] = field(default_factory=dict)
     _loaded: dict[str, mi.BSDF] = field(default_factory=dict)
     """Materials of XML files, which take long to load."""
+    _data: dict[tuple[str, Any], Grid | Samples] = field(default_factory=dict)
+    """What measured files hold, by their paths and quantities."""
 
     def forget(self) -> None:
         """Load the materials of XML files again, as models have changed."""
@@ -110,6 +113,14 @@ class Materials:
                     yield _built_in(kind, values)
         except (RuntimeError, ValueError, TypeError) as error:
             raise StateError(one_line(error)) from None
+
+    def data(self, bsdf: Bsdf) -> Grid | Samples | None:
+        """Return what the file of an expanded plugin dict holds, if there is one and nothing says how it goes on."""
+        if bsdf["type"] != MEASURED or not (file := measured_file(bsdf | {"filename": self._source(bsdf).path})):
+            return None
+        if file not in self._data:
+            self._data[file] = read(*file).data
+        return self._data[file]
 
     def controls(self, bsdf: Bsdf) -> list[Control]:
         """Return the controls of an expanded plugin dict."""

@@ -197,7 +197,7 @@ class Session:
             self._send_picture(k, state, serial)
             return
         with self.materials.loaded(bsdf) as loaded:
-            for frame in frames(view, loaded, state, serial, k):
+            for frame in frames(view, loaded, self.materials.data(bsdf), state, serial, k):
                 self.send(frame)
 
     def _refine(self, state: State, serial: int) -> bool:

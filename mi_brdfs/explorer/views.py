@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..measured import Grid, Samples
 from ..measured.coordinates import HalfDifference
 from ..probe import curves as lobes
 from ..probe.arrays import CENTRE, Array, luminance
@@ -90,7 +91,7 @@ def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     parallels = COARSE if state.dragged else PARALLELS
     meshes = lobes.meshes(probe, state.theta, state.phi, parallels, state.channels[0][1])
     for k, (theta, phi, value) in enumerate(meshes):
-        yield {"payload": value.astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
+        yield {"payload": np.nan_to_num(value).astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
 
 
 def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> Iterator[dict[str, Any]]:
@@ -102,7 +103,7 @@ def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> It
 
 def _thinned(curve: lobes.Curve) -> lobes.Curve:
     """Return every other point of a curve, and its ends and peak."""
-    last, peak = len(curve.theta) - 1, int(np.nanargmax(curve.value))
+    last, peak = len(curve.theta) - 1, int(np.argmax(np.nan_to_num(curve.value)))
     kept = np.unique([0, *range(peak % 2, last, 2), last])
     return lobes.Curve(curve.theta[kept], curve.value[kept])
 
@@ -199,9 +200,11 @@ VIEWS = {
 """By name, in the order in which they are drawn."""
 
 
-def frames(name: str, bsdf: mi.BSDF, state: State, serial: int, subject: int) -> Iterable[Frame]:
-    """Yield the frames of a view of a subject."""
-    probe = ComponentProbe(bsdf, state.component, state.cosine)
+def frames(
+    name: str, bsdf: mi.BSDF, data: Grid | Samples | None, state: State, serial: int, subject: int
+) -> Iterable[Frame]:
+    """Yield the frames of a view of a subject, which says nothing where measured data do not."""
+    probe = ComponentProbe(bsdf, state.component, state.cosine, data=data)
     for found in VIEWS[name].frames(probe, state):
         common = {"serial": serial, "subject": subject}
         if "payload" in found:

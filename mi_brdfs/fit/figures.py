@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import mitsuba as mi
 import numpy as np
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -17,6 +16,7 @@ from ..pages.figures import DIFFERENCE, SERIES
 from ..plot.measured import LitTable
 from ..plot.planar import THIN
 from ..plot.style import FAINT, GRID, INK, STYLES, calm, new_figure
+from ..probe.arrays import Array
 from ..probe.bsdf import BSDFProbe
 from ..probe.curves import GRAZING, Curve, in_plane, value
 from ..probe.directions import direction
@@ -93,22 +93,39 @@ class Residuals:
 
     def __init__(self, material: Observations, fit: Fit, probe: BSDFProbe) -> None:
         metric = METRICS[fit.metric]
-        cosine = material.wi[:, 2:].astype(np.float64)
-        model = probe.eval(probe.whole, material.wi, material.wo)[:, : material.channels] / material.wo[:, 2:]
-        difference = metric.transform(model * cosine) - metric.transform(material.f * cosine)
-        usable = material.usable.sum(axis=1)
-        mean = np.where(material.usable, difference, 0).sum(axis=1) / np.maximum(usable, 1)
-        half = material.wi + material.wo.astype(np.float64)
+        wi, wo = (w.astype(np.float64) for w in (material.wi, material.wo))
+        model = probe.eval(probe.whole, material.wi, material.wo)[:, : material.channels] / wo[:, 2:] * wi[:, 2:]
+        data = material.f * wi[:, 2:]
+        light = material.usable * (material.solid_angle * wo[:, 2])[:, None]
+        self.off = float((light * abs(model - data)).sum() / (light * abs(data)).sum())
+        half = wi + wo
         half /= np.linalg.norm(half, axis=1, keepdims=True)
-        theta_h = np.degrees(np.arccos(np.clip(half[:, 2], -1, 1)))
-        theta_d = np.degrees(np.arccos(np.clip((half * material.wi).sum(axis=1), -1, 1)))
+        theta_h, theta_d, theta_i = (
+            np.degrees(np.arccos(np.clip(cosine, -1, 1))) for cosine in (half[:, 2], (half * wi).sum(axis=1), wi[:, 2])
+        )
         self.quantity = metric.text.partition(",")[0]
-        self.edges = np.linspace(0, 1, 1 + int(np.clip(np.sqrt(len(mean) / PAIRS), *CELLS)))
+        self.edges = np.linspace(0, 1, 1 + int(np.clip(np.sqrt(len(wi) / PAIRS), *CELLS)))
         places = np.sqrt(theta_h / 90), theta_d / 90
-        total, *_ = np.histogram2d(*places, self.edges, weights=mean * (usable > 0))
-        number, *_ = np.histogram2d(*places, self.edges, weights=1.0 * (usable > 0))
-        with np.errstate(invalid="ignore"):
-            self.cells = total / np.where(number, number, np.nan)
+        number, *_ = np.histogram2d(*places, self.edges)
+
+        def cells(values: Array) -> Array:
+            """Return the means of cells, of a value of each pair or of those channels of it that have a weight."""
+            if values.ndim > 1:
+                values = np.mean(values, axis=1, where=material.usable)
+            with np.errstate(invalid="ignore"):
+                return np.histogram2d(*places, self.edges, weights=values)[0] / number
+
+        self.cells = cells(metric.transform(model) - metric.transform(data))
+        worst = np.unravel_index(np.nanargmax(abs(self.cells)), self.cells.shape)
+        self.worst = [float(cells(it)[worst]) for it in (theta_i, theta_h, model, data)]
+
+    @property
+    def told(self) -> str:
+        """How far the fit is from the data, and where most, in words."""
+        theta_i, theta_h, model, data = self.worst
+        times = f", where it is {model / data:.2g} times as bright" if min(model, data) > 0 else ""
+        where = f"for light from about {theta_i:.0f}° at half angles of about {theta_h:.0f}°{times}"
+        return f"It differs from the data by {100 * self.off:.2g} % of the light that they reflect; most {where}."
 
     @property
     def extent(self) -> float:
@@ -121,17 +138,13 @@ class Residuals:
         ax = figure.subplots()
         calm(ax)
         ax.grid(False)
-        norm = Normalize(-limit, limit)
         ax.add_patch(Rectangle((0, 0), 1, 1, fill=False, edgecolor=GRID, hatch="////", linewidth=0))
-        ax.pcolormesh(self.edges, self.edges, np.ma.masked_invalid(self.cells.T), norm=norm, cmap=DIFFERENCE,
-                      rasterized=True)  # fmt: skip
+        ax.pcolormesh(self.edges, self.edges, np.ma.masked_invalid(self.cells.T), norm=Normalize(-limit, limit),
+                      cmap=DIFFERENCE, rasterized=True)  # fmt: skip
         places = [0, 2, 10, 30, 60, 90]
         ax.set_xticks(np.sqrt(np.array(places) / 90), [f"{angle}°" for angle in places])
         ax.set_yticks(np.array([0, 30, 60, 90]) / 90, [f"{angle}°" for angle in (0, 30, 60, 90)])
         ax.set(xlim=(0, 1), ylim=(0, 1))
         ax.set_xlabel(r"$\theta_h$", fontsize=9, color=INK)
         ax.set_ylabel(r"$\theta_d$", fontsize=9, color=INK)
-        bar = figure.colorbar(ScalarMappable(norm, DIFFERENCE), ax=ax, aspect=18, pad=0.03, extend="both")
-        bar.ax.tick_params(labelsize=8, labelcolor=INK)
-        bar.outline.set_visible(False)
         return figure

@@ -30,6 +30,12 @@ DECISIVE = 10
 R. E. Kass, A. E. Raftery, Bayes factors, Journal of the American Statistical Association 90(430), 1995,
 doi:10.1080/01621459.1995.10476572.
 """
+NOTICED = 2.3
+"""The difference of colours in CIELAB that is just noticed, side by side.
+
+M. Mahy, L. Van Eycken, A. Oosterlinck, Evaluation of uniform color spaces developed after the adoption of CIELAB and
+CIELUV, Color Research & Application 19(2), 1994, doi:10.1111/j.1520-6378.1994.tb00070.x.
+"""
 SCALES = 1, 2, 5, 10, 20, 50, 100
 """The ends of the scale of differences of lightness."""
 
@@ -42,6 +48,8 @@ class Card:
     picture: str = ""
     difference: str = ""
     residuals: str = ""
+    told: str = ""
+    """How far it is from the data, in sentences."""
 
 
 @dataclass
@@ -60,6 +68,8 @@ class Section:
     """By how many stops pictures are brightened."""
     quantity: str = ""
     """What residuals are of."""
+    limit: float = 0
+    """The end of their scale."""
     lobes: Sequence[tuple[str, str]] = ()
 
     @property
@@ -118,6 +128,7 @@ def page_of(sections: Sequence[Section], unfinished: str = "") -> str:
         curves=CURVES,
         steepest=ANGLES[-1],
         notes=notes,
+        noticed=NOTICED,
         values=values,
     )
 
@@ -129,8 +140,7 @@ def _draw(section: Section, shown: Appearance) -> None:
     data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
     section.data = data_uri(data)
     differences = [lightness(picture) - lightness(data) for picture in pictures]
-    largest = np.quantile(abs(differences[0]), 0.99)
-    section.lightness = next((end for end in SCALES if end >= largest), SCALES[-1])
+    section.lightness = next((end for end in SCALES if end >= np.quantile(abs(differences[0]), 0.99)), SCALES[-1])
     for card, picture, difference in zip(cards, pictures, differences, strict=False):
         card.picture = data_uri(picture)
         card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference / section.lightness)[..., :3])
@@ -141,9 +151,12 @@ def _draw(section: Section, shown: Appearance) -> None:
         residuals = [Residuals(pairs, card.fit, probe) for card, probe in zip(cards, probes, strict=True)]
         section.lobes = [(caption, svg(it)) for caption, it in lobes(measurement, probes[:CURVES], cut)]
     section.quantity = residuals[0].quantity
-    limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
-    for card, each in zip(cards, residuals, strict=True):
-        card.residuals = svg(each.draw(limit))
+    section.limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
+    for card, each, difference in zip(cards, residuals, differences, strict=True):
+        card.residuals = svg(each.draw(section.limit))
+        most = np.quantile(abs(difference), 0.99)
+        seen = "an eye sees that" if most > NOTICED else "an eye hardly sees that"
+        card.told = f"{each.told} Rendered, its lightness L* is off by up to {most:.2g} in 99 % of the pixels: {seen}."
 
 
 def _smooth(picture: np.ndarray) -> np.ndarray:

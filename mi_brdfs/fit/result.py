@@ -117,13 +117,13 @@ class Fit(Data):
         if not self.resolved:
             found.append(f"The highlight is narrower than the data resolve: {self.in_highlight} pairs lie in it.")
         if self.undetermined:
-            found.append(f"Not determined by the data: {', '.join(self.undetermined)}.")
+            found.append(f"Not determined by the data: {whole(self.undetermined)}.")
         if self.bounds:
-            found.append(f"At the end of the range: {', '.join(self.bounds)}.")
-        close = [f"{a} and {b} ({r:.3f})" for a, row in self.correlations.items() for b, r in row.items()
-                 if a < b and abs(r) > CORRELATED and a.partition(".")[0] != b.partition(".")[0]]  # fmt: skip
+            found.append(f"At the end of the range: {whole(self.bounds)}.")
+        close = {" and ".join(sorted(pair)) for a, row in self.correlations.items() for b, r in row.items()
+                 if abs(r) > CORRELATED and len(pair := {_colour(a), _colour(b)}) > 1}  # fmt: skip
         if close:
-            found.append(f"Hard to tell apart: {', '.join(close)}.")
+            found.append(f"Hard to tell apart: {', '.join(sorted(close))}.")
         for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True) if scatter else ():
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
@@ -166,10 +166,21 @@ class Median(NamedTuple):
     flip: float | None
 
 
+def _colour(number: str) -> str:
+    """Return the parameter of a number: the name without the channel."""
+    return number.partition(".")[0]
+
+
+def whole(numbers: Sequence[str]) -> str:
+    """Return names of numbers in words: colours by one name, with the channels that it is about if not with all."""
+    channels = {it: [number[-1] for number in numbers if number.startswith(f"{it}.")] for it in map(_colour, numbers)}
+    return ", ".join(it if len(own) in (0, 3) else f"{it} ({', '.join(own)})" for it, own in channels.items())
+
+
 def notes(fit: Fit) -> str:
     """Return what of a fit calls for caution, in words."""
     words = ["albedo above 1"] * (fit.albedo > 1) + ["unresolved"] * (not fit.resolved)
-    return ", ".join(words + ([f"at its limit: {', '.join(fit.bounds)}"] if fit.bounds else []))
+    return ", ".join(words + ([f"at its limit: {whole(fit.bounds)}"] if fit.bounds else []))
 
 
 def number(value: float | None) -> str:
@@ -178,12 +189,14 @@ def number(value: float | None) -> str:
 
 
 def values(fit: Fit) -> list[tuple[str, float, float | None]]:
-    """Return ``(name, value, standard deviation)`` of each fitted number; of a colour's, the first has the name."""
+    """Return ``(name, value, standard deviation)`` of each fitted number: of a colour "name.r", ".g" and ".b"."""
     found = []
     for name, sigma in fit.sigma.items():
         value = fit.bsdf[name]
-        for k, own in enumerate(value["value"] if isinstance(value, dict) else [value]):
-            found.append(("" if k else name, own, sigma[k] if isinstance(sigma, list) else sigma))
+        numbers = value["value"] if isinstance(value, dict) else [value]
+        labels = [f"{name}.r", ".g", ".b"] if len(numbers) == 3 else [name]
+        for k, (label, own) in enumerate(zip(labels, numbers, strict=True)):
+            found.append((label, own, sigma[k] if isinstance(sigma, list) else sigma))
     return found
 
 

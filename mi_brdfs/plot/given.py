@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import mitsuba as mi
-import numpy as np
-from numpy.typing import ArrayLike
 
 from ..given import load_described
 from ..measured import read
-from ..measured.measurement import Grid, Samples
 from ..parameters.messages import brief
-from ..probe.arrays import CENTRE, Array
-from ..probe.bsdf import BSDFProbe, Part
-from ..probe.sources import find_sources, name_of
+from ..probe.bsdf import BSDFProbe
+from ..probe.sources import find_sources, measured_file, name_of
 from ..variants import is_measurable
 from .style import plain
 
@@ -28,16 +23,6 @@ class Named(NamedTuple):
 
     label: str
     probe: BSDFProbe
-
-
-@dataclass
-class MeasuredProbe(BSDFProbe):
-    """A probe of a measured file, whose values are NaN where nothing was measured."""
-
-    data: Grid | Samples = field(kw_only=True)
-
-    def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
-        return np.where(self.data.seen(wi, wo)[:, None], super().eval(part, wi, wo, uv), np.nan)
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
@@ -123,11 +108,8 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe
 
 
 def _probe(given: Any) -> BSDFProbe:
-    bsdf = load_described(given)
-    # Who says how to extrapolate wants to see that; and tables know nothing of a plugin's rotation.
-    if isinstance(given, dict) and given["type"] == "tabulated" and not given.keys() & {"extrapolate", "rotation"}:
-        return MeasuredProbe(bsdf, data=read(given["filename"], given.get("quantity", "stated")).data)
-    return BSDFProbe(bsdf)
+    file = measured_file(given) if isinstance(given, dict) else None
+    return BSDFProbe(load_described(given), data=read(*file).data if file else None)
 
 
 def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:

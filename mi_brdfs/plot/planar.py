@@ -18,7 +18,7 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import MeasuredProbe, Named, channels_of, constants, named, quantity, scales_of, with_smooth_part
+from .given import Named, channels_of, constants, named, quantity, scales_of, with_smooth_part
 from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, incidence, look
 
 MIRROR = {"marker": "v", "markersize": 5}
@@ -121,7 +121,7 @@ def _planar(
     channels = channels_of(rgb)
     whole = any(lobes.transmits(it.probe) for it in found)
     beside = side_by_side and len(found) > 1
-    measured = [k for k, it in enumerate(found) if isinstance(it.probe, MeasuredProbe)]
+    measured = [k for k, it in enumerate(found) if it.probe.data]
     by_bsdf = beside or not (rgb or len(found) > 1)
 
     def lines(it: Named, k: int, theta: float, j: int) -> list[LabelledCurve]:

@@ -26,6 +26,7 @@ from .arrays import (
 )
 
 if TYPE_CHECKING:
+    from .. import measured
     from ..model import Model
 
 
@@ -88,6 +89,8 @@ class BSDFProbe:
     """Whether lanes have wavelengths of their own in spectral variants, from the whole visible range."""
     turned: bool = field(default=False, kw_only=True)
     """Whether the surface is turned in the world; directions are local, and stay."""
+    data: measured.Grid | measured.Samples | None = field(default=None, kw_only=True)
+    """What a measured file holds: values of ``eval`` are NaN where that has none."""
 
     @cached_property
     def components(self) -> list[Part]:
@@ -158,7 +161,8 @@ class BSDFProbe:
 
     def eval(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return f |cosθ_o|."""
-        return numbers(self.bsdf.eval(part.context, self._at(wi, uv, len(wo)), vectors(wo), True), len(wo))
+        value = numbers(self.bsdf.eval(part.context, self._at(wi, uv, len(wo)), vectors(wo), True), len(wo))
+        return np.where(self.data.seen(wi, wo)[:, None], value, np.nan) if self.data is not None else value
 
     def pdf(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return the density of ``wo``."""

@@ -43,6 +43,11 @@ def chi_square(observed: Array, expected: Array, least: float = 5) -> ChiSquare:
     return ChiSquare(_survival(statistic, degrees), statistic, len(e) - 1, worst)
 
 
+def in_words(p_value: float) -> str:
+    """Return a p-value as text; what float64 has no digits for is less than 1e-300."""
+    return "p < 1e-300" if p_value < 1e-300 else f"p = {p_value:.2g}"
+
+
 def lone_cell(observed: Array, expected: Array) -> float:
     """Return how probable it is that one of some counts is as far from what is expected as the farthest one. They may
     overlap.

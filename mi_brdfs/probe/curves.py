@@ -8,6 +8,7 @@ the sampler locate narrow lobes: none is too narrow to be found.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -140,9 +141,10 @@ def disc(
     """Return a picture of the hemisphere above (1) or below (-1), in rows from the bottom, each pixel the mean over it.
 
     It is the disc of :func:`~mi_brdfs.probe.directions.to_plane` with wi on the left; pixels outside repeat its rim.
-    Pixels with many samples are divided more finely.
+    Pixels with many samples are divided more finely. Where the middle of one is not among measured data, it is NaN.
     """
-    wi, n = direction(theta_i, azimuth), resolution
+    wi, n, data = direction(theta_i, azimuth), resolution, probe.data
+    probe = replace(probe, data=None)  # which asks for each of many samples
     axis = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
     wo = drawn(probe, wi, 1 << 14)
     x, y = (
@@ -150,13 +152,19 @@ def disc(
     )
     crowded = np.bincount(y * n + x, minlength=n * n) > len(wo) / 1000
     picture = np.zeros(n * n)
-    for pixels, parts in ((np.flatnonzero(~crowded), 3), (np.flatnonzero(crowded), 48)):
+
+    def within(pixels: Array, parts: int) -> Array:
         step = np.stack(np.meshgrid(np.arange(parts), np.arange(parts)), axis=-1).reshape(-1, 2) + 0.5
         corner = np.stack([pixels % n, pixels // n], axis=-1)
         points = 90 * ((corner[:, None] + step / parts) * 2 / n - 1).reshape(-1, 2)
         points /= np.maximum(np.hypot(*points.T) / GRAZING, 1)[:, None]
-        values = value(probe, wi, from_plane(points[:, 0], points[:, 1], side, axis).astype(np.float32), channel)
+        return from_plane(points[:, 0], points[:, 1], side, axis).astype(np.float32)
+
+    for pixels, parts in ((np.flatnonzero(~crowded), 3), (np.flatnonzero(crowded), 48)):
+        values = value(probe, wi, within(pixels, parts), channel)
         picture[pixels] = values.reshape(len(pixels), parts * parts).mean(axis=1)
+    if data is not None:
+        picture[~data.seen(wi, within(np.arange(n * n), 1))] = np.nan
     return picture.reshape(n, n)
 
 

@@ -63,6 +63,14 @@ class BSDFSource(NamedTuple):
         return {"type": self.source} | values
 
 
+def measured_file(given: Mapping[str, Any]) -> tuple[str, Any] | None:
+    """Return the path and the quantity of the file of a ``tabulated`` dict, and None for any other, or one that says
+    how to extrapolate, as that is to be seen, or is turned, of which tables know nothing."""
+    if given["type"] != "tabulated" or given.keys() & {"extrapolate", "rotation"}:
+        return None
+    return given["filename"], given.get("quantity", "stated")
+
+
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
     """Yield the BSDFs that a word stands for: the type of a plugin, the name of a published material, a ``<bsdf …>`` as
     text, the path of a measured file, which ``tabulated`` renders, the path of a scene, whose materials count once each

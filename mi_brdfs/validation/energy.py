@@ -52,11 +52,11 @@ def albedo(run: Run) -> Findings:
             if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
+        finding = _judged(part, outcome, found, limits)
         if outcome.faults and (failing := _failing(run, part)):
             words = f"Not judged: mend {listed(failing, 'and')} first; only then the mean of the weights is the albedo."
-            yield Finding("albedo", part.name, "skip", words, outcome.data)
-            continue
-        yield _judged(part, outcome, found, limits)
+            finding = Finding("albedo", part.name, "skip", words, outcome.data)
+        yield finding
 
 
 def _failing(run: Run, part: Part) -> list[str]:

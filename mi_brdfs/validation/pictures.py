@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from ..pages.figures import DENSITY, DIFFERENCE, SERIES
@@ -122,10 +122,9 @@ def pictures(trial: Trial) -> Iterator[tuple[str, Figure, str, str]]:
 
 
 def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:
-    """Draw a picture, white where it is transparent, with where the light comes from and where a mirror sends it."""
+    """Draw a picture, with where the light comes from and where a mirror sends it."""
     left, right, size = view.x - view.half, view.x + view.half, 2 * view.half
     top, bottom = view.y - view.half, view.y + view.half
-    ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, color="white", zorder=-1))
     ax.imshow(colours, interpolation="none", extent=(left, right, bottom, top))
     ax.axhline(0, color=FAINT, linewidth=0.6, linestyle=(0, (3, 4)))
     wi = trial.incident.wi

@@ -6,6 +6,7 @@ from math import erfc, sqrt
 
 import numpy as np
 
+from ..probe.chi_square import in_words
 from .outcome import Findings, Outcome
 from .report import Finding
 from .run import SEED, Run
@@ -25,7 +26,7 @@ def chi2(run: Run) -> Findings:
             smallest = min(smallest, test.p_value)
             outcome.data[name] = test.__dict__ | {"cells": len(trial.counts), "drawn": trial.share}
             if not test.p_value >= run.level:
-                numbers = f"p = {test.p_value:.2g}, χ² = {test.statistic:.0f} for {test.degrees} degrees of freedom"
+                numbers = f"{in_words(test.p_value)}, χ² = {test.statistic:.0f} for {test.degrees} degrees of freedom"
                 told = f"the directions drawn are not distributed as pdf says ({numbers}): {trial.deviation}"
                 size = test.statistic / max(test.degrees, 1)
                 outcome.fault(f"for light from {name} {told}", size, wi=trial.incident.wi, seed=trial.seed)

@@ -56,6 +56,7 @@ function drawList(host, bsdf) {
   host.replaceChildren(
     ...Object.entries(bsdf)
       .filter(([name]) => name !== "type")
+      .map(([name, value]) => [name, name === "file" ? value.replace(/^.*[\\/]/, "") : value])
       .map(([name, value]) =>
         element(
           "div",

@@ -5,12 +5,15 @@ import { session } from "./session.js";
 export const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
 export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k][Number(isDark())];
 
-/** Return the path through points, without those that cannot be told from the one before. */
+/** Return the path through points, without those that cannot be told from the one before; it ends where one is none. */
 export function path(points) {
   let text = "";
   let last = null;
   points.forEach(([x, y], k) => {
-    if (!Number.isFinite(x + y)) return;
+    if (!Number.isFinite(x + y)) {
+      last = null;
+      return;
+    }
     if (last && k < points.length - 1 && Math.abs(x - last[0]) + Math.abs(y - last[1]) < 0.25) return;
     text += `${last ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`;
     last = [x, y];

@@ -22,7 +22,8 @@ export function drawMaps(view) {
   found.forEach((map, k) => paint(boxes[k] ?? addBox(card, view), view, map, low, high));
   boxes.slice(found.length).forEach((box) => box.remove());
   if (view === "hemisphere") card.note.textContent = `${quantity()} from above`;
-  bar(card, low, high, `${view === "slice" ? "f" : quantity()}, 1/sr`);
+  const hatched = found.some(isMeasured) ? "; hatched: not measured" : "";
+  bar(card, low, high, `${view === "slice" ? "f" : quantity()}, 1/sr, logarithmic${hatched}`);
 }
 
 function addBox(card, view) {
@@ -69,15 +70,19 @@ function where(view, map, x, y) {
   const value = map.values[Math.floor(y * map.height) * map.width + Math.floor(x * map.width)];
   const name = session.state.subjects[map.subject]?.name;
   if (view === "slice") {
-    const told = Number.isNaN(value) ? "below the horizon" : `f ${format(value, 4)}`;
-    return `${name}: θh ${format(90 * x)}°, θd ${format(90 * y)}°: ${told}`;
+    return `${name}: θh ${format(90 * x)}°, θd ${format(90 * y)}°: ${told(map, "f", value)}`;
   }
   const [along, across] = [2 * x - 1, 2 * y - 1];
   const theta = 90 * Math.hypot(along, across);
   if (theta > 90) return `${name}: outside the hemisphere`;
   const azimuth = ((degrees(Math.atan2(-across, -along)) + session.state.phi + 540) % 360) - 180;
-  return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: ${quantity()} ${format(value, 4)}`;
+  return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: ${told(map, quantity(), value)}`;
 }
+
+const isMeasured = ({ subject }) => session.state.subjects[subject]?.bsdf.type === "tabulated";
+
+const told = (map, name, value) =>
+  Number.isNaN(value) ? (isMeasured(map) ? "not measured" : "at the horizon") : `${name} ${format(value, 4)}`;
 
 function paint(box, view, map, low, high) {
   box.map = map;
@@ -97,7 +102,11 @@ function paint(box, view, map, low, high) {
       const value = values[(height - 1 - row) * width + column];
       const outside =
         view === "hemisphere" && Math.hypot((2 * (column + 0.5)) / width - 1, (2 * (row + 0.5)) / height - 1) > 1;
-      if (Number.isNaN(value) || outside) continue;
+      if (outside) continue;
+      if (Number.isNaN(value)) {
+        if (isMeasured(map) && (row + column) % 6 === 0) image.data.fill(128, 4 * (row * width + column), 4 * (row * width + column) + 4);
+        continue;
+      }
       const share = value > 0 ? (Math.log10(value) - low) / (high - low) : 0;
       const colour = 4 * Math.round(255 * clamp(share, 0, 1));
       image.data.set(COLOUR_MAP.subarray(colour, colour + 4), 4 * (row * width + column));
@@ -118,7 +127,7 @@ function bar(card, low, high, unit) {
   box.replaceChildren(
     element("div", { class: "ramp", style: `background:linear-gradient(90deg,${stops})` }),
     element("div", { class: "labels" }, ...labels),
-    element("div", { class: "unit" }, `${unit}, logarithmic`),
+    element("div", { class: "unit" }, unit),
   );
 }
 

@@ -9,6 +9,7 @@ function curvesOf(view) {
   return visible().flatMap((k) =>
     (session.shown[view][k]?.curves ?? []).map((curve) => ({
       ...curve,
+      y: curve.y.map((value) => value ?? NaN),
       subject: k,
       dimmed: Boolean(session.info[k]?.error),
       dash: DASHES[session.state.subjects[k].colour],
@@ -161,7 +162,7 @@ export function drawPolar() {
 function dots(overlay, curves, place) {
   for (const curve of curves) {
     const value = interpolate(curve.x, curve.y, cursor);
-    if (value === null) continue;
+    if (!Number.isFinite(value)) continue;
     const [cx, cy] = place(value);
     overlay.append(shape("circle", { cx, cy, r: 4, fill: curve.colour, class: "dot" }));
   }
