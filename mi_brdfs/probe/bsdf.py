@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -26,8 +26,15 @@ from .arrays import (
 )
 
 if TYPE_CHECKING:
-    from .. import measured
     from ..model import Model
+
+
+class Data(Protocol):
+    """What a measured file holds."""
+
+    def seen(self, wi: Array, wo: Array) -> Array:
+        """Return whether there is a value for each pair of directions."""
+        ...
 
 
 class Part(NamedTuple):
@@ -89,7 +96,7 @@ class BSDFProbe:
     """Whether lanes have wavelengths of their own in spectral variants, from the whole visible range."""
     turned: bool = field(default=False, kw_only=True)
     """Whether the surface is turned in the world; directions are local, and stay."""
-    data: measured.Grid | measured.Samples | None = field(default=None, kw_only=True)
+    data: Data | None = field(default=None, kw_only=True)
     """What a measured file holds: values of ``eval`` are NaN where that has none."""
 
     @cached_property
