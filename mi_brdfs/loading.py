@@ -87,13 +87,13 @@ def instantiated(config: Any, state: Any) -> Any:
     bsdfs = dict[int, list[int]]()
     for k, node in enumerate(state.nodes):
         props = mi.Properties(node.props)  # a copy: Mitsuba complains of what was never read in its own
-        kind, values = props.plugin_name(), {key: props[key] for key in props.keys()}
-        check_plugin(kind, values)
-        if node.type == mi.ObjectType.BSDF:
-            bsdfs[k] = [it.index() for it in values.values() if isinstance(it, mi.Properties.ResolvedReference)]
-        if kind in MESHES:
-            given = {key: values[key] for key in ("filename", "shape_index") if key in values}
-            with suppress(RuntimeError):  # Mitsuba says it again, with the line
+        with suppress(RuntimeError, UnicodeError):  # Mitsuba says it again, with the line
+            kind, values = props.plugin_name(), {key: props[key] for key in props.keys()}
+            check_plugin(kind, values)
+            if node.type == mi.ObjectType.BSDF:
+                bsdfs[k] = [it.index() for it in values.values() if isinstance(it, mi.Properties.ResolvedReference)]
+            if kind in MESHES:
+                given = {key: values[key] for key in ("filename", "shape_index") if key in values}
                 checked_mesh({"type": kind, **given})
     inner = set(bsdfs)
     for _ in range(DEEPEST):

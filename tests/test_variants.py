@@ -2,7 +2,6 @@
 
 import copy
 import functools
-import gc
 import importlib
 import itertools
 import multiprocessing
@@ -322,7 +321,13 @@ def test_frozen_values(variant):
 
 @pytest.mark.parametrize("variant", COMPILED_RGB, indirect=True)
 def test_frozen_pictures(variant):
-    gc.collect()  # Dr.Jit records no picture while a BSDF that its scene does not hold is alive
+    """In a process of its own: Dr.Jit records no picture while a BSDF that its scene does not hold is alive."""
+    with fresh_process() as process:
+        process.submit(check_frozen_pictures, variant).result()
+
+
+def check_frozen_pictures(variant):
+    mi.set_variant(variant)
     scene = tiles({"type": "path", "max_depth": 2})
     params = mi.traverse(scene)
     keys = [key for key in params.keys() if "bsdf" in key and key.endswith(".value")]
