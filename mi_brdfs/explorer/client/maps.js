@@ -37,7 +37,7 @@ function addBox(card, view) {
   const axes =
     view === "slice"
       ? [element("div", { class: "labels" }, ...ticks("θh", "left"))]
-      : [element("span", { class: "across" }, ...subscripted("○ ωi, + mirror, rim at 90°"))];
+      : [element("span", { class: "across" }, ...subscripted("○ ωi, + mirror; rim 90°"))];
   if (view === "slice") frame.append(element("div", { class: "up" }, ...ticks("θd", "bottom")));
   const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
   card.maps.append(box);
