@@ -20,11 +20,13 @@ from ..probe import curves as lobes
 from ..probe.curves import largest
 from . import style
 from .given import channels_of, constants, named, quantity, with_smooth_part
-from .style import CHANNELS, FAINT, HATCHED, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
+from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
 DOTTED = 0, (1, 2)
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
 MIRROR = {"marker": "+", "markersize": 8, "markeredgewidth": 1.1}
+HATCHED = {"facecolor": "white", "edgecolor": GRID, "hatch": "////", "linewidth": 0}
+"""The look of what was not measured."""
 DARK = 0.2
 """The albedo from which on the scale of albedos reaches 1."""
 

@@ -27,9 +27,9 @@ from ..observer import to_srgb
 from ..parameters.messages import brief
 from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
-from .maps import frame_albedo
+from .maps import HATCHED, frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
-from .style import CHANNELS, FAINT, HATCHED, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
+from .style import CHANNELS, FAINT, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""

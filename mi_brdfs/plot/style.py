@@ -23,8 +23,6 @@ UNBROKEN = {"linestyle": "-"}
 """The look of what has gaps, which must not be taken for dashes."""
 CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}
 INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
-HATCHED = {"facecolor": "white", "edgecolor": GRID, "hatch": "////", "linewidth": 0}
-"""The look of what was not measured."""
 TEXT, SMALL = 9, 8
 LETTERS = 12
 """The approximate number of letters per inch."""
