@@ -118,7 +118,7 @@ def test_python(tmp_path):
 
 
 def test_the_gate_finds_its_command():
-    (command,) = re.findall(r"^python3 -m venv .*&&\n.* pytest$", README, re.MULTILINE)
+    (command,) = re.findall(r"^python3 -m venv .* pytest.*$", README, re.MULTILINE)
     assert "[dev]" in command and "./tests/guest" in command
 
 
