@@ -215,3 +215,6 @@ def test_report_from_python(fits, tmp_path):
     with pytest.raises(FitError, match="there is none of arrays"):
         report([replace(fits[0], file="arrays")], tmp_path / "no.html")
     assert not (tmp_path / "no.html").exists()
+    (tmp_path / "data.bsdf").write_text("data")
+    with pytest.raises(ValueError, match="would replace the data"):
+        report([replace(fits[0], file=str(tmp_path / "data.bsdf"))], tmp_path / "data.bsdf")

@@ -51,6 +51,13 @@ def test_it_says_what_was_not_measured(tmp_path):
     )
 
 
+def test_it_says_what_has_no_value(tmp_path):
+    """Outside its highlight this BSDF is negative."""
+    dark = {"type": "diffuse", "reflectance": {"type": "uniform", "value": -0.5}}
+    told = convert({"type": "blendbsdf", "weight": 0.2, "a": dark, "b": {"type": "ward"}}, tmp_path / "x.csv").losses
+    assert any("of its values are negative or not finite, and became 0." in it for it in told), told
+
+
 def measurement(f, channels, wavelengths=None):
     """Values at the nodes of a coarse grid of polar angles."""
     polar, azimuth = Axis(np.radians(np.arange(5, 90, 10))), Axis(np.radians(np.arange(0, 181, 20)))

@@ -2,6 +2,7 @@
 f cosθ, grids, and files read back."""
 
 import itertools
+import warnings
 
 import merl_tables
 import numpy as np
@@ -212,6 +213,16 @@ def test_rows_that_are_no_grid_are_samples(tmp_path):
         measurement = measured(tmp_path, text, "x.csv")
         assert isinstance(measurement.data, Samples)
         np.testing.assert_allclose(value_at(measurement, spherical(30, 0), spherical(20, 90)), f_of(30, 20, 90))
+
+
+def test_rows_that_contradict_others_are_told(tmp_path):
+    """Two runs in one file; noise, and what is next to nothing, is no contradiction."""
+    noisy, other = (table("", factor=lambda *_, it=it: it).lstrip() for it in (1.1, 5.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        measured(tmp_path, table() + noisy, "x.csv")
+    with pytest.warns(UserWarning, match="27 rows have the angles of others and more than twice"):
+        measured(tmp_path, table() + other, "y.csv")
 
 
 def test_rows_of_anisotropic_materials(tmp_path):

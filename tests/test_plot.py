@@ -241,7 +241,7 @@ def test_red_green_and_blue():
 
 @pytest.mark.slow
 def test_marks_are_beside_the_lobes():
-    """Those of the mirror direction, which peaks are close to."""
+    """Those of the mirror direction, which peaks are close to; on a map they are at the directions themselves."""
     for theta in 0, 80:
         ax = plot.polar(MIRROR, angles=(theta,), scale="linear").axes[0]
         (mark,) = [line for line in ax.lines if line.get_marker() not in ("None", "")]
@@ -252,8 +252,9 @@ def test_marks_are_beside_the_lobes():
         ax = plot.cartesian(MIRROR, angles=(theta,), scale="linear").axes[0]
         (mark,) = [line for line in ax.lines if line.get_marker() not in ("None", "")]
         assert mark.get_xdata()[0] == theta and mark.get_ydata()[0] > 1  # of the axes' height
-    for ax in plot.hemisphere(MIRROR, resolution=8).axes[:3]:
-        assert all(line.get_ydata()[0] > 0.1 for line in ax.lines)
+    for theta, ax in zip((10, 40, 70), plot.hemisphere(MIRROR, resolution=8).axes, strict=False):
+        assert [line.get_xdata()[0] * 90 for line in ax.lines] == pytest.approx([-theta, theta])
+        assert [line.get_ydata()[0] for line in ax.lines] == [0, 0]
 
 
 # --- Several BSDFs --------------------------------------------------------------------------------------------------
@@ -280,7 +281,7 @@ def test_a_sweep_is_named_by_what_differs():
 def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
     figure = plot.cartesian("lambert", "phong", angles=(10, 60))
     assert len(figure.axes) == 4 and list(curves(figure, 2)) == ["lambert", "phong"]
-    assert ["10°" in ax.get_title() for ax in figure.axes] == [True, True, False, False]
+    assert ["10°" in ax.get_title() for ax in figure.axes] == [True, False, False, False]
     figure = plot.cartesian({"type": "phong", "exponent": 7}, angles=(10, 60))
     assert len(figure.axes) == 2 and figure.get_suptitle() == "phong exponent=7"
     assert ["10°" in label for label in curves(figure)] == [True, False]
@@ -320,6 +321,13 @@ def test_zeros_of_a_measured_file_are_gaps():
     theta, value = theta[np.isfinite(value)], value[np.isfinite(value)]
     assert [theta[0], theta[-1]] == pytest.approx([-80, 80], abs=1)
     assert (abs(np.diff(np.log(value))) < 0.2).all()  # by 0.07 at most for each degree that it is measured
+    theta, value = curve(plot.albedo(AEROGLAZE))
+    assert theta[np.isfinite(value)][[0, -1]].tolist() == [10, 70]
+
+
+def test_what_was_measured_in_the_plane_of_incidence_alone_is_a_line_of_a_map():
+    (picture,) = maps(plot.hemisphere(AEROGLAZE, angles=(40,), resolution=40))
+    assert np.isfinite(picture[19:21, 10]).all() and np.isnan(picture[[18, 21], 10]).all()  # at -43°
 
 
 def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):

@@ -171,7 +171,7 @@ def test_noise_and_speed():
     bench = json.loads((ROOT / "docs" / "bench.json").read_text(encoding="utf-8"))
     same = {f"{it['name']} / {it['builtin']['type']}" for it in bench["cases"].values() if it["same"]}
     paragraph = README.split("## Noise and speed\n")[1].split("\n## ")[0]
-    said = re.search(r"from (\d+) times as fast to (\d+) % slower.*?(\d+) to (\d+) times slower", paragraph, re.DOTALL)
+    said = re.search(r"(\d+) times faster and (\d+) % slower.*?(\d+) to (\d+) times slower", paragraph, re.DOTALL)
     compared = [f for f in bench["figures"] if f["section"] == "variance" and f["subject"] in same]
     noise = [f["value"] for f in compared if f["name"] in ("sphere", "Cornell box")]
     scalar = [f["value"] for f in bench["figures"] if f["section"] == "scalar" and f["targets"]]

@@ -136,6 +136,9 @@ def test_values_have_derivatives_on_request(llvm_rgb, glossy):
     params.update()
     (doubled,) = call(bsdf.eval, context(), wi, wo)
     np.testing.assert_allclose(doubled, 2 * value, rtol=1e-5)
+    params["values"] = mi.TensorXf([1.0, 2.0])  # kernels would read beyond it
+    with pytest.raises(ValueError, match=r"values has the shape \(2,\); it must have"):
+        params.update()
 
 
 REAL = {

@@ -75,7 +75,7 @@ def material_argument(count: str = "", metavar: str = "MATERIAL…") -> Any:
     """Return an argument for one material or for several, whose help says what these may be."""
     help = (
         "A plugin, a preset, a measured file, XML, FILE.xml:ID, fit.json:MODEL; each with its own parameters, as in "
-        "ward:alpha=.2,rotation=30."
+        "ward:alpha_u=.1,alpha_v=.3."
     )
     return typer.Argument(metavar=metavar, help=f"{count} {help}".strip())
 

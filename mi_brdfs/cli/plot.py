@@ -62,7 +62,8 @@ def plot(
     variant: TracingVariant = None,
 ) -> None:
     """Draw the lobes of one BSDF, or of several to compare: in the plane of incidence (polar, cartesian), over the
-    hemisphere, or as albedo curves. `mi-brdfs explore MATERIAL… --export FILE.html` writes a lobe in 3D."""
+    hemisphere, or as albedo curves. `mi-brdfs explore MATERIAL…` shows lobes in 3D and slices over θh and θd, with
+    `--export FILE.html` as a file; `mi-brdfs measured FILE --plot PICTURE.png` draws those slices of measured files."""
     from ..plot import command as asked
 
     if kind not in asked.KINDS:

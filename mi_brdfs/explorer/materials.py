@@ -235,7 +235,7 @@ def _set(bsdf: mi.BSDF, values: Bsdf) -> dict[str, Any]:
     keys = {controls.key_to_name(key): key for key, _ in params}
     for name in values:
         if name not in keys:
-            raise StateError(f"There is no value {name}; there are {listed(keys, 'and')}.")
+            raise StateError(f"There is no value {name}" + (f"; there are {listed(keys, 'and')}." if keys else "."))
     usual = {keys[name]: type(params[keys[name]])(params[keys[name]]) for name in values}
     try:
         params.update({keys[name]: mi.Color3f(it) if isinstance(it, list) else it for name, it in values.items()})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import ipaddress
 import logging
 import re
 import socket
@@ -93,7 +94,13 @@ class Explorer:
 
     def _is_ours(self, host: str) -> bool:
         name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
-        return name in self.hosts or not ANY.isdisjoint(self.hosts)
+        if ANY.isdisjoint(self.hosts):
+            return name in self.hosts
+        # A page of another server can give its name our address, but cannot take an address for its name.
+        with contextlib.suppress(ValueError):
+            return bool(ipaddress.ip_address(name.strip("[]")))
+        own = socket.gethostname()
+        return name in ("localhost", own, f"{own}.local", socket.getfqdn())
 
     async def _index(self, request: web.Request) -> web.Response:
         return web.Response(text=index(), content_type="text/html")

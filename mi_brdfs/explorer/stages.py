@@ -206,8 +206,11 @@ def load(setting: Setting, user: UserScene) -> Stage:
 def _environment(name: str, path: Path) -> mi.Bitmap:
     """Return the pixels of an environment map. Raise a ValueError where Mitsuba would end the process or the picture be
     without light."""
-    bitmap = mi.Bitmap(linked(str(path)))
-    pixels = np.array(bitmap)
+    try:
+        bitmap = mi.Bitmap(linked(str(path)))
+        pixels = np.array(bitmap)
+    except MemoryError:
+        raise ValueError(f"{name}: there is no memory for so many pixels; make it smaller.") from None
     if not (pixels.size and np.isfinite(pixels).all() and pixels.max() > 0):
         raise ValueError(f"{name}: it has no light, or pixels that are not finite; write those as numbers.")
     return bitmap

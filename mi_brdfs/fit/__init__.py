@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -157,14 +158,19 @@ def report(fits: Sequence[Fit], path: str | Path, image: bool = False) -> list[F
 
     Raises:
         ImportError: without the extra ``report``.
-        FitError: if the data of a fit are no file.
+        FitError: if the data of a fit are no file, or there is no fit.
+        ValueError: if the page would replace the data.
         OSError: if the page cannot be written.
     """
     from .appearance import look
     from .html import page_of, section_of
 
     sections, found = [], []
+    if not fits:
+        raise FitError("There is no fit to write a page about.")
     for file in dict.fromkeys(it.file for it in fits):
+        if file and os.path.exists(path) and os.path.exists(file) and os.path.samefile(file, path):
+            raise ValueError(f"{path}: the page would replace the data; give another name.")
         ranked, shown = look(sorted((it for it in fits if it.file == file), key=lambda it: it.held_out), image)
         sections.append(section_of(ranked, shown))
         found += ranked

@@ -175,7 +175,10 @@ def _left_out(probe: BSDFProbe) -> Iterator[str]:
         yield "The light that it transmits is left out."
     wi, wo = (np.float32(w) for w in pairs(PAIRS))
     elsewhere = np.random.default_rng(2).random((PAIRS, 2), np.float32)
-    if not _alike(probe.eval(probe.whole, wi, wo), probe.eval(probe.whole, wi, wo, elsewhere)):
+    f = probe.eval(probe.whole, wi, wo)
+    if wrong := np.mean(~(np.isfinite(f) & (f >= 0))):
+        yield f"{percent(float(wrong))} of its values are negative or not finite, and became 0."
+    if not _alike(usable(f), usable(probe.eval(probe.whole, wi, wo, elsewhere))):
         yield f"It varies over the surface; this is how it is at texture coordinates {CENTRE}."
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 
 import numpy as np
@@ -37,8 +38,9 @@ def arranged(
     """Return rows of angles in radians, shape (N,), and values, shape (N, channels), as a grid of
     :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with each other, and as samples if
     not. Rows of a single φi are of an isotropic material. A negative θ means the other side of the normal. Rows of the
-    same angles are averaged.
+    same angles are averaged, with a warning if one is more than twice another.
     """
+    warn_of_contradictions((theta_i, phi_i, theta_o, phi_o), values)
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
     anisotropic = bool(np.ptp(around_zero(phi_i - phi_i[0])) > SAME)
@@ -47,6 +49,20 @@ def arranged(
     return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
         stacked(spherical(theta_i, phi_i)), stacked(spherical(theta_o, phi_o)), values, anisotropic
     )
+
+
+def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -> None:
+    """Warn of rows that say of the same directions what is no noise: two runs in one file, perhaps."""
+    order = np.lexsort(angles)
+    one, next_ = order[:-1], order[1:]
+    again = np.logical_and.reduce([angle[one] == angle[next_] for angle in angles])
+    both = abs(np.stack([values[one[again]], values[next_[again]]]))
+    bright = both.max(axis=0) > 0.01 * np.max(abs(values), initial=0)
+    if count := int(np.any(bright & (both.max(axis=0) > 2 * both.min(axis=0)), axis=1).sum()):
+        warnings.warn(
+            f"{count:,} rows have the angles of others and more than twice, or less than half, their values; "
+            "means of these are used.", stacklevel=2,
+        )  # fmt: skip
 
 
 def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -37,6 +37,7 @@ class ModelBSDF:
         # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,
         # but not in other Python objects.
         self.textures, self.captured = self.model.textures, self.model.captured
+        self.shapes = {name: dr.shape(it) for name, it in self.model.arrays.items()}
 
         flags = mi.BSDFFlags
         common = flags.FrontSide
@@ -229,6 +230,9 @@ class ModelBSDF:
             callback.put(name, value, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: Any = ()) -> None:
+        for name, shape in self.shapes.items():
+            if (found := dr.shape(self.model.arrays[name])) != shape:
+                raise ValueError(f"{self.model.plugins[0]}: {name} has the shape {found}; it must have {shape}.")
         uniform = self.model.uniform
         # Textures in Python may say something else in each call.
         if uniform.names and not is_scalar() and all(type(it) is mi.Texture for it in self.textures.values()):

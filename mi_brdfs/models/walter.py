@@ -10,7 +10,7 @@ from ..parameters import Choice, FresnelSet, Number, Reflectance, Rotation
 
 
 class Walter(Model):
-    """The GGX microfacet model of Walter, Marschner, Li and Torrance (2007), its reflection part.
+    """The reflection part of the GGX microfacet model of Walter, Marschner, Li and Torrance (2007).
 
     B. Walter, S. R. Marschner, H. Li and K. E. Torrance, Microfacet models for refraction through rough surfaces, EGSR
     2007, doi:10.2312/EGWR/EGSR07/195-206. For the anisotropic and the height-correlated form: E. Heitz, Understanding

@@ -12,7 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
 from ..given import angles_of_incidence
@@ -20,13 +20,13 @@ from ..probe import curves as lobes
 from ..probe.curves import largest
 from . import style
 from .given import channels_of, constants, named, quantity, with_smooth_part
-from .style import CHANNELS, FAINT, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
+from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
 DOTTED = 0, (1, 2)
-# Beside what they mark: their tips touch it.
-WI = {"marker": "v", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
-MIRROR = {"marker": "v", "markersize": 6}
-ABOVE = 0.11
+WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
+MIRROR = {"marker": "+", "markersize": 8, "markeredgewidth": 1.1}
+HATCHED = {"facecolor": "white", "edgecolor": GRID, "hatch": "////", "linewidth": 0}
+"""The look of what was not measured."""
 DARK = 0.2
 """The albedo from which on the scale of albedos reaches 1."""
 
@@ -42,8 +42,8 @@ def hemisphere(
 ) -> Figure:
     """Draw the luminance of f cosθ_o for all wo, in false colours on a logarithmic scale of at most five decades.
 
-    The distance from the middle of a disc is the angle θ_o. wi, at the tip of a hollow mark, is on the left at any
-    azimuth; the mirror direction, at the tip of a full one, on the right. There is a column for each angle of incidence
+    The distance from the middle of a disc is the angle θ_o. wi, a circle, is on the left at any azimuth; the mirror
+    direction, a cross, on the right. Hatched is what was not measured. There is a column for each angle of incidence
     and a row for each BSDF, and another for its transmission. Each pixel is the mean over its area, so that narrower
     lobes keep their total brightness. ``resolution`` is the number of pixels across a disc; everything else is as in
     :func:`polar`.
@@ -70,8 +70,11 @@ def hemisphere(
     if title or len(rows) == 1:
         style.set_title(figure, style.plain(title) if title else found[0].label)
     style.add_bar(ScalarMappable(norm, "viridis"), axes, quantity(QUANTITY), shrink=0.8, extend="min")
-    marks = [Line2D([], [], linestyle="", color=INK, **mark) for mark in (WI, MIRROR)]
-    style.add_legend(figure, marks, [r"$\omega_i$", "mirror direction"], constants(bsdfs))
+    marks = {name: Line2D([], [], linestyle="", color=INK, **mark)
+             for name, mark in ((r"$\omega_i$", WI), ("mirror direction", MIRROR))}  # fmt: skip
+    if any(np.isnan(picture).any() for row in pictures for picture in row):
+        marks["not measured"] = Patch(**HATCHED)
+    style.add_legend(figure, [*marks.values()], [*marks], constants(bsdfs))
     return figure
 
 
@@ -117,12 +120,14 @@ def frame_albedo(ax: Axes, text: str) -> None:
 def _draw_disc(ax: Axes, picture: np.ndarray, norm: LogNorm, theta_i: float, above: bool) -> None:
     shown = ax.imshow(picture, "viridis", norm, extent=(-1, 1, -1, 1), origin="lower")
     shown.set_clip_path(Circle((0, 0), 1, transform=ax.transData))
-    outline = [withStroke(linewidth=1.8, foreground="#00000060")]
+    ax.add_patch(Circle((0, 0), 1, **HATCHED, zorder=-1))
+    ink, halo, ring = (INK, "#ffffffc0", FAINT) if np.isnan(picture).any() else ("white", "#00000060", "#ffffff80")
+    outline = [withStroke(linewidth=1.8, foreground=halo)]
     for angle in (30, 60, 90):
-        ax.add_patch(Circle((0, 0), angle / 90, fill=False, color=FAINT if angle == 90 else "#ffffff80", linewidth=0.6))
+        ax.add_patch(Circle((0, 0), angle / 90, fill=False, color=FAINT if angle == 90 else ring, linewidth=0.6))
     for angle in (30, 60):
-        ax.text(0, -angle / 90, f"{angle}°", fontsize=7, color="white", ha="center", va="center", path_effects=outline)
+        ax.text(0, -angle / 90, f"{angle}°", fontsize=7, color=ink, ha="center", va="center", path_effects=outline)
     for x, mark in ((-theta_i / 90, WI), (theta_i / 90, MIRROR)) if above else ():
-        ax.plot(x, ABOVE, color="white", path_effects=outline, **mark)
+        ax.plot(x, 0, color=ink, path_effects=outline, **mark)
     ax.set(xlim=(-1.03, 1.03), ylim=(-1.03, 1.03), xticks=[], yticks=[], aspect="equal")
     ax.set_frame_on(False)

@@ -27,9 +27,9 @@ from ..observer import to_srgb
 from ..parameters.messages import brief
 from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
-from .maps import frame_albedo
+from .maps import HATCHED, frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
-from .style import CHANNELS, FAINT, GRID, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
+from .style import CHANNELS, FAINT, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -93,7 +93,7 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
         shown, palette = brightness[..., None] * hue ** (1 / 2.2), "gray"
     else:
         shown, palette = colormaps["viridis"](brightness)[..., :3], "viridis"
-    patch = Rectangle((0, 0), 90, 90, facecolor="white", edgecolor=GRID, hatch="////", linewidth=0, zorder=-1)
+    patch = Rectangle((0, 0), 90, 90, **HATCHED, zorder=-1)
     ax.add_patch(patch)
     ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
     add_bar(ScalarMappable(norm, palette), ax, it.quantity, location="top", extend="both")

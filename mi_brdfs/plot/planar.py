@@ -138,7 +138,9 @@ def _planar(
 
     each = [[lines(it, k, theta, j) for j, theta in enumerate(angles)] for k, it in enumerate(found)]
     peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
-    if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 100:  # the lowest curve cannot be seen
+    notes = constants(bsdfs)
+    if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 50:  # the lowest curve cannot be seen
+        notes.append(f"The maxima differ by a factor of {ratio:.0f}.")
         warnings.warn(f"the maxima differ by a factor of {ratio:.0f}; --normalize compares shapes", stacklevel=3)
     rows = each if by_bsdf else zip(*each, strict=True)
     headings = [it.label for it in found] if by_bsdf else [incidence(theta) for theta in angles]
@@ -156,12 +158,12 @@ def _planar(
             ax = axes[k // columns * len(scales) + s, k % columns] if beside else axes[k, s]
             style.calm(ax)
             draw(ax, curves, name == "log", whole, text, everything if beside or name == "log" else curves)
-            if len(panels) > 1 and not (beside and s):
+            if len(panels) > 1 and not s:
                 ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=10)
-            if beside and k % columns:
+            if k % columns if beside else s:
                 ax.set_ylabel("")
-                ax.tick_params(labelleft=False)
-            if not beside and k < len(panels) - 1:
+                ax.tick_params(labelleft=not beside)
+            if draw is _draw_polar and k % columns if beside else k < len(panels) - 1:
                 ax.set_xlabel("")
     for ax in axes.flat:
         if not ax.lines:
@@ -173,7 +175,7 @@ def _planar(
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
     handles = [Line2D([], [], **curve.look) for curve in curves]
     names = [curve.label for curve in curves]
-    style.add_legend(figure, [*handles, *marks.values()], [*names, *marks], constants(bsdfs))
+    style.add_legend(figure, [*handles, *marks.values()], [*names, *marks], notes)
     return figure
 
 
@@ -181,7 +183,7 @@ def _draw_polar(
     ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str, alike: list[LabelledCurve]
 ) -> None:
     low, high = _range(alike) if log else (0, largest(line.curve.value for line in alike))
-    end = 1.06 * (high - low)
+    end, most = 1.06 * (high - low), 12 // max(2, ax.get_gridspec().ncols)
     if log:
         powers = range(low, int(np.floor(high)) + 1)
         rings = {power - low: f"$10^{{{power}}}$" for power in powers}
@@ -191,7 +193,7 @@ def _draw_polar(
     round_ = np.linspace(-180, 180, 361) if whole else np.linspace(-90, 90, 181)
     for k, (ring, number) in enumerate(rings.items()):
         ax.plot(*_at(round_, ring), color=GRID, linewidth=0.6)
-        if k % (1 + len(rings) // 6) == 0 and ring < 0.95 * end and (ring > 0 or not whole):
+        if k % (1 + len(rings) // most) == 0 and ring < 0.95 * end and (ring > 0 or not whole):
             ax.text(ring, -0.035 * end, number, color=INK, fontsize=SMALL - 1, ha="center", va="top")
     ax.plot(*_at(round_, end), color=FAINT, linewidth=0.6)
     for turn in turns:
@@ -212,7 +214,8 @@ def _draw_polar(
     ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-1.25 if whole else -0.15) * end, 1.25 * end), xticks=[], yticks=[])
     ax.set_aspect("equal")
     ax.spines[:].set_visible(False)
-    ax.set_xlabel(f"{text}, {'log' if log else 'linear'} radius", fontsize=TEXT, color=INK)
+    radius = f"log radius, cut off below $10^{{{low}}}$" if log else "linear radius"
+    ax.set_xlabel(f"{text},\n{radius}", fontsize=TEXT, color=INK)
 
 
 def _at(theta: Any, radius: Any) -> tuple[np.ndarray, np.ndarray]:

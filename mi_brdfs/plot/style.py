@@ -18,7 +18,7 @@ from ..parameters.messages import printable
 # Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow, too pale for lines.
 COLOURS = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"
 # Styles too, so that coinciding curves are both visible; their number is coprime to that of the colours.
-STYLES = "-", (0, (4, 3)), (0, (2.5, 4.5)), (0, (6, 3, 1.5, 3))
+STYLES = "-", (0, (3, 1.5)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5)), (0, (4, 1.5, 1, 1.5, 1, 1.5))
 UNBROKEN = {"linestyle": "-"}
 """The look of what has gaps, which must not be taken for dashes."""
 CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}

@@ -121,15 +121,20 @@ def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None, log2_co
     """Return the fraction of light reflected or transmitted over the angle of incidence, delta functions included.
 
     It is the mean weight of samples of the BSDF's own sampler, with the same variates at each angle, so that the curve
-    is smooth.
+    is smooth. Where measured data have none of the plane of incidence, it is NaN.
     """
-    theta = np.concatenate([np.arange(0, 78, 3), np.arange(78, 88), [88, 88.5, 89, 89.5, 89.9]])
+    theta = np.concatenate([np.arange(0, 77.5, 2.5), np.arange(78, 88), [88, 88.5, 89, 89.5, 89.9]])
     points = lattice(log2_count, 5)
     part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
     samples = probe.sample(part, wi, np.tile(points, (len(theta), 1)))
     weight = _reduced(samples.weight, channel) * samples.eta**2  # refraction compresses radiance, but not energy
-    return Curve(theta, weight.reshape(len(theta), -1).mean(axis=1))
+    mean = weight.reshape(len(theta), -1).mean(axis=1)
+    if probe.data is not None:
+        wo = in_plane(np.arange(-89, 90), azimuth)
+        seen = [probe.data.seen(direction(each, azimuth), wo).any() for each in theta]
+        mean = np.where(seen, mean, np.nan)
+    return Curve(theta, mean)
 
 
 # --- Maps and meshes ------------------------------------------------------------------------------------------------
@@ -164,7 +169,10 @@ def disc(
         values = value(probe, wi, within(pixels, parts), channel)
         picture[pixels] = values.reshape(len(pixels), parts * parts).mean(axis=1)
     if data is not None:
-        picture[~data.seen(wi, within(np.arange(n * n), 1))] = np.nan
+        seen = data.seen(wi, within(np.arange(n * n), 1)).reshape(n, n)
+        # What was measured in the plane of incidence alone is a line.
+        seen[[(n - 1) // 2, n // 2]] |= data.seen(wi, in_plane(180 * (np.arange(n) + 0.5) / n - 90, azimuth))
+        picture[~seen.ravel()] = np.nan
     return picture.reshape(n, n)
 
 

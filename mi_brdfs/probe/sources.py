@@ -1,5 +1,5 @@
 """BSDFs by the words that name them on the command line: plugins, published materials, measured files, XML, the
-materials of scene files, fits; each with parameters of its own, as in ``ward:alpha=0.2,rotation=30``."""
+materials of scene files, fits; each with parameters of its own, as in ``ward:alpha_u=.1,alpha_v=.3``."""
 
 from __future__ import annotations
 

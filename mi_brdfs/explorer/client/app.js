@@ -188,6 +188,7 @@ function drawBars() {
   }
   const several = visible().length > 1;
   byId("compare-row").hidden = !several;
+  byId("picture-bar").hidden = session.exported && !several;
   byId("pair-row").hidden = !several || state.compare === "side";
   const names = visible().map((k) => [k, state.subjects[k].name]);
   pairOf().forEach((k, at) => {
@@ -351,6 +352,7 @@ function start() {
     // Where the picture stays in sight on a phone, the bar above it does not.
     document.documentElement.style.setProperty("--above", `${byId("picture-bar").parentElement.offsetHeight + 12}px`);
     redraw("lobe");
+    if (innerWidth > 700) byId("picture-bar").open = true;
     if (innerWidth !== width) redraw(...VIEWS);
     width = innerWidth;
   });

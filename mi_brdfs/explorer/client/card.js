@@ -1,5 +1,5 @@
 // A card of the page: a heading, buttons, a figure, and a line for the values under the pointer.
-import { element, save, shape, standalone } from "./util.js";
+import { element, save, shape, standalone, subscripted } from "./util.js";
 import { session } from "./session.js";
 
 export const cards = {};
@@ -19,7 +19,7 @@ export function makeCard(view, title, note, files = []) {
       ),
     );
   }
-  card.note = element("span", { class: "note" }, note);
+  card.note = element("span", { class: "note" }, ...subscripted(note));
   card.node = element(
     "section",
     { class: "card", id: `view-${view}`, "aria-label": title },
@@ -61,8 +61,10 @@ const quoted = (cell) => (/[",\n]/.test(String(cell)) ? `"${String(cell).replace
 export function tell(card, items) {
   card.readout.replaceChildren(
     ...(items.length ? items : card.legend).map(([colour, text, dash]) => {
-      if (dash === undefined)
-        return element("span", { style: colour ? `--mark:${colour}` : null, class: colour ? "marked" : null }, text);
+      if (dash === undefined) {
+        const attributes = { style: colour ? `--mark:${colour}` : null, class: colour ? "marked" : null };
+        return element("span", attributes, element("span", {}, ...subscripted(text)));
+      }
       return element(
         "span",
         {},

@@ -1,5 +1,5 @@
 // Controls of a subject's parameters, made from what the server declares of them.
-import { byId, clamp, element, format, fromDisplay, toDisplay } from "./util.js";
+import { byId, clamp, element, format, fromDisplay, subscripted, toDisplay } from "./util.js";
 import { changeSubject, session, setParameter } from "./session.js";
 import { scrub } from "./link.js";
 
@@ -50,22 +50,23 @@ export function drawControls() {
   byId("notes").textContent = (info?.notes ?? []).join(" · ");
 }
 
-/** In an exported page nothing can be changed: list the parameters. */
+/** In an exported page nothing can be changed: list the parameters, folded where there is little room. */
 function drawList(host, bsdf) {
   const told = (value) => (typeof value === "number" ? format(value, 4) : String(value));
-  host.replaceChildren(
-    ...Object.entries(bsdf)
-      .filter(([name]) => name !== "type")
-      .map(([name, value]) => [name, name === "file" ? value.replace(/^.*[\\/]/, "") : value])
-      .map(([name, value]) =>
-        element(
-          "div",
-          { class: "fixed" },
-          element("span", {}, name.replaceAll("_", " ")),
-          element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
-        ),
+  const open = host.querySelector("details")?.open ?? innerWidth >= 900;
+  const varied = session.scrubbers.map(({ name }) => name);
+  const rows = Object.entries(bsdf)
+    .filter(([name]) => name !== "type" && !varied.includes(name))
+    .map(([name, value]) => [name, name === "file" ? value.replace(/^.*[\\/]/, "") : value])
+    .map(([name, value]) =>
+      element(
+        "div",
+        { class: "fixed" },
+        element("span", {}, name.replaceAll("_", " ")),
+        element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
       ),
-  );
+    );
+  host.replaceChildren(element("details", { open }, element("summary", {}, "Parameters"), ...rows));
 }
 
 /** Make the scrubbers of an exported page, each with its values listed. */
@@ -91,7 +92,7 @@ function makeScrubber({ name, values }, k) {
     element(
       "div",
       { class: "name" },
-      element("label", { for: id }, name === "theta" ? `θi in degrees${phi}` : name.replaceAll("_", " ")),
+      element("label", { for: id }, ...subscripted(name === "theta" ? `θi in degrees${phi}` : name.replaceAll("_", " "))),
     ),
     element(
       "div",
@@ -159,7 +160,7 @@ function makeRow(control, k) {
       sign,
     ),
   );
-  const meaning = control.text ? element("p", { class: "meaning" }, control.text) : null;
+  const meaning = control.text ? element("p", { class: "meaning" }, ...subscripted(control.text)) : null;
   return {
     control,
     node: element("div", { class: `control ${control.kind}` }, head, body, error, meaning),

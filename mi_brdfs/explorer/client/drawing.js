@@ -1,5 +1,5 @@
 // What plots are drawn with: paths, labels, axes, and a crosshair that pointer and keys move.
-import { PALETTE, clamp, format, largest, shape } from "./util.js";
+import { PALETTE, clamp, format, largest, shape, subscripted } from "./util.js";
 import { session } from "./session.js";
 
 export const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
@@ -26,7 +26,11 @@ export const LETTER = 7;
 
 export const line = (x1, y1, x2, y2, kind) => shape("line", { x1, y1, x2, y2, class: kind });
 export const label = (x, y, text, anchor = "middle", kind = "tick") =>
-  shape("text", { x, y, "text-anchor": anchor, class: kind }, text);
+  shape(
+    "text",
+    { x, y, "text-anchor": anchor, class: kind },
+    ...subscripted(text, (index) => shape("tspan", { dy: 3, "font-size": "0.75em" }, index)),
+  );
 export const drawing = (width, height, summary) =>
   shape("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", tabindex: 0, "aria-label": summary });
 

@@ -1,5 +1,5 @@
 // The lobe as a body to turn, drawn by WebGL; the arrow of wi can be dragged.
-import { clamp, decades, degrees, element, format, largest, radians } from "./util.js";
+import { clamp, decades, degrees, element, format, largest, radians, subscripted } from "./util.js";
 import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geometry.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
@@ -32,10 +32,7 @@ export function startLobe() {
     return false;
   }
   card.legend = [
-    [
-      null,
-      "Drag ωi to move it, the rest to turn; arrow keys turn, with Shift they move ωi",
-    ],
+    [null, "Drag ωi to move it, or elsewhere to rotate. Arrow keys rotate; Shift+arrows move ωi."],
   ];
   tell(card, []);
   labels = element("div", { class: "labels" });
@@ -169,10 +166,11 @@ export function drawLobe() {
       .map(({ subject }, k) => `${state.subjects[subject].name}, at most ${format(peaks[k])} per steradian`)
       .join("; ")}. Arrow keys turn it.`,
   );
-  card.note.textContent =
-    `${quantity()} as radius` +
-    (log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "") +
-    (state.normalise ? ", over their peaks" : `, at most ${format(common)}`);
+  card.note.replaceChildren(
+    ...subscripted(`${quantity()} as radius`),
+    log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "",
+    state.normalise ? ", over their peaks" : `, at most ${format(common)}`,
+  );
 }
 
 function render(found) {
@@ -233,9 +231,9 @@ function render(found) {
     }
     const mark = (text, point, kind) => {
       const [x, y] = project(view, point, area);
-      labels.append(element("span", { class: kind, style: `left:${x}px;top:${y}px` }, text));
+      labels.append(element("span", { class: kind, style: `left:${x}px;top:${y}px` }, ...subscripted(text)));
     };
-    mark("ωi", scaled(wi, ARROW + 0.1), "direction");
+    mark("ωi", scaled(wi, ARROW + 0.15), "direction");
     mark("n", [0, 0, 1.15], "");
     mark("u", [1.07, 0, 0], "");
     if (side) mark(state.subjects[found[at].subject].name, places.whole ? [0, 0, -1.3] : [0, 0, -0.4], "name");

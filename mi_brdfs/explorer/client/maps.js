@@ -1,5 +1,5 @@
 // Maps in false colours: the θh × θd slice and the hemisphere.
-import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, power } from "./util.js";
+import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, power, shape, subscripted } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { belowOf } from "./link.js";
@@ -21,18 +21,24 @@ export function drawMaps(view) {
   const boxes = [...card.maps.children];
   found.forEach((map, k) => paint(boxes[k] ?? addBox(card, view), view, map, low, high));
   boxes.slice(found.length).forEach((box) => box.remove());
-  if (view === "hemisphere") card.note.textContent = `${quantity()} from above`;
+  if (view === "hemisphere") card.note.replaceChildren(...subscripted(`${quantity()} from above`));
   const hatched = found.some(isMeasured) ? "; hatched: not measured" : "";
-  bar(card, low, high, `${view === "slice" ? "f" : quantity()}, 1/sr, logarithmic${hatched}`);
+  bar(card, low, high, `${view === "slice" ? "f" : quantity()}, 1/sr, always logarithmic${hatched}`);
 }
 
 function addBox(card, view) {
   const canvas = element("canvas", { role: "img", tabindex: 0 });
-  const frame = element("div", { class: "plate" }, canvas, element("i", { class: "spot", hidden: true }));
+  const marks = shape("svg", { class: "marks", viewBox: "-1 -1 2 2", "aria-hidden": "true" });
+  const frame = element("div", { class: "plate" }, canvas, marks, element("i", { class: "spot", hidden: true }));
+  const ticks = (symbol, side) =>
+    [[0, "0°"], [30, "30°"], [45, symbol], [60, "60°"], [90, "90°"]].map(([at, text]) =>
+      element("span", { style: `${side}:${at / 0.9}%` }, ...subscripted(text)),
+    );
   const axes =
     view === "slice"
-      ? [element("span", { class: "across" }, "θh 0…90°"), element("span", { class: "up" }, "θd 0…90°")]
-      : [element("span", { class: "across" }, "ωi on the left, rim at 90°")];
+      ? [element("div", { class: "labels" }, ...ticks("θh", "left"))]
+      : [element("span", { class: "across" }, ...subscripted("○ ωi, + mirror; rim 90°"))];
+  if (view === "slice") frame.append(element("div", { class: "up" }, ...ticks("θd", "bottom")));
   const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
   card.maps.append(box);
   let spot = [0.5, 0.5];
@@ -113,6 +119,20 @@ function paint(box, view, map, low, high) {
     }
   }
   canvas.getContext("2d").putImageData(image, 0, 0);
+  const marks = box.querySelector(".marks");
+  marks.classList.toggle("measured", isMeasured(map));
+  if (view === "hemisphere") marks.replaceChildren(...ringsOf(map));
+}
+
+/** Draw the rings of a hemisphere, and wi and its mirror direction on the side of the light. */
+function ringsOf(map) {
+  const x = session.state.theta / 90;
+  const rings = [30, 60].flatMap((angle) => [
+    shape("circle", { r: angle / 90, class: "ring" }),
+    shape("text", { y: angle / 90 + 0.04, "text-anchor": "middle" }, `${angle}°`),
+  ]);
+  if (map.below) return rings;
+  return [...rings, shape("circle", { cx: -x, r: 0.045 }), shape("path", { d: `M${x - 0.055} 0h.11M${x} -.055v.11` })];
 }
 
 function bar(card, low, high, unit) {
@@ -127,7 +147,7 @@ function bar(card, low, high, unit) {
   box.replaceChildren(
     element("div", { class: "ramp", style: `background:linear-gradient(90deg,${stops})` }),
     element("div", { class: "labels" }, ...labels),
-    element("div", { class: "unit" }, unit),
+    element("div", { class: "unit" }, ...subscripted(unit)),
   );
 }
 

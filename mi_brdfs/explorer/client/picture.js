@@ -32,7 +32,7 @@ export function startPicture() {
     event.preventDefault();
     slideTo(session.state.wipe + step);
   });
-  if (!session.exported) card.legend = [[null, "Drag to go around; arrow keys do, too; a double click goes back"]];
+  if (!session.exported) card.legend = [[null, "Drag or use the arrow keys to orbit; double-click to reset."]];
   tell(card, []);
   card.image = (done) => stack.querySelector("canvas") && flat().toBlob(done);
 }
@@ -87,7 +87,7 @@ export function drawPicture() {
     handle.setAttribute("aria-valuenow", Math.round(100 * share));
     handle.setAttribute(
       "aria-valuetext",
-      `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * share)} %`,
+      `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * share)}\u00a0%`,
     );
   }
   if (mode === "difference") drawDifference(shown);
@@ -177,7 +177,7 @@ function put(canvas, answer) {
   canvas.getContext("2d").putImageData(new ImageData(answer.pixels, answer.width, answer.height), 0, 0);
 }
 
-/** Show |a - b| of the values shown, times the power of two that makes all but a thousandth of it visible. */
+/** Show |a - b| of the values shown, times the power of two at which all but a fiftieth of it is below white. */
 function drawDifference([a, b]) {
   const canvas = stack.querySelector("canvas.difference");
   const [first, second] = [session.shown.picture[a], session.shown.picture[b]];
@@ -200,14 +200,14 @@ function drawDifference([a, b]) {
     total += off;
   }
   let [high, above] = [255, 0];
-  while (high > 0 && (above += histogram[high]) < 0.003 * count) high--;
+  while (high > 0 && (above += histogram[high]) < 0.06 * count) high--;
   const gain = Math.min(2 ** Math.floor(Math.log2(255 / Math.max(high, 1))), 64);
   for (let k = 0; k < 4 * count; k++) image.data[k] = k % 4 === 3 ? 255 : image.data[k] * gain;
   Object.assign(canvas, { width: first.width, height: first.height });
   canvas.getContext("2d").putImageData(image, 0, 0);
   told.textContent =
     `|a − b| of the values shown (sRGB, 0…1), ${gain === 1 ? "as it is" : `${gain} times`}: white is ` +
-    `${format(1 / gain)}; mean ${format(total / count / 3 / 255, 2)}`;
+    `${format(1 / gain)} and more; mean ${format(total / count / 3 / 255, 2)}`;
   canvas.setAttribute("aria-label", told.textContent);
 }
 

@@ -1,5 +1,5 @@
 // Curves: the plane of incidence as polar and cartesian plots; and albedo.
-import { CHANNELS, DASHES, clamp, degrees, format, interpolate, largest, radians, shape, valueScale } from "./util.js";
+import { CHANNELS, DASHES, clamp, degrees, format, interpolate, largest, radians, shape, subscripted, valueScale } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { LETTER, attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
@@ -46,7 +46,7 @@ function replaceFigure(card, ...nodes) {
 /** Put the legend and the unit of curves of f cosθ into their card. */
 function describe(card, curves, axis = AXES.theta_o) {
   card.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
-  card.note.textContent = `${unitOf()}, ${axis.held()}`;
+  card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}`));
 }
 
 export const quantity = () => (session.state.cosine ? "f cosθo" : "f");
@@ -224,7 +224,7 @@ export function drawCartesian() {
   const axis = AXES[session.state.axis];
   const inPlane = axis === AXES.theta_o;
   describe(cards.cartesian, curves, axis);
-  cards.cartesian.node.querySelector("h2").textContent = axis.title;
+  cards.cartesian.node.querySelector("h2").replaceChildren(...subscripted(axis.title));
   const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
   const across = !inPlane
     ? axis

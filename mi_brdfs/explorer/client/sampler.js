@@ -1,26 +1,26 @@
 // The sampler's view: directions drawn, a histogram of weights, the efficiency over the angle.
-import { DASHES, clamp, degrees, element, format, interpolate, radians, shape, ticks, valueScale } from "./util.js";
+import { DASHES, clamp, degrees, element, format, interpolate, radians, shape, subscripted, ticks, valueScale } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
 
-/** Draw the directions, weights and efficiencies of the samplers, with a box of tests below. */
+/** Draw the directions, weights and efficiencies of the samplers, with a box of tests above. */
 export function drawSampler(chi2) {
   const card = cards.sampler;
   const found = visible()
     .filter((k) => session.shown.sampler[k])
     .map((k) => [k, session.shown.sampler[k]]);
   const full = widthOf(card, 1400);
-  const columns = full > 900 ? 3 : full > 560 ? 2 : 1;
+  const columns = full > 700 ? 3 : 1;
   const width = Math.floor((full - 16 * (columns - 1)) / columns);
   const height = Math.round(clamp(0.7 * width, 190, 300));
-  const titled = (title, svg) => element("figure", {}, element("figcaption", {}, title), svg);
+  const titled = (title, svg) => element("figure", {}, element("figcaption", {}, ...subscripted(title)), svg);
   const figures = [
     titled("Directions drawn", drawDots(found, width, Math.max(height, Math.min(width, 300)))),
     titled("Weight ÷ mean weight", drawHistogram(found, width, height)),
     titled("Efficiency η over θi", drawEfficiency(found, width, height)),
   ];
-  card.figure.replaceChildren(...figures, chi2);
+  card.figure.replaceChildren(chi2, ...figures);
 }
 
 function drawDots(found, width, height) {
@@ -48,7 +48,7 @@ function drawDots(found, width, height) {
     svg.append(group);
   }
   const at = x - (radius * session.state.theta) / 90;
-  svg.append(shape("circle", { cx: at, cy: y, r: 4, class: "source" }), label(at, y - 8, "ωi", "middle", "direction"));
+  svg.append(shape("circle", { cx: at, cy: y, r: 4, class: "source" }), label(at, y - 12, "ωi", "middle", "direction"));
   svg.addEventListener("pointermove", (event) => {
     const box = svg.getBoundingClientRect();
     const scale = width / box.width;
@@ -99,7 +99,7 @@ function drawHistogram(found, width, height) {
       const shareAt = (edges, share) => share[edges.findLastIndex((edge) => edge <= weight)] ?? 0;
       const told = shares.map(([k, edges, share]) => [
         colourOf(k),
-        `${session.state.subjects[k].name} ${format(100 * shareAt(edges, share))} %`,
+        `${session.state.subjects[k].name} ${format(100 * shareAt(edges, share))}\u00a0%`,
       ]);
       tell(cards.sampler, [[null, `weight ${format(weight)} of the mean`], ...told]);
     },

@@ -1,5 +1,5 @@
 // Guided tours: a text for each step, whose state is merged into the page's.
-import { byId, element } from "./util.js";
+import { byId, element, subscripted } from "./util.js";
 import { change, clean, goTo, session } from "./session.js";
 
 export function startTours() {
@@ -48,8 +48,8 @@ export function drawTour() {
   byId("tour").hidden = !step;
   if (!step) return;
   byId("tour-name").textContent = `${found.title} · ${tour.step + 1} of ${found.steps.length}`;
-  byId("tour-title").textContent = step.title;
-  byId("tour-text").replaceChildren(...step.text.split(/\n\s*\n/).map((text) => element("p", {}, text)));
+  byId("tour-title").replaceChildren(...subscripted(step.title));
+  byId("tour-text").replaceChildren(...step.text.split(/\n\s*\n/).map((text) => element("p", {}, ...subscripted(text))));
   byId("tour-back").disabled = tour.step === 0;
   byId("tour-next").textContent = tour.step + 1 === found.steps.length ? "Finish" : "Next";
 }

@@ -33,6 +33,11 @@ function fill(node, attributes, children) {
   return node;
 }
 
+/** Return a text as what to append, in which the index of θi and the like is a `tag`. */
+export function subscripted(text, tag = (index) => element("sub", {}, index)) {
+  return text.split(/(?<=[θφωρ])([iohds])(?!\p{L})/u).map((part, k) => (k % 2 ? tag(part) : part));
+}
+
 export const byId = (id) => document.getElementById(id);
 export const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 export const radians = (degrees) => (degrees * Math.PI) / 180;
