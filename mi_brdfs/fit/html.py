@@ -147,7 +147,8 @@ def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
     cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
-    wi, wo = (pairs := observe(measurement, section.best.cut, PAIRS)).wi, pairs.wo
+    pairs = observe(measurement, section.best.cut, PAIRS)
+    wi, wo = pairs.wi, pairs.wo
     section.planar = bool(np.all(abs(wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]) < 1e-3))
     data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
     section.data = data_uri(data)
