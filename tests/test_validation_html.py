@@ -103,9 +103,9 @@ def test_hostile_words_are_harmless():
     trial, _ = lobe(1)
     trials = [replace(trial, part=HOSTILE, incident=Incident(HOSTILE, trial.incident.wi))]
     data = {"0°": {"albedo": 0.5, "noise": 0}}
-    parsed = Page(page([Report(HOSTILE, [finding, Finding("albedo", HOSTILE, "info", "", data)], trials)]))
+    parsed = Page(page([Report(HOSTILE, [finding, Finding("albedo", HOSTILE, "info", "", data)], trials)], [HOSTILE]))
     assert "script" not in {tag for tag, _ in parsed.elements} and "b" not in {tag for tag, _ in parsed.elements}
-    assert parsed.text.count(HOSTILE) >= 8
+    assert parsed.text.count(HOSTILE) >= 9
     assert sum(told.startswith(f"{HOSTILE}, {HOSTILE}") for told in parsed.pictures()) == 3
 
 

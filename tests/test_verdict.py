@@ -391,3 +391,12 @@ def test_commands_warn_in_a_sentence(tmp_path):
     told = "phong: diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1."
     assert done.returncode == 0 and done.stderr.splitlines()[0] == f"mi-brdfs: {told}"
     assert done.stderr.count("1.6") == 1
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_wrong_constant_is_told_as_one():
+    """A density without its 1/π is off by the same factor wherever light comes from."""
+    wrong = next(mutant for mutant in MUTANTS if mutant.name == "density without pi")
+    (finding,) = [it for it in check(wrong.register(), only=["pdf"], angles=(50,)).failures if it.subject == "whole"]
+    assert "pdf integrates to 3.14" in finding.message and "it fails for all 17 directions tried" in finding.message
+    assert finding.message.endswith("It is off by the same factor for all: a constant is wrong.")

@@ -51,7 +51,7 @@ def _output(output: dict[str, Any], drawn: Iterator[Path]) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(base64.b64decode("".join(data[kind])))
         with Image.open(path) as image:
-            strip = "{.strip}" if image.width >= WIDTH else ""  # phones scroll through those that were reduced
-        return f"![](/notebooks/{path.parent.name}/{path.name}){strip}"
+            kind = "strip" if image.width >= WIDTH else "output"  # phones scroll through those that were reduced
+        return f"![](/notebooks/{path.parent.name}/{path.name}){{.{kind}}}"
     text = "".join(output.get("text", data.get("text/plain", ""))).rstrip()
     return f"```text\n{text}\n```" if text else ""

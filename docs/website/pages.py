@@ -55,6 +55,9 @@ FILES = GUIDE | {
 OTHERS: tuple[type[Plugin], ...] = (Tabulated, Shading)
 """The plugins that are no models."""
 
+TITLES = {"bench": "Benchmarks", "testing": "Test coverage", "guide/limits": "Known limits"}
+"""Titles of pages whose files are called by a word."""
+
 CONTENTS = """
 ```{{toctree}}
 :hidden:
@@ -80,7 +83,11 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
         if (ROOT / file).is_file():
             pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
     pages["index"] = ("README.md", _front())
-    pages["folklore"] = ("docs/folklore.md", pages["folklore"][1].replace("## What", "# What", 1))
+    folklore = pages["folklore"][1].replace("## What", "# What", 1)
+    pages["folklore"] = ("docs/folklore.md", f"---\nhide-toc: true\n---\n{folklore}")
+    for page, title in TITLES.items():
+        origin, text = pages[page]
+        pages[page] = origin, re.sub(r"\A# .*", f"# {title}", text)
     for page in ("shading", "polarization"):
         text = re.sub(r"^## \[(\w+)\]\((.*)\)$", r"## \1\n\n[\2](\2)", pages[page][1], flags=re.MULTILINE)
         pages[page] = (f"scenes/{page}/README.md", text)
@@ -161,10 +168,13 @@ def _thumbnails() -> str:
         name = model.plugins[0]
         return f"[![{name}](../../docs/thumbnails/{name}.png)](#{name})\n[`{name}`](#{name})\\\n{year(model)}"
 
-    return "\n\n".join(
-        f"**{family}**\n\n::::{{container}} pictures\n" + "\n\n".join(map(cell, members)) + "\n::::"
+    families = "\n".join(
+        f":::::{{container}} family\n**{family}**\n\n::::{{container}} pictures\n"
+        + "\n\n".join(map(cell, members))
+        + "\n::::\n:::::"
         for family, members in groupby(by_family(own_models()), key=lambda it: it.family)
     )
+    return f"::::::{{container}} families\n{families}\n::::::"
 
 
 def _reference() -> str:
@@ -181,7 +191,15 @@ def _summary(name: str) -> str:
 
 def _model(plugin: type[Plugin], page: Callable[[type[Plugin]], str]) -> str:
     parameters = {word for row in models.own_rows(plugin)[1:] for word in re.findall(r"\w+", row[0])}
-    return with_formulas(page(plugin).removeprefix("#"), parameters) + "\n"
+    text = with_formulas(page(plugin).removeprefix("#"), parameters)
+    large = re.sub(r"\[!\[(\w+)\]\(\S+?\)\]\((\S+?)\)", r"[![\1](\2){.portrait}](\2)", text, count=1)
+    return "\n\n".join(_references(it) for it in large.split("\n\n")) + "\n"
+
+
+def _references(paragraph: str) -> str:
+    """Return a paragraph that has nothing but references as a list."""
+    parts = re.split(r"(?<=\))\. (?=[A-Z]\. )", paragraph.replace("\n", " "))
+    return "\n".join(f"* {it}" for it in parts) if len(parts) > 1 and re.match(r"[A-Z]\. ", paragraph) else paragraph
 
 
 # --- Links ----------------------------------------------------------------------------------------------------------

@@ -106,14 +106,16 @@ def check(
         sources = sources_of(words, given)
         other = None if against is None else source_of(against, {})
         reports = _check_all(sources, other, options, chosen, min(jobs, len(sources)))
+        pairs = zip(sources, reports, strict=True)
+        again = [_again(*pair, options) if pair[1].failures and other is None else "" for pair in pairs]
     write_json(json_file, [report.to_dict() for report in reports])
     if html_file is not None:
-        write_text(html_file, page(reports))
+        write_text(html_file, page(reports, again))
     if junit_file is not None:
         from ..validation.formats import junit
 
         write_text(junit_file, junit(reports))
-    _print_reports(sources, reports, None if other else options)
+    _print_reports(reports, again)
     err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
     if any(report.failures for report in reports):
         raise typer.Exit(Exit.ERROR)
@@ -197,16 +199,15 @@ def _end_with_parent() -> None:
     os._exit(Exit.ERROR)
 
 
-def _print_reports(sources: list[BSDFSource], reports: list[Report], options: dict[str, Any] | None) -> None:
-    """Print a block for each report, with the command that makes its failing checks again, with the options of these
-    if there are any."""
+def _print_reports(reports: list[Report], again: list[str]) -> None:
+    """Print a block for each report, with the command that makes its failing checks again."""
     from ..validation.formats import block
 
-    for source, report in zip(sources, reports, strict=True):
+    for report, words in zip(reports, again, strict=True):
         for line, style in block(report, out.width):
             out.print(line, style=style)
-        if report.failures and options is not None:
-            out.print(printable(f"    Again: {_again(source, report, options)}"))
+        if words:
+            out.print(printable(f"    Again: {words}"))
 
 
 def _again(source: BSDFSource, report: Report, options: dict[str, Any]) -> str:

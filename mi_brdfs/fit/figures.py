@@ -54,6 +54,9 @@ def lobes(measurement: Measurement, fits: Sequence[BSDFProbe], cut: float) -> li
             turned = f", φi = {np.degrees(table.phi):.0f}°" if len(tables) > 1 else ""
             caption = f"θi = {theta:.3g}°{turned}"
             drawn.append((caption, _lobe(table, theta, caption, nodes, fits)))
+    ends = [it.axes[0].get_ylim() for _, it in drawn]
+    for _, it in drawn:
+        it.axes[0].set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
     return drawn
 
 
@@ -63,7 +66,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
     near = np.geomspace(0.02, 20, 30)
     theta = np.unique(np.concatenate([np.linspace(-GRAZING, GRAZING, 241), theta_i + near, theta_i - near, [theta_i]]))
     theta = theta[abs(theta) < 88]
-    figure = new_figure(3.5, 2.5)
+    figure = new_figure(2.8, 2.2)
     ax = figure.subplots()
     calm(ax)
     ax.plot(*curve, color=FAINT, linewidth=3, alpha=0.45, solid_capstyle="round")
@@ -81,7 +84,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
         ax.set_ylim(max(np.quantile(seen, 0.02) / 4, seen.max() * 1e-6), seen.max() * 3)
     ax.axvline(theta_i, color=FAINT, linestyle=(0, (1, 2)), **THIN)
     ax.set_xlim(-90, 90)
-    ax.set_xticks(range(-90, 91, 30), [f"{turn}°".replace("-", "−") for turn in range(-90, 91, 30)])
+    ax.set_xticks(range(-90, 91, 45), [f"{turn}°".replace("-", "−") for turn in range(-90, 91, 45)])
     ax.set_title(caption, fontsize=9, color=INK)
     ax.set_xlabel(r"$\theta_o$", fontsize=9, color=INK)
     ax.set_ylabel("f [1/sr]", fontsize=9, color=INK)
@@ -123,9 +126,10 @@ class Residuals:
     def told(self) -> str:
         """How far the fit is from the data, and where most, in words."""
         theta_i, theta_h, model, data = self.worst
-        times = f", where it is {model / data:.2g} times as bright" if min(model, data) > 0 else ""
-        where = f"for light from about {theta_i:.0f}° at half angles of about {theta_h:.0f}°{times}"
-        return f"It differs from the data by {100 * self.off:.2g} % of the light that they reflect; most {where}."
+        most = f"θi ≈ {theta_i:.0f}° and half angles near {theta_h:.0f}°"
+        if (least := min(model, data)) > 0:
+            most += f", where it is {max(model, data) / least:.2g} times too {'bright' if model > data else 'dark'}"
+        return f"The fit is off by {100 * self.off:.2g} % of the reflected light, most at {most}."
 
     @property
     def extent(self) -> float:
@@ -134,7 +138,7 @@ class Residuals:
 
     def draw(self, limit: float) -> Figure:
         """Return them as a figure, with a scale from ``-limit`` to ``limit``."""
-        figure = new_figure(3.5, 2.7)
+        figure = new_figure(3, 2.4)
         ax = figure.subplots()
         calm(ax)
         ax.grid(False)

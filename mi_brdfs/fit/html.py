@@ -36,6 +36,7 @@ NOTICED = 2.3
 M. Mahy, L. Van Eycken, A. Oosterlinck, Evaluation of uniform color spaces developed after the adoption of CIELAB and
 CIELUV, Color Research & Application 19(2), 1994, doi:10.1111/j.1520-6378.1994.tb00070.x.
 """
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SCALES = 1, 2, 5, 10, 20, 50, 100
 """The ends of the scale of differences of lightness."""
 
@@ -62,6 +63,8 @@ class Section:
     """What a file calls it, and its format."""
     data: str = ""
     """The picture of the data."""
+    planar: bool = False
+    """Whether only the plane of incidence was measured."""
     lightness: int = 0
     """The end of the scale of differences."""
     stops: float = 0
@@ -77,12 +80,19 @@ class Section:
         return self.cards[0].fit
 
     @property
+    def changed(self) -> str:
+        """By how much pictures are brightened, in words."""
+        word, by = "brightened" if self.stops > 0 else "darkened", abs(self.stops)
+        return f"{word} by {by:g} stop{'s' * (by != 1)}" if by else ""
+
+    @property
     def verdict(self) -> str:
         """Which model fits best, and by how much, in sentences."""
         fits = [card.fit for card in self.cards]
-        best, agreement = fits[0], f"{fits[0].starts.agree} of {fits[0].starts.tried} starts of {fits[0].model} agree."
+        best = fits[0]
+        closing = [_converged(best), *best.cautions]
         if len(fits) == 1:
-            return f"Only {best.model} was fitted. {agreement}"
+            return " ".join([f"Only {best.model} was fitted.", *closing])
         told = [f"{best.model} comes nearest to the data."]
         ratio, name, against = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model, fits[1].bic - best.bic
         kind = "held-out error" if best.flip is None else "FLIP error"
@@ -100,7 +110,7 @@ class Section:
             told.append(f"By the held-out error it would be {nearest.model}.")
         if likeliest is not best:
             told.append(f"By the BIC it would be {likeliest.model}, which is better by {best.bic - likeliest.bic:.0f}.")
-        return " ".join([*told, agreement])
+        return " ".join([*told, *closing])
 
 
 def section_of(fits: Sequence[Fit], shown: Appearance | None = None) -> Section:
@@ -137,6 +147,9 @@ def _draw(section: Section, shown: Appearance) -> None:
     """Draw a material, and its best fits."""
     cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
+    pairs = observe(measurement, section.best.cut, PAIRS)
+    wi, wo = pairs.wi, pairs.wo
+    section.planar = bool(np.all(abs(wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]) < 1e-3))
     data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
     section.data = data_uri(data)
     differences = [lightness(picture) - lightness(data) for picture in pictures]
@@ -146,23 +159,38 @@ def _draw(section: Section, shown: Appearance) -> None:
         card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference / section.lightness)[..., :3])
     with rgb_variant():
         probes = [probe_of(card.fit) for card in cards]
-        cut = section.best.cut
-        pairs = observe(measurement, cut, PAIRS)
         residuals = [Residuals(pairs, card.fit, probe) for card, probe in zip(cards, probes, strict=True)]
-        section.lobes = [(caption, svg(it)) for caption, it in lobes(measurement, probes[:CURVES], cut)]
+        section.lobes = [(caption, svg(it)) for caption, it in lobes(measurement, probes[:CURVES], section.best.cut)]
     section.quantity = residuals[0].quantity
     section.limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
     for card, each, difference in zip(cards, residuals, differences, strict=True):
         card.residuals = svg(each.draw(section.limit))
         most = np.quantile(abs(difference), 0.99)
-        seen = "an eye sees that" if most > NOTICED else "an eye hardly sees that"
-        card.told = f"{each.told} Rendered, its lightness L* is off by up to {most:.2g} in 99 % of the pixels: {seen}."
+        seen = "a visible difference" if most > NOTICED else "hardly a visible difference"
+        where = f"In the rendering{section.changed and f', {section.changed}'}"
+        card.told = f"{each.told} {where}, L* is within {most:.2g} in 99 % of the pixels: {seen}."
 
 
 def _smooth(picture: np.ndarray) -> np.ndarray:
     """Return a picture in sRGB, denoised where the denoiser loads."""
     denoise = denoiser()
     return encoded(denoise(decoded(picture))) if denoise else picture
+
+
+def _converged(fit: Fit) -> str:
+    agree, tried = fit.starts.agree, fit.starts.tried
+    if tried == 1:
+        return f"{fit.model} was optimised from one start only."
+    of = "All" if agree == tried else f"{agree} of"
+    return f"{of} {tried} optimisations of {fit.model} converged to the same error."
+
+
+def _number(value: float | None) -> str:
+    """Return a number as text, a small one with a power of ten."""
+    if not value or not np.isfinite(value) or abs(value) >= 1e-3:
+        return number(value)
+    digits, power = f"{value:.2e}".split("e")
+    return f"{digits}·10{str(int(power)).translate(SUPERSCRIPTS)}"
 
 
 def _error(fit: Fit) -> float:
@@ -177,4 +205,4 @@ def _told(measurement: Measurement) -> str:
     return ", ".join(word for word in words if word)
 
 
-environment.filters |= {"number": number, "error": _error, "name": lambda file: Path(file).name}
+environment.filters |= {"number": _number, "error": _error, "name": lambda file: Path(file).name}

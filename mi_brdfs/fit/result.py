@@ -109,8 +109,9 @@ class Fit(Data):
             probe = BSDFProbe(mi.load_dict(self.bsdf))
             return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
 
-    def remarks(self, scatter: bool = True) -> list[str]:
-        """Return what to know of this fit, in sentences, with or without those of the ``scatter``."""
+    @property
+    def cautions(self) -> list[str]:
+        """Why not to trust its parameters, in sentences."""
         found = []
         if self.albedo > 1:
             found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
@@ -124,6 +125,11 @@ class Fit(Data):
                  if abs(r) > CORRELATED and len(pair := {_colour(a), _colour(b)}) > 1}  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(sorted(close))}.")
+        return found
+
+    def remarks(self, scatter: bool = True) -> list[str]:
+        """Return what to know of this fit, in sentences, with or without those of the ``scatter``."""
+        found = self.cautions
         for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True) if scatter else ():
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"

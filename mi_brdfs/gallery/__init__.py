@@ -165,9 +165,7 @@ class Entry:
     def rows(self) -> list[Row]:
         """Return a row for each sweep, as far as there are pictures."""
         shots = iter(self.shots[1:])
-        rows = [
-            sweep_row(sweep, self.type, self.stage, list(islice(shots, len(sweep.values)))) for sweep in self.sweeps
-        ]
+        rows = [sweep_row(sweep, "", self.stage, list(islice(shots, len(sweep.values)))) for sweep in self.sweeps]
         return [row for row in rows if row.pictures]
 
     def wall(self) -> list[Row]:
@@ -189,7 +187,8 @@ class Entry:
 
     def described(self) -> str:
         """Return what the contact sheet shows, in words."""
-        return "; ".join(f"{row.headings[0]}: {', '.join(row.captions)}" for row in self.rows())
+        told = "; ".join(f"{row.headings[0]}: {', '.join(row.captions)}" for row in self.rows())
+        return told and f"{self.type}: {told}"
 
     def finished_presets(self) -> list[str]:
         return self.presets[: max(len(self.shots) - len(self.bsdfs), 0)]

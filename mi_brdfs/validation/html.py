@@ -16,11 +16,12 @@ from .runner import CHECKS
 from .trial import Trial
 
 
-def page(reports: Sequence[Report]) -> str:
-    """Return the page, as text."""
+def page(reports: Sequence[Report], again: Sequence[str] = ()) -> str:
+    """Return the page, as text; ``again`` are the commands that make the failing checks again."""
     functions = {"parts": _parts, "others": _others, "failures": _failures, "meaning": _meaning, "in_words": in_words}
     drawings = {"pictures": pictures, "chart": chart, "svg": svg, "sure": SURE}
-    return environment.get_template("check.html").render(reports=reports, **functions, **drawings)
+    again = again or [""] * len(reports)
+    return environment.get_template("check.html").render(reports=reports, again=again, **functions, **drawings)
 
 
 def _parts(report: Report) -> Iterator[tuple[str, list[Trial], dict[str, dict[str, Any]], list[str]]]:

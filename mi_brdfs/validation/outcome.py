@@ -98,14 +98,17 @@ class Outcome:
         error = relative(got, expected, floor, unknown) * where
         self.wrong(error * (error > tolerance), name, got, why, wi, wo, expected=expected, **reproduces)
 
-    def finding(self, message: str, remark: str = "") -> Finding:
-        """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case."""
+    def finding(self, message: str, remark: str = "", tried: int = 0) -> Finding:
+        """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case. Of each of the
+        directions ``tried`` there may be a fault."""
         remark = f" {remark}" if remark else ""
         if not self.faults:
             return Finding(self.check, self.subject, "pass", message + remark, self.data)
         worst = max(self.faults, key=lambda fault: fault.size)
         more = len(self.faults) - 1
-        text = worst.message + (f" (and {more} more like it)" if more else "") + "." + remark
+        others = f" (it fails for all {tried} directions tried)" if more and more + 1 == tried else ""
+        others = others or (f" (and {more} more like it)" if more else "")
+        text = worst.message + others + "." + remark
         data = self.data | {"faults": [fault.message for fault in self.faults]}
         return Finding(self.check, self.subject, "fail", text, data, worst.at)
 

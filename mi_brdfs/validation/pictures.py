@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from ..pages.figures import DENSITY, DIFFERENCE, SERIES
-from ..plot.style import FAINT, SMALL, STYLES, calm, new_figure
+from ..plot.style import FAINT, INK, SMALL, STYLES, calm, new_figure
 from ..probe.arrays import Array
 from ..probe.directions import from_plane, to_plane
 from .trial import Trial
@@ -116,7 +116,7 @@ def pictures(trial: Trial) -> Iterator[tuple[str, Figure, str, str]]:
         figure = Figure(figsize=(6.1, 2.3))
         places = {"left": 0, "right": 1, "bottom": 0.09, "top": 0.92, "wspace": 0.05}
         for ax, (title, colours) in zip(figure.subplots(1, 3, gridspec_kw=places), shown.items(), strict=True):
-            ax.set_title(title, loc="left", fontsize=SMALL, pad=3)
+            ax.set_title(title + ", zoomed" * (view.half < HEMISPHERE), loc="left", fontsize=SMALL, pad=3)
             _draw(ax, colours, trial, view)
         yield side, figure, _brief(low), _brief(high)
 
@@ -133,6 +133,10 @@ def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:
         ax.plot(theta, 0, "+", color=colour, markersize=7, markeredgewidth=width)
         if wi[2] * view.side > 0:
             ax.plot(-theta, 0, "o", color=colour, markersize=5, markeredgewidth=width, fillstyle="none")
+    if trial.test.p_value < SURE and (worst := trial.partition.centres[trial.test.worst])[2] * view.side > 0:
+        x, y = to_plane(worst[None], trial.axis)
+        for colour, width in ("white", 2.6), ("black", 1.2):
+            ax.plot(x, -y, "o", color=colour, markersize=13, markeredgewidth=width, fillstyle="none")
     ax.set(xlim=(left, right), ylim=(bottom, top), yticks=[], frame_on=False)
     if view.half == HEMISPHERE:
         marked = [-60, 0, 60]
@@ -152,7 +156,7 @@ def _brief(value: float) -> str:
 
 def chart(energy: dict[str, dict[str, Any]]) -> Figure:
     """Return a chart of the albedo and the efficiency of a part over the angle of incidence."""
-    figure = new_figure(4, 1.9)
+    figure = new_figure(4, 2.1)
     ax = figure.subplots()
     calm(ax)
     ax.grid(axis="x", visible=False)
@@ -171,4 +175,6 @@ def chart(energy: dict[str, dict[str, Any]]) -> Figure:
             largest = max([largest, *(value for _, value in points)])
     ax.set(xlim=(0, 90), ylim=(0, min(largest, 4) * 1.02))
     ax.set_xticks([0, 30, 60, 90], ["0°", "30°", "60°", "90°"])
+    ax.set_xlabel("θi", fontsize=SMALL, color=INK)
+    ax.set_ylabel("albedo, η" if "efficiency" in energy else "albedo", fontsize=SMALL, color=INK)
     return figure

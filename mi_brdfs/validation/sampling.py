@@ -32,7 +32,7 @@ def chi2(run: Run) -> Findings:
                 outcome.fault(f"for light from {name} {told}", size, wi=trial.incident.wi, seed=trial.seed)
         left_out = max(trial.left_out for trial in own)
         aside = f"; up to {left_out:.0%} of the samples lie in lines too narrow to be integrated" * (left_out > 0.01)
-        yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}{aside}.")
+        yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}{aside}.", tried=len(own))
 
 
 def pdf(run: Run) -> Findings:
@@ -43,7 +43,8 @@ def pdf(run: Run) -> Findings:
         if run.is_black(part):
             yield Finding("pdf", part.name, "skip", "Black.")
             continue
-        for trial in run.trials(part):
+        own = run.trials(part)
+        for trial in own:
             name = trial.incident.name
             noise = sqrt(max(trial.share * (1 - trial.share), 1 / trial.count) / trial.count)
             excess = max(trial.mismatch - 1e-3, 0) / noise
@@ -53,7 +54,10 @@ def pdf(run: Run) -> Findings:
                 share = "all" if trial.share == 1 else f"{100 * trial.share:.2f} % of the"
                 told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
                 outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
-        yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.")
+        factors = [trial.integral / max(trial.share, 1e-30) for trial in own]
+        constant = len(outcome.faults) == len(own) > 1 and max(factors) < 1.02 * min(factors)
+        remark = "It is off by the same factor for all: a constant is wrong." if constant else ""
+        yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.", remark, len(own))
 
 
 def weight(run: Run) -> Findings:
