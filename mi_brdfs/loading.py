@@ -19,7 +19,7 @@ from .names import check_name
 
 MESHES = ("ply", "serialized")
 """The shapes whose faces Mitsuba takes as they are."""
-NEEDED = {"bitmap": ("filename", "bitmap", "data", "texture"), "blendbsdf": ("weight",)}
+NEEDED = {"bitmap": ("filename", "bitmap", "data", "texture"), "blendbsdf": ("weight",), "volume": ("volume",)}
 """Of plugins whose absence ends the process: properties of which they need one."""
 DEEPEST = 16
 """How many BSDFs may be in one another: each with two sides doubles what Mitsuba visits."""

@@ -479,6 +479,15 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]
 
 
+def test_a_mesh_that_is_refused_breaks_no_picture(client, tmp_path):
+    """While a mesh without vertices is alive, Dr.Jit compiles no kernel."""
+    mesh = "ply\nformat ascii 1.0\nelement vertex 0\n" + "".join(f"property float {it}\n" for it in "xyz")
+    (tmp_path / "e.ply").write_text(f"{mesh}element face 0\nproperty list uchar int vertex_indices\nend_header\n")
+    with pytest.raises(ValueError, match="has no triangles") as told:
+        client.scenes.add(tmp_path / "e.ply", "e.ply")
+    assert of(client.show({"type": "lambert"}, views=["picture"]), "picture") and told
+
+
 def test_values_of_a_material_are_its_own(llvm_rgb, tmp_path):
     """Files are kept loaded: what one subject changes, another one does not see."""
     path = tmp_path / "metal.xml"

@@ -221,7 +221,7 @@ def test_rows_that_contradict_others_are_told(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         measured(tmp_path, table() + noisy, "x.csv")
-    with pytest.warns(UserWarning, match="27 rows have the angles of others and more than twice"):
+    with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 27"):
         measured(tmp_path, table() + other, "y.csv")
 
 

@@ -356,9 +356,10 @@ class Stages:
         kind, word = self.user.add(path, name)
         try:
             self.stage(Setting("studio", word, QUICK) if kind == "shape" else Setting(word, "body", QUICK))
-        except Exception:
+        except Exception as error:
             del (self.user.meshes if kind == "shape" else self.user.lights)[word]
-            raise
+            # Frames would keep a mesh alive with which no kernel can be compiled.
+            raise error.with_traceback(None) from None
         return {kind: word}
 
     @property

@@ -60,8 +60,8 @@ def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -
     bright = both.max(axis=0) > 0.01 * np.max(abs(values), initial=0)
     if count := int(np.any(bright & (both.max(axis=0) > 2 * both.min(axis=0)), axis=1).sum()):
         warnings.warn(
-            f"{count:,} rows have the angles of others and more than twice, or less than half, their values; "
-            "means of these are used.", stacklevel=2,
+            "Rows with the angles of others, and more than twice or less than half their values, are averaged: "
+            f"{count:,}.", stacklevel=2,
         )  # fmt: skip
 
 

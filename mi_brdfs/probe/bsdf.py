@@ -240,7 +240,9 @@ def _copied(given: Any) -> Any:
         for name, value in given.items():
             if value is None:
                 raise ValueError(f"{name} is None; leave it out, or give it a value.")
-        return {name: _copied(value) for name, value in given.items()}
+        # Whole numbers of indices are numbers, too; Mitsuba expects the name of a medium, or a point.
+        floats = {name: float(it) for name, it in given.items() if name.endswith("_ior") and type(it) is int}
+        return {name: _copied(value) for name, value in given.items()} | floats
     return mi.Bitmap(given) if isinstance(given, mi.Bitmap) else given
 
 

@@ -81,6 +81,8 @@ class Store:
                     if missing := set(SCHEMA.names) - set(file.schema_arrow.names):
                         raise ValueError(f"it has no column {min(missing)}")
                     found = file.read(list(columns) if columns else SCHEMA.names).to_pylist()
+                for row in found:
+                    json.loads(row.get("bsdf", "{}"))
             except (OSError, ValueError) as error:  # pa.ArrowInvalid is a ValueError
                 text = f"{path} holds no fits, and is left out: {error}"
                 warnings.warn(" ".join(text.split()), StoreWarning, stacklevel=2)
