@@ -179,7 +179,7 @@ def test_check_of_the_narrowest_of_each_model(name):
 
 def test_names():
     """As many as README says, of a model, and the user's own."""
-    assert f"names {len(mi_brdfs.presets())} real materials" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"lists {len(mi_brdfs.presets())} materials" in (ROOT / "README.md").read_text(encoding="utf-8")
     ward = mi_brdfs.presets("ward")
     assert set(ward) < set(mi_brdfs.presets()) and {mi_brdfs.preset(name)["type"] for name in ward} == {"ward"}
     name = "ngan/ward/blue-acrylic"
