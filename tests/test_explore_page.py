@@ -587,7 +587,9 @@ def test_light_camera_and_shape_are_chosen_by_dragging(tab, address, tmp_path):
     opened(tab, address, {"subjects": [{"bsdf": {"type": "ward"}, "name": "ward"}], "views": ["picture", "lobe"]})
     tab.locator("#view-lobe canvas").scroll_into_view_if_needed()
     tab.wait_for_selector("#view-lobe .labels .direction")
-    box = tab.locator("#view-lobe .labels .direction").first.bounding_box()
+    boxes = []  # a label that is drawn anew has none for a moment
+    settled(tab, lambda: boxes.append(tab.locator("#view-lobe .labels .direction").first.bounding_box()) or boxes[-1])
+    box = boxes[-1]
     before = tab.locator("#theta-field").input_value()
     dragged(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2 + 8, -40, 32)
     assert tab.locator("#theta-field").input_value() != before

@@ -56,9 +56,12 @@ def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -
     order = np.lexsort(angles)
     one, next_ = order[:-1], order[1:]
     again = np.logical_and.reduce([angle[one] == angle[next_] for angle in angles])
-    both = abs(np.stack([values[one[again]], values[next_[again]]]))
-    bright = both.max(axis=0) > 0.01 * np.max(abs(values), initial=0)
-    if count := int(np.any(bright & (both.max(axis=0) > 2 * both.min(axis=0)), axis=1).sum()):
+    low, high = values[one[again]], values[next_[again]]
+    np.abs(low, out=low)
+    np.abs(high, out=high)
+    apart = (high > 2 * low) | (low > 2 * high)
+    apart &= np.maximum(low, high, out=high) > 0.01 * np.max(high, initial=0)
+    if count := int(np.any(apart, axis=1).sum()):
         warnings.warn(
             "Rows with the angles of others, and more than twice or less than half their values, are averaged: "
             f"{count:,}.", stacklevel=2,
