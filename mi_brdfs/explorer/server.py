@@ -94,13 +94,12 @@ class Explorer:
 
     def _is_ours(self, host: str) -> bool:
         name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
-        if ANY.isdisjoint(self.hosts):
+        if name in self.hosts or ANY.isdisjoint(self.hosts):
             return name in self.hosts
         # A page of another server can give its name our address, but cannot take an address for its name.
         with contextlib.suppress(ValueError):
             return bool(ipaddress.ip_address(name.strip("[]")))
-        own = socket.gethostname()
-        return name in ("localhost", own, f"{own}.local", socket.getfqdn())
+        return False
 
     async def _index(self, request: web.Request) -> web.Response:
         return web.Response(text=index(), content_type="text/html")
@@ -284,7 +283,9 @@ def serve(
     """
     engine = Engine(variant, user, watched)
     port = on.getsockname()[1]
-    explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host])), notebook)
+    own = socket.gethostname()  # asked once: a name server may take long
+    names = [own, f"{own}.local", socket.getfqdn()] if host in ANY else []
+    explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host, *names])), notebook)
 
     async def run() -> None:
         if user != UserScene():  # what is wrong with it is said before there is a page
