@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..measured import Measurement, read
+from ..measured.report.counts import in_one_plane
 from ..pages import environment
 from ..pages.figures import DIFFERENCE, data_uri, svg
 from ..rendering.output import denoiser
@@ -148,8 +149,7 @@ def _draw(section: Section, shown: Appearance) -> None:
     cards, measurement = section.cards[:MOST], read(section.file, section.best.quantity)
     section.material, section.stops = _told(measurement), shown.stops
     pairs = observe(measurement, section.best.cut, PAIRS)
-    wi, wo = pairs.wi, pairs.wo
-    section.planar = bool(np.all(abs(wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]) < 1e-3))
+    section.planar = in_one_plane(measurement.data)
     data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
     section.data = data_uri(data)
     differences = [lightness(picture) - lightness(data) for picture in pictures]
