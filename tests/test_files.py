@@ -104,6 +104,7 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
         done = subprocess.run(command("--version"), stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 1
     assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
+    assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")

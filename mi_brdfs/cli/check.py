@@ -9,6 +9,7 @@ import threading
 import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from multiprocessing import active_children, connection, get_context, parent_process
 from pathlib import Path
@@ -161,6 +162,8 @@ def _check_all(
                 for future in [pool.submit(_check_one, source, other, options) for source in sources]:
                     reports.append(future.result())
                     bar.update(task, description=reports[-1].name, advance=each)
+            except BrokenProcessPool:
+                fail(f"a process ended while it checked, perhaps for want of memory: use fewer jobs than -j {jobs}")
             except BaseException:  # also Ctrl-C
                 for process in active_children():
                     process.terminate()

@@ -96,6 +96,6 @@ def default_file(kind: str, targets: Sequence[str]) -> Path:
 def write(figure: Any, path: Path) -> None:
     """Write a figure."""
     data = BytesIO()  # where a disk is full, writers of formats raise other errors than OSError
-    figure.savefig(data, format=path.suffix[1:].lower(), dpi=DPI)
+    figure.savefig(data, format=path.suffix[1:].lower() or "png", dpi=DPI)
     with replacing(path) as part:
         part.write_bytes(data.getvalue())
