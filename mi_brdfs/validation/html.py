@@ -17,11 +17,11 @@ from .trial import Trial
 
 
 def page(reports: Sequence[Report], again: Sequence[str] = ()) -> str:
-    """Return the page, as text; ``again`` are the commands that make the failing checks again."""
+    """Return the page, as text, failures first; ``again`` are the commands that make the failing checks again."""
     functions = {"parts": _parts, "others": _others, "failures": _failures, "meaning": _meaning, "in_words": in_words}
     drawings = {"pictures": pictures, "chart": chart, "svg": svg, "sure": SURE}
-    again = again or [""] * len(reports)
-    return environment.get_template("check.html").render(reports=reports, again=again, **functions, **drawings)
+    checked = sorted(zip(reports, again or [""] * len(reports), strict=True), key=lambda it: not it[0].failures)
+    return environment.get_template("check.html").render(checked=checked, **functions, **drawings)
 
 
 def _parts(report: Report) -> Iterator[tuple[str, list[Trial], dict[str, dict[str, Any]], list[str]]]:
