@@ -153,8 +153,12 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     """None is as good that has very strong evidence against it. Nothing is said twice."""
     first = replace(fits[0], model="first", bic=0, bounds=[], correlations={}, errors={"log": {"held_out": 1.0}})
     second = replace(fits[1], model="second", bic=bic, errors={"log": {"held_out": error}})
-    verdict = Section("f", [Card(first), Card(second)]).verdict
-    assert verdict == f"first comes nearest to the data. {told} first was optimised from one start only."
+    section = Section("f", [Card(first), Card(second)])
+    assert section.verdict == f"first comes nearest to the data. {told}"
+    assert section.converged == "first was optimised from one start only."
+    assert (
+        replace(section, off=0.4).verdict == f"first comes nearest to the data, but fits poorly: it is 40 % off. {told}"
+    )
 
 
 def test_how_far_a_fit_is_from_the_data_is_told(fits):

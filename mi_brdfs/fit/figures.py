@@ -28,6 +28,8 @@ CURVES = len(SERIES)
 """How many fits are drawn over the data."""
 NODES = 60
 """The most nodes that are drawn of a lobe."""
+NARROW = 10
+"""The width at half of the peak, in degrees, below which the surroundings of the mirror direction are stretched."""
 CELLS = 8, 28
 """The least and the most cells of a residual map, along each side."""
 PAIRS = 20
@@ -83,10 +85,17 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
     if len(seen):
         ax.set_ylim(max(np.quantile(seen, 0.02) / 4, seen.max() * 1e-6), seen.max() * 3)
     ax.axvline(theta_i, color=FAINT, linestyle=(0, (1, 2)), **THIN)
+    ticks, zero, label = np.arange(-90, 91, 45), 0.0, r"$\theta_o$"
+    if np.ptp(curve.theta[curve.value > 0.5 * np.nanmax(curve.value)]) < NARROW:
+        # A line at the scale of the hemisphere: its surroundings are stretched.
+        ticks, zero, label = np.array([-60, -20, -5, 0, 5, 20, 60]), theta_i, r"$\theta_o - \theta_i$"
+        ticks = ticks[abs(zero + ticks) <= 90]
+        places = lambda x: np.sign(x - zero) * np.sqrt(abs(x - zero)), lambda y: zero + np.sign(y) * y * y
+        ax.set_xscale("function", functions=places)
+    ax.set_xticks(zero + ticks, [f"{turn}°".replace("-", "−") for turn in ticks], minor=False)
     ax.set_xlim(-90, 90)
-    ax.set_xticks(range(-90, 91, 45), [f"{turn}°".replace("-", "−") for turn in range(-90, 91, 45)])
     ax.set_title(caption, fontsize=9, color=INK)
-    ax.set_xlabel(r"$\theta_o$", fontsize=9, color=INK)
+    ax.set_xlabel(label, fontsize=9, color=INK)
     ax.set_ylabel("f [1/sr]", fontsize=9, color=INK)
     return figure
 

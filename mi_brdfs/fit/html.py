@@ -31,6 +31,8 @@ DECISIVE = 10
 R. E. Kass, A. E. Raftery, Bayes factors, Journal of the American Statistical Association 90(430), 1995,
 doi:10.1080/01621459.1995.10476572.
 """
+POOR = 0.25
+"""The part of the reflected light from which a fit that is off by it is called poor."""
 NOTICED = 2.3
 """The difference of colours in CIELAB that is just noticed, side by side.
 
@@ -74,6 +76,8 @@ class Section:
     """What residuals are of."""
     limit: float = 0
     """The end of their scale."""
+    off: float = 0
+    """How far the best fit is off, as a part of the reflected light."""
     lobes: Sequence[tuple[str, str]] = ()
 
     @property
@@ -90,11 +94,10 @@ class Section:
     def verdict(self) -> str:
         """Which model fits best, and by how much, in sentences."""
         fits = [card.fit for card in self.cards]
-        best = fits[0]
-        closing = [_converged(best), *best.cautions]
+        best, poorly = fits[0], f", but fits poorly: it is {100 * self.off:.2g} % off" if self.off > POOR else ""
         if len(fits) == 1:
-            return " ".join([f"Only {best.model} was fitted.", *closing])
-        told = [f"{best.model} comes nearest to the data."]
+            return f"Only {best.model} was fitted{poorly}."
+        told = [f"{best.model} comes nearest to the data{poorly}."]
         ratio, name, against = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model, fits[1].bic - best.bic
         kind = "held-out error" if best.flip is None else "FLIP error"
         larger = f"its {kind} is only {100 * (ratio - 1):.1f} % larger"
@@ -111,7 +114,16 @@ class Section:
             told.append(f"By the held-out error it would be {nearest.model}.")
         if likeliest is not best:
             told.append(f"By the BIC it would be {likeliest.model}, which is better by {best.bic - likeliest.bic:.0f}.")
-        return " ".join([*told, *closing])
+        return " ".join(told)
+
+    @property
+    def converged(self) -> str:
+        """How many optimisations of the best model found it, in a sentence."""
+        agree, tried = self.best.starts.agree, self.best.starts.tried
+        if tried == 1:
+            return f"{self.best.model} was optimised from one start only."
+        of = "All" if agree == tried else f"{agree} of"
+        return f"{of} {tried} optimisations of {self.best.model} converged to the same error."
 
 
 def section_of(fits: Sequence[Fit], shown: Appearance | None = None) -> Section:
@@ -161,7 +173,7 @@ def _draw(section: Section, shown: Appearance) -> None:
         probes = [probe_of(card.fit) for card in cards]
         residuals = [Residuals(pairs, card.fit, probe) for card, probe in zip(cards, probes, strict=True)]
         section.lobes = [(caption, svg(it)) for caption, it in lobes(measurement, probes[:CURVES], section.best.cut)]
-    section.quantity = residuals[0].quantity
+    section.quantity, section.off = residuals[0].quantity, residuals[0].off
     section.limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
     for card, each, difference in zip(cards, residuals, differences, strict=True):
         card.residuals = svg(each.draw(section.limit))
@@ -177,17 +189,9 @@ def _smooth(picture: np.ndarray) -> np.ndarray:
     return encoded(denoise(decoded(picture))) if denoise else picture
 
 
-def _converged(fit: Fit) -> str:
-    agree, tried = fit.starts.agree, fit.starts.tried
-    if tried == 1:
-        return f"{fit.model} was optimised from one start only."
-    of = "All" if agree == tried else f"{agree} of"
-    return f"{of} {tried} optimisations of {fit.model} converged to the same error."
-
-
 def _number(value: float | None) -> str:
     """Return a number as text, a small one with a power of ten."""
-    if not value or not np.isfinite(value) or abs(value) >= 1e-3:
+    if not value or not np.isfinite(value) or abs(value) >= 1e-4:
         return number(value)
     digits, power = f"{value:.2e}".split("e")
     return f"{digits}·10{str(int(power)).translate(SUPERSCRIPTS)}"
