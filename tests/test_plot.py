@@ -393,7 +393,7 @@ def test_what_is_black_is_drawn_and_figures_are_nobody_elses():
     """pyplot knows none of them, its settings stay, and a notebook can show them."""
     before = dict(rcParams)
     for kind in command.KINDS.values():
-        assert kind({"type": "lambert", "reflectance": 0})._repr_png_().startswith(b"\x89PNG")
+        assert kind({"type": "lambert", "reflectance": 0})._repr_png_()[0].startswith(b"\x89PNG")
     assert pyplot.get_fignums() == [] and dict(rcParams) == before
 
 

@@ -38,10 +38,11 @@ class _Figure(Figure):
     is_sized = False
     """Whether its size was asked for, so that it does not grow with its legend."""
 
-    def _repr_png_(self) -> bytes:
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         png = BytesIO()
-        self.savefig(png, format="png")
-        return png.getvalue()
+        self.savefig(png, format="png", dpi=2 * self.dpi)  # as the format "retina" of Jupyter
+        width, height = self.get_size_inches() * self.dpi
+        return png.getvalue(), {"width": round(width), "height": round(height)}
 
 
 def new_figure(width: float, height: float, size: tuple[float, float] | None = None) -> _Figure:
