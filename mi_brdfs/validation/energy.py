@@ -49,10 +49,8 @@ def albedo(run: Run) -> Findings:
             least = np.nan_to_num(means - 5 * noises, nan=np.inf)
             k = int(np.argmax(least))
             alike = np.ptp(means) <= 1e-4 * abs(means[k])
-            turned = f", φ = {azimuth:g}°" if azimuth != AZIMUTHS[0] else ""
-            words = (
-                f"light from {name}{turned} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
-            )
+            place = name + (f", φ = {azimuth:g}°" if azimuth != AZIMUTHS[0] else "")
+            words = f"light from {place} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
             found.append(Reflected(place, mean, float(least[k]), words))
             if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
