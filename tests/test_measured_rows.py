@@ -224,6 +224,7 @@ def test_rows_that_contradict_others_are_told(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         measured(tmp_path, table() + noisy, "x.csv")
+        measured(tmp_path, table() + other + "50,50,10,1000\n", "x.csv")
     with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 63"):
         measured(tmp_path, table() + other, "y.csv")
 

@@ -65,7 +65,8 @@ def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -
     np.abs(low, out=low)
     np.abs(high, out=high)
     apart = (high > 2 * low) | (low > 2 * high)
-    apart &= np.maximum(low, high, out=high) > 0.01 * np.max(high, initial=0)
+    brightest = np.max(values, where=np.isfinite(values), initial=0)
+    apart &= np.maximum(low, high, out=high) > 0.01 * brightest
     if count := int(np.any(apart, axis=1).sum()):
         warnings.warn(
             "Rows with the angles of others, and more than twice or less than half their values, are averaged: "
