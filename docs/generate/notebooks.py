@@ -16,7 +16,7 @@ from .made import ROOT, Picture
 
 FOLDER = ROOT / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-COLOURS, QUALITY, WIDTH = 128, 88, 1500
+COLOURS, GROUND, QUALITY, WIDTH = 128, 0.55, 88, 1500
 SECONDS = 900
 ALONE = """\
 import importlib.metadata as metadata
@@ -90,12 +90,16 @@ def _output(output: dict[str, Any]) -> dict[str, Any]:
 
 
 def _reduced(encoded: str) -> tuple[str, str]:
-    """Return a PNG with fewer columns and colours, or a JPEG where that is smaller, as of renderings; and its kind."""
+    """Return the kind of a picture, and the picture with fewer columns: a PNG with fewer colours if most of it is one
+    ground, as in plots, or else a JPEG, since smooth shading would have rings."""
     image = Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGB")
+    buffer, area = io.BytesIO(), image.width * image.height
+    is_drawn = max(image.getcolors(area))[0] > GROUND * area
     if image.width > WIDTH:
         image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
-    png, jpeg = io.BytesIO(), io.BytesIO()
-    image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(png, "png", optimize=True)
-    image.save(jpeg, "jpeg", quality=QUALITY, subsampling=0, optimize=True)
-    kind, smaller = min(("image/png", png), ("image/jpeg", jpeg), key=lambda it: len(it[1].getvalue()))
-    return kind, base64.b64encode(smaller.getvalue()).decode()
+    if is_drawn:
+        few = image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few.save(buffer, "png", optimize=True)
+    else:
+        image.save(buffer, "jpeg", quality=QUALITY, subsampling=0, optimize=True)
+    return "image/png" if is_drawn else "image/jpeg", base64.b64encode(buffer.getvalue()).decode()
