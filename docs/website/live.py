@@ -29,7 +29,7 @@ PAGES: dict[str, tuple[str, list[str]]] = {
     ),
     "measured_paint": (
         "a measured black paint and its fit",
-        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted walter", "--exposure", "4"],
+        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted walter", "--exposure", "3"],
     ),
 }
 """What each page shows: in words, and as arguments of ``mi-brdfs explore``."""
