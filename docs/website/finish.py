@@ -28,7 +28,7 @@ def _finish(context: dict) -> None:
     if body := context.get("body"):
         body = TABLE.sub(_with_headings, body)
         body = re.sub(r'<img (?=alt="\w+: )', '<img class="strip" ', body)
-        body = body.replace('<img alt="Lobes of ', '<img class="strip output" alt="Lobes of ')
+        body = re.sub(r'<img (?=alt="Lobes of \w+ in )', '<img class="strip output" ', body)
         context["metatags"] += _described(context)
         context["body"] = re.sub(r' download=""(?= href="[^"]+\.(?:jpg|png)")', "", body)
 
