@@ -108,7 +108,7 @@ def test_labels_cover_no_picture_and_are_not_cut():
     ]
     image = np.array(sheet(rows))
     assert (image == (255, 0, 0)).all(axis=-1).sum() == 3 * 20 * 20
-    ink = (image < 128).all(axis=-1)
+    ink = (image > 128).all(axis=-1)
     assert ink.sum() > 200
     assert not any(edge.any() for edge in (ink[:4], ink[-4:], ink[:, :4], ink[:, -4:]))
 
@@ -118,10 +118,10 @@ def test_profiles_are_below_their_pictures_on_one_scale():
     flat, step = np.full(90, 0.5), np.repeat([0.0, 1.0], 45)
     image = np.array(sheet([Row({}, [red, red], ["", ""], [flat, step])]).convert("L"), float)
     panels = [image[98:128, start : start + 90] for start in (8, 106)]
-    heights = [np.argmin(panel, axis=0) for panel in panels]
+    heights = [np.argmax(panel, axis=0) for panel in panels]
     assert abs(heights[0] - 15).max() < 3  # half of the largest
     assert heights[1][:40].min() > 26 and heights[1][50:].max() < 4
-    assert (panels[1][13:17, 5:40].min(axis=0) < 230).all()  # the first one
+    assert (panels[1][13:17, 5:40].max(axis=0) > 50).all()  # the first one
 
 
 # --- What is rendered and written -----------------------------------------------------------------------------------

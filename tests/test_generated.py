@@ -60,8 +60,8 @@ def test_another_model_makes_its_own_pages_and_pictures_stale(monkeypatch, as_be
     monkeypatch.setattr(registry, "is_own", lambda model: model is Chalk or is_own(model))
     assert {name(each) for each in everything() if each.is_stale()} == {
         "README.md", "mi_brdfs/models/README.md", "scenes/catalogue.xml",
-        "docs/thumbnails/chalk.png", "docs/thumbnails/large/chalk.jpg", "docs/sweeps/chalk.jpg", "docs/gallery.jpg",
-        "mi_brdfs/explorer/client/models.jpg",
+        "docs/thumbnails/chalk.png", "docs/thumbnails/large/chalk.jpg", "docs/sweeps/chalk.jpg", "docs/lobes/chalk.png",
+        "docs/gallery.jpg", "mi_brdfs/explorer/client/models.jpg",
     }  # fmt: skip
     text = scenes.catalogue()
     assert text.count('<shape type="sphere" id=') == len(own_models())

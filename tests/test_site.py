@@ -75,6 +75,8 @@ def test_every_page_has_its_source(tmp_path):
     write_pages(tmp_path)
     for name in ("index", "gallery", "guide/python", *(f"reference/{model.plugins[0]}" for model in own_models())):
         assert (tmp_path / f"{name}.md").read_text(encoding="utf-8").lstrip().startswith("#"), name
+    rows = re.findall(r"^\| [`a]", models.CHAPTER.read_text(encoding="utf-8"), re.MULTILINE)
+    assert (tmp_path / "folklore.md").read_text(encoding="utf-8").count("* **In circulation:**") == len(rows) > 40
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ def text() -> str:
         *(f"| {' | '.join(cells)} |" for cells in rows),
         "",
         *(f"* {sentence}" for sentence in _sentences(measured["figures"])),
-        f"* Of {sum(len(it['targets']) for it in measured['figures'])} targets {len(measured['missed'])} are missed !; "
+        f"* {len(measured['missed'])} of {sum(len(it['targets']) for it in measured['figures'])} targets are missed; "
         "`python tests/benchmarks` names them.",
     ]
     return "\n".join(lines) + "\n"

@@ -6,13 +6,13 @@ import io
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 import mi_brdfs
 from mi_brdfs import plot
+from mi_brdfs.explorer.materials import BALLS
 from mi_brdfs.fit import fit
 from mi_brdfs.fit.figures import lobes, probe_of
 from mi_brdfs.lobes import LambertLobe
@@ -32,6 +32,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from PIL import Image
 
+from .balls import BALL
 from .made import ROOT, Picture, code
 
 FOLDER = ROOT / "docs" / "pictures"
@@ -44,13 +45,14 @@ MEASURED = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
 def pictures() -> list[Picture]:
     made: dict[str, Callable[[], Image.Image]] = {
         "explorer.jpg": _explorer, "lobes.png": _lobes, "fits.png": _fits, "checker.png": _checker, "globe.jpg": _globe,
+        "published.jpg": _published,
     }  # fmt: skip
     return [Picture(FOLDER / name, partial(_sources, name), partial(_save, draw)) for name, draw in made.items()]
 
 
 def _sources(name: str) -> list[str | bytes]:
     """Return what a picture is made from."""
-    files = {"fits.png": [MEASURED], "globe.jpg": [GLOBE]}.get(name, [])
+    files = {"fits.png": [MEASURED], "globe.jpg": [GLOBE], "published.jpg": [BALLS]}.get(name, [])
     return [code(sys.modules[__name__]), *(file.read_bytes() for file in files if file.is_file())]
 
 
@@ -139,24 +141,38 @@ def _globe() -> Image.Image:
     return Image.fromarray(np.array(display_image(mi.Bitmap(denoise(np.array(image)[..., :3])))))
 
 
+def _published() -> Image.Image:
+    """Some of the balls that the explorer shows of published materials."""
+    return Image.open(BALLS).crop((0, 0, 12 * BALL, 9 * BALL)).resize(SIZE, Image.Resampling.LANCZOS)
+
+
+PARTS = {".frame >> nth=0": (6, 6, 232), ".frame >> nth=1": (6, 242, 232), ".figure.polar": (244, 24, 390),
+         "#view-polar .readout": (250, 282, 378), ".control.number >> nth=0": (250, 372, 378)}  # fmt: skip
+"""What is shown of the explorer's page: where, and how wide."""
+
+
 def _explorer() -> Image.Image:
-    """The page of README's command, in Chromium."""
+    """Parts of the explorer's page in Chromium: pictures and lobes of two metals, and a slider."""
     from playwright.sync_api import sync_playwright
 
     command = [sys.executable, "-m", "mi_brdfs", "explore", *SHOWN, "--no-browser", "--port", "0"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         address = server.stdout.readline().strip()
-        with sync_playwright() as running, tempfile.TemporaryDirectory() as folder:
+        with sync_playwright() as running:
             chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
             flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
             page = running.chromium.launch(executable_path=chromium, args=flags).new_page(
-                viewport={"width": 1280, "height": 960}, device_scale_factor=1
+                viewport={"width": 1280, "height": 960}, device_scale_factor=2
             )
             page.goto(address)
-            page.wait_for_timeout(20_000)
-            page.screenshot(path=f"{folder}/page.png")
-            return Image.open(f"{folder}/page.png").resize(SIZE, Image.Resampling.LANCZOS)
+            page.get_by_text("denoised").nth(1).wait_for(timeout=600_000)
+            shown = Image.new("RGB", SIZE, "white")
+            for place, (x, y, width) in PARTS.items():
+                part = Image.open(io.BytesIO(page.locator(place).screenshot()))
+                size = width, round(width * part.height / part.width)
+                shown.paste(part.resize(size, Image.Resampling.LANCZOS), (x, y))
+            return shown
     finally:
         server.terminate()
         server.wait(20)

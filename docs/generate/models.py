@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from mi_brdfs import preview
+from mi_brdfs import plot, preview
 from mi_brdfs.gallery import overview, sheet, shot, sweep_row
 from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
@@ -26,11 +26,14 @@ REFERENCE = ROOT / "mi_brdfs" / "models" / "README.md"
 THUMBNAILS = ROOT / "docs" / "thumbnails"
 LARGE = THUMBNAILS / "large"
 STRIPS = ROOT / "docs" / "sweeps"
+LOBES = ROOT / "docs" / "lobes"
 GALLERY = ROOT / "docs" / "gallery.jpg"
 CHAPTER = ROOT / "docs" / "folklore.md"
 PICTURES_PER_LINE = 5
 SIZE, SAMPLES = 160, 256
 LARGE_SIZE, STRIP_SIZE, FEWER_SAMPLES = 384, 200, 64
+ANGLE, DPI = 45, 130
+"""Of the lobes."""
 
 INTRODUCTION = """\
 # The plugins
@@ -42,7 +45,8 @@ Directions are unit vectors away from the surface: wi is the given one (towards 
 Every colour and every number is a texture slot; a literal outside its range is an error, and a textured or optimised
 value is clamped to the range where it is evaluated. In polarised variants a model that depolarises reflects light of
 any polarisation as unpolarised light. Pictures show the models of a family in one colour, each with what it is known
-for, strips the effect of one parameter; they are larger behind their links, and `mi-brdfs gallery` renders all of them.
+for, strips and lobes the effect of one parameter; pictures are larger behind their links, and `mi-brdfs gallery`
+renders all of them.
 Diffuse and cartoon models stand under a point light: below each picture of a strip is the luminance along its middle
 line, beside that of the first picture in orange.
 """
@@ -53,7 +57,7 @@ def pages() -> list[Page]:
 
 
 def pictures() -> list[Picture]:
-    """Return two portraits and the main sweep of each model, and the overview of all thumbnails."""
+    """Return two portraits, the main sweep and its lobes of each model, and the overview of all thumbnails."""
     stage = "".join(map(code, (preview, body, studio)))
     found = []
     for model in own_models():
@@ -66,6 +70,8 @@ def pictures() -> list[Picture]:
             found.append(Picture(file, partial(list, sources), partial(_draw_portrait, model, size, spp)))
         sources = [repr((main_sweep(model), stage_of(model), STRIP_SIZE, FEWER_SAMPLES)), stage]
         found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), partial(_draw_strip, model)))
+        sources = [repr((main_sweep(model), ANGLE, DPI))]
+        found.append(Picture(LOBES / f"{name}.png", partial(list, sources), partial(_draw_lobes, model)))
     return [*found, Picture(GALLERY, _thumbnails, _draw_gallery)]
 
 
@@ -85,6 +91,12 @@ def _draw_strip(model: type[Model], path: Path) -> None:
     strip(model).save(path, quality=85, optimize=True)
 
 
+def _draw_lobes(model: type[Model], path: Path) -> None:
+    path.parent.mkdir(exist_ok=True)
+    plot.polar(*main_sweep(model).bsdfs(model.plugins[0]), angles=(ANGLE,)).savefig(path, dpi=DPI)
+    Image.open(path).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=64).save(path, optimize=True)
+
+
 def _draw_gallery(path: Path) -> None:
     all_thumbnails().save(path, quality=90, optimize=True)
 
@@ -92,7 +104,8 @@ def _draw_gallery(path: Path) -> None:
 def reference() -> str:
     """Return the text of the plugin reference."""
     models = own_models()
-    pages = [*map(model_page, models), data_page(), integrator_page(), CHAPTER.read_text(encoding="utf-8")]
+    chapter = re.sub(r"\]\((?=\.\./|scenes/)", "](../../docs/", CHAPTER.read_text(encoding="utf-8"))
+    pages = [*map(model_page, models), data_page(), integrator_page(), chapter]
     parts = [INTRODUCTION, _overview(models), *pages]
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
@@ -115,7 +128,7 @@ def _code(text: str) -> str:
 def strip(model: type[Model], spp: int = FEWER_SAMPLES) -> Image.Image:
     """Render the model's main sweep."""
     name, main, stage = model.plugins[0], main_sweep(model), stage_of(model)
-    return sheet([sweep_row(main, name, stage, [shot(bsdf, stage, STRIP_SIZE, spp) for bsdf in main.bsdfs(name)])])
+    return sheet([sweep_row(main, stage, [shot(bsdf, stage, STRIP_SIZE, spp) for bsdf in main.bsdfs(name)])])
 
 
 def main_sweep(model: type[Model]) -> Sweep:
@@ -136,7 +149,13 @@ def strip_picture(model: type[Model]) -> str:
     """Return the link to the picture of a model's main sweep."""
     name, main = model.plugins[0], main_sweep(model)
     file = f"../../docs/sweeps/{name}.jpg"
-    return f"[![{main.heading(name)}: {', '.join(map(shown, main.values))}]({file})]({file})"
+    return f"[![{name}: {main.heading()}: {', '.join(map(shown, main.values))}]({file})]({file})"
+
+
+def lobes_picture(model: type[Model]) -> str:
+    """Return the picture of the lobes of a model's main sweep."""
+    name = model.plugins[0]
+    return f"![Lobes of {name} in the plane of incidence, at {ANGLE}°](../../docs/lobes/{name}.png)"
 
 
 def _overview(models: list[type[Model]]) -> str:
@@ -148,7 +167,8 @@ def _overview(models: list[type[Model]]) -> str:
 
 def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
-    return _page(model, _picture(model), strip_picture(model), _table(model.energy.rows()), ENERGY_NOTE)
+    pictures = f"{strip_picture(model)}\n\n{lobes_picture(model)}"
+    return _page(model, _picture(model), pictures, _table(model.energy.rows()), ENERGY_NOTE)
 
 
 def data_page() -> str:

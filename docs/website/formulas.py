@@ -44,20 +44,21 @@ BIG = "Σ∫Π"
 FUNCTIONS = {"exp", "log", "max", "min", "cos", "sin", "tan", "mix"}
 PAIRS = {
     "wi", "wo", "nu", "nv", "fd", "fs", "fss", "Rd", "Rs", "Cx", "Cy", "Cz", "Cmax", "ks", "f0", "Dc", "Gc", "Zd", "Zs",
-    "td", "ts", "sd", "ss", "C1", "C2", "C3", "dω_h",
+    "td", "ts", "sd", "ss", "C1", "C2", "C3", "dω_h", "dω", "NL", "NV", "NH", "VH",
 }  # fmt: skip
 """Symbols of more than one Latin letter."""
 
 GREEK = {
     "α": "alpha", "β": "beta", "γ": "gamma", "θ": "theta", "κ": "kappa", "μ": "mu", "π": "pi", "ρ": "rho", "σ": "sigma",
+    "ε": "varepsilon",
     "φ": "varphi", "ω": "omega", "Γ": "Gamma", "Λ": "Lambda", "η": "eta",
 }  # fmt: skip
 LETTER = f"[{''.join(GREEK)}]"
 TOKEN = re.compile(
     rf"""(?P<space>\s+)
     |(?P<number>\d+(?:\.\d+)?)
-    |(?P<trig>(?:cos|sin|tan)(?:[²⁴ⁿᵞ])?(?:θ(?:_[a-z])?|[φαβ]))
-    |(?P<name>π|dω_h|{LETTER}(?:_[a-z]+|[uvdsc](?![a-z]))?|Ē|[A-Za-z]+\d?(?:_[a-z]+)?'?)
+    |(?P<trig>(?:cos|sin|tan)(?:[²⁴ⁿᵞ])?(?:[θφ](?:_[a-z])?|[αβ]))
+    |(?P<name>π|dω_h|dω|{LETTER}(?:_[a-z]+|[uvdsc](?![a-z]))?|Ē|[A-Za-z]+\d?(?:_[a-z]+)?'?)
     |(?P<power>[{"".join(SUPERSCRIPTS)}]+)
     |(?P<sign><=|>=|[-+/·()|,;=<>∝→≠^√{BIG}{"".join(FRACTIONS)}])""",
     re.VERBOSE,

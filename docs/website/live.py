@@ -29,7 +29,7 @@ PAGES: dict[str, tuple[str, list[str]]] = {
     ),
     "measured_paint": (
         "a measured black paint and its fit",
-        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted walter", "--exposure", "2"],
+        [MEASURED.name, "fit.json:walter", "--labels", "measured,fitted walter", "--exposure", "3"],
     ),
 }
 """What each page shows: in words, and as arguments of ``mi-brdfs explore``."""
@@ -38,7 +38,7 @@ PAGES: dict[str, tuple[str, list[str]]] = {
 def links() -> str:
     """Return a paragraph that leads to the pages, with a picture of each."""
     cells = (f'<a href="{name}.html"><img src="{name}.jpg" alt="">{words}</a>' for name, (words, _) in PAGES.items())
-    return f'Try it without an installation:\n\n<div class="live">{"".join(cells)}</div>'
+    return f'Try it without installing anything:\n\n<div class="live">{"".join(cells)}</div>'
 
 
 def write_pages(folder: Path) -> None:

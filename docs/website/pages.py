@@ -19,7 +19,7 @@ from mi_brdfs.model import Model, Plugin
 from mi_brdfs.tabulated.tabulated import Tabulated
 
 from . import live, notebooks
-from .reference import with_formulas
+from .reference import inline, with_formulas
 
 GUIDE = {
     "docs/python.md": "guide/python",
@@ -83,8 +83,7 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
         if (ROOT / file).is_file():
             pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
     pages["index"] = ("README.md", _front())
-    folklore = pages["folklore"][1].replace("## What", "# What", 1)
-    pages["folklore"] = ("docs/folklore.md", f"---\nhide-toc: true\n---\n{folklore}")
+    pages["folklore"] = ("docs/folklore.md", _folklore(pages["folklore"][1]))
     for page, title in TITLES.items():
         origin, text = pages[page]
         pages[page] = origin, re.sub(r"\A# .*", f"# {title}", text)
@@ -154,10 +153,31 @@ def _scene(path: Path) -> str:
 
 
 def _gallery() -> str:
-    parts = ["# Gallery", "Each picture leads to the page of its model; below is the effect of its main parameter."]
-    parts.append(_thumbnails())
+    about = (
+        "The models by family and year, each with what it is known for; each picture leads to the page of its model. "
+        "Below is the effect of each model's main parameter. Diffuse and cartoon models stand under a point light, "
+        "with a curve below each picture: the luminance along its middle line, beside that of the first picture in "
+        "orange, as far as the two differ."
+    )
+    parts = ["# Gallery", about, _thumbnails()]
     for model in by_family(own_models()):
-        parts += [f"## {model.plugins[0]}", models.strip_picture(model)]
+        name = model.plugins[0]
+        parts += [f"## {name}", f"{_summary(name)} [Formulas and parameters](#{name})", models.strip_picture(model)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _folklore(chapter: str) -> str:
+    """Return the chapter on the folklore with a section for each model in place of its table, and its formulas set."""
+    about, _, table = chapter.removeprefix("#").partition("\n| ")
+    (_, *labels), _, *rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in table.splitlines()]
+    parts = [with_formulas(about.rstrip().replace("(#shading)", "(../mi_brdfs/models/README.md#shading)"), ())]
+    for name, errors in groupby(rows, key=lambda row: row[0].strip("`")):
+        own = f"[Its page](../mi_brdfs/models/README.md#{name}) has the published model."
+        parts += ["## Any model"] if name == "any" else [f"## {name}", own]
+        for _, *cells in errors:
+            told = zip(labels, cells, strict=False)
+            lines = [f"**{label.capitalize()}:** {inline(cell, ())}" for label, cell in told if cell]
+            parts.append("* " + "\\\n  ".join(lines))
     return "\n\n".join(parts) + "\n"
 
 
@@ -166,7 +186,7 @@ def _thumbnails() -> str:
 
     def cell(model: type[Model]) -> str:
         name = model.plugins[0]
-        return f"[![{name}](../../docs/thumbnails/{name}.png)](#{name})\n[`{name}`](#{name})\\\n{year(model)}"
+        return f"[![{name}](../../docs/thumbnails/large/{name}.jpg)](#{name})\n[`{name}`](#{name})\\\n{year(model)}"
 
     families = "\n".join(
         f":::::{{container}} family\n**{family}**\n\n::::{{container}} pictures\n"

@@ -32,20 +32,20 @@ def _paragraph(text: str, parameters: Collection[str]) -> str:
         return text
     if text.lstrip("\n").startswith("|"):
         return "\n".join(_row(line, parameters) for line in text.split("\n"))
-    return _linked(_inline(text, parameters))
+    return _linked(inline(text, parameters))
 
 
 def _row(line: str, parameters: Collection[str]) -> str:
     """Set the formulas in the last cell of a row, which is text."""
     *cells, text, end = re.split(r"(?<!\\)\|", line) if line else ["", "", ""]
-    return "|".join([*cells, _inline(text, ()), end]) if line else line
+    return "|".join([*cells, inline(text, ()), end]) if line else line
 
 
 def _linked(text: str) -> str:
     return DOI.sub(r"[doi:\1](https://doi.org/\1)", URL.sub(r"<\1>", text))
 
 
-def _inline(text: str, parameters: Collection[str]) -> str:
+def inline(text: str, parameters: Collection[str]) -> str:
     """Return a paragraph with its formulas between dollar signs."""
     hidden = PROTECTED.sub(lambda match: "☐" * len(match[0]), text)
     out, at = [], 0

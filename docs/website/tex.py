@@ -76,8 +76,8 @@ def symbol(name: str) -> str:
         return rf"\{trig[1]} {symbol(trig[2])}"
     if name == "Ē":
         return r"\bar{E}"
-    if name == "dω_h":
-        return r"\mathrm{d}\omega_h"
+    if name.startswith("dω"):
+        return rf"\mathrm{{d}}{symbol(name[1:])}"
     prime = "'" if name.endswith("'") else ""
     base, _, below = name.rstrip("'").partition("_")
     if len(base) > 3 and base != "Cmax":

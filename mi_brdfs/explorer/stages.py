@@ -191,6 +191,7 @@ def load(setting: Setting, user: UserScene) -> Stage:
     if environment:
         scene["studio"]["bitmap"] = _environment(setting.stage, environment)
     if setting.stage == INCIDENCE:
+        del scene["sky"]
         scene["light"] = {"type": "directional", "irradiance": IRRADIANCE}
     scene["sensor"]["film"] |= {"width": setting.size, "height": setting.size, "rfilter": {"type": "box"}}
     if setting.shape != "body":

@@ -145,11 +145,11 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
     return sheet(rows)
 
 
-def sweep_row(sweep: Sweep, type: str, stage: str, shots: list[Shot]) -> Row:
+def sweep_row(sweep: Sweep, stage: str, shots: list[Shot]) -> Row:
     """Return the pictures of a sweep, as far as they go; under a point light, with their profiles."""
     captions = [shown(value) for value in sweep.values[: len(shots)]]
     profiles = [each.profile for each in shots] if stage == "point" else []
-    return Row({0: sweep.heading(type)}, [each.picture for each in shots], captions, profiles)
+    return Row({0: sweep.heading()}, [each.picture for each in shots], captions, profiles)
 
 
 class Entry:
@@ -165,7 +165,7 @@ class Entry:
     def rows(self) -> list[Row]:
         """Return a row for each sweep, as far as there are pictures."""
         shots = iter(self.shots[1:])
-        rows = [sweep_row(sweep, "", self.stage, list(islice(shots, len(sweep.values)))) for sweep in self.sweeps]
+        rows = [sweep_row(sweep, self.stage, list(islice(shots, len(sweep.values)))) for sweep in self.sweeps]
         return [row for row in rows if row.pictures]
 
     def wall(self) -> list[Row]:

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-PAPER, INK, FAINT, FIRST = "white", "#222222", "#666666", "#e08214"
+PAPER, INK, FAINT, FIRST = "#15181d", "#e8eaed", "#9aa0a8", "#e8912d"
+PROFILES = "Below each picture: the luminance along its middle line; orange: that of the first."
 GAP = 8
 FINER = 3
 """How many times larger profiles are drawn, for smooth lines."""
@@ -35,10 +36,11 @@ def sheet(rows: list[Row]) -> Image.Image:
     column = max(size, *(_width(font, caption) for caption in captions)) + GAP
     lines = max(caption.count("\n") for caption in captions) + 1
     heights = [
-        (line + GAP // 2 if row.headings else 0) + size + (size // 3 if row.profiles else 0) + lines * line + 2 * GAP
+        size + lines * line + 2 * GAP + bool(row.headings) * (line + GAP // 2) + bool(row.profiles) * (line + size // 3)
         for row in rows
     ]
     reach = [column * at + _width(font, text) + GAP for row in rows for at, text in row.headings.items()]
+    reach += [_width(font, PROFILES) + GAP for row in rows if row.profiles]
     width = max([column * len(row.pictures) for row in rows] + reach)
 
     image = Image.new("RGB", (width + GAP, sum(heights) + GAP), PAPER)
@@ -60,6 +62,8 @@ def sheet(rows: list[Row]) -> Image.Image:
             for number, text in enumerate(caption.split("\n")):
                 middle = (x + (column - GAP) / 2, below + GAP // 4 + number * line)
                 draw.text(middle, text, FAINT if number else INK, font, anchor="ma")
+        if row.profiles:
+            draw.text((GAP, top + height - GAP), PROFILES, FAINT, font, anchor="ld")
         top += height
     return image
 

@@ -22,10 +22,10 @@ class Sweep:
         names = self.parameter.split(", ")
         return [{"type": type, **self.given, **dict.fromkeys(names, value)} for value in self.values]
 
-    def heading(self, type: str = "") -> str:
-        """Return the heading: the model if it is told, the parameter, and what is given."""
+    def heading(self) -> str:
+        """Return the heading: the parameter, and what is given."""
         given = ", ".join(f"{name} = {shown(value)}" for name, value in self.given.items())
-        return (f"{type}: " if type else "") + self.parameter + (f", with {given}" if given else "")
+        return self.parameter + (f", with {given}" if given else "")
 
 
 def shown(value: Any) -> str:

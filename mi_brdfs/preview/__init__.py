@@ -24,7 +24,7 @@ def preview_scene(bsdf: str | dict | mi.BSDF, stage: str = "studio") -> dict:
         stage: the light. ``studio``, an environment with something to reflect: a softbox and a thin strip on the left,
             a strip on the right, a panel above and a rim from behind; no radiance is above 5, and white paper is about
             1. ``lamp``, two small lamps in the dark, for the shape of highlights and their tails. ``point``, one point
-            light on the left and no interreflection, for bands, limb and terminator.
+            light on the left, a faint sky and no interreflection, for bands, limb and terminator.
 
     Returns:
         A dict for ``mi.load_dict``, to be changed at will before loading; it belongs to the active variant.
@@ -66,7 +66,8 @@ def _lamps() -> dict[str, dict]:
 
 
 def _point() -> dict[str, dict]:
-    return {"light": {"type": "point", "position": [-15.5, -16.0, 10.0], "intensity": 1700.0}}
+    light = {"type": "point", "position": [-15.5, -16.0, 10.0], "intensity": 1700.0}
+    return {"light": light, "sky": {"type": "constant", "radiance": 0.06}}  # shows the whole outline
 
 
 STAGES: dict[str, Callable[[], dict[str, dict]]] = {"studio": _studio, "lamp": _lamps, "point": _point}
