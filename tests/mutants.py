@@ -817,6 +817,14 @@ MUTANTS = [
     ),
     mutant("energy gained in blue", "albedo", diffuse(lambda wi, wo: mi.Color3f(1, 1, 1.2)), reflectance=0.9),
     mutant("energy gained at grazing", "albedo", diffuse(lambda wi, wo: 1 + dr.power(1 - wi.z, 20)), reflectance=0.7),
+    mutant(
+        "energy gained across the scratches",
+        "albedo",
+        walter(changed(MicrofacetLobe, lambda wi, wo: (1 + 2 * wi.y**4) * (1 + 2 * wo.y**4))),
+        alpha_u=0.3,
+        alpha_v=0.1,
+        specular_reflectance=0.5,
+    ),
     mutant("not a number straight back", "finite", diffuse(nothing_over_nothing)),
     mutant(
         "cut a quarter of a degree above the horizon",

@@ -188,12 +188,15 @@ def test_what_is_no_request_is_refused(address):
             assert connection.recv(1000).startswith(b"HTTP/1.0 400 "), request[:20]
 
 
-@pytest.mark.parametrize("name, ours", [("evil.example:80", False), ("192.0.2.7:80", True), ("[::1]:80", True)])
+@pytest.mark.parametrize(
+    "name, ours",
+    [("evil.example:80", False), ("192.0.2.7:80", True), ("[::1]:80", True), ("desk.local:80", True), ("DESK", False)],
+)
 def test_names_of_a_machine_on_all_networks(name, ours):
     """Other pages can give their own names our address, but not go by an address."""
     from mi_brdfs.explorer.server import Explorer
 
-    assert Explorer(None, [], {}, ["localhost", "0.0.0.0"], False)._is_ours(name) is ours
+    assert Explorer(None, [], {}, ["localhost", "Desk.local", "0.0.0.0"], False)._is_ours(name) is ours
 
 
 def test_other_pages_of_the_browser_are_refused(address):

@@ -2,6 +2,7 @@
 f cosθ, grids, and files read back."""
 
 import itertools
+import re
 import warnings
 
 import merl_tables
@@ -11,6 +12,8 @@ from support import shared, spherical, written
 
 from mi_brdfs.measured import FileError, Grid, Samples, read
 from mi_brdfs.measured.formats import csv, zemax
+from mi_brdfs.measured.report.summary import summarize
+from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.measured.source import Source
 
 
@@ -111,7 +114,7 @@ def test_alta_values(tmp_path):
 
 
 def test_alta_vectors_have_any_length_but_none(tmp_path):
-    rows = [(*(3 * V), *(1e-200 * L), 0.5), (*V, *V, 0.1)]
+    rows = [(*(3 * V), *(1e-200 * L), 0.5), (*L, *V, 0.1)]
     samples = measured(tmp_path, alta("CARTESIAN", rows), "x.dat").data
     np.testing.assert_allclose([samples.wi[0], samples.wo[0]], [L, V], atol=1e-9)
     with pytest.raises(FileError, match=r"in line 5, .* a direction is the zero vector"):
@@ -158,7 +161,7 @@ def test_what_a_file_states_counts(tmp_path, held, asked):
 
 # --- CSV ------------------------------------------------------------------------------------------------------------
 
-ROWS = list(itertools.product((0, 30, 60), (0, 20, 40), (0, 90, 180)))
+ROWS = list(itertools.product((0, 30, 60), (0, 20, 40), range(0, 181, 30)))
 
 
 def f_of(theta_i, theta_o, delta):
@@ -221,7 +224,8 @@ def test_rows_that_contradict_others_are_told(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         measured(tmp_path, table() + noisy, "x.csv")
-    with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 27"):
+        measured(tmp_path, table() + other + "50,50,10,1000\n", "x.csv")
+    with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 63"):
         measured(tmp_path, table() + other, "y.csv")
 
 
@@ -235,15 +239,50 @@ def test_rows_of_anisotropic_materials(tmp_path):
     assert [axis.period for axis in data.axes[2:]] == [2 * np.pi, 2 * np.pi]
     found = data.evaluate(spherical(40, 270), spherical(20, 270 + 300), "nearest")
     np.testing.assert_allclose(found, 40 + 0.2 + 270e-5 + 300e-7, rtol=1e-9)
-    once = "\n".join(line for line in table().splitlines() if ",0,90," not in line and ",0,180," not in line)
+    once = "\n".join(line for line in table().splitlines() if not re.search(r"^\d+,0,[1-9]", line))
     assert isinstance(measured(tmp_path, once, "x.csv").data, Grid)
 
 
 def test_angles_on_the_other_side_of_the_normal(tmp_path):
     rows = "\n".join(f"{i},{o},0,{i + o + 100}" for i, o in itertools.product((20, 40), (-60, -20, 20, 60)))
     measurement = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv")
-    assert isinstance(measurement.data, Grid)
     np.testing.assert_allclose(value_at(measurement, spherical(40, 0), spherical(60, 180)), 80)
+
+
+def highlight(wi, wo):
+    """A reciprocal and isotropic highlight."""
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
+    return 0.1 + np.exp(-20 * (1 - half[..., 2] ** 2))
+
+
+@pytest.mark.parametrize(
+    "azimuths",
+    [lambda i, d: (180, 180 + d), lambda i, d: (180 if i else 0, 180 + d), lambda i, d: (-d, 0)],
+    ids=["light at 180°", "light at 180°, but 0 at the normal", "light goes round"],
+)
+def test_isotropic_materials_are_recognized(tmp_path, azimuths):
+    """Whichever azimuth a file keeps; at the normal one means nothing."""
+    rows = []
+    for i, o, d in itertools.product((0, 30, 60), (0, 20, 40), range(0, 360, 30)):
+        phi_i, phi_o = azimuths(i, d)
+        rows.append(f"{i},{phi_i},{o},{phi_o},{highlight(spherical(i, 0), spherical(o, d))}")
+    data = measured(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows), "x.csv").data
+    assert isinstance(data, Grid) and not data.anisotropic
+    wi, wo = spherical(30, 50), spherical(20, 200)
+    np.testing.assert_allclose(data.evaluate(wi, wo), highlight(wi, wo), rtol=1e-3)
+
+
+@pytest.mark.parametrize("step", [180, 90, 60])
+def test_highlights_are_not_smeared_around_the_normal(tmp_path, step):
+    """Between azimuths that are far apart, as those of the plane of incidence, half vectors say where they are; a table
+    of azimuths would be several times too bright there."""
+    angles = itertools.product(range(0, 81, 10), range(0, 81, 5), range(0, 181, step))
+    rows = [f"{i},{o},{d},{highlight(spherical(i, 0), spherical(o, d))}" for i, o, d in angles]
+    measurement = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + "\n".join(rows), "x.csv")
+    wi, wo = spherical(60, 0), np.stack([spherical(o, d) for o, d in itertools.product((40, 60), range(100, 181, 10))])
+    found = as_grid(measurement.data).evaluate(wi, wo)[:, 0]
+    np.testing.assert_allclose(found, highlight(wi, wo), atol=0.1)
+    assert ("plane of incidence only" in str(summarize(measurement).rows())) == (step == 180)
 
 
 # --- Writers --------------------------------------------------------------------------------------------------------

@@ -64,7 +64,8 @@ class Explorer:
     def __init__(
         self, engine: Engine, sources: list[BSDFSource], initial: dict[str, Any], hosts: list[str], notebook: bool
     ) -> None:
-        self.engine, self.initial, self.hosts = engine, initial, hosts
+        # Browsers send names in small letters.
+        self.engine, self.initial, self.hosts = engine, initial, [host.lower() for host in hosts]
         self.policy = POLICY + (NOTEBOOKS if notebook else "'none'")
         self.named = {it.word: it for it in sources}
         self.folder = tempfile.TemporaryDirectory(prefix="mi-brdfs-explore-")
@@ -84,7 +85,7 @@ class Explorer:
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
         """Refuse requests that another page of the browser sends, under its own name or under ours."""
         origin = request.headers.get("Origin")
-        if not self._is_ours(request.host) or (origin and origin.partition("://")[2] != request.host):
+        if not self._is_ours(request.host) or (origin and origin.partition("://")[2].lower() != request.host.lower()):
             raise web.HTTPForbidden(text="This server answers only its own page.")
         response = await handler(request)
         if not response.prepared:
@@ -93,7 +94,7 @@ class Explorer:
         return response
 
     def _is_ours(self, host: str) -> bool:
-        name = host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host
+        name = (host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host).lower()
         if name in self.hosts or ANY.isdisjoint(self.hosts):
             return name in self.hosts
         # A page of another server can give its name our address, but cannot take an address for its name.

@@ -142,12 +142,13 @@ def _bounded(work: Work, element: Element) -> Element:
 
 @rule("bsdf", "conductor", "roughconductor")
 def _conductor(work: Work, element: Element) -> Element:
-    index, given = element.number("ext_eta", 0), [it for it in element.of("rgb", "float") if it.name in ("eta", "k")]
-    if given and index > 0:
+    exterior, given = element.pop("ext_eta"), [it for it in element.of("rgb", "float") if it.name in ("eta", "k")]
+    if exterior and given:
         for it in given:
-            element.put(times(it, [1 / index]))
-        element.pop("ext_eta")
+            element.put(times(it, [1 / _index(exterior)]))
         work.changed(element, f"eta and k of {element.type} are divided by extEta")
+    elif exterior and not np.isclose(_index(exterior), 1, atol=1e-3):
+        work.dropped(element, "extEta beside the spectra of a metal, which are not divided by it: they are as in air")
     if not element["material"] and not element["eta"]:
         element.set("material", "Cu")
         work.changed(element, f"{element.type} without a material is copper, as in 0.6")
@@ -160,6 +161,20 @@ def _conductor(work: Work, element: Element) -> Element:
         element.set("exponent", max(2 / max(alphas.pop() ** 2, 1e-8) - 2, 0.1))  # as 0.6 converts α
         element.type = "microfacet"
     return _bounded(work, element)
+
+
+def _index(element: Element) -> float:
+    """Return an index of refraction, which is a number or the name of a substance."""
+    if element.tag != "string":
+        return max(element.numbers(1)[0], 1e-6)
+    # No variant needs to be set.
+    scalar, properties = (importlib.import_module(f"mitsuba.{name}") for name in ("scalar_rgb", "mitsuba_ext"))
+    props = properties.Properties()
+    props["index"] = element.value
+    try:
+        return scalar.lookup_ior(props, "index", 1.0)
+    except RuntimeError:
+        raise element.error(f"{element.value!r} is no index of refraction") from None
 
 
 @rule("bsdf", "bumpmap", "normalmap")

@@ -22,7 +22,7 @@ from .coordinates import turned_about_normal
 from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .measurement import Grid, Measurement, usable
-from .report.counts import census
+from .report.counts import census, in_one_plane
 from .report.summary import ends, percent
 from .scattered import as_grid
 from .source import Source, batches, pairs
@@ -161,6 +161,8 @@ def _not_measured(measurement: Measurement) -> Iterator[str]:
             f"{percent(found.above.missing / found.above.values)} of its values were missing; they are filled in from "
             "those around them, with 0 where there are none."
         )
+    if in_one_plane(data):
+        yield "It was measured in the plane of incidence only; what lies beside it is interpolated."
     ranges = [("θi", *ends(data, "theta_i", found.theta_i)), ("θo", *ends(data, "theta_o", found.theta_o))]
     told = [f"{name} {low:.4g} to {high:.4g}°" for name, low, high in ranges if low > NEAR_NORMAL or high < BAKED_TO]
     if told:

@@ -15,6 +15,8 @@ from .text import TextFile
 
 SAME = 1e-6
 """By how much, in radians, angles of one node may differ."""
+COARSE = math.radians(35)
+"""The step in azimuth from which half and difference angles interpolate better than a table: half as wide as lobes."""
 LEAST_COSINE = 1e-4
 """Below it, f cosθ says nothing of f."""
 
@@ -37,15 +39,18 @@ def arranged(
 ) -> Grid | Samples:
     """Return rows of angles in radians, shape (N,), and values, shape (N, channels), as a grid of
     :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with each other, and as samples if
-    not. Rows of a single φi are of an isotropic material. A negative θ means the other side of the normal. Rows of the
-    same angles are averaged, with a warning if one is more than twice another.
+    not. Rows of a single φi or φo are of an isotropic material. A negative θ means the other side of the normal. Rows
+    of the same angles are averaged, with a warning if one is more than twice another.
     """
     warn_of_contradictions((theta_i, phi_i, theta_o, phi_o), values)
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
-    anisotropic = bool(np.ptp(around_zero(phi_i - phi_i[0])) > SAME)
+    turned_i, turned_o = phi_i[theta_i > SAME], phi_o[theta_o > SAME]
+    anisotropic = not any(is_single(each) for each in (turned_i, turned_o))
     if not anisotropic:
-        phi_o, phi_i = phi_o - phi_i, np.zeros_like(phi_i)
+        # At the normal the azimuth means nothing, and files have any there.
+        phi_o = phi_o - np.where(theta_i > SAME, phi_i, turned_i[:1].sum())
+        phi_i = np.zeros_like(phi_i)
     return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
         stacked(spherical(theta_i, phi_i)), stacked(spherical(theta_o, phi_o)), values, anisotropic
     )
@@ -60,12 +65,18 @@ def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -
     np.abs(low, out=low)
     np.abs(high, out=high)
     apart = (high > 2 * low) | (low > 2 * high)
-    apart &= np.maximum(low, high, out=high) > 0.01 * np.max(high, initial=0)
+    brightest = np.max(values, where=np.isfinite(values), initial=0)
+    apart &= np.maximum(low, high, out=high) > 0.01 * brightest
     if count := int(np.any(apart, axis=1).sum()):
         warnings.warn(
             "Rows with the angles of others, and more than twice or less than half their values, are averaged: "
             f"{count:,}.", stacklevel=2,
         )  # fmt: skip
+
+
+def is_single(azimuths: np.ndarray) -> bool:
+    """Return whether there is at most one azimuth."""
+    return not len(azimuths) or bool(np.ptp(around_zero(azimuths - azimuths[0])) <= SAME)
 
 
 def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +92,8 @@ def gathered(
     values: np.ndarray,
     anisotropic: bool,
 ) -> Grid | None:
-    """Return the grid that rows fill, None if they do not."""
+    """Return the grid that rows fill, None if they do not, or if isotropic ones are so far apart in azimuth, as in the
+    plane of incidence, that a table would smear the highlight between them."""
     delta = np.pi - around_zero(np.pi - phi_o + phi_i)
     mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
     delta = abs(delta) if mirrored else around_zero(delta)
@@ -93,6 +105,8 @@ def gathered(
         if size > 2 * len(values) + 4:  # more than single rows at poles could stand for
             return None
         place = place * len(different) + rank
+    if not anisotropic and np.diff(nodes[2]).max(initial=np.pi * (len(nodes[2]) == 1)) > COARSE:
+        return None
     shape = tuple(len(each) for each in nodes)
     count = np.bincount(place, minlength=size)
     table = np.zeros((size, values.shape[1]))

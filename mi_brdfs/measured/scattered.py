@@ -15,7 +15,7 @@ MOST_VALUES = 1 << 23
 """The most nodes times channels: spectra with many wavelengths get fewer nodes."""
 SHARES = {False: np.array([4.0, 4.0, 1.0]), True: np.array([2.0, 1.5, 1.5, 2.0])}
 """How finely √θh, θd, φd (of isotropic materials, only up to π/2) and φh are divided, compared with each other."""
-PAIRS, CHUNK, CHUNK_VALUES = 4096, 8192, 1 << 18
+PAIRS, CHUNK, CHUNK_VALUES = 1 << 14, 8192, 1 << 18
 """How many distances are computed at once, and how many nodes and values are interpolated at once."""
 RIDGE = 1e-2
 """How much the weights prefer their start to balancing, in units of the neighbourhood: the samples around a node at the
@@ -134,7 +134,7 @@ def nearest(points: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
     """Return the indices of the nearest points of each node, shape (nodes, count).
 
     Nodes are halved until few are left, and with them the points in question: those of a group are no further from its
-    middle than the middle's own are, and twice the reach of the group."""
+    box than the middle's own are from that, and the reach of the group."""
     index = np.empty((len(nodes), count), dtype=np.int64)
     groups = [(np.arange(len(nodes)), np.arange(len(points)))]
     while groups:
@@ -142,8 +142,10 @@ def nearest(points: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
         low, high = nodes[group].min(axis=0), nodes[group].max(axis=0)
         middle = (low + high) / 2
         reach = np.sqrt(np.max(np.sum((nodes[group] - middle) ** 2, axis=1)))
-        distance = np.sqrt(np.sum((points[near] - middle) ** 2, axis=1))
-        near = near[distance <= np.partition(distance, count - 1)[count - 1] + 2 * reach + 1e-12]
+        offset = abs(points[near] - middle)
+        own = np.partition(np.einsum("nd,nd->n", offset, offset), count - 1)[count - 1]
+        outside = np.maximum(offset - (high - low) / 2, 0)
+        near = near[np.einsum("nd,nd->n", outside, outside) <= (np.sqrt(own) + reach + 1e-12) ** 2]
         if len(group) * len(near) > PAIRS and len(group) > 1:
             order = np.argsort(nodes[group, np.argmax(high - low)])
             groups += [(group[half], near) for half in np.array_split(order, 2)]

@@ -190,6 +190,8 @@ def value_of(text: str) -> Any:
     """Return a number, true or false, a colour given as #rrggbb (sRGB) or r;g;b (linear), or else a word."""
     if text in ("true", "false"):
         return text == "true"
+    if "_" in text:  # which Python ignores in numbers
+        return text
     for number in (int, float):
         try:
             return number(text)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from math import isfinite, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
+import mitsuba as mi
 import numpy as np
 
 from ..parameters.messages import listed
@@ -37,7 +38,8 @@ def albedo(run: Run) -> Findings:
         added = limits.diffuse if part.component is None else 0
         angles = sorted({*run.angles, 0, 45, 70, 85, 89, 89.9})
         for side, theta in ((side, theta) for side in part.sides for theta in angles):
-            name, wi = named(theta, side), on_side(direction(theta, 17), side)
+            name, azimuth = named(theta, side), _brightest_azimuth(run, part, theta, side)
+            wi = on_side(direction(theta, azimuth), side)
             samples = run.probe.sample(part, wi, points)
             weights = samples.weight * np.where(samples.weight.any(axis=1), samples.eta, 1)[:, None] ** 2
             copies = weights.reshape(SHIFTS, -1, weights.shape[1]).mean(axis=1)
@@ -47,8 +49,9 @@ def albedo(run: Run) -> Findings:
             least = np.nan_to_num(means - 5 * noises, nan=np.inf)
             k = int(np.argmax(least))
             alike = np.ptp(means) <= 1e-4 * abs(means[k])
-            words = f"light from {name} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
-            found.append(Reflected(name, mean, float(least[k]), words))
+            place = name + (f", φ = {azimuth:g}°" if azimuth != AZIMUTHS[0] else "")
+            words = f"light from {place} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
+            found.append(Reflected(place, mean, float(least[k]), words))
             if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
@@ -57,6 +60,15 @@ def albedo(run: Run) -> Findings:
             words = f"Not judged: mend {listed(failing, 'and')} first; only then the mean of the weights is the albedo."
             finding = Finding("albedo", part.name, "skip", words, outcome.data)
         yield finding
+
+
+def _brightest_azimuth(run: Run, part: Part, theta: float, side: int) -> float:
+    """Return the azimuth, of a few, of which an anisotropic part reflects most."""
+    if not part.has(mi.BSDFFlags.Anisotropic):
+        return AZIMUTHS[0]
+    wi = on_side(direction(np.full(len(AZIMUTHS), theta), AZIMUTHS).T, side)
+    means = luminance(run.probe.weights(part, wi, lattice(5, 5))).mean(axis=1)
+    return float(AZIMUTHS[np.argmax(np.nan_to_num(means))])
 
 
 def _failing(run: Run, part: Part) -> list[str]:
@@ -71,6 +83,8 @@ def _failing(run: Run, part: Part) -> list[str]:
 
 TOLERANCE = 1e-3
 """Of float32, relatively."""
+AZIMUTHS = 17 + 22.5 * np.arange(16)
+"""In degrees; the first one serves where the azimuth changes nothing."""
 
 
 class Reflected(NamedTuple):

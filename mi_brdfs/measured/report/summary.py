@@ -11,7 +11,7 @@ from ..files import named
 from ..measurement import FileError, Grid, Measurement, Samples
 from ..scattered import as_grid
 from .albedo import albedos, coverage
-from .counts import Counts, Range, census
+from .counts import Counts, Range, census, in_one_plane
 from .reciprocity import ReciprocityError, reciprocity_error
 
 ANGLES = np.arange(0, 86, 5)
@@ -73,6 +73,8 @@ class Summary:
     """From the least to the largest angle at which anything was measured."""
     coverage: Range
     """The least and the largest share of the hemisphere of wo, by solid angle, that was measured at one wi."""
+    planar: bool
+    """Whether all of it was measured in planes through the normal, of which the coverage is 0."""
     above: Counts
     """Of pairs of directions above the horizon."""
     below: Counts
@@ -122,6 +124,8 @@ class Summary:
         low, high = (f"{100 * share:.0f}" for share in self.coverage)
         ends = [f"{name} {start:.4g} to {end:.4g}°" for name, (start, end) in
                 (("θi", self.theta_i), ("θo", self.theta_o))]  # fmt: skip
+        if self.planar:
+            return f"{', '.join(ends)}; in the plane of incidence only, the rest is interpolated"
         if low == high == "100":
             return f"all directions, {ends[0]}" if self.theta_i != (0, 90) else "all directions"
         return f"{', '.join(ends)}; {low if low == high else f'{low} to {high}'} % of the hemisphere at each θi"
@@ -165,7 +169,8 @@ def summarize(measurement: Measurement) -> Summary:
     angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
     turns = azimuths(grid)
     turns = thinned(turns, AZIMUTHS)
-    covered = np.array([coverage(grid, np.radians(angles), phi) for phi in turns])
+    planar = in_one_plane(data)
+    covered = np.array([coverage(grid, np.radians(angles), phi) for phi in turns]) * (not planar)
     return Summary(
         file=named(measurement.path),
         format=measurement.format,
@@ -177,6 +182,7 @@ def summarize(measurement: Measurement) -> Summary:
         theta_i=theta_i,
         theta_o=theta_o,
         coverage=(float(covered.min(initial=1)), float(covered.max(initial=0))),
+        planar=planar,
         above=found.above,
         below=found.below,
         most_negative=min(found.least, 0) / found.most if found.most > 0 else 0,
