@@ -47,10 +47,7 @@ def oracle(name: str, material) -> float:
     "file",
     [
         "AnoBlackEC1onAlum.bsdf",
-        *(
-            pytest.param(name, marks=pytest.mark.slow)
-            for name in ("aeroglaze_z307.bsdf", "rgl")
-        ),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("aeroglaze_z307.bsdf", "rgl")),
     ],
 )
 def test_no_worse_than_least_squares(name, file):

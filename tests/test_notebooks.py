@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mi_brdfs
+from mi_brdfs.plot import maps
 from notebooks import FOLDER, NOTEBOOKS, code_cells, read_notebook, run_notebook
 
 # --- What they say --------------------------------------------------------------------------------------------------
@@ -212,6 +213,17 @@ def test_committed_form(path):
     numbers = [re.match(r"\*\*Solution (\d)\.\*\* ", text) for text in solutions]
     assert [found[1] for found in numbers if found] == re.findall(r"^(\d)\. ", exercises, re.MULTILINE) != []
     assert numbers[0] and not any(tagged[tagged.index(True) + len(solutions) :])
+
+
+def test_texts_name_the_marks_that_are_drawn():
+    """Of directions on a hemisphere."""
+    drawn = {{"o": "circle", "+": "cross"}[mark["marker"]] for mark in (maps.WI, maps.MIRROR)}
+    named = set()
+    for path in NOTEBOOKS:
+        text = "".join("".join(cell["source"]) for cell in read_notebook(path)["cells"])
+        for sentence in re.findall(r"`plot\.hemisphere` maps.*?\.\s", text, re.DOTALL):
+            named |= set(re.findall(r"circle|cross|triangle|square|dot|arrow", sentence))
+    assert named == drawn
 
 
 def test_every_notebook_has_its_place():

@@ -8,12 +8,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib import pyplot, rcParams
+from matplotlib.colors import to_rgb
 from support import LOFT, ROOT, call, context, direction
 from test_cli import invoke
 
 from mi_brdfs import plot
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.plot import command
+from mi_brdfs.probe import curves as curves_of
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -225,14 +227,15 @@ def test_each_curve_over_its_maximum():
 
 @pytest.mark.slow
 def test_red_green_and_blue():
-    """In a row for each angle, a style for each BSDF, and without the word luminance."""
+    """In a row for each angle, a style for each BSDF, and without the word luminance; one curve for what is grey."""
     figure = plot.cartesian(COLOURED, "lambert", angles=(0, 60), scale="linear", rgb=True)
     drawn = curves(figure)
     assert list(drawn)[:3] == [f"lambert reflectance=0.2;0.5;0.8, {name}" for name in ("red", "green", "blue")]
+    assert list(drawn)[3:] == ["lambert"] and legend(figure)[:4] == list(drawn)
     peaks = [value.max() for _, value in drawn.values()]
-    assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5, 0.5, 0.5]) / np.pi, rel=1e-3)
+    assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5]) / np.pi, rel=1e-3)
     lines = [line for line in figure.axes[0].lines if line.get_label()[0] != "_"]
-    assert len({line.get_color() for line in lines}) == 3 and len({line.get_linestyle() for line in lines}) == 2
+    assert len({line.get_color() for line in lines}) == 4 and len({line.get_linestyle() for line in lines}) == 2
     assert len(figure.axes) == 2 and "luminance" not in figure.axes[0].get_ylabel()
     assert [value[0] for _, value in curves(plot.albedo(COLOURED, rgb=True)).values()] == pytest.approx([0.2, 0.5, 0.8])
     with mi.variant_context("llvm_ad_spectral"), pytest.raises(ValueError, match="rgb curves need an rgb variant"):
@@ -274,14 +277,27 @@ def test_a_sweep_is_named_by_what_differs():
                for kind, n in (("phong", 9), ("phong", 20), ("blinnphong", 9))]  # fmt: skip
     figure = plot.albedo(*several)
     assert legend(figure) == ["phong exponent=9", "phong exponent=20", "blinnphong exponent=9"]
-    assert figure.legends[0].get_title().get_text() == "phong, blinnphong with specular_reflectance=0.1"
+    assert figure.legends[0].get_title().get_text() == "all with specular_reflectance=0.1"
+
+
+def test_a_sweep_of_a_number_has_colours_in_its_order():
+    def brightness(*bsdfs):
+        figure = plot.cartesian(*bsdfs, angles=(30,), scale="log")
+        lines = [line for line in figure.axes[0].lines if line.get_label()[0] != "_"]
+        return [sum(to_rgb(line.get_color())) for line in lines], {line.get_linestyle() for line in lines}
+
+    sweep = [{"type": "phong", "exponent": n} for n in (2, 4, 8, 16)]
+    levels, styles = brightness(*sweep)
+    assert levels == sorted(levels) and len(set(levels)) == 4 and styles == {"-"}
+    for others in ([sweep[0], sweep[2], sweep[1]], [*sweep[:3], {"type": "blinnphong", "exponent": 16}]):
+        assert len(brightness(*others)[1]) > 1
 
 
 @pytest.mark.slow
 def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
     figure = plot.cartesian("lambert", "phong", angles=(10, 60))
     assert len(figure.axes) == 4 and list(curves(figure, 2)) == ["lambert", "phong"]
-    assert ["10°" in ax.get_title() for ax in figure.axes] == [True, False, False, False]
+    assert ["10°" in ax.get_title() for ax in figure.axes] == [True, True, False, False]
     figure = plot.cartesian({"type": "phong", "exponent": 7}, angles=(10, 60))
     assert len(figure.axes) == 2 and figure.get_suptitle() == "phong exponent=7"
     assert ["10°" in label for label in curves(figure)] == [True, False]
@@ -323,6 +339,15 @@ def test_zeros_of_a_measured_file_are_gaps():
     assert (abs(np.diff(np.log(value))) < 0.2).all()  # by 0.07 at most for each degree that it is measured
     theta, value = curve(plot.albedo(AEROGLAZE))
     assert theta[np.isfinite(value)][[0, -1]].tolist() == [10, 70]
+
+
+def test_negative_values_are_left_out(monkeypatch):
+    """Which measured files have: they have no radius."""
+    given = curves_of.Curve(np.array([-60.0, 0, 45]), np.array([-0.1, 0.2, 0.1]))
+    monkeypatch.setattr(curves_of, "in_plane_of_incidence", lambda *_: given)
+    figure = plot.polar("lambert", angles=(0,), scale="linear")
+    assert [*np.hypot(*curve(figure))] == pytest.approx([0, 0.2, 0.1])
+    assert figure.legends[0].get_title().get_text() == "Negative values are left out."
 
 
 def test_what_was_measured_in_the_plane_of_incidence_alone_is_a_line_of_a_map():
@@ -368,7 +393,7 @@ def test_what_is_black_is_drawn_and_figures_are_nobody_elses():
     """pyplot knows none of them, its settings stay, and a notebook can show them."""
     before = dict(rcParams)
     for kind in command.KINDS.values():
-        assert kind({"type": "lambert", "reflectance": 0})._repr_png_().startswith(b"\x89PNG")
+        assert kind({"type": "lambert", "reflectance": 0})._repr_png_()[0].startswith(b"\x89PNG")
     assert pyplot.get_fignums() == [] and dict(rcParams) == before
 
 

@@ -16,7 +16,7 @@ from .made import ROOT, Picture
 
 FOLDER = ROOT / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-COLOURS, WIDTH = 256, 900
+COLOURS, GROUND, QUALITY, WIDTH = 128, 0.55, 88, 1500
 SECONDS = 900
 ALONE = """\
 import importlib.metadata as metadata
@@ -25,8 +25,10 @@ import os
 os.environ.pop("MI_BRDFS_DATA", None)
 found = metadata.entry_points
 metadata.entry_points = lambda **which: () if which.get("group") == "mi_brdfs.models" else found(**which)
+get_ipython().run_line_magic("config", "InlineBackend.figure_format = 'retina'")
 """
-"""A first cell that hides the models of other packages, and the measured materials of whoever runs it."""
+"""A first cell that hides the models of other packages, and the measured materials of whoever runs it, and doubles the
+resolution of pictures."""
 
 
 def pictures() -> list[Picture]:
@@ -74,23 +76,30 @@ def _output(output: dict[str, Any]) -> dict[str, Any]:
     themselves."""
     if output["output_type"] == "stream":
         return {"name": output["name"], "output_type": "stream", "text": output["text"].splitlines(keepends=True)}
-    data = dict(output["data"])
+    data, metadata = dict(output["data"]), {}
     kept = {"text/plain": data["text/plain"].splitlines(keepends=True)}
     if found := re.search(r"data:image/jpeg;base64,\s*([^\"']+)", data.get("text/html", "")):  # of mi.Bitmap
         kept = {"image/jpeg": found[1], "text/plain": ["Bitmap"]}
     elif "image/png" in data:
-        kept = {"image/png": _reduced(data["image/png"]), "text/plain": kept["text/plain"]}
+        kind, kept_picture = _reduced(data["image/png"])
+        kept = {kind: kept_picture, "text/plain": kept["text/plain"]}
+        if shown := output["metadata"].get("image/png"):
+            metadata = {kind: shown}
     count = {"execution_count": output["execution_count"] - 1} if "execution_count" in output else {}
-    return {**output, **count, "data": kept, "metadata": {}}
+    return {**output, **count, "data": kept, "metadata": metadata}
 
 
-def _reduced(encoded: str) -> str:
-    """Return a PNG with at most so many colours and columns."""
+def _reduced(encoded: str) -> tuple[str, str]:
+    """Return the kind of a picture, and the picture with fewer columns: a PNG with fewer colours if most of it is one
+    ground, as in plots, or else a JPEG, since smooth shading would have rings."""
     image = Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGB")
+    buffer, area = io.BytesIO(), image.width * image.height
+    is_drawn = max(image.getcolors(area))[0] > GROUND * area
     if image.width > WIDTH:
         image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
-    buffer = io.BytesIO()
-    palette = image.quantize(COLOURS, kmeans=1)
-    # Dithered: otherwise smooth shading has rings.
-    image.quantize(palette=palette).save(buffer, "png", optimize=True)
-    return base64.b64encode(buffer.getvalue()).decode()
+    if is_drawn:
+        few = image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few.save(buffer, "png", optimize=True)
+    else:
+        image.save(buffer, "jpeg", quality=QUALITY, subsampling=0, optimize=True)
+    return "image/png" if is_drawn else "image/jpeg", base64.b64encode(buffer.getvalue()).decode()

@@ -9,8 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from generate.notebooks import WIDTH
 from PIL import Image
+
+WIDE = 900
+"""The width of a picture, in pixels of the page, through which phones scroll."""
 
 
 def markdown(path: Path, pictures: Path) -> str:
@@ -51,7 +53,8 @@ def _output(output: dict[str, Any], drawn: Iterator[Path]) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(base64.b64decode("".join(data[kind])))
         with Image.open(path) as image:
-            kind = "strip" if image.width >= WIDTH else "output"  # phones scroll through those that were reduced
-        return f"![](/notebooks/{path.parent.name}/{path.name}){{.{kind}}}"
+            width = output["metadata"].get(kind, {}).get("width", image.width)
+        kind = "strip" if width >= WIDE else "output"
+        return f"![](/notebooks/{path.parent.name}/{path.name}){{.{kind} width={width}}}"
     text = "".join(output.get("text", data.get("text/plain", ""))).rstrip()
     return f"```text\n{text}\n```" if text else ""

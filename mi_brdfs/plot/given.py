@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import mitsuba as mi
+import numpy as np
 
 from ..given import load_described
 from ..measured import read
 from ..parameters.messages import brief
 from ..probe.bsdf import BSDFProbe
+from ..probe.curves import Curve
 from ..probe.sources import find_sources, measured_file, name_of
 from ..variants import is_measurable
-from .style import plain
+from .style import CHANNELS, plain
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 
@@ -60,14 +62,17 @@ def with_smooth_part(found: list[Named]) -> list[Named]:
     return [it._replace(label=f"{it.label} without its delta lobe") if it.probe.deltas else it for it in found]
 
 
-def channels_of(rgb: bool) -> list[tuple[int | None, str]]:
-    """Return the index and the name of each channel to draw, or (None, "") for the luminance. Raise a ValueError if the
-    active variant has none."""
+def by_channel(draw: Sequence[Callable[[int | None], Curve]], rgb: bool) -> list[tuple[str, list[Curve]]]:
+    """Return the name and the curves of each channel to draw: "" for the luminance, or "grey" if red, green and blue
+    are one. Raise a ValueError if the active variant has none."""
     if not rgb:
-        return [(None, "")]
+        return [("", [each(None) for each in draw])]
     if not mi.is_rgb:
         raise ValueError(f"{mi.variant()} has no red, green and blue: rgb curves need an rgb variant")
-    return list(enumerate(("red", "green", "blue")))
+    found = [(name, [each(k) for each in draw]) for k, name in enumerate(CHANNELS)]
+    pairs = [pair for _, curves in found[1:] for pair in zip(found[0][1], curves, strict=True)]
+    alike = all(len(a.value) == len(b.value) and np.allclose(a.value, b.value, 1e-3, equal_nan=True) for a, b in pairs)
+    return [("grey", found[0][1])] if alike else found
 
 
 def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool = False) -> str:
@@ -81,7 +86,19 @@ def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool =
 def constants(bsdfs: Sequence[Any]) -> list[str]:
     """Return a line with what all dicts have in common, if anything: their labels tell the rest."""
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
-    return [_told(f"{', '.join(kinds)} with", same)] if (same := _common(bsdfs)) else []
+    who = "all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds)
+    return [_told(f"{who} with", same)] if (same := _common(bsdfs)) else []
+
+
+def is_sweep(bsdfs: Sequence[Any]) -> bool:
+    """Return whether these are dicts of one plugin, of which one number alone increases or decreases."""
+    if not all(isinstance(given, dict) for given in bsdfs):
+        return False
+    varied = {name: [given.get(name) for given in bsdfs] for name in bsdfs[0]}
+    varied = {name: values for name, values in varied.items() if any(value != values[0] for value in values)}
+    (values,) = varied.values() if len(varied) == 1 else ([],)
+    numbers = [value for value in values if type(value) in (int, float)]
+    return len(numbers) == len(bsdfs) and numbers in (sorted(numbers), sorted(numbers, reverse=True))
 
 
 def _common(bsdfs: Sequence[Any]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from textwrap import fill
 
 import mitsuba as mi
@@ -19,8 +20,8 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import largest
 from . import style
-from .given import channels_of, constants, named, quantity, with_smooth_part
-from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
+from .given import by_channel, constants, is_sweep, named, quantity, with_smooth_part
+from .style import FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
 DOTTED = 0, (1, 2)
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
@@ -95,11 +96,11 @@ def albedo(
         style.set_title(figure, style.plain(title))
     ax = figure.subplots()
     handles = []
+    ramp = len(found) if is_sweep(bsdfs) else 0
     for k, it in enumerate(found):
-        for channel, name in channels_of(rgb):
-            label = f"{it.label}, {name}" if name else it.label
-            curve = lobes.albedo(it.probe, azimuth, channel)
-            handles += ax.plot(*curve, label=label, **look(k, CHANNELS.get(name)))
+        for name, (curve,) in by_channel([partial(lobes.albedo, it.probe, azimuth)], rgb):
+            label = f"{it.label}, {name}" if name in style.CHANNELS else it.label
+            handles += ax.plot(*curve, label=label, **look(k, name, ramp))
     frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
     style.add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
     return figure
@@ -121,8 +122,8 @@ def _draw_disc(ax: Axes, picture: np.ndarray, norm: LogNorm, theta_i: float, abo
     shown = ax.imshow(picture, "viridis", norm, extent=(-1, 1, -1, 1), origin="lower")
     shown.set_clip_path(Circle((0, 0), 1, transform=ax.transData))
     ax.add_patch(Circle((0, 0), 1, **HATCHED, zorder=-1))
-    ink, halo, ring = (INK, "#ffffffc0", FAINT) if np.isnan(picture).any() else ("white", "#00000060", "#ffffff80")
-    outline = [withStroke(linewidth=1.8, foreground=halo)]
+    ink, halo, ring = (INK, "#ffffffc0", FAINT) if np.isnan(picture).any() else ("white", "#000000a0", "#ffffff80")
+    outline = [withStroke(linewidth=2.4, foreground=halo)]
     for angle in (30, 60, 90):
         ax.add_patch(Circle((0, 0), angle / 90, fill=False, color=FAINT if angle == 90 else ring, linewidth=0.6))
     for angle in (30, 60):

@@ -141,7 +141,7 @@ def _draw_albedo(ax: Axes, it: LitTable) -> None:
     names = list(CHANNELS) if colour.shape[-1] == 3 else [""]
     handles = []
     for channel, name in enumerate(names):
-        handles += ax.plot(angles, colour[:, channel], label=name or "integrated", **look(channel, CHANNELS.get(name)))
+        handles += ax.plot(angles, colour[:, channel], label=name or "integrated", **look(channel, name))
     stated = {theta: albedo[0] for theta, albedo in it.measurement.stated_albedos.items()}
     if stated:
         handles += ax.plot(np.degrees(list(stated)), list(stated.values()), label="stated", **STATED)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import partial
 from textwrap import fill
 from typing import Any, NamedTuple
 
@@ -18,8 +19,8 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import Named, channels_of, constants, named, quantity, scales_of, with_smooth_part
-from .style import CHANNELS, FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, incidence, look
+from .given import Named, by_channel, constants, is_sweep, named, quantity, scales_of, with_smooth_part
+from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, incidence, look
 
 MIRROR = {"marker": "v", "markersize": 5}
 THIN = {"linewidth": 0.8}
@@ -43,7 +44,7 @@ def polar(
 
     The radius is the luminance of f cosθ_o, in 1/sr. wi is an arrow, on the left; triangles at the rim are the mirror
     directions. One BSDF gets one panel, with a colour for each angle; several get a row for each angle, and a colour
-    each. Transmission, if any, is below the surface. Delta functions are left out.
+    each. Transmission, if any, is below the surface. Delta functions and negative values are left out.
 
     Args:
         bsdfs: plugin names, plugin dicts, loaded BSDFs of the active variant, XML texts, or paths of XML files, each of
@@ -54,7 +55,7 @@ def polar(
         labels: the names in the legend. By default the type of a dict with the parameters that distinguish it, and the
             id or class of a loaded BSDF; what the others have in common is above the legend.
         normalize: divide each curve by its maximum, to compare shapes.
-        rgb: draw red, green and blue in place of the luminance, in a row for each angle.
+        rgb: draw red, green and blue in place of the luminance, in a row for each angle; one curve of what is grey.
         side_by_side: draw each BSDF in a panel of its own, on the same scale, with a colour for each angle.
         title: above the figure; by default the name of the only BSDF, or the only angle.
         size: width and height in inches; by default what the panels need.
@@ -118,27 +119,33 @@ def _planar(
     angles = angles_of_incidence(angles)
     scales = scales_of(scale)
     found = with_smooth_part(named(bsdfs, labels))
-    channels = channels_of(rgb)
     whole = any(lobes.transmits(it.probe) for it in found)
     beside = side_by_side and len(found) > 1
     measured = [k for k, it in enumerate(found) if it.probe.data]
     by_bsdf = beside or not (rgb or len(found) > 1)
+    ramp = 0 if by_bsdf or not is_sweep(bsdfs) else len(found)
 
-    def lines(it: Named, k: int, theta: float, j: int) -> list[LabelledCurve]:
-        curves, own = [], incidence(theta) if by_bsdf else it.label
-        for channel, name in channels:
-            curve = lobes.in_plane_of_incidence(it.probe, theta, azimuth, channel)
-            if normalize:
-                curve = curve._replace(value=curve.value / largest([curve.value]))
-            own_look = look(j if by_bsdf else k, CHANNELS.get(name))
-            if k in measured or (beside and measured):
-                own_look |= UNBROKEN
-            curves.append(LabelledCurve(f"{own}, {name}" if name else own, theta, curve, own_look))
-        return curves
+    def lines(it: Named, k: int) -> list[list[LabelledCurve]]:
+        rows: list[list[LabelledCurve]] = [[] for _ in angles]
+        plane = [partial(lobes.in_plane_of_incidence, it.probe, theta, azimuth) for theta in angles]
+        for name, curves in by_channel(plane, rgb):
+            for j, (theta, curve) in enumerate(zip(angles, curves, strict=True)):
+                if normalize:
+                    curve = curve._replace(value=curve.value / largest([curve.value]))
+                own_look = look(j if by_bsdf else k, name, ramp)
+                if k in measured or (beside and measured):
+                    own_look |= UNBROKEN
+                own = incidence(theta) if by_bsdf else it.label
+                rows[j].append(
+                    LabelledCurve(f"{own}, {name}" if name in style.CHANNELS else own, theta, curve, own_look)
+                )
+        return rows
 
-    each = [[lines(it, k, theta, j) for j, theta in enumerate(angles)] for k, it in enumerate(found)]
+    each = [lines(it, k) for k, it in enumerate(found)]
     peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
     notes = constants(bsdfs)
+    if any((line.curve.value < 0).any() for rows in each for part in rows for line in part):
+        notes.append("Negative values are left out.")
     if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 50:  # the lowest curve cannot be seen
         notes.append(f"The maxima differ by a factor of {ratio:.0f}.")
         warnings.warn(f"the maxima differ by a factor of {ratio:.0f}; --normalize compares shapes", stacklevel=3)
@@ -158,7 +165,7 @@ def _planar(
             ax = axes[k // columns * len(scales) + s, k % columns] if beside else axes[k, s]
             style.calm(ax)
             draw(ax, curves, name == "log", whole, text, everything if beside or name == "log" else curves)
-            if len(panels) > 1 and not s:
+            if len(panels) > 1 and not (beside and s):
                 ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=10)
             if k % columns if beside else s:
                 ax.set_ylabel("")
@@ -173,9 +180,9 @@ def _planar(
     marks = {"mirror direction": Line2D([], [], linestyle="", **MIRROR, color=FAINT)}
     if draw is _draw_polar:
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
-    handles = [Line2D([], [], **curve.look) for curve in curves]
-    names = [curve.label for curve in curves]
-    style.add_legend(figure, [*handles, *marks.values()], [*names, *marks], notes)
+    shown = {curve.label: curve for curve in everything}.values() if beside else curves
+    handles = [Line2D([], [], **curve.look) for curve in shown]
+    style.add_legend(figure, [*handles, *marks.values()], [*(curve.label for curve in shown), *marks], notes)
     return figure
 
 
@@ -208,7 +215,7 @@ def _draw_polar(
         ax.plot(*_at(line.theta_i, 1.035 * end), color=colour, **inwards)
     for line in lines:
         with np.errstate(divide="ignore", invalid="ignore"):
-            radius = np.maximum(np.log10(line.curve.value) - low, 0) if log else line.curve.value
+            radius = np.maximum(np.log10(line.curve.value) - low if log else line.curve.value, 0)
         ax.plot(*_at(line.curve.theta, radius), label=line.label, **line.look)
     ax.plot([-end, end], [0, 0], color=INK, linewidth=1.5)
     ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-1.25 if whole else -0.15) * end, 1.25 * end), xticks=[], yticks=[])

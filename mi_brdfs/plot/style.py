@@ -9,8 +9,10 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from ..parameters.messages import printable
@@ -33,16 +35,21 @@ QUANTITY = r"$f\,\cos\theta_o$"
 class _Figure(Figure):
     """A figure that notebooks show without pyplot."""
 
-    def _repr_png_(self) -> bytes:
+    is_sized = False
+    """Whether its size was asked for, so that it does not grow with its legend."""
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         png = BytesIO()
-        self.savefig(png, format="png")
-        return png.getvalue()
+        self.savefig(png, format="png", dpi=2 * self.dpi)  # as the format "retina" of Jupyter
+        width, height = self.get_size_inches() * self.dpi
+        return png.getvalue(), {"width": round(width), "height": round(height)}
 
 
-def new_figure(width: float, height: float, size: tuple[float, float] | None = None) -> Figure:
+def new_figure(width: float, height: float, size: tuple[float, float] | None = None) -> _Figure:
     """Return a figure of a width and a height in inches, or of the size that is asked for."""
     width, height = size or (width, height)
     figure = _Figure(figsize=(width, height), dpi=144, layout="constrained", facecolor="white")
+    figure.is_sized = size is not None
     figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.08 / height))  # titles otherwise touch the edge
     return figure
 
@@ -65,7 +72,7 @@ def set_title(figure: Figure, text: str) -> None:
     figure.suptitle(fill(text, int(LETTERS * figure.get_figwidth())), fontsize=TEXT + 1, color=INK)
 
 
-def add_legend(figure: Figure, handles: list, labels: list[str], constants: Sequence[str] = ()) -> None:
+def add_legend(figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = ()) -> None:
     """Add a legend below the figure, with the constants above its entries."""
     room = LETTERS * figure.get_figwidth()
     labels = [fill(label, int(room) - 10) for label in labels]
@@ -73,6 +80,9 @@ def add_legend(figure: Figure, handles: list, labels: list[str], constants: Sequ
     widths = [max(map(len, re.sub(r"\$.*?\$", "xx", label).splitlines())) + 6 for label in labels]
     columns = len(labels) if sum(widths) < room else max(1, int(room / max(widths)))
     heading = "\n".join(fill(text, int(room)) for text in constants)
+    if not figure.is_sized:
+        rows = -(-len(labels) // columns) + max(label.count("\n") for label in labels) + heading.count("\n")
+        figure.set_figheight(figure.get_figheight() + 0.18 * (rows - 1 + bool(heading)))
     added = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=TEXT,
                           labelcolor=INK, title=heading or None, title_fontsize=TEXT)  # fmt: skip
     added.get_title().set_color(INK)
@@ -86,9 +96,12 @@ def add_bar(colours: ScalarMappable, axes: Any, text: str, **options: Any) -> No
     bar.outline.set_visible(False)
 
 
-def look(k: int, colour: str | None = None) -> dict[str, Any]:
-    """Return the style of the k-th curve, and its colour unless one is given."""
-    return {"color": colour or COLOURS[k % len(COLOURS)], "linestyle": STYLES[k % len(STYLES)], "linewidth": 1.6}
+def look(k: int, channel: str = "", ramp: int = 0) -> dict[str, Any]:
+    """Return the style of the k-th curve, and its colour: a channel's, or one in the order of so many of a ramp."""
+    if ramp > 2 and not channel:
+        return {"color": to_hex(colormaps["viridis"](0.88 * k / (ramp - 1))), **UNBROKEN, "linewidth": 1.6}
+    colour = CHANNELS.get(channel, INK) if channel else COLOURS[k % len(COLOURS)]
+    return {"color": colour, "linestyle": STYLES[k % len(STYLES)], "linewidth": 1.6}
 
 
 def incidence(theta: float) -> str:

@@ -200,7 +200,9 @@ function drawBars() {
   if (state.dark === null) delete document.documentElement.dataset.dark;
   else document.documentElement.dataset.dark = state.dark;
   byId("theme").textContent = isDark() ? "Light" : "Dark";
-  document.title = `${state.subjects.map(({ name }) => name).join(", ") || "Explorer"} · mi_brdfs`;
+  const told = state.subjects.map(({ name }) => name).join(", ");
+  document.title = `${told || "Explorer"} · mi_brdfs`;
+  if (session.exported) byId("version").textContent = `${told}: move a slider, turn the lobe, point at a curve`;
 }
 
 // --- The sampler's test ---------------------------------------------------------------------------------------------

@@ -16,14 +16,19 @@ export function drawMaps(view) {
   const peak = largest(arrays);
   const [low, high] = decades(arrays, peak);
   card.maps ??= card.figure.appendChild(element("div", { class: "maps" }));
-  card.node.classList.toggle("wide", found.length > 3);
+  card.node.classList.toggle("wide", found.length > 1);
   card.maps.className = `maps of-${Math.min(found.length, 4)}`;
   const boxes = [...card.maps.children];
   found.forEach((map, k) => paint(boxes[k] ?? addBox(card, view), view, map, low, high));
   boxes.slice(found.length).forEach((box) => box.remove());
   if (view === "hemisphere") card.note.replaceChildren(...subscripted(`${quantity()} from above`));
-  const hatched = found.some(isMeasured) ? "; hatched: not measured" : "";
-  bar(card, low, high, `${view === "slice" ? "f" : quantity()}, 1/sr, always logarithmic${hatched}`);
+  const hatched = [view === "slice" && "below the horizon", found.some(isMeasured) && "not measured"].filter(Boolean);
+  const notes = [
+    `${view === "slice" ? "f" : quantity()}, 1/sr, always logarithmic`,
+    ...(hatched.length ? [`hatched: ${hatched.join(" or ")}`] : []),
+    ...(view === "slice" ? [] : ["○ ωi, + mirror, rim 90°"]),
+  ];
+  bar(card, low, high, notes.join("; "));
 }
 
 function addBox(card, view) {
@@ -34,10 +39,7 @@ function addBox(card, view) {
     [[0, "0°"], [30, "30°"], [45, symbol], [60, "60°"], [90, "90°"]].map(([at, text]) =>
       element("span", { style: `${side}:${at / 0.9}%` }, ...subscripted(text)),
     );
-  const axes =
-    view === "slice"
-      ? [element("div", { class: "labels" }, ...ticks("θh", "left"))]
-      : [element("span", { class: "across" }, ...subscripted("○ ωi, + mirror; rim 90°"))];
+  const axes = view === "slice" ? [element("div", { class: "labels" }, ...ticks("θh", "left"))] : [];
   if (view === "slice") frame.append(element("div", { class: "up" }, ...ticks("θd", "bottom")));
   const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
   card.maps.append(box);
