@@ -16,10 +16,13 @@ from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
 from mi_brdfs.probe import directions
 from mi_brdfs.probe.arrays import context as context
+from mi_brdfs.probe.arrays import floats as floats
 from mi_brdfs.probe.arrays import interaction as interaction
 from mi_brdfs.probe.arrays import luminance
 from mi_brdfs.probe.arrays import numbers as numbers
 from mi_brdfs.probe.arrays import per_lane as per_lane
+from mi_brdfs.probe.arrays import sample_arguments as sample_arguments
+from mi_brdfs.probe.arrays import vectors as vectors
 from mi_brdfs.probe.bsdf import BSDFProbe
 from mi_brdfs.probe.directions import direction as direction
 from mi_brdfs.probe.variates import lattice, sampling_efficiency
@@ -158,8 +161,12 @@ def call(method, ctx, wi, *arrays):
     for each value that it returns. Scalar variants get one call for each row."""
     types = {3: mi.Vector3f, 2: mi.Point2f, 1: mi.Float}
 
+    def given_as(array):
+        columns = array.T if is_scalar() or array.ndim == 1 else [*map(floats, array.T)]
+        return types[array.shape[-1]](*columns)
+
     def once(wi, arrays):
-        given = [types[array.shape[-1]](array.T if array.shape[-1] > 1 else array.ravel()) for array in arrays]
+        given = [*map(given_as, arrays)]
         result = method(ctx, interaction(wi), *given, True)
         result = result if isinstance(result, tuple) else (result,)
         dr.eval(result)  # in one kernel

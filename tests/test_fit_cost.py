@@ -22,5 +22,5 @@ def test_cost_is_linear(measure):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the memory that a process holds is read from /proc")
 def test_memory_is_flat():
-    resident = [held for held, _ in fit_cost.memory(["lambert", "low"])]
-    assert len(resident) == 20 and max(resident[10:]) - min(resident[10:]) < 16
+    resident = [held for held, _ in fit_cost.memory(["lambert", "low"], repeats=12)]
+    assert max(resident[6:]) - min(resident[6:]) < 4

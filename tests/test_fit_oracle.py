@@ -47,15 +47,12 @@ def oracle(name: str, material) -> float:
     "file",
     [
         "AnoBlackEC1onAlum.bsdf",
-        *(
-            pytest.param(name, marks=pytest.mark.slow)
-            for name in ("AnoBlackEC2onAlum.bsdf", "AnoBlackNiTEonINVAR.bsdf", "aeroglaze_z307.bsdf", "rgl")
-        ),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("aeroglaze_z307.bsdf", "rgl")),
     ],
 )
 def test_no_worse_than_least_squares(name, file):
     """The error is at most 1.01 times the best of ten runs of SciPy's; of colours, the green channel is compared."""
-    paths = sorted(shared("rgl").glob("*.bsdf"))[::2] if file == "rgl" else [ROOT / "scenes" / "measured" / file]
+    paths = sorted(shared("rgl").glob("*.bsdf"))[::4] if file == "rgl" else [ROOT / "scenes" / "measured" / file]
     materials = [green(path) for path in paths]
     for path, material, it in zip(paths, materials, fit(materials, name, starts=STARTS), strict=True):
         expected = oracle(name, material)

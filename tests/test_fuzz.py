@@ -6,7 +6,6 @@ evaluates thousands of settings and pairs of directions, which fill the lanes in
 
 from __future__ import annotations
 
-import gc
 import re
 import zlib
 
@@ -15,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from fuzzing import FILM, typical, ways
-from support import context, interaction, numbers, per_lane
+from support import context, floats, interaction, is_scalar, numbers, per_lane, sample_arguments, vectors
 
 from mi_brdfs.mitsuba.registry import brought_terms, own_models
 
@@ -24,6 +23,8 @@ EVALUATIONS = 1_000_000
 and as many again with the others, which take long to compile."""
 LANES, EXAMPLES = 1 << 14, 6
 """Lanes that are filled in the same way, and how many ways there are."""
+
+pytestmark = pytest.mark.usefixtures("no_lanes_left")
 
 MODELS = own_models()
 FEW = "eon", "ward", "burley"
@@ -37,13 +38,6 @@ MOSTLY_SLOW = [
     case if case.values[0].plugins[0] in FEW else pytest.param(*case.values, id=case.id, marks=pytest.mark.slow)
     for case in CASES
 ]
-
-
-@pytest.fixture(autouse=True)
-def no_lanes_left():
-    """Every BSDF that lives is part of the kernels of its variant, and arrays of many lanes can be in none."""
-    yield
-    gc.collect()
 
 
 # --- Inputs: each function has its own way to fill the lanes --------------------------------------------------------
@@ -221,25 +215,29 @@ class FuzzedPlugin:
         """Give the quantities their values in all lanes, or in one."""
         for quantity in self.quantities:
             kind = mi.UnpolarizedSpectrum if quantity.colour else mi.Float
-            self.textures[quantity.name].value = kind(self.values[quantity.name][..., lane])
+            value = self.values[quantity.name][..., lane]
+            if not is_scalar():
+                value = [*map(floats, value)] if quantity.colour else floats(value)
+            self.textures[quantity.name].value = kind(value)
+
+    def arguments(self, lane=slice(None)):
+        """Those of ``eval_pdf_sample`` after the context; vectorized ones in memory that keeps the kernel the same."""
+        u, v, w = self.u[lane].T
+        variates = (mi.Float(u), mi.Point2f(v, w)) if is_scalar() else sample_arguments(self.u[lane])
+        return interaction(self.wi[lane]), vectors(self.wo[lane]), *variates
 
     def answers(self, lane=slice(None)):
-        """What each method answers, by name, for the whole BSDF (None) and for each of its components."""
+        """What ``eval_pdf_sample`` answers, by name, for the whole BSDF (None) and for each of its components. That the
+        other methods answer the same is for the checker to say."""
         self.enter(lane)
         count = self.bsdf.component_count()
         parts = {part: context(part) for part in [None, *range(count if count > 1 else 0)]}
-        si, wo = interaction(self.wi[lane]), mi.Vector3f(self.wo[lane].T)
-        u, *v = self.u[lane].T
-        u, v = mi.Float(u), mi.Point2f(np.array(v))
-        found = {}
+        arguments, found = self.arguments(lane), {}
         for part, ctx in parts.items():
-            value, pdf = self.bsdf.eval_pdf(ctx, si, wo, True)
-            sample, weight = self.bsdf.sample(ctx, si, u, v, True)
+            value, pdf, sample, weight = self.bsdf.eval_pdf_sample(ctx, *arguments, True)
             found[part] = {
-                "eval": self.bsdf.eval(ctx, si, wo, True),
-                "pdf": self.bsdf.pdf(ctx, si, wo, True),
-                "the value of eval_pdf": value,
-                "the density of eval_pdf": pdf,
+                "eval": value,
+                "pdf": pdf,
                 "the direction of sample": sample.wo,
                 "the density of sample": sample.pdf,
                 "the weight of sample": weight,
@@ -251,13 +249,10 @@ class FuzzedPlugin:
         """Those of all that the methods answer together, by name of the input; in forward mode for all of these at
         once."""
         self.enter()
-        si, wo = interaction(self.wi), mi.Vector3f(self.wo.T)
-        u, *v = self.u.T
+        si, wo, *variates = self.arguments()
         inputs = {name: texture.value for name, texture in self.textures.items()} | {"wi": si.wi, "wo": wo}
         dr.enable_grad(inputs)
-        value, pdf, sample, weight = self.bsdf.eval_pdf_sample(
-            context(), si, wo, mi.Float(u), mi.Point2f(np.array(v)), True
-        )
+        value, pdf, sample, weight = self.bsdf.eval_pdf_sample(context(), si, wo, *variates, True)
         total = mi.luminance(value) + pdf + sample.pdf + mi.luminance(weight)
         if mode == "reverse":
             dr.backward(total)
@@ -322,7 +317,7 @@ def test_values(model, options):
 def test_values_of_a_scalar_variant(model, options):
     """Where Python's floats divide: by zero they raise an error, and they go on below the least of float32."""
     with mi.variant_context("scalar_rgb"):
-        plugin = FuzzedPlugin(model, options, 1e20, 2, lanes=50)
+        plugin = FuzzedPlugin(model, options, 1e20, 2, lanes=25)
         for lane in range(len(plugin.wi)):
             try:
                 found = plugin.answers(lane)

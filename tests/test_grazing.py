@@ -1,16 +1,15 @@
 """Samplers, over all that is declared: at grazing, too, no sample weighs much more than the others."""
 
-import gc
-
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 from support import context, direction, interaction, numbers
 from test_fuzz import CASES, FuzzedPlugin, directions, magnitudes
 
-from mi_brdfs.math import luminance
+from mi_brdfs.probe.arrays import luminance
 from mi_brdfs.probe.variates import lattice, sampling_efficiency
+
+pytestmark = pytest.mark.usefixtures("llvm_rgb", "no_lanes_left")
 
 SETTINGS = 48
 LARGEST_WEIGHT = 30
@@ -39,7 +38,6 @@ def drawn(options, rng):
     return {name: np.float32(value) for name, value in values.items()}
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model, options", CASES)
 def test_weights(model, options):
     """Of every lobe alone and of their mixture, from 30° to 89°, most of them beyond 80°, at any azimuth."""
@@ -53,18 +51,10 @@ def test_weights(model, options):
     wi = directions(np.cos(theta), np.sin(theta), rng)
 
     plugin.values = {name: np.repeat(value, len(points), axis=-1) for name, value in settings.items()}
-    plugin.enter()
-    si = interaction(np.repeat(wi, len(points), axis=0))
-    u, x, y = np.tile(points.T, SETTINGS)
-    count = plugin.bsdf.component_count()
-    parts = [None, *range(count)] if count > 1 else [None]
-    weights = [
-        luminance(plugin.bsdf.sample(context(part), si, mi.Float(u), mi.Point2f(x, y), True)[1]) for part in parts
-    ]
-    dr.eval(weights)
+    plugin.wi, plugin.u = np.repeat(wi, len(points), axis=0), np.tile(np.float32(points), (SETTINGS, 1))
     whole = 0
-    for part, weight in zip(parts, weights, strict=True):
-        weight = numbers(weight).reshape(SETTINGS, len(points))
+    for part, answers in plugin.answers().items():  # in the kernel of fuzzing
+        weight = luminance(answers["the weight of sample"]).reshape(SETTINGS, len(points))
         mean = weight.mean(axis=1)
         black = mean <= 1e-30
         whole = mean if part is None else whole
@@ -139,17 +129,10 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("theta, phi, part, given", HEAVY)
 def test_heaviest_weights(theta, phi, part, given):
     u, x, y = lattice(10, 1).T
     si = interaction(np.tile(direction(theta, phi), (len(u), 1)))
     sampled = mi.load_dict(given).sample(context(part), si, mi.Float(u), mi.Point2f(x, y), True)
-    weights = numbers(luminance(sampled[1]))
+    weights = luminance(numbers(sampled[1]))
     assert 0 < weights.max() <= LARGEST_WEIGHT * weights.mean()
-
-
-@pytest.fixture(autouse=True)
-def no_lanes_left():
-    yield
-    gc.collect()
