@@ -177,7 +177,6 @@ def call(method, ctx, wi, *arrays):
 
     if not is_scalar():
         return once(wi, arrays)
-    types[1] = lambda value: float(value[0])
     rows = [once(w, [array[k] for array in arrays]) for k, w in enumerate(wi)]
     return [np.concatenate(column) for column in zip(*rows, strict=True)]
 
