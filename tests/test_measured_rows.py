@@ -243,6 +243,15 @@ def test_rows_of_anisotropic_materials(tmp_path):
     assert isinstance(measured(tmp_path, once, "x.csv").data, Grid)
 
 
+def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
+    rows = "\n".join(f"{i},{o},0,{highlight(spherical(i, 0), spherical(o, 0))}"
+                     for i, o in itertools.product(range(-60, 61, 10), range(-60, 61, 5)))  # fmt: skip
+    data = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv").data
+    assert not data.anisotropic
+    wi, wo = spherical(30, 70), spherical(30, 250)
+    np.testing.assert_allclose(as_grid(data).evaluate(wi, wo), highlight(wi, wo), rtol=0.05)
+
+
 def test_angles_on_the_other_side_of_the_normal(tmp_path):
     rows = "\n".join(f"{i},{o},0,{i + o + 100}" for i, o in itertools.product((20, 40), (-60, -20, 20, 60)))
     measurement = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv")

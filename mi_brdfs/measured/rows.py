@@ -39,14 +39,15 @@ def arranged(
 ) -> Grid | Samples:
     """Return rows of angles in radians, shape (N,), and values, shape (N, channels), as a grid of
     :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with each other, and as samples if
-    not. Rows of a single φi or φo are of an isotropic material. A negative θ means the other side of the normal. Rows
-    of the same angles are averaged, with a warning if one is more than twice another.
+    not. Rows of a single φi or φo, or in a single plane, are of an isotropic material. A negative θ means the other
+    side of the normal. Rows of the same angles are averaged, with a warning if one is more than twice another.
     """
     warn_of_contradictions((theta_i, phi_i, theta_o, phi_o), values)
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
     turned_i, turned_o = phi_i[theta_i > SAME], phi_o[theta_o > SAME]
-    anisotropic = not any(is_single(each) for each in (turned_i, turned_o))
+    in_plane = is_single(2 * turned_i) and is_single(2 * turned_o)
+    anisotropic = not (in_plane or is_single(turned_i) or is_single(turned_o))
     if not anisotropic:
         # At the normal the azimuth means nothing, and files have any there.
         phi_o = phi_o - np.where(theta_i > SAME, phi_i, turned_i[:1].sum())
