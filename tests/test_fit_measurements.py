@@ -290,7 +290,8 @@ def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_p
         "grazing": (wi, np.tile(np.float32([0.995, 0, 0.0999]), (50, 1)), f), "file": tmp_path / "none.bsdf",
         "pole": tmp_path / "pole.csv",
     }  # fmt: skip
-    sources["pole"].write_text("theta_i_deg,theta_o_deg,delta_phi_deg,f\n0,0,0,0.3\n")
+    rows = "".join(f"0,0,{turn},0.3\n" for turn in range(0, 181, 30))
+    sources["pole"].write_text("theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows)
     with pytest.raises((FitError, FileError, ValueError)) as caught:
         fit(sources[data], model, **options)
     text = str(caught.value)

@@ -297,6 +297,12 @@ def test_commands_take_the_file_itself_and_know_its_plugin(llvm_rgb, glossy):
         list(find_sources("nowhere.binary"))
 
 
+def test_a_file_may_have_the_name_of_a_plugin(llvm_rgb, glossy, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("ward").symlink_to(glossy)
+    assert [next(find_sources(word)).load()["type"] for word in ("ward", "./ward")] == ["ward", "tabulated"]
+
+
 # --- MERL's own files, where there are some --------------------------------------------------------------------------
 
 MERL = sorted(Path(os.environ.get("MI_BRDFS_MERL_DIR", "nowhere")).glob("*.binary"))

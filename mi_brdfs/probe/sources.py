@@ -95,7 +95,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     if is_file and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     name = path.name if is_file or is_data else word
-    source = BSDFSource(name, word, str(path) if is_file or is_data else word, None, parameters)
+    source = BSDFSource(name, word, str(path) if is_file else word, None, parameters)
     if is_file and path.suffix == ".json":
         found = list(_chosen(source, _names_of(_fits(path)), wanted))
         for each, given in zip(found, shared([it.word for it in found], parameters), strict=True):
