@@ -29,7 +29,7 @@ def mentioned(names: Iterable[str], texts: Iterable[str] = (), values: Mapping[s
     more than Mitsuba reads, but no less, of any version and without an error."""
     known, found = dict(values or {}), dict[object, str]()
     folder_at = cache(lambda path: os.path.realpath(path) if os.path.isdir(path) else None)  # most are asked for often
-    start = list(dict.fromkeys(["", os.environ.get("MI_BRDFS_MERL_DIR", "")]))
+    start = _start()
     todo = [*((text, start) for text in texts), *_new(names, start, found)]
     while todo:
         text, folders = todo.pop()
@@ -42,11 +42,26 @@ def mentioned(names: Iterable[str], texts: Iterable[str] = (), values: Mapping[s
 def _new(names: Iterable[str], folders: list[str], found: dict[object, str]) -> Iterator[tuple[str, list[str]]]:
     """Add what these names are in some folders to what is found, and yield the texts of new ones, with the folders of
     what is named there."""
-    for path in (os.path.join(folder, name) for name in names for folder in folders):
+    for path in (path for name in names for path in _places(name, folders)):
         if os.path.exists(path) and not os.path.isdir(path) and (it := identity(path)) not in found:
             found[it] = path
             if os.path.isfile(path) and (text := _text(path)):
-                yield text, list(dict.fromkeys([*folders, os.path.dirname(path)]))
+                # What JSON names is looked for in the working folder.
+                own = [os.curdir] if path.endswith(".json") else []
+                yield text, list(dict.fromkeys([*folders, *own, os.path.dirname(path)]))
+
+
+def _places(name: str, folders: list[str]) -> list[str]:
+    """Return where a name may be: in some folders, but in the working one only if not in the scene's, which is asked
+    first."""
+    paths = [os.path.join(folder, name) for folder in folders]
+    scene = len(_start())
+    return paths[1:] if len(paths) > scene and os.path.exists(paths[scene]) else paths
+
+
+def _start() -> list[str]:
+    """Return the folders in which the names of a command are: the working one, and that of MERL's files."""
+    return list(dict.fromkeys(["", os.environ.get("MI_BRDFS_MERL_DIR", "")]))
 
 
 def _text(path: str) -> str:

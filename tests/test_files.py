@@ -283,6 +283,20 @@ def test_comments_and_defaults_name_no_file(room):
     scene.write_text(WALL.replace("$tex", "shot-polar"))
 
 
+def test_what_stands_beside_a_scene_is_not_looked_for_elsewhere(tmp_path, monkeypatch):
+    """So the same command, from another folder, may be given again; what only JSON names is in the working folder."""
+    scene = tmp_path / "scene" / "wall.xml"
+    scene.parent.mkdir()
+    scene.write_text('<scene version="3.0.0"><string name="filename" value="wood.png"/></scene>')
+    (tmp_path / "scene" / "fit.json").write_text('{"filename": "wood.png"}')
+    for path in (tmp_path / "wood.png", tmp_path / "scene" / "wood.png"):
+        path.write_bytes(b"")
+    monkeypatch.chdir(tmp_path)
+    found = [set(map(os.path.realpath, mentioned([name]).values())) for name in ("scene/wall.xml", "scene/fit.json")]
+    assert [str(tmp_path / "wood.png") in it for it in found] == [False, True]
+    assert all(str(tmp_path / "scene" / "wood.png") in it for it in found)
+
+
 @pytest.mark.parametrize("text", ["<!--" * 100_000, "<default " * 50_000])
 def test_what_is_never_closed_takes_no_time(text, tmp_path):
     (tmp_path / "open.xml").write_text(f'<scene version="3.0.0">{text}')
