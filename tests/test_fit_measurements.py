@@ -262,7 +262,6 @@ def test_runs_without_a_variant_for_it(ward):
     [
         ("below", "ward", {}, "arrays: no pair of directions has both above the horizon."),
         ("grazing", "ward", {}, "arrays: all pairs of directions are beyond the cut at 80°; give a larger one."),
-        ("pole", "ward", {}, "pole.csv: its pairs of directions within the cut at 80° cover no solid angle."),
         ("dark", "ward", {}, "arrays: no value within the cut at 80° is a positive number."),
         ("good", "lambert", {"given": {"reflectance": 0.5}}, "lambert has nothing to fit: all its parameters are"),
         ("good", "ward", {"given": {"alfa": 0.5}}, "ward: there is no parameter alfa; did you mean alpha?"),
@@ -288,10 +287,7 @@ def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_p
         "good": (wi, wo, f), "below": (-wi, wo, f), "dark": (wi, wo, -f), "shapes": (wi, wo[:4], f), "nothing": [],
         "one": (wi[:1], wo[:1], f[:1]),
         "grazing": (wi, np.tile(np.float32([0.995, 0, 0.0999]), (50, 1)), f), "file": tmp_path / "none.bsdf",
-        "pole": tmp_path / "pole.csv",
     }  # fmt: skip
-    rows = "".join(f"0,0,{turn},0.3\n" for turn in range(0, 181, 30))
-    sources["pole"].write_text("theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows)
     with pytest.raises((FitError, FileError, ValueError)) as caught:
         fit(sources[data], model, **options)
     text = str(caught.value)

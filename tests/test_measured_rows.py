@@ -161,7 +161,7 @@ def test_what_a_file_states_counts(tmp_path, held, asked):
 
 # --- CSV ------------------------------------------------------------------------------------------------------------
 
-ROWS = list(itertools.product((0, 30, 60), (0, 20, 40), range(0, 181, 30)))
+ROWS = list(itertools.product((0, 20, 40), (0, 20, 40), range(0, 181, 20)))
 
 
 def f_of(theta_i, theta_o, delta):
@@ -212,10 +212,10 @@ def test_csv_values(tmp_path):
 
 
 def test_rows_that_are_no_grid_are_samples(tmp_path):
-    for text in (table().rsplit("\n", 2)[0], table().replace("\n60,40,90", "\n60,41,90")):
+    for text in (table().rsplit("\n", 2)[0], table().replace("\n40,40,80", "\n40,41,80")):
         measurement = measured(tmp_path, text, "x.csv")
         assert isinstance(measurement.data, Samples)
-        np.testing.assert_allclose(value_at(measurement, spherical(30, 0), spherical(20, 90)), f_of(30, 20, 90))
+        np.testing.assert_allclose(value_at(measurement, spherical(40, 0), spherical(20, 80)), f_of(40, 20, 80))
 
 
 def test_rows_that_contradict_others_are_told(tmp_path):
@@ -225,7 +225,7 @@ def test_rows_that_contradict_others_are_told(tmp_path):
         warnings.simplefilter("error")
         measured(tmp_path, table() + noisy, "x.csv")
         measured(tmp_path, table() + other + "50,50,10,1000\n", "x.csv")
-    with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 63"):
+    with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 90"):
         measured(tmp_path, table() + other, "y.csv")
 
 
@@ -252,6 +252,20 @@ def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
     np.testing.assert_allclose(as_grid(data).evaluate(wi, wo), highlight(wi, wo), rtol=0.05)
 
 
+def test_half_a_turn_tells_the_other_half(tmp_path):
+    """Of the light's azimuths, by reciprocity; there is no jump where they end."""
+    angles = itertools.product(range(0, 61, 20), range(0, 181, 20), range(0, 61, 20), range(0, 360, 20))
+    rows = [f"{i},{p},{o},{q},{streaks(spherical(i, p), spherical(o, q))[0]}" for i, p, o, q in angles]
+    header = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n"
+    data = as_grid(measured(tmp_path, header + "\n".join(rows), "x.csv").data)
+    assert data.anisotropic
+    for phi in (-1e-3, 1e-3, 90, 270):
+        wi, wo = spherical(40, phi), spherical(40, phi + 180)
+        np.testing.assert_allclose(data.evaluate(wi, wo), streaks(wi, wo), rtol=0.25)
+        wi, wo = spherical(40, phi), spherical(20, phi + 90)
+        np.testing.assert_allclose(data.evaluate(wi, wo), streaks(wi, wo), rtol=0.25)
+
+
 def test_angles_on_the_other_side_of_the_normal(tmp_path):
     rows = "\n".join(f"{i},{o},0,{i + o + 100}" for i, o in itertools.product((20, 40), (-60, -20, 20, 60)))
     measurement = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv")
@@ -272,13 +286,30 @@ def highlight(wi, wo):
 def test_isotropic_materials_are_recognized(tmp_path, azimuths):
     """Whichever azimuth a file keeps; at the normal one means nothing."""
     rows = []
-    for i, o, d in itertools.product((0, 30, 60), (0, 20, 40), range(0, 360, 30)):
+    for i, o, d in itertools.product((0, 20, 40), (0, 20, 40), range(0, 360, 20)):
         phi_i, phi_o = azimuths(i, d)
         rows.append(f"{i},{phi_i},{o},{phi_o},{highlight(spherical(i, 0), spherical(o, d))}")
     data = measured(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows), "x.csv").data
     assert isinstance(data, Grid) and not data.anisotropic
-    wi, wo = spherical(30, 50), spherical(20, 200)
+    wi, wo = spherical(20, 50), spherical(40, 210)
     np.testing.assert_allclose(data.evaluate(wi, wo), highlight(wi, wo), rtol=1e-3)
+
+
+def test_a_single_angle_of_incidence_is_that_of_both_directions(tmp_path):
+    """Where the light comes from one of the views, as it would for reciprocal materials, and not as from the light."""
+    angles = itertools.product(range(0, 81, 5), range(0, 181, 10))
+    rows = [f"45,{o},{d},{highlight(spherical(45, 0), spherical(o, d))}" for o, d in angles]
+    data = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + "\n".join(rows), "x.csv").data
+    wi, wo = np.stack([spherical(o, 0) for o in (10, 30, 60)]), spherical(45, 180)
+    np.testing.assert_allclose(as_grid(data).evaluate(wi, wo)[:, 0], highlight(wi, wo), rtol=0.1)
+
+
+def test_what_lies_beside_a_single_angle_counts(tmp_path):
+    rows = "\n".join(f"45,{o},180,0.25" for o in range(-85, 86, 5))
+    measurement = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows, "x.csv")
+    assert summarize(measurement).largest_albedo.value == pytest.approx(0.25 * np.pi, rel=0.01)
+    zero = as_grid(measurement.data, "zero")
+    assert zero.evaluate(spherical(45, 0), spherical(20, 100), extrapolate="zero") == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize("step", [180, 90, 60])

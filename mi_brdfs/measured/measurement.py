@@ -100,6 +100,8 @@ def corners(
 MOST_CHANNELS = 4096
 MARGIN = 1e-5
 """By how much a float32 angle may miss the end of an axis."""
+THINNEST = np.radians(6)
+"""Half of the least range of angles that counts as measured."""
 LEEWAY = 1e-3
 """By how much an angle may miss the range of samples, whose angles are written with few digits."""
 
@@ -294,9 +296,11 @@ class Samples:
 
     @cached_property
     def _ranges(self) -> list[tuple[float, float]]:
-        """The ends of the polar angles of wi and of wo, and a little more."""
+        """The ends of the polar angles of wi and of wo, and a little more: nodes between samples of a single angle are
+        next to it."""
         angles = [polar_angle(components(it[self.known])) for it in (self.wi, self.wo)]
-        return [(each.min() - LEEWAY, each.max() + LEEWAY) for each in angles]
+        margins = [max(LEEWAY, THINNEST - np.ptp(each) / 2) for each in angles]
+        return [(each.min() - more, each.max() + more) for each, more in zip(angles, margins, strict=True)]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from .text import TextFile
 
 SAME = 1e-6
 """By how much, in radians, angles of one node may differ."""
-COARSE = math.radians(35)
-"""The step in azimuth from which half and difference angles interpolate better than a table: half as wide as lobes."""
+COARSE = math.radians(25)
+"""The step from which half and difference angles interpolate rough highlights as well as a table or better."""
 LEAST_COSINE = 1e-4
 """Below it, f cosθ says nothing of f."""
 
@@ -47,7 +47,7 @@ def arranged(
     theta_o, phi_o = upright(theta_o, phi_o)
     turned_i, turned_o = phi_i[theta_i > SAME], phi_o[theta_o > SAME]
     in_plane = is_single(2 * turned_i) and is_single(2 * turned_o)
-    anisotropic = not (in_plane or is_single(turned_i) or is_single(turned_o))
+    anisotropic = not (in_plane or is_single(turned_i) or (len(turned_o) and is_single(turned_o)))
     if not anisotropic:
         # At the normal the azimuth means nothing, and files have any there.
         phi_o = phi_o - np.where(theta_i > SAME, phi_i, turned_i[:1].sum())
@@ -93,8 +93,8 @@ def gathered(
     values: np.ndarray,
     anisotropic: bool,
 ) -> Grid | None:
-    """Return the grid that rows fill, None if they do not, or if isotropic ones are so far apart in azimuth, as in the
-    plane of incidence, that a table would smear the highlight between them."""
+    """Return the grid that rows fill, None if they do not, or if isotropic ones are so far apart, as in the plane of
+    incidence or with a single θi, that highlights of a table would stay where they were measured."""
     delta = np.pi - around_zero(np.pi - phi_o + phi_i)
     mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
     delta = abs(delta) if mirrored else around_zero(delta)
@@ -106,7 +106,7 @@ def gathered(
         if size > 2 * len(values) + 4:  # more than single rows at poles could stand for
             return None
         place = place * len(different) + rank
-    if not anisotropic and np.diff(nodes[2]).max(initial=np.pi * (len(nodes[2]) == 1)) > COARSE:
+    if not anisotropic and any(np.diff(it).max(initial=np.pi * (len(it) == 1)) > COARSE for it in nodes):
         return None
     shape = tuple(len(each) for each in nodes)
     count = np.bincount(place, minlength=size)
@@ -123,7 +123,7 @@ def gathered(
     axes = [Axis(each) for each in nodes]
     for k in range(3 if mirrored else 2, len(axes)):
         axes[k] = around(nodes[k])
-        if k == 2 and axes[k].period is None and shape[k] > 1:
+        if axes[k].period is None and shape[k] > 1:
             return None
     return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
 
