@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from support import LOFT
+from support import LOFT, ROOT
 from test_cli import SCENE, command, invoke
 
 import mi_brdfs
@@ -105,6 +105,18 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
     assert done.returncode == 1
     assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
     assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
+
+
+def test_files_are_written_also_if_nobody_reads_on(tmp_path):
+    """As behind ``head``, which ends after some lines."""
+    source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.json"
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        command("measured", source, "--json", target), stdout=writing, stderr=subprocess.PIPE, text=True
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "") and target.is_file()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")

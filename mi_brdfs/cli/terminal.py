@@ -30,6 +30,11 @@ class Terminal(Console):
             is_raw = it.control or not (self.stderr or self.is_terminal)
             yield it if is_raw else it._replace(text="\n".join(map(printable, it.text.split("\n"))))
 
+    def on_broken_pipe(self) -> None:
+        """Go on in silence where nobody reads on, as behind ``head``: files may still have to be written."""
+        self.quiet = True
+        os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.stderr if self.stderr else sys.stdout).fileno())
+
 
 out = Terminal(markup=False, emoji=False, highlight=False, soft_wrap=True)
 err = Terminal(markup=False, emoji=False, highlight=False, soft_wrap=True, stderr=True)
