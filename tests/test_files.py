@@ -359,7 +359,7 @@ def test_scenes_that_are_not_upgraded_stay_where_they_are(words, sentence, room)
     assert done.exit_code == 2 and sentence in done.stderr
 
 
-def test_a_model_that_ends_the_process_ends_no_command_well(tmp_path):
+def test_a_model_that_ends_the_process_ends_no_command_well(tmp_path, as_before):
     (tmp_path / "leaver.py").write_text("import sys\nimport mi_brdfs\nclass Leaver(mi_brdfs.Model):\n    'Leaves.'\n"
                                         "    def lobes(self, p):\n        sys.exit(0)\n")  # fmt: skip
     done = invoke("check", "leaver", "--only", "finite", "--import", tmp_path / "leaver.py")

@@ -185,7 +185,7 @@ def check_tile(tile):
 def keys_in(variant):
     """The keys of all parameters, by plugin name and for some of the rows."""
     with mi.variant_context(variant):
-        bsdfs = {name: {"type": name} for name in mi_brdfs.list_models()}
+        bsdfs = {name: {"type": name} for name in NAMES}
         bsdfs |= {row.name: row.bsdf for row in RICHEST.values()}
         return {name: list(mi.traverse(mi.load_dict(bsdf)).keys()) for name, bsdf in bsdfs.items()}
 
