@@ -42,7 +42,8 @@ def mentioned(names: Iterable[str], texts: Iterable[str] = (), values: Mapping[s
 def _new(names: Iterable[str], folders: list[str], found: dict[object, str]) -> Iterator[tuple[str, list[str]]]:
     """Add what these names are in some folders to what is found, and yield the texts of new ones, with the folders of
     what is named there."""
-    for path in (path for name in names for path in _places(name, folders)):
+    scene = len(_start())
+    for path in (path for name in names for path in _places(name, folders, scene)):
         if os.path.exists(path) and not os.path.isdir(path) and (it := identity(path)) not in found:
             found[it] = path
             if os.path.isfile(path) and (text := _text(path)):
@@ -51,11 +52,10 @@ def _new(names: Iterable[str], folders: list[str], found: dict[object, str]) -> 
                 yield text, list(dict.fromkeys([*folders, *own, os.path.dirname(path)]))
 
 
-def _places(name: str, folders: list[str]) -> list[str]:
+def _places(name: str, folders: list[str], scene: int) -> list[str]:
     """Return where a name may be: in some folders, but in the working one only if not in the scene's, which is asked
-    first."""
+    first; ``scene`` is the index of that."""
     paths = [os.path.join(folder, name) for folder in folders]
-    scene = len(_start())
     return paths[1:] if len(paths) > scene and os.path.exists(paths[scene]) else paths
 
 

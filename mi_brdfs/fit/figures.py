@@ -92,7 +92,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
         ticks = ticks[abs(zero + ticks) <= 90]
         places = lambda x: np.sign(x - zero) * np.sqrt(abs(x - zero)), lambda y: zero + np.sign(y) * y * y
         ax.set_xscale("function", functions=places)
-    ax.set_xticks(zero + ticks, [f"{turn}°".replace("-", "−") for turn in ticks], minor=False)
+    ax.set_xticks(zero + ticks, [f"{turn}°".replace("-", "−") for turn in ticks])
     ax.set_xlim(-90, 90)
     ax.set_title(caption, fontsize=9, color=INK)
     ax.set_xlabel(label, fontsize=9, color=INK)

@@ -170,7 +170,7 @@ def summarize(measurement: Measurement) -> Summary:
     turns = azimuths(grid)
     turns = thinned(turns, AZIMUTHS)
     planar = in_one_plane(data)
-    covered = np.array([coverage(grid, np.radians(angles), phi) for phi in turns]) * (not planar)
+    covered = np.zeros(1) if planar else np.array([coverage(grid, np.radians(angles), phi) for phi in turns])
     return Summary(
         file=named(measurement.path),
         format=measurement.format,
