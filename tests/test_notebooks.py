@@ -43,7 +43,7 @@ def is_my_sampler_right(names):
     assert dimmer["loses_samples"] == pytest.approx([0.01, 0.1], abs=0.02)
 
     assert (names["eta"]["walter"] > names["eta"]["roughconductor"]).all()
-    assert (names["eta"]["roughconductor"][3:] > names["eta"]["facets"][3:] + 0.03).all()
+    assert (names["eta"]["roughconductor"][6:] > names["eta"]["facets"][6:] + 0.03).all()
     drawn = names["facets"].of("pdf")[0].data["80°"]
     assert drawn["drawn"] == pytest.approx(drawn["integral"], abs=0.003) and drawn["drawn"] < 0.7
 

@@ -37,9 +37,8 @@ SETTINGS = {
             "color-brand-primary": accent,
             "color-brand-content": accent,
             "color-brand-visited": accent,
-            "white-pictures": dimmed,
         }
-        for scheme, accent, dimmed in (("light", "#0b5fa5", "none"), ("dark", "#6db4f2", "brightness(0.85)"))
+        for scheme, accent in (("light", "#0b5fa5"), ("dark", "#6db4f2"))
     },
     "html_css_files": ["site.css"],
     "html_copy_source": False,

@@ -24,11 +24,10 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 def _finish(context: dict) -> None:
     """Describe the page to sites that show links to it, name the heading in each cell of a wide table, name strips of
-    pictures, mark plots, and let links show pictures, which MyST makes downloads."""
+    pictures, and let links show pictures, which MyST makes downloads."""
     if body := context.get("body"):
         body = TABLE.sub(_with_headings, body)
-        body = re.sub(r'<img (?=alt="\w+: )', '<img class="strip" ', body)
-        body = re.sub(r'<img (?=alt="Lobes of \w+ in )', '<img class="strip output" ', body)
+        body = re.sub(r'<img (?=alt="(?:\w+: |Lobes of \w+ in ))', '<img class="strip" ', body)
         context["metatags"] += _described(context)
         context["body"] = re.sub(r' download=""(?= href="[^"]+\.(?:jpg|png)")', "", body)
 

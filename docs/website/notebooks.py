@@ -54,7 +54,7 @@ def _output(output: dict[str, Any], drawn: Iterator[Path]) -> str:
         path.write_bytes(base64.b64decode("".join(data[kind])))
         with Image.open(path) as image:
             width = output["metadata"].get(kind, {}).get("width", image.width)
-        kind = "strip" if width >= WIDE else "output"
-        return f"![](/notebooks/{path.parent.name}/{path.name}){{.{kind} width={width}}}"
+        strip = ".strip " * (width >= WIDE)
+        return f"![](/notebooks/{path.parent.name}/{path.name}){{{strip}width={width}}}"
     text = "".join(output.get("text", data.get("text/plain", ""))).rstrip()
     return f"```text\n{text}\n```" if text else ""

@@ -184,17 +184,16 @@ def _folklore(chapter: str) -> str:
 def _thumbnails() -> str:
     """Return the examples of all models by family, with their years and links to their pages."""
 
-    def cell(model: type[Model]) -> str:
+    def cell(model: type[Model], heading: str) -> str:
         name = model.plugins[0]
-        return f"[![{name}](../../docs/thumbnails/large/{name}.jpg)](#{name})\n[`{name}`](#{name})\\\n{year(model)}"
+        picture = f"[![{name}](../../docs/thumbnails/large/{name}.jpg)](#{name})"
+        return f"{heading}{picture}\n[`{name}`](#{name})\\\n{year(model)}"
 
-    families = "\n".join(
-        f":::::{{container}} family\n**{family}**\n\n::::{{container}} pictures\n"
-        + "\n\n".join(map(cell, members))
-        + "\n::::\n:::::"
-        for family, members in groupby(by_family(own_models()), key=lambda it: it.family)
+    families = groupby(by_family(own_models()), key=lambda it: it.family)
+    cells = (
+        cell(model, f"**{family}**" if k == 0 else "") for family, own in families for k, model in enumerate(own)
     )
-    return f"::::::{{container}} families\n{families}\n::::::"
+    return ":::{container} pictures\n" + "\n\n".join(cells) + "\n:::"
 
 
 def _reference() -> str:
