@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import groupby
 from pathlib import Path, PurePosixPath
 
@@ -58,6 +59,9 @@ OTHERS: tuple[type[Plugin], ...] = (Tabulated, Shading)
 TITLES = {"bench": "Benchmarks", "testing": "Test coverage", "guide/limits": "Known limits"}
 """Titles of pages whose files are called by a word."""
 
+PICTURES = "notebooks/pictures"
+"""Where the pictures of notebooks are."""
+
 CONTENTS = """
 ```{{toctree}}
 :hidden:
@@ -97,14 +101,11 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
         pages[f"reference/{model.plugins[0]}"] = ("mi_brdfs/models/README.md", _model(model, models.model_page))
     pages["reference/tabulated"] = ("mi_brdfs/models/README.md", _model(Tabulated, lambda _: models.data_page()))
     pages["reference/shading"] = ("mi_brdfs/models/README.md", _model(Shading, lambda _: models.integrator_page()))
-    index = pages["notebooks/index"][1]
-    pages["notebooks/index"] = ("notebooks/README.md", f"{index}\n{_hidden(notebook_order())}\n")
     for name in notebook_order():
         path = ROOT / "notebooks" / f"{name}.ipynb"
-        pages[f"notebooks/{name}"] = (
-            f"notebooks/{name}.ipynb",
-            notebooks.markdown(path, folder / "notebooks" / "pictures"),
-        )
+        pages[f"notebooks/{name}"] = (f"notebooks/{name}.ipynb", notebooks.markdown(path, folder / PICTURES))
+    index = re.sub(r"\[(.*)\]\((\w+)\.ipynb\)", partial(_glance, folder / PICTURES), pages["notebooks/index"][1])
+    pages["notebooks/index"] = ("notebooks/README.md", f"{index}\n{_hidden(notebook_order())}\n")
     return pages
 
 
@@ -131,6 +132,12 @@ def _contents() -> Iterator[str]:
 def notebook_order() -> list[str]:
     """Return the names of the notebooks in the order of notebooks/README.md."""
     return re.findall(r"\((\w+)\.ipynb\)", (ROOT / "notebooks" / "README.md").read_text(encoding="utf-8"))
+
+
+def _glance(pictures: Path, link: re.Match) -> str:
+    """Return a link to a notebook, with the first picture that it renders."""
+    first = min(pictures.glob(f"{link[2]}_*.jpeg"), key=lambda path: (len(path.name), path.name))
+    return f"[![](/{PICTURES}/{first.name}){{.glance}}{link[1]}]({link[2]}.ipynb)"
 
 
 def _hidden(names: list[str]) -> str:
@@ -190,9 +197,7 @@ def _thumbnails() -> str:
         return f"{heading}{picture}\n[`{name}`](#{name})\\\n{year(model)}"
 
     families = groupby(by_family(own_models()), key=lambda it: it.family)
-    cells = (
-        cell(model, f"**{family}**" if k == 0 else "") for family, own in families for k, model in enumerate(own)
-    )
+    cells = (cell(model, f"**{family}**" if k == 0 else "") for family, own in families for k, model in enumerate(own))
     return ":::{container} pictures\n" + "\n\n".join(cells) + "\n:::"
 
 
