@@ -27,6 +27,7 @@ from mi_brdfs.explorer.tours import parse as parse_tour
 from mi_brdfs.explorer.tours import tours
 from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.probe.sources import BSDFSource, find_sources
+from mi_brdfs.rendering.scene_file import SceneFile
 
 STAGES = ["studio", "lamp", "point"]
 LOFT = str(FILE)
@@ -477,6 +478,26 @@ def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     client = Client(UserScene(scene, "ward"))  # the id of a shape
     client.show({"type": "lambert"}, **shown)
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]
+
+
+TWINS = """<scene version="3.0.0"><integrator type="path"/><sensor type="perspective"/>
+<bsdf id="one" type="diffuse"/><bsdf id="other" type="diffuse"/>
+<shape id="left" type="cube"><ref id="one"/></shape><shape id="right" type="cube"><ref id="one"/></shape>
+<shape id="above" type="cube"><ref id="other"/></shape></scene>"""
+
+
+@pytest.mark.parametrize(
+    ("id", "shapes"), [("one", ["left", "right"]), ("other", ["above"]), ("left", ["left"]), ("right", ["right"])]
+)
+def test_materials_that_are_alike_are_not_one(llvm_rgb, tmp_path, id, shapes):
+    """Mitsuba makes one of those, and of meshes that share one, and forgets the names of the rest."""
+    path = tmp_path / "twins.xml"
+    path.write_text(TWINS)
+    client = Client(UserScene(path, id))
+    client.show({"type": "lambert"}, views=["picture"], shape="scene", size=32)
+    assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == shapes
+    scene = SceneFile(str(path), replaced={id: BSDFSource("lambert", "lambert", "lambert")}).load()
+    assert [it.id() for it in scene.shapes() if it.bsdf().class_name() != "SmoothDiffuse"] == shapes
 
 
 def test_a_mesh_that_is_refused_breaks_no_picture(client, tmp_path):

@@ -107,6 +107,16 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
     assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
+def test_files_are_written_also_if_the_standard_output_is_full(tmp_path):
+    source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.xml"
+    arguments = command("fit", source, "--model", "lambert", "--starts", "1", "-o", target)
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(arguments, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and target.is_file()
+    assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
+
+
 def test_files_are_written_also_if_nobody_reads_on(tmp_path):
     """As behind ``head``, which ends after some lines."""
     source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.json"

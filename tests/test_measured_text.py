@@ -8,6 +8,7 @@ import pytest
 from support import spherical
 
 from mi_brdfs.measured import read
+from mi_brdfs.measured.report.summary import summarize
 
 LOFT = Path(__file__).parents[1] / "scenes" / "measured"
 
@@ -109,19 +110,32 @@ def zemax(folder, **choices):
         {"symmetry": "Asymmetrical4D", "rotations": (0, 45, 90), "azimuths": (0, 120, 240, 360)},
         {"symmetry": "ASymmetrical4D", "rotations": (270, 180, 90, 0), "azimuths": (0, 120, 240)},
         {"symmetry": "PlaneSymmetrical", "rotations": (0, 90), "azimuths": (0, 90, 180)},
+        {"symmetry": "ASymmetrical4D", "rotations": (120, 90, 60), "azimuths": (0, 120, 240)},
     ],
 )
 def test_zemax_symmetries_and_orders(tmp_path, choices):
     measurement, table = zemax(tmp_path, **choices)
     azimuth, radial = np.meshgrid(table.azimuths % 360, table.radials, indexing="ij")
     kept = np.unique(table.azimuths % 360, return_index=True)[1]  # of 0 and 360, the first
-    rotations = np.degrees(measurement.data.axes[3].nodes) if len(table.rotations) > 1 else [90]
+    rotations = np.degrees(measurement.data.axes[3].nodes) if len(table.rotations) > 1 else np.array([90])
     for k, rotation in enumerate(table.rotations):
-        (node,) = np.flatnonzero(np.isclose(rotations, (90 - rotation) % 360))
+        (node,) = np.flatnonzero(np.isclose(rotations % 360, (90 - rotation) % 360))
         for i, incidence in enumerate(table.incidences):
             found = measurement.data.evaluate(*directions(rotation, incidence, azimuth, radial), "nearest")
             np.testing.assert_array_equal(found[kept, 1:, 0], table.values[k, i][kept, 1:])
             assert measurement.stated_albedos[np.radians(incidence)][node] == table.tis[k, i]
+
+
+def test_zemax_part_of_a_turn(tmp_path):
+    """Light from 30°, 0 and -30°: what lies between is measured, also beyond 0, and the rest passes from end to end."""
+    measurement, table = zemax(tmp_path, symmetry="ASymmetrical4D", rotations=(60, 90, 120), azimuths=(0, 120, 240))
+    mirror = [directions(rotation, 40, 0, 10) for rotation in (60, 75, 90, 120, 119.9, 121, 270, 59)]
+    wi, wo = (np.array([np.ravel(pair[k]) for pair in mirror]) for k in (0, 1))
+    np.testing.assert_array_equal(measurement.data.measured(wi, wo), [1, 1, 1, 1, 1, 0, 0, 0])
+    first, middle, last = table.values[:, list(table.incidences).index(40), 0, 1]
+    expected = np.interp((60, 75, 90, 120, 119.9, -239, -90, 59), (-240, 60, 90, 120), (last, first, middle, last))
+    np.testing.assert_allclose(measurement.data.evaluate(wi, wo)[:, 0], expected, rtol=1e-6)
+    assert "3 φi from 330 to 390°" in summarize(measurement).grid
 
 
 def test_zemax_xyz_is_a_colour(tmp_path):

@@ -22,7 +22,7 @@ from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.messages import printable
 from ..starting import Terminated, exit_on_sigterm, raise_on_ctrl_c
 from .files import begin, check_inputs
-from .terminal import Exit, err, fail, out
+from .terminal import Exit, Terminal, err, fail, out
 
 app = typer.Typer(
     no_args_is_help=True, pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
@@ -44,13 +44,15 @@ def main() -> None:
     try:
         app(prog_name="mi-brdfs")
     except OSError as error:
-        if error.errno == errno.ENOSPC:
-            err.print(f"mi-brdfs: cannot write {error.filename or 'to the standard output'}: {error.strerror}")
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what is left in the buffer
-        elif error.errno == errno.ENAMETOOLONG:  # which Python raises wherever it looks at a path
-            err.print(f"mi-brdfs: {error.filename}: {error.strerror}")
-        else:
+        # Python raises the second one wherever it looks at a path.
+        if error.errno not in (errno.ENOSPC, errno.ENAMETOOLONG):
             raise
+        err.print(f"mi-brdfs: {error.filename}: {error.strerror}")
+        sys.exit(Exit.ERROR)
+    except SystemExit as ended:
+        if ended.code or not Terminal.unwritten:
+            raise
+        err.print(f"mi-brdfs: cannot write to the standard output: {Terminal.unwritten}")
         sys.exit(Exit.ERROR)
 
 

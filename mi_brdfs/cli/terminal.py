@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
-from typing import NoReturn
+from typing import Any, ClassVar, NoReturn
 
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -23,7 +23,19 @@ from ..parameters.messages import printable
 
 class Terminal(Console):
     """A console that no text controls, as text of files and arguments might. What is no terminal gets results as they
-    are, with the names of files that programs need."""
+    are, with the names of files that programs need. Where it cannot be written to, the rest is left out: files may
+    still have to be written."""
+
+    unwritten: ClassVar[str] = ""
+    """Why results could not be written, but for nobody who reads on, as behind ``head``."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        try:
+            super().print(*objects, **options)
+        except OSError as error:
+            self.on_broken_pipe()
+            if not self.stderr:
+                Terminal.unwritten = str(error.strerror)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
         for it in super().render(renderable, options):
@@ -31,7 +43,6 @@ class Terminal(Console):
             yield it if is_raw else it._replace(text="\n".join(map(printable, it.text.split("\n"))))
 
     def on_broken_pipe(self) -> None:
-        """Go on in silence where nobody reads on, as behind ``head``: files may still have to be written."""
         self.quiet = True
         os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.stderr if self.stderr else sys.stdout).fileno())
 

@@ -232,7 +232,7 @@ def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
 
 
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
-    scene = SceneFile(str(user.scene), box_filter=True).load()  # as the denoiser expects
+    scene = SceneFile(str(user.scene), box_filter=True, keeps_ids=True).load()  # as the denoiser expects
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
     shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]

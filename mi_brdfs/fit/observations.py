@@ -211,9 +211,8 @@ def _cells(axis: Axis, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if len(nodes) == 1:
         return nodes[k] - 0.5, nodes[k] + 0.5
     between = (nodes[1:] + nodes[:-1]) / 2
-    if axis.period is None:
-        low, high = min(axis.low, nodes[0]), max(axis.high, nodes[-1])
-    else:
+    low, high = min(axis.low, nodes[0]), max(axis.high, nodes[-1])
+    if axis.period is not None and axis.whole:
         high = (nodes[-1] + nodes[0] + axis.period) / 2
         low = high - axis.period
     edges = np.concatenate([[low], between, [high]])

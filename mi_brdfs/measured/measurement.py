@@ -38,8 +38,9 @@ class FileError(ValueError):
 class Axis:
     """An axis of a grid: increasing ``nodes``, between which values are interpolated, in the coordinate's unit.
 
-    An axis with a ``period`` goes round. Another one was measured from ``low`` to ``high``, by default its outer nodes;
-    cells reach beyond their centres."""
+    It was measured from ``low`` to ``high``, by default its outer nodes; cells reach beyond their centres. An axis with
+    a ``period`` goes round: all of it was measured by default, and between its last node and the first one, a period
+    later, values are interpolated in any case."""
 
     nodes: np.ndarray
     period: float | None = None
@@ -51,7 +52,7 @@ class Axis:
         if nodes.ndim != 1 or not len(nodes) or not np.all(np.isfinite(nodes)) or np.any(np.diff(nodes) <= 0):
             raise ValueError("The nodes of an axis must increase.")
         object.__setattr__(self, "nodes", nodes)
-        for name, end in (("low", nodes[0]), ("high", nodes[-1])):
+        for name, end in (("low", nodes[0]), ("high", nodes[-1] if self.period is None else nodes[0] + self.period)):
             if np.isnan(getattr(self, name)):
                 object.__setattr__(self, name, float(end))
 
@@ -80,9 +81,18 @@ class Axis:
         """Return the index of a looped node."""
         return xp.select(k == len(self.nodes), 0, k) if self.period is not None else k
 
-    def measured(self, x: Any) -> Any:
+    @property
+    def whole(self) -> bool:
+        """Whether all of a period was measured."""
+        return self.period is not None and self.high - self.low > self.period - MARGIN
+
+    def measured(self, x: Any, xp: SimpleNamespace = NUMPY) -> Any:
         """Return whether values lie in the measured range, up to rounding."""
-        return True if self.period is not None else (x >= self.low - MARGIN) & (x <= self.high + MARGIN)
+        if self.whole:
+            return True
+        if self.period is not None:
+            x = x - self.period * xp.floor((x - self.low + MARGIN) * (1 / self.period))
+        return (x >= self.low - MARGIN) & (x <= self.high + MARGIN)
 
 
 def corners(

@@ -122,9 +122,11 @@ def gathered(
         return None
     axes = [Axis(each) for each in nodes]
     for k in range(3 if mirrored else 2, len(axes)):
-        axes[k] = around(nodes[k])
-        if axes[k].period is None and shape[k] > 1:
+        if shape[k] == 1:
+            continue
+        if sector_start(nodes[k]) is not None:
             return None
+        axes[k] = Axis(nodes[k], TWO_PI)
     return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
 
 
@@ -141,10 +143,11 @@ def nodes_of(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.bincount(rank, angles) / np.bincount(rank), rank
 
 
-def around(nodes: np.ndarray) -> Axis:
-    """Return azimuths in [0, 2π) as an axis that goes round, if no gap among them is much larger than the others."""
+def sector_start(nodes: np.ndarray) -> int | None:
+    """Return the index of the azimuth behind a gap much larger than all others, None if those in [0, 2π) go round."""
     gaps = np.diff(np.append(nodes, nodes[0] + TWO_PI))
-    return Axis(nodes, period=TWO_PI if len(nodes) > 1 and gaps[-1] <= 1.5 * max(gaps[:-1]) else None)
+    widest = int(gaps.argmax())
+    return (widest + 1) % len(nodes) if gaps[widest] > 1.5 * np.delete(gaps, widest).max(initial=0) else None
 
 
 def without_cosine(values: np.ndarray, cosine: np.ndarray) -> np.ndarray:

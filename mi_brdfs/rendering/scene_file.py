@@ -34,6 +34,8 @@ class SceneFile:
     """Whether stand-ins take the place of files that a scene of Mitsuba 0.6 lacks."""
     replaced: dict[str, BSDFSource] = field(default_factory=dict)
     """What takes the place of BSDFs, or of those of shapes, by their ids."""
+    keeps_ids: bool = False
+    """Whether BSDFs that are alike, and meshes of one BSDF, stay apart though nothing is replaced."""
     contents: dict[str, bytes] | None = None
     """In a copy, the files by their paths, without the root."""
     names: dict[str, str] = field(default_factory=dict)
@@ -78,6 +80,7 @@ class SceneFile:
             state, _ = parsed(config, path, self.lenient, self.parameters)
             for props, key in file_names(state):
                 props[key] = names.get(props[key], props[key])
+            config.merge_equivalent = config.merge_meshes = not (self.keeps_ids or self.replaced)
             mi.parser.transform_all(config, state)
             _check_films(state)
             for id, source in self.replaced.items():

@@ -133,7 +133,7 @@ class Table:
         places, scale = self.coordinates.locate_scaled(wi, wo, DRJIT)
         if self.extrapolate == "zero":
             for axis, place in zip(self.axes, places, strict=True):
-                scale = dr.select(axis.measured(place), scale, 0)
+                scale = dr.select(axis.measured(place, DRJIT), scale, 0)
         if self.spectrum is None:
             read = [[(channel, 1)] for channel in range(self.channels)]
         else:

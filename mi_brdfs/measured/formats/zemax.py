@@ -12,10 +12,10 @@ import numpy as np
 
 from ...parameters.messages import listed
 from ..arrays import stacked
-from ..coordinates import SpecularPolar, wrapped
+from ..coordinates import TWO_PI, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
 from ..report.albedo import hemisphere
-from ..rows import around
+from ..rows import sector_start
 from ..source import Source
 from ..text import TextFile, first_words, is_number, opening, shortened, whole
 
@@ -97,7 +97,7 @@ def read(path: Path) -> Measurement:
     half = np.all((header.angles["ScatterAzimuth"] >= 0) & (header.angles["ScatterAzimuth"] <= 180))
     mirrored = bool(half) and not symmetry.startswith("ASym")
     azimuth, a = header.ordered("ScatterAzimuth", most=180) if mirrored else header.turning("ScatterAzimuth")
-    phi_i, k = header.turning("SampleRotation", start=90, sense=-1)
+    phi_i, k = header.turning("SampleRotation", zero=90, sense=-1)
     axes: tuple[Axis, ...] = (theta_i, azimuth, radial, phi_i)
     values = values.transpose(2, 3, 4, 1, 0)[np.ix_(i, a, r, k)]
     anisotropic = len(k) > 1
@@ -237,14 +237,18 @@ class Header:
         order = np.argsort(angles)
         return Axis(np.radians(angles[order])), order
 
-    def turning(self, name: str, start: float = 0, sense: int = 1) -> tuple[Axis, np.ndarray]:
-        """Return the same as an axis that goes round, if the angles do. Of angles that a turn makes equal, as 0 and
-        360, the first counts."""
+    def turning(self, name: str, zero: float = 0, sense: int = 1) -> tuple[Axis, np.ndarray]:
+        """Return the same as an axis that goes round, measured where the angles are. Of angles that a turn makes equal,
+        as 0 and 360, the first counts."""
         angles = self.angles[name]
         if not np.all(np.isfinite(angles)):
             raise FileError(f"{self.file.path}: {name} must be numbers.")
-        nodes, order = np.unique(np.round(wrapped(start + sense * angles, 360.0), 6), return_index=True)
-        return around(np.radians(nodes)), order
+        nodes, order = np.unique(np.round(wrapped(zero + sense * angles, 360.0), 6), return_index=True)
+        nodes = np.radians(nodes)
+        if (start := sector_start(nodes)) is None:
+            return Axis(nodes, TWO_PI), order
+        nodes = np.append(nodes[start:], nodes[:start] + TWO_PI)
+        return Axis(nodes, TWO_PI, low=nodes[0], high=nodes[-1]), np.roll(order, -start)
 
     @property
     def wavelength(self) -> float:

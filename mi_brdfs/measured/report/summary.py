@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..files import named
-from ..measurement import FileError, Grid, Measurement, Samples
+from ..measurement import Axis, FileError, Grid, Measurement, Samples
 from ..scattered import as_grid
 from .albedo import albedos, coverage
 from .counts import Counts, Range, census, in_one_plane
@@ -215,7 +215,17 @@ def _grid(data: Grid | Samples) -> str:
     if isinstance(data, Samples):
         return f"{len(data.values):,} pairs of directions{of}"
     named = zip(data.axes, data.coordinates.names, strict=True)
-    return " × ".join(f"{len(axis.nodes)} {AXES.get(name, name.replace('_', ' '))}" for axis, name in named) + of
+    return (
+        " × ".join(f"{len(axis.nodes)} {AXES.get(name, name.replace('_', ' '))}{_sector(axis)}" for axis, name in named)
+        + of
+    )
+
+
+def _sector(axis: Axis) -> str:
+    """Return which part of a turn was measured, if not all of it."""
+    if axis.period is None or axis.whole:
+        return ""
+    return f" from {np.degrees(axis.low):.4g} to {np.degrees(axis.high):.4g}°"
 
 
 def _wavelengths(measurement: Measurement) -> str:
