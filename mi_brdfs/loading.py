@@ -33,16 +33,18 @@ def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters:
         ValueError: as :func:`upgrade`.
         RuntimeError: what Mitsuba says where it cannot load the scene.
     """
-    return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient)
+    return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient, merge=True)
 
 
-def load(path: Path, parameters: Mapping[str, str], lenient: bool = False) -> Any:
-    """Load a scene file, old or new."""
+def load(path: Path, parameters: Mapping[str, str], lenient: bool = False, merge: bool = False) -> Any:
+    """Load a scene file, old or new. With ``merge``, as Mitsuba does it, BSDFs that are alike become one, and meshes
+    with the same BSDF: it is faster, and ids are lost."""
     with looking_in(path.parent):
         config = mi.parser.ParserConfig(mi.variant())
         state, upgraded = parsed(config, path, lenient, parameters)
+        config.merge_equivalent = merge
         # Mitsuba merges what is turned inside out with what is not, and fails.
-        config.merge_meshes = "flip_normals" not in (upgraded or "")
+        config.merge_meshes = merge and "flip_normals" not in (upgraded or "")
         try:
             mi.parser.transform_all(config, state)
             return instantiated(config, state)
@@ -57,6 +59,7 @@ def load_text(text: str, parameters: Mapping[str, str]) -> Any:
     """Load what XML of Mitsuba 3 describes, with a version or without."""
     config = mi.parser.ParserConfig(mi.variant())
     state = mi.parser.parse_string(config, versioned(text), **parameters)
+    config.merge_equivalent = False
     mi.parser.transform_all(config, state)
     return instantiated(config, state)
 

@@ -500,6 +500,15 @@ def test_materials_that_are_alike_are_not_one(llvm_rgb, tmp_path, id, shapes):
     assert [it.id() for it in scene.shapes() if it.bsdf().class_name() != "SmoothDiffuse"] == shapes
 
 
+def test_each_material_of_a_scene_is_its_own(llvm_rgb, tmp_path):
+    path = tmp_path / "twins.xml"
+    path.write_text(TWINS.replace("<shape", '<bsdf id="unused" type="diffuse"/><shape', 1))
+    assert [it.name for it in find_sources(str(path))] == ["twins.xml:one", "twins.xml:other"]
+    grey = BSDFSource("lambert", "lambert", "lambert")
+    with pytest.raises(ValueError, match="nothing in the scene has the BSDF unused"):
+        SceneFile(str(path), replaced={"unused": grey}).load()
+
+
 def test_a_mesh_that_is_refused_breaks_no_picture(client, tmp_path):
     """While a mesh without vertices is alive, Dr.Jit compiles no kernel."""
     mesh = "ply\nformat ascii 1.0\nelement vertex 0\n" + "".join(f"property float {it}\n" for it in "xyz")

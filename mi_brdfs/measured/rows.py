@@ -17,6 +17,8 @@ SAME = 1e-6
 """By how much, in radians, angles of one node may differ."""
 COARSE = math.radians(25)
 """The step from which half and difference angles interpolate rough highlights as well as a table or better."""
+WIDE = math.radians(40)
+"""The gap between azimuths of incidence of which reports tell."""
 LEAST_COSINE = 1e-4
 """Below it, f cosθ says nothing of f."""
 
@@ -52,6 +54,8 @@ def arranged(
         # At the normal the azimuth means nothing, and files have any there.
         phi_o = phi_o - np.where(theta_i > SAME, phi_i, turned_i[:1].sum())
         phi_i = np.zeros_like(phi_i)
+    else:
+        warn_of_a_sector(nodes_of(around_zero(turned_i))[0])
     return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
         stacked(spherical(theta_i, phi_i)), stacked(spherical(theta_o, phi_o)), values, anisotropic
     )
@@ -73,6 +77,15 @@ def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -
             "Rows with the angles of others, and more than twice or less than half their values, are averaged: "
             f"{count:,}.", stacklevel=2,
         )  # fmt: skip
+
+
+def warn_of_a_sector(phi_i: np.ndarray) -> None:
+    """Warn of azimuths of incidence in [0, 2π) that leave out a wide part of the turn."""
+    start = sector_start(phi_i)
+    if start is not None and (phi_i[start] - phi_i[start - 1]) % TWO_PI > WIDE:
+        low, high = np.degrees(phi_i[[start, start - 1]])
+        warnings.warn(f"Light from φi = {low:.4g}° to {high:.4g}° was measured; from elsewhere, f is interpolated.",
+                      stacklevel=2)  # fmt: skip
 
 
 def is_single(azimuths: np.ndarray) -> bool:

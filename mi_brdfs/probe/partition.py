@@ -54,10 +54,8 @@ class Partition:
         """Return the integrals over some cells by the mean of so many nodes along each side."""
         nodes = (np.arange(count) + 0.5) / count
         size = 2.0 ** -self.level[cells]
-        px = (self.x[cells, None, None] + nodes[:, None] + 0 * nodes) * size[:, None, None]
-        py = (self.y[cells, None, None] + nodes + 0 * nodes[:, None]) * size[:, None, None]
-        w, jacobian = _to_sphere(np.stack([px.ravel(), py.ravel()], axis=-1), self.axis)
-        return (density(w.astype(np.float32)) * jacobian).reshape(len(cells), -1).mean(axis=1) * size * size
+        w, jacobian = _to_sphere(*_nodes(self.x[cells], self.y[cells], nodes, size), self.axis)
+        return (density(w.reshape(-1, 3)).reshape(w.shape[:-1]) * jacobian).mean(axis=(1, 2)) * size * size
 
     def only(self, cells: Array) -> Partition:
         """Return some of its cells, which cover less than the sphere."""
@@ -70,14 +68,13 @@ class Partition:
 
     def cells(self, w: Array) -> Array:
         """Return the cell that each of the directions lies in."""
-        points = (_to_square(w, self.axis) * (1 << LAST_LEVEL)).astype(np.int64).clip(0, (1 << LAST_LEVEL) - 1)
-        return np.searchsorted(self.starts, _interleaved(points[:, 0], points[:, 1]), side="right") - 1
+        return np.searchsorted(self.starts, _interleaved(*_places(w, self.axis)), side="right") - 1
 
     @property
     def centres(self) -> Array:
         """A direction in the middle of each cell, shape (cells, 3)."""
-        middles = np.stack([self.x + 0.5, self.y + 0.5], axis=-1) * 2.0 ** -self.level[:, None]
-        return _to_sphere(middles, self.axis)[0]
+        size = 2.0**-self.level
+        return _to_sphere((self.x + 0.5) * size, (self.y + 0.5) * size, self.axis)[0]
 
     @property
     def solid_angles(self) -> Array:
@@ -124,14 +121,12 @@ def partitions(
 def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, Array, Partition]:
     """Return a partition; yield the directions whose density it needs."""
     axis = azimuth_axis(wi)
-    points, heights = _to_square(pilot, axis), (yield pilot) if len(pilot) else np.zeros(0)
+    places, heights = _places(pilot, axis), (yield pilot) if len(pilot) else np.zeros(0)
     side = 1 << FIRST_LEVEL
     x, y = (index.ravel() for index in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
     integrals, _ = yield from _integrals(axis, x, y, FIRST_LEVEL)
-    done = []
+    slots, done = places[0] >> LAST_LEVEL - FIRST_LEVEL << FIRST_LEVEL | places[1] >> LAST_LEVEL - FIRST_LEVEL, []
     for level in range(FIRST_LEVEL, LAST_LEVEL + 1):
-        slots, inside = _slots(points, x, y, level)
-        points, heights = points[inside], heights[inside]
         held, peaks = np.bincount(slots, minlength=len(x)), np.zeros(len(x))
         np.maximum.at(peaks, slots, heights)
         quarters = [(2 * x + i, 2 * y + j) for i in (0, 1) for j in (0, 1)]
@@ -156,6 +151,10 @@ def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, A
         x, y, integrals = qx[split].ravel(), qy[split].ravel(), parts[split].ravel()
         if not len(x):
             break
+        inside = split[slots]
+        places, heights, parents = places[:, inside], heights[inside], (np.cumsum(split) - 1)[slots[inside]]
+        i, j = places >> LAST_LEVEL - level - 1 & 1
+        slots = 4 * parents + 2 * i + j
     levels, x, y, integrals, errors = (np.concatenate(column) for column in zip(*done, strict=True))
     shift = LAST_LEVEL - levels
     starts = _interleaved(x << shift, y << shift)
@@ -163,45 +162,41 @@ def _grow(pilot: Array, wi: Array, count: int, cells: int) -> Generator[Array, A
     return Partition(axis, starts[order], *(field[order] for field in (levels, x, y, integrals, errors)))
 
 
-def _slots(points: Array, x: Array, y: Array, level: int) -> tuple[Array, Array]:
-    """Return ``(slots, inside)``: which points lie in one of some cells of a level, and in which."""
-    indices = (points * (1 << level)).astype(np.int64).clip(0, (1 << level) - 1)
-    keys, cells = indices[:, 0] << 32 | indices[:, 1], x.astype(np.int64) << 32 | y
-    order = np.argsort(cells)
-    slot = np.searchsorted(cells[order], keys).clip(0, len(cells) - 1)
-    inside = cells[order][slot] == keys
-    return order[slot[inside]], inside
-
-
 def _integrals(axis: Array, x: Array, y: Array, level: int) -> Generator[Array, Array, tuple[Array, Array]]:
     """Return the integrals of a density over cells, and its largest value at a node of each; yield the directions whose
     density is needed."""
     size = 2.0**-level
-    px = (x[:, None, None] + _NODES[:, None]) * size + np.zeros(NODES)
-    py = (y[:, None, None] + _NODES[None, :]) * size + np.zeros((NODES, 1))
-    w, jacobian = _to_sphere(np.stack([px.ravel(), py.ravel()], axis=-1), axis)
-    density = yield w.astype(np.float32)
-    integrand = (density * jacobian).reshape(-1, NODES, NODES)
-    integrals = np.einsum("kij,i,j->k", integrand, _WEIGHTS, _WEIGHTS) * size * size
-    return integrals, density.reshape(len(x), -1).max(axis=1, initial=0)
+    w, jacobian = _to_sphere(*_nodes(x, y, _NODES, size), axis)
+    density = (yield w.reshape(-1, 3)).reshape(w.shape[:-1])
+    integrals = np.einsum("kij,i,j->k", density * jacobian, _WEIGHTS, _WEIGHTS) * size * size
+    return integrals, density.max(axis=(1, 2), initial=0)
 
 
-def _to_sphere(points: Array, axis: Array) -> tuple[Array, Array]:
-    """Return the directions of points of the unit square, and the solid angle of its unit area there."""
-    latitude, longitude = np.pi * (points[:, 0] - 0.5), 2 * np.pi * points[:, 1]
-    cos = np.cos(latitude)
-    along, across, up = cos * np.cos(longitude), np.sin(latitude), cos * np.sin(longitude)
-    w = np.stack([axis[0] * along - axis[1] * across, axis[1] * along + axis[0] * across, up], axis=-1)
+def _nodes(x: Array, y: Array, nodes: Array, size: Array | float) -> tuple[Array, Array]:
+    """Return the coordinates of nodes of cells, shapes (cells, nodes, 1) and (cells, 1, nodes)."""
+    px, py = ((at[:, None] + nodes) * np.reshape(size, (-1, 1)) for at in (x, y))
+    return px[:, :, None], py[:, None, :]
+
+
+def _to_sphere(px: Array, py: Array, axis: Array) -> tuple[Array, Array]:
+    """Return the directions, in float32, of points of the unit square, and the solid angle of its unit area there."""
+    latitude, longitude = np.pi * (px - 0.5), 2 * np.pi * py
+    cos, across, right, up = np.cos(latitude), np.sin(latitude), np.cos(longitude), np.sin(longitude)
+    w = np.empty((*np.broadcast_shapes(px.shape, py.shape), 3), np.float32)
+    w[..., 0] = axis[0] * cos * right - axis[1] * across
+    w[..., 1] = axis[1] * cos * right + axis[0] * across
+    w[..., 2] = cos * up
     return w, 2 * np.pi**2 * cos
 
 
-def _to_square(w: Array, axis: Array) -> Array:
-    """Return the points of the unit square that stand for directions."""
+def _places(w: Array, axis: Array) -> Array:
+    """Return the cells of the last level that directions lie in, shape (2, N)."""
     w = np.asarray(w, np.float64)
     along, across = axis[0] * w[:, 0] + axis[1] * w[:, 1], axis[0] * w[:, 1] - axis[1] * w[:, 0]
     latitude = np.arctan2(across, np.hypot(along, w[:, 2]))
     longitude = np.arctan2(w[:, 2], along) / (2 * np.pi)
-    return np.stack([latitude / np.pi + 0.5, np.where(longitude < 0, longitude + 1, longitude)], axis=-1)
+    points = np.stack([latitude / np.pi + 0.5, np.where(longitude < 0, longitude + 1, longitude)])
+    return (points * (1 << LAST_LEVEL)).astype(np.int64).clip(0, (1 << LAST_LEVEL) - 1)
 
 
 def _interleaved(x: Array, y: Array) -> Array:

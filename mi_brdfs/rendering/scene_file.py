@@ -35,7 +35,7 @@ class SceneFile:
     replaced: dict[str, BSDFSource] = field(default_factory=dict)
     """What takes the place of BSDFs, or of those of shapes, by their ids."""
     keeps_ids: bool = False
-    """Whether BSDFs that are alike, and meshes of one BSDF, stay apart though nothing is replaced."""
+    """Whether BSDFs that are alike, and meshes with the same BSDF, stay apart though nothing is replaced."""
     contents: dict[str, bytes] | None = None
     """In a copy, the files by their paths, without the root."""
     names: dict[str, str] = field(default_factory=dict)
@@ -108,7 +108,8 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
         raise ValueError(f"no BSDF or shape has the id {id}; there are {', '.join(sorted(ids)) or 'none with one'}")
     is_shape = state.nodes[ids[id]].type == mi.ObjectType.Shape
     found = False
-    for node in [state.nodes[ids[id]]] if is_shape else state.nodes:
+    places = [state.nodes[ids[id]]] if is_shape else [it for it in state.nodes if it.type != mi.ObjectType.Scene]
+    for node in places:
         for name in node.props.keys():
             value = node.props[name]
             if isinstance(value, mi.Properties.ResolvedReference):
@@ -119,6 +120,8 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
                     found = True
     if is_shape and not found:
         state.nodes[ids[id]].props["bsdf"] = bsdf
+    elif not found:
+        raise ValueError(f"nothing in the scene has the BSDF {id}; name another one, or a shape")
 
 
 def _is_seen_from_behind(bsdf: mi.BSDF) -> bool:

@@ -99,8 +99,8 @@ class Trial:
         of several sizes: one wrong place may lie in many cells."""
         own, centres = [self.counts, self.expected], self.partition.centres
         middles = centres[:: max(len(centres) // 1000, 1)]
-        cosines = middles @ centres.T
-        caps = [(cosines > np.cos(radius)) @ np.stack(own, axis=1) for radius in np.radians(CAPS)]
+        cosines, each = middles @ centres.T, np.stack(own, axis=1).astype(np.float32)
+        caps = [(cosines > np.cos(radius)).astype(np.float32) @ each for radius in np.radians(CAPS)]
         counts, expected = (np.concatenate([each, *(cap[:, k] for cap in caps)]) for k, each in enumerate(own))
         return counts, expected
 
@@ -151,7 +151,7 @@ def _trials(
 ) -> list[Trial]:
     """Make the trials of several directions together: a kernel has the work of many of them. The cells are turned about
     the normal by an angle, in radians."""
-    wis, uvs = (np.array([incident[field] for incident in incidents]) for field in (1, 2))
+    wis, uvs = (np.array([incident[field] for incident in incidents], np.float32) for field in (1, 2))
 
     def drawn(count: int, seed: int) -> Iterator[Samples]:
         at_once = max(1, COUNT // count)

@@ -15,7 +15,7 @@ from ..arrays import stacked
 from ..coordinates import TWO_PI, SpecularPolar, wrapped
 from ..measurement import Axis, FileError, Grid, Measurement
 from ..report.albedo import hemisphere
-from ..rows import sector_start
+from ..rows import sector_start, warn_of_a_sector
 from ..source import Source
 from ..text import TextFile, first_words, is_number, opening, shortened, whole
 
@@ -101,6 +101,8 @@ def read(path: Path) -> Measurement:
     axes: tuple[Axis, ...] = (theta_i, azimuth, radial, phi_i)
     values = values.transpose(2, 3, 4, 1, 0)[np.ix_(i, a, r, k)]
     anisotropic = len(k) > 1
+    if anisotropic:
+        warn_of_a_sector(np.sort(phi_i.nodes % TWO_PI))
     if not anisotropic:
         axes, values = axes[:3], values[..., 0, :]
     coordinates = SpecularPolar(mirrored, anisotropic)
