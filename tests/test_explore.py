@@ -500,6 +500,35 @@ def test_materials_that_are_alike_are_not_one(llvm_rgb, tmp_path, id, shapes):
     assert [it.id() for it in scene.shapes() if it.bsdf().class_name() != "SmoothDiffuse"] == shapes
 
 
+GROUP = """<scene version="3.0.0"><integrator type="path"/><sensor type="perspective"><transform name="to_world">
+<lookat origin="0, 0, 6" target="0, 0, 0" up="0, 1, 0"/></transform></sensor><emitter type="constant"/>
+<shape type="shapegroup" id="group"><shape type="cube" id="part"><bsdf type="mute" id="paint"/></shape></shape>
+<shape type="instance"><ref id="group"/></shape></scene>"""
+
+
+def test_materials_that_instances_show(llvm_rgb, tmp_path):
+    class Mute(mi.BSDF):
+        """It has no name in words, and reflects nothing."""
+
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.m_components, self.m_flags = [mi.BSDFFlags.DiffuseReflection], mi.BSDFFlags.DiffuseReflection
+
+        def eval(self, context, si, wo, active=True):
+            return mi.Spectrum(0)
+
+    mi.register_bsdf("mute", Mute)
+    path = tmp_path / "group.xml"
+    path.write_text(GROUP)
+    (found,) = find_sources(str(path))
+    assert found.name == "group.xml:paint"
+    path.write_text(GROUP.replace("mute", "diffuse"))
+    client = Client(UserScene(path, "paint"))
+    shown = {"views": ["picture"], "shape": "scene", "size": 32}
+    pictures = [of(client.show({"type": "lambert", "reflectance": it}, **shown), "picture")[0] for it in (0.1, 0.9)]
+    assert pictures[0]["payload"] != pictures[1]["payload"]
+
+
 def test_each_material_of_a_scene_is_its_own(llvm_rgb, tmp_path):
     path = tmp_path / "twins.xml"
     path.write_text(TWINS.replace("<shape", '<bsdf id="unused" type="diffuse"/><shape', 1))

@@ -21,6 +21,7 @@ from ..names import linked
 from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
+from ..probe.bsdf import shapes_of
 from ..rendering.output import denoiser, tonemap
 from ..rendering.passes import pass_source
 from ..rendering.scene_file import SceneFile
@@ -235,7 +236,7 @@ def _user_stage(setting: Setting, user: UserScene) -> Stage:
     scene = SceneFile(str(user.scene), box_filter=True, keeps_ids=True).load()  # as the denoiser expects
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
-    shapes = [it for it in scene.shapes() if it.bsdf() is not None and not it.is_emitter()]
+    shapes = [it for it in shapes_of(scene) if not it.is_emitter()]
     materials, names = ([it.id() for it in objects] for objects in ([it.bsdf() for it in shapes], shapes))
     wanted = user.material or (materials[0] if shapes else None)
     chosen = [it for it in shapes if it.bsdf().id() == wanted] or [it for it in shapes if it.id() == wanted]

@@ -251,6 +251,12 @@ def contained(bsdf: mi.BSDF) -> list[mi.BSDF]:
     return [it for it in mi.traverse(bsdf).hierarchy if isinstance(it, mi.BSDF) and it is not bsdf]
 
 
+def shapes_of(scene: mi.Scene) -> list[mi.Shape]:
+    """Return the shapes that have a BSDF, including those in groups, which instances show."""
+    shapes = [it for it in mi.traverse(scene).hierarchy if isinstance(it, mi.Shape)]
+    return [it for it in shapes if it.bsdf() is not None and it.class_name() not in ("Instance", "ShapeGroupPlugin")]
+
+
 def _sides(flags: int) -> tuple[int, ...]:
     front, back = (bool(flags & int(flag)) for flag in (mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide))
     return tuple(side for side, seen in ((1, front or not back), (-1, back)) if seen)

@@ -18,7 +18,7 @@ from .. import loading
 from ..names import check_name, tabulated
 from ..parameters import published
 from ..srgb import decoded
-from .bsdf import BSDFProbe, contained, load
+from .bsdf import BSDFProbe, contained, load, shapes_of
 from .directions import direction, on_side
 from .variates import random
 
@@ -234,15 +234,14 @@ def _distinct(names: list[str]) -> list[str]:
 
 
 def _materials(scene: mi.Scene) -> list[mi.BSDF]:
-    """Return each material of a scene once, without the black ones of lamps and mere boundaries of media. Sort them:
-    Mitsuba may merge shapes, in an order that differs each time."""
+    """Return each material of a scene once, by name, without the black ones of lamps and mere boundaries of media."""
     found: list[mi.BSDF] = []
-    for shape in scene.shapes():
+    for shape in shapes_of(scene):
         bsdf = shape.bsdf()
-        known = bsdf is None or any(bsdf is other for other in found)
+        known = any(bsdf is other for other in found)
         if not known and bsdf.class_name() != "Null" and not (shape.is_emitter() and _is_black(bsdf)):
             found.append(bsdf)
-    return sorted(found, key=lambda bsdf: (name_of(bsdf), str(bsdf)))
+    return sorted(found, key=name_of)
 
 
 def _is_black(bsdf: mi.BSDF) -> bool:
