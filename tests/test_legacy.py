@@ -318,6 +318,16 @@ def test_walls_that_are_turned_inside_out_load_beside_others(load):
     assert len(scene.shapes()) == 3
 
 
+def test_many_parts_of_a_mixture(load):
+    grey = np.linspace(0.1, 0.9, 60)
+    weights = np.linspace(0.2, 1, 60) / 36.5
+    parts = "".join(f'<bsdf type="diffuse"><spectrum name="reflectance" value="{it}"/></bsdf>' for it in grey)
+    mixture = f'<string name="weights" value="{", ".join(map(str, weights))}"/>{parts}'
+    scene, _ = load(in_shape(f'<bsdf type="mixturebsdf">{mixture}</bsdf>'))
+    cosines = np.repeat(WO[:, 2:], 3, axis=1)
+    np.testing.assert_allclose(evaluated(scene.shapes()[0].bsdf()), weights @ grey / np.pi * cosines, rtol=1e-4)
+
+
 @pytest.mark.parametrize("old, stand_in", MISSING)
 def test_missing_files(upgraded, old, stand_in):
     old = old.format('<transform name="toWorld"><scale value="2"/></transform><bsdf type="conductor"/>')

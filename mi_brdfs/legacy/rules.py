@@ -209,12 +209,17 @@ def _mixture(work: Work, element: Element) -> Element:
         parts.append(plugin("bsdf", "diffuse", reflectance=[0.0]))
         weights.append(1 - sum(weights))
     work.changed(element, f"{element.type} is blend{element.tag}, nested for more than two")
-    result, total = parts.pop(), weights.pop()
-    for part, weight in zip(reversed(parts), reversed(weights), strict=True):
-        total += weight
-        share = 1 - weight / total if total > 0 else 0.5
-        result = plugin(element.tag, f"blend{element.tag}", part, result, weight=share)
-    return result
+    return _blend(element.tag, parts, weights)
+
+
+def _blend(tag: str, parts: list[Element], weights: list[float]) -> Element:
+    """Return mixtures of two, as few in one another as can be."""
+    if len(parts) == 1:
+        return parts[0]
+    half, total = len(parts) // 2, sum(weights)
+    share = sum(weights[half:]) / total if total > 0 else 0.5
+    ends = (_blend(tag, parts[k], weights[k]) for k in (slice(half), slice(half, None)))
+    return plugin(tag, f"blend{tag}", *ends, weight=share)
 
 
 @rule("bsdf", "coating", "roughcoating")
