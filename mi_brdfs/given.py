@@ -10,6 +10,7 @@ from typing import Any
 import mitsuba as mi
 
 from .mitsuba.errors import one_line
+from .parameters.messages import brief
 from .probe.bsdf import load
 from .probe.sources import find_sources
 
@@ -20,7 +21,7 @@ def check_given(bsdf: Any) -> None:
     is_object = hasattr(bsdf, "eval_pdf")
     if not (is_object or isinstance(bsdf, str) or (isinstance(bsdf, dict) and isinstance(bsdf.get("type"), str))):
         raise ValueError(
-            f"{bsdf!r} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a loaded BSDF."
+            f"{brief(repr(bsdf))} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a loaded BSDF."
         )
 
 

@@ -127,8 +127,9 @@ def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(
     path = tmp_path / "x.csv"
     convert({"type": "lambert"}, path)
     before = path.read_bytes()
-    with pytest.raises(ValueError, match="onto itself"):
-        convert(path, path)
+    for given in (path, {"type": "tabulated", "filename": str(path)}):
+        with pytest.raises(ValueError, match="onto itself"):
+            convert(given, path)
 
     def full(path, source):
         path.write_bytes(b"half of it")

@@ -77,7 +77,7 @@ def convert(
         OSError: if the file cannot be written.
     """
     path = Path(path)
-    file = given.path if isinstance(given, Measurement) else given
+    file = given.path if isinstance(given, Measurement) else given.get("filename") if isinstance(given, dict) else given
     if isinstance(file, (str, Path)) and Path(file).exists() and path.exists() and os.path.samefile(file, path):
         raise ValueError(f"{named(path)} cannot be converted onto itself; give another name")
     if path.exists() and not path.is_file():
