@@ -21,7 +21,8 @@ def check_given(bsdf: Any) -> None:
     is_object = hasattr(bsdf, "eval_pdf")
     if not (is_object or isinstance(bsdf, str) or (isinstance(bsdf, dict) and isinstance(bsdf.get("type"), str))):
         raise ValueError(
-            f"{brief(repr(bsdf))} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a loaded BSDF."
+            f"{brief(repr(bsdf))} is no BSDF; give a dict such as {{'type': 'ward'}}, the name of a plugin, or a "
+            "loaded BSDF."
         )
 
 
