@@ -199,6 +199,13 @@ def test_names_of_a_machine_on_all_networks(name, ours):
     assert Explorer(None, [], {}, ["localhost", "Desk.local", "0.0.0.0"], False)._is_ours(name) is ours
 
 
+def test_an_address_is_asked_for_in_brackets():
+    from mi_brdfs.explorer.server import Explorer
+
+    explorer = Explorer(None, [], {}, ["fd00::2"], False)
+    assert explorer._is_ours("[fd00::2]:8490") and not explorer._is_ours("[fd00::3]:8490")
+
+
 def test_other_pages_of_the_browser_are_refused(address):
     from aiohttp import WSServerHandshakeError
 

@@ -180,6 +180,7 @@ def table(header="theta_i_deg,theta_o_deg,phi_o_deg,f", scale=1.0, mark=",", fac
         table(),
         table("theta_i_rad,theta_o_rad,phi_o_rad,f", np.pi / 180),
         table("# angles: radians\ntheta_i,theta_o,phi_o,f", np.pi / 180),
+        table("# units: Degree\ntheta_i,theta_o,phi_o,f"),
         table("# Angles = degrees\nTheta_in,Theta_r,delta_phi,brdf [1/sr]"),
         table("theta_l (deg)\ttheta_v (deg)\tphi_v (deg)\tf", mark="\t"),
         table("theta_l (deg)\ttheta_v (deg)\tphi_v (deg)\tf", mark="\t").replace(".", ","),
@@ -187,7 +188,7 @@ def table(header="theta_i_deg,theta_o_deg,phi_o_deg,f", scale=1.0, mark=",", fac
         table("theta_i_deg,theta_o_deg,phi_o_deg,f_cos", factor=lambda i, o, d: np.cos(np.radians(o))),
         table("# quantity: f cos\n" + table().splitlines()[0], factor=lambda i, o, d: np.cos(np.radians(o))),
     ],
-    ids=range(9),
+    ids=range(10),
 )
 def test_csv_spellings(tmp_path, text):
     measurement = measured(tmp_path, text, "x.csv")

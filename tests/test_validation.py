@@ -407,6 +407,20 @@ def test_parameters_that_are_no_numbers():
     assert not report.failures, report
 
 
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_bsdf_without_components_fails():
+    """Nothing of it could be judged."""
+
+    class Forgetful(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.m_flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
+
+    mi.register_bsdf("forgetful", Forgetful)
+    (finding,) = check({"type": "forgetful"}, only="pdf").findings
+    assert finding.verdict == "fail" and "m_components" in finding.message
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 def test_negative_channels_that_a_page_announces():

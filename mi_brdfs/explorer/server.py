@@ -53,7 +53,7 @@ NOTEBOOKS = (
 """Who may frame the page that a notebook asks for: Jupyter, VS Code and Colab, with a kernel on this machine."""
 MALFORMED = HttpProcessingError, web.RequestPayloadError
 """What aiohttp says of requests that are none."""
-LOCAL = "127.0.0.1", "localhost", "[::1]"
+LOCAL = "127.0.0.1", "localhost", "::1"
 ANY = {"0.0.0.0", "::"}
 """The addresses of all networks, which a machine has other names in."""
 
@@ -94,12 +94,12 @@ class Explorer:
         return response
 
     def _is_ours(self, host: str) -> bool:
-        name = (host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host).lower()
+        name = (host.rpartition(":")[0] if ":" in host and not host.endswith("]") else host).lower().strip("[]")
         if name in self.hosts or ANY.isdisjoint(self.hosts):
             return name in self.hosts
         # A page of another server can give its name our address, but cannot take an address for its name.
         with contextlib.suppress(ValueError):
-            return bool(ipaddress.ip_address(name.strip("[]")))
+            return bool(ipaddress.ip_address(name))
         return False
 
     async def _index(self, request: web.Request) -> web.Response:

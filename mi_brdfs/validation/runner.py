@@ -80,6 +80,7 @@ FAINT = 1e-6
 """Values below this part of the largest one for an angle of incidence differ as much as this part does."""
 OF_SAMPLES = "albedo", "deltas", "active", "recorded", "calls", "null", "polarization"
 """The checks that do without values, which delta functions have none of."""
+NO_COMPONENTS = "component_count() is 0: put the flags of each component into m_components."
 DELTA = "A delta function, which has no values: deltas judges its samples."
 
 
@@ -126,6 +127,8 @@ def check(
         probe, given = _probe(bsdf), bsdf if isinstance(bsdf, dict) else None
         run = Run(probe, angles, significance, conserves, given)
         findings = [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
+        if not probe.bsdf.component_count():
+            findings.append(Finding("components", "whole", "fail", NO_COMPONENTS))
         for word in wanted:
             if probe.parts or word in OF_SAMPLES:
                 findings += _found(word, run)
@@ -213,7 +216,8 @@ def _name(bsdf: dict[str, Any] | mi.BSDF) -> str:
 def _found(word: str, run: Run) -> Findings:
     """Yield the findings of a check; if it is skipped or raises, that is another."""
     try:
-        with unwrapped_ctrl_c():
+        # What is not finite is for the check to tell.
+        with unwrapped_ctrl_c(), np.errstate(invalid="ignore"):
             yield from CHECKS[word](run)
     except Skipped as reason:
         yield Finding(word, "whole", "skip", str(reason))

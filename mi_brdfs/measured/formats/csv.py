@@ -29,8 +29,8 @@ VALUE = re.compile(
     r"(?:(red|green|blue|r|g|b)|(f|f_r|brdf)|(?:(?:f|brdf)[\s_]*)?(\d+(?:\.\d+)?)[\s_]*(?:nm)?)([\s_*·]*cos)?"
     r"\s*(?:[(\[]1/sr[)\]])?"
 )
-UNITS = {"d": np.pi / 180, "°": np.pi / 180, "r": 1.0}
-"""Radians in a unit, by its first letter."""
+UNITS = {"deg": np.pi / 180, "degree": np.pi / 180, "°": np.pi / 180, "rad": 1.0, "radian": 1.0}
+"""Radians in a unit."""
 LONGEST_NAME = 100
 """The characters of a column's name."""
 MOST_VALUES = 1 << 25
@@ -159,15 +159,15 @@ class Columns:
         self.quantity = self._quantity(cosines, quantity)
 
     def _add_angle(self, k: int, name: str, kind: str, of: str | None, unit: str | None) -> None:
-        unit = unit or self.file.stated("angles", "units")
-        if not unit or unit[0].lower() not in UNITS:
+        unit = (unit or self.file.stated("angles", "units")).strip().lower().removesuffix("s")
+        if unit not in UNITS:
             raise self.file.error(f"the column {shortened(name)} has no unit: call it {name.strip()}_deg or _rad")
         key = f"{kind}_{'i' if of in INCIDENT else 'o'}" if kind in ("theta", "phi") else "delta_phi"
         if (kind in ("theta", "phi")) == (of is None) or key in self.angles:
             raise self.file.error(
                 f"the column {shortened(name)} is ambiguous: angles are theta_i, phi_i, theta_o, phi_o"
             )
-        self.angles[key] = k, UNITS[unit[0].lower()]
+        self.angles[key] = k, UNITS[unit]
 
     def _quantity(self, cosines: set[bool], unstated: Quantity) -> Literal["f", "f cos"]:
         stated = re.sub(r"[\s_*·]+", " ", self.file.stated("quantity").lower())
