@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 __all__ = ["FOLDER", "NOTEBOOKS", "code_cells", "read_notebook", "run_notebook"]
 
 
-SAMPLES = 4
+SAMPLES = 16
 """Samples per pixel, in a test, of renderings that take theirs from the scene: these are to be looked at, and others
 are fitted and compared."""
 
