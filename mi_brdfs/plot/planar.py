@@ -166,7 +166,8 @@ def _planar(
             style.calm(ax)
             draw(ax, curves, name == "log", whole, text, everything if beside or name == "log" else curves)
             if len(panels) > 1 and not (beside and s):
-                ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=10)
+                pad = -3 if draw is _draw_polar else 10  # an angle is below, or a triangle
+                ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=pad)
             if k % columns if beside else s:
                 ax.set_ylabel("")
                 ax.tick_params(labelleft=not beside)
