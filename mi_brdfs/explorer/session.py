@@ -167,9 +167,10 @@ class Session:
         ]
 
     def _draw(self, state: State, serial: int) -> bool:
-        """Draw the first thing that is missing: pictures first."""
+        """Draw the first thing that is missing: pictures first, but for the very first, which takes longer than all
+        curves together."""
         setting = stages.Setting.of(state)
-        for view in state.views:
+        for view in sorted(state.views, key=lambda view: view == "picture" and not self._pictures):
             for k, key, given in self._visible(state):
                 depends = (setting, state.exposure) if view == "picture" else VIEWS[view].depends(state)
                 wanted = key, state.component if view != "picture" else None, depends
