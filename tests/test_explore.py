@@ -21,13 +21,13 @@ from support import ROOT
 from mi_brdfs.explorer.export import CLIENT, index, page
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
-from mi_brdfs.explorer.stages import Progress, Stages, UserScene, rgba
+from mi_brdfs.explorer.stages import Pose, Progress, Setting, Stages, UserScene, rgba
 from mi_brdfs.explorer.state import StateError, checked, parse
 from mi_brdfs.explorer.tours import parse as parse_tour
 from mi_brdfs.explorer.tours import tours
 from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.probe.sources import BSDFSource, find_sources
-from mi_brdfs.rendering.scene_file import SceneFile
+from mi_brdfs.rendering.scene_file import SceneFile, with_material
 
 STAGES = ["studio", "lamp", "point"]
 LOFT = str(FILE)
@@ -536,6 +536,48 @@ def test_each_material_of_a_scene_is_its_own(llvm_rgb, tmp_path):
     grey = BSDFSource("lambert", "lambert", "lambert")
     with pytest.raises(ValueError, match="nothing in the scene has the BSDF unused"):
         SceneFile(str(path), replaced={"unused": grey}).load()
+
+
+TWISTED = """<scene version="3.0.0"><integrator type="direct"/><emitter type="constant"/>
+<sensor type="perspective"><transform name="to_world"><lookat origin="0, 0, -4" target="0, 0, 0" up="0, 1, 0"/>
+</transform><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
+<bsdf type="twosided" id="outer"><bsdf type="diffuse" id="inner"/></bsdf>
+<shape type="rectangle" id="behind"><transform name="to_world"><scale value="9"/></transform>{}</shape>
+<shape type="sphere" id="ball"><float name="radius" value="0.1"/><ref id="{}"/></shape></scene>"""
+
+
+@pytest.mark.parametrize(
+    ("word", "wall", "ball"),
+    [
+        ("outer", '<ref id="outer"/>', "inner"),
+        ("inner", '<ref id="outer"/>', "inner"),
+        ("behind", '<bsdf type="twosided" id="own"><bsdf type="diffuse"/></bsdf>', "own"),
+    ],
+)
+def test_pictures_replacements_and_copies_are_the_same(llvm_rgb, tmp_path, word, wall, ball):
+    """Of a wall that is seen from behind, and whose material, or what is in it, is that of a ball, too."""
+    path = tmp_path / "twisted.xml"
+    path.write_text(TWISTED.format(wall, ball))
+    black = '<bsdf type="lambert"><float name="reflectance" value="0.1"/></bsdf>'
+    (tmp_path / "copy.xml").write_text(with_material(path, word, black))
+    source = BSDFSource("lambert", "lambert", "lambert", None, {"reflectance": "0.1"})
+    replaced = SceneFile(str(path), box_filter=True, replaced={word: source})
+    scenes = replaced.load(), SceneFile(str(tmp_path / "copy.xml"), box_filter=True).load()
+    stage = Stages(UserScene(path, word)).stage(Setting("", "scene", 8))
+    pictures = [np.array(mi.render(it, spp=16)) for it in scenes]
+    with stage.showing(mi.load_dict({"type": "lambert", "reflectance": 0.1}), Pose()):
+        pictures.append(np.array(mi.render(stage.scene, spp=16)))
+    assert pictures[0][0, 0] == pytest.approx(0.1, rel=0.1)  # the ball reflects, too
+    for it in pictures[1:]:
+        np.testing.assert_allclose(it, pictures[0], rtol=1e-5)
+
+
+def test_part_of_a_mixture_is_not_shown_in_part(llvm_rgb, tmp_path):
+    path = tmp_path / "mixed.xml"
+    mixture = '<bsdf type="blendbsdf"><float name="weight" value="0.5"/><ref id="outer"/><ref id="inner"/></bsdf>'
+    path.write_text(TWISTED.format(mixture, "inner"))
+    with pytest.raises(ValueError, match="inner is also part of other materials"):
+        Stages(UserScene(path, "inner")).stage(Setting("", "scene", 8))
 
 
 def test_a_mesh_that_is_refused_breaks_no_picture(client, tmp_path):

@@ -18,13 +18,13 @@ import numpy as np
 
 from ..loading import checked_mesh
 from ..names import linked
-from ..parameters.messages import listed
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
-from ..probe.bsdf import shapes_of
+from ..probe.bsdf import contained, shapes_of
+from ..probe.sources import BSDFSource
 from ..rendering.output import denoiser, tonemap
 from ..rendering.passes import pass_source
-from ..rendering.scene_file import SceneFile
+from ..rendering.scene_file import SceneFile, on_both_sides
 from ..srgb import encoded_8bit
 from .state import INCIDENCE, SHAPES, Bsdf, State
 
@@ -42,6 +42,7 @@ PEAK = 8.0
 """The radiance that is shown as white, the same in all pictures."""
 IRRADIANCE = 3.0
 """Of the light from ωi, on what faces it."""
+MARK, TWOSIDED = "mi_brdfs shown", "TwoSidedBRDF"
 LIGHTS, MESHES = (".exr", ".hdr"), (".ply", ".obj")
 """The endings of uploads that are environments, and of files that are meshes."""
 
@@ -137,8 +138,8 @@ class Stage:
         """Give the shapes a BSDF, and camera and light their places."""
         if pose != self.pose:
             self._take(pose)
-        for shape in self.shapes:
-            shape.set_bsdf(bsdf)
+        for shape, usual in zip(self.shapes, self.usual, strict=True):
+            shape.set_bsdf(on_both_sides(bsdf) if usual.class_name() == TWOSIDED else bsdf)
         try:
             yield
         finally:
@@ -232,18 +233,29 @@ def _placed(name: str, shape: mi.Shape) -> mi.ScalarTransform4f:
     return to_world.translate(-np.array(box.center()))
 
 
+def _within(bsdf: mi.BSDF) -> list[mi.BSDF]:
+    """Return the BSDFs in ``twosided``, or a BSDF with those in it."""
+    return contained(bsdf) if bsdf.class_name() == TWOSIDED else [bsdf, *contained(bsdf)]
+
+
 def _user_stage(setting: Setting, user: UserScene) -> Stage:
-    scene = SceneFile(str(user.scene), box_filter=True, keeps_ids=True).load()  # as the denoiser expects
+    # Mark where ``render --replace`` would put the material.
+    mark = {user.material: BSDFSource(MARK, MARK, f'<bsdf type="lambert" id="{MARK}"/>')} if user.material else {}
+    # A box filter is what the denoiser expects.
+    scene = SceneFile(str(user.scene), box_filter=True, keeps_ids=True, replaced=mark).load()
     if not isinstance(scene, mi.Scene) or not scene.sensors() or not scene.integrator():
         raise ValueError(f"{user.scene} is not a scene with a sensor and an integrator.")
-    shapes = [it for it in shapes_of(scene) if not it.is_emitter()]
-    materials, names = ([it.id() for it in objects] for objects in ([it.bsdf() for it in shapes], shapes))
-    wanted = user.material or (materials[0] if shapes else None)
-    chosen = [it for it in shapes if it.bsdf().id() == wanted] or [it for it in shapes if it.id() == wanted]
+    shapes = [it for it in shapes_of(scene) if it.bsdf().class_name() != "Null"]
+    if mark:
+        inside = {it: [bsdf.id() for bsdf in _within(it.bsdf())] for it in shapes}
+        chosen = [it for it, ids in inside.items() if MARK in ids]
+        if any(set(inside[it]) != {MARK} for it in chosen):
+            raise ValueError(f"{user.scene}: {user.material} is also part of other materials; name one of these.")
+    else:
+        shapes = [it for it in shapes if not it.is_emitter()]
+        chosen = [it for it in shapes if it.bsdf() is shapes[0].bsdf()]
     if not chosen:
-        told = [f"{kind} {listed(dict.fromkeys(filter(None, ids)), 'and')}"
-                for kind, ids in (("materials", materials), ("shapes", names)) if any(ids)]  # fmt: skip
-        raise ValueError(f"{user.scene} has no material or shape {wanted}; it has {', and '.join(told) or 'neither'}.")
+        raise ValueError(f"{user.scene} has no material to be replaced.")
     film = scene.sensors()[0].film()
     width, height = (int(it) for it in film.size())
     scale = setting.size / max(width, height)

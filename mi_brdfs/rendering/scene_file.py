@@ -115,13 +115,22 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
             if isinstance(value, mi.Properties.ResolvedReference):
                 usual = state.nodes[value.index()]
                 if usual.type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]:
-                    wrapped = usual.props.plugin_name() == "twosided" and not _is_seen_from_behind(bsdf)
-                    node.props[name] = mi.load_dict({"type": "twosided", "bsdf": bsdf}) if wrapped else bsdf
+                    node.props[name] = on_both_sides(bsdf) if usual.props.plugin_name() == "twosided" else bsdf
                     found = True
     if is_shape and not found:
         state.nodes[ids[id]].props["bsdf"] = bsdf
     elif not found:
         raise ValueError(f"nothing in the scene has the BSDF {id}; name another one, or a shape")
+
+
+def on_both_sides(bsdf: mi.BSDF) -> mi.BSDF:
+    """Return a BSDF that is seen from behind, too."""
+    if _is_seen_from_behind(bsdf):
+        return bsdf
+    id = bsdf.id()  # which becomes that in the dict
+    both = mi.load_dict({"type": "twosided", "bsdf": bsdf})
+    bsdf.set_id(id)
+    return both
 
 
 def _is_seen_from_behind(bsdf: mi.BSDF) -> bool:
@@ -154,10 +163,18 @@ def with_material(path: Path, id: str, xml: str) -> str:
     indented = xml.replace("\n", f"\n{margin if margin.isspace() else ''}")
     given: Any = minidom.parseString(indented).documentElement
     new = document.importNode(given, deep=True)
-    for name in ("name", "id") if place is usual else ("name",):
+    referred = {it.getAttribute("id") for it in document.getElementsByTagName("ref")}
+    # What a shape has in itself may be that of others, too, who keep it; so is what is in it.
+    own = place is usual and (id == place.getAttribute("id") or place.getAttribute("id") not in referred)
+    for name in ("name", "id") if own else ("name",):
         if place.hasAttribute(name):
             new.setAttribute(name, place.getAttribute(name))
     place.parentNode.replaceChild(new, place)
+    for lost in (place, *place.getElementsByTagName("*")):
+        defined = {it.getAttribute("id") for it in document.getElementsByTagName("*") if it.tagName != "ref"}
+        if lost.tagName != "ref" and lost.getAttribute("id") in referred - defined:
+            root: Any = document.documentElement
+            root.insertBefore(lost.cloneNode(True), root.firstChild)
     return "\n".join(node.toxml() for node in document.childNodes) + "\n"
 
 
