@@ -109,7 +109,7 @@ def pictures(trial: Trial) -> Iterator[tuple[str, Figure, str, str]]:
         expected, impossible = palette(scale(density)), (density < 0) | (density >= LARGEST)
         expected[impossible] = IMPOSSIBLE
         shown = {
-            f"drawn, {side}": palette(scale(drawn)),
+            f"drawn {side.split()[0]}": palette(scale(drawn)),
             "pdf, red where negative or infinite" if impossible.any() else "pdf": expected,
             "difference": DIFFERENCE.resampled(LEVELS - 1)(Normalize(-5, 5)(deviation)),
         }
