@@ -70,6 +70,7 @@ def test_the_page_is_complete(reports, text):
             drawn = f"{report.name}, {part}, light from 50°, "
             assert any(told.startswith(drawn) for told in parsed.pictures())
             assert f"{report.name}, {part}: albedo and efficiency over the angle of incidence" in parsed.pictures()
+    assert parsed.text.count("corrected for three tests") == 2  # once for each report with pictures
     below = [told for told in parsed.pictures() if "below the surface" in told]
     through = "component 1 (diffuse transmission)"
     assert [told.split(", ")[:2] for told in below] == [["wrap", "whole"], ["wrap", through]]

@@ -17,7 +17,9 @@ from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
 from mi_brdfs.model import ENERGY_NOTE, EXAMPLE, Model, Plugin
+from mi_brdfs.plot.given import named
 from mi_brdfs.preview import body, studio
+from mi_brdfs.probe.curves import in_plane_of_incidence
 from mi_brdfs.tabulated.tabulated import Tabulated
 
 from .made import ROOT, Page, Picture, code
@@ -32,8 +34,8 @@ CHAPTER = ROOT / "docs" / "folklore.md"
 PICTURES_PER_LINE = 5
 SIZE, SAMPLES = 160, 256
 LARGE_SIZE, STRIP_SIZE, FEWER_SAMPLES = 384, 200, 64
-ANGLE, DPI = 45, 130
-"""Of the lobes."""
+ANGLE, DPI, FACTOR = 45, 130, 20
+"""Of the lobes: maxima that differ by a larger factor are drawn in log scale only."""
 
 INTRODUCTION = """\
 # The plugins
@@ -70,7 +72,7 @@ def pictures() -> list[Picture]:
             found.append(Picture(file, partial(list, sources), partial(_draw_portrait, model, size, spp)))
         sources = [repr((main_sweep(model), stage_of(model), STRIP_SIZE, FEWER_SAMPLES)), stage]
         found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), partial(_draw_strip, model)))
-        sources = [repr((main_sweep(model), ANGLE, DPI))]
+        sources = [repr((main_sweep(model), ANGLE, DPI, FACTOR))]
         found.append(Picture(LOBES / f"{name}.png", partial(list, sources), partial(_draw_lobes, model)))
     return [*found, Picture(GALLERY, _thumbnails, _draw_gallery)]
 
@@ -93,7 +95,10 @@ def _draw_strip(model: type[Model], path: Path) -> None:
 
 def _draw_lobes(model: type[Model], path: Path) -> None:
     path.parent.mkdir(exist_ok=True)
-    plot.polar(*main_sweep(model).bsdfs(model.plugins[0]), angles=(ANGLE,)).savefig(path, dpi=DPI)
+    bsdfs = main_sweep(model).bsdfs(model.plugins[0])
+    maxima = [in_plane_of_incidence(it.probe, ANGLE, 0).value.max() for it in named(bsdfs, None)]
+    scale = "both" if max(maxima) < FACTOR * min(maxima) else "log"
+    plot.polar(*bsdfs, angles=(ANGLE,), scale=scale).savefig(path, dpi=DPI)
     Image.open(path).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=64).save(path, optimize=True)
 
 
@@ -167,8 +172,8 @@ def _overview(models: list[type[Model]]) -> str:
 
 def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
-    pictures = f"{strip_picture(model)}\n\n{lobes_picture(model)}"
-    return _page(model, _picture(model), pictures, _table(model.energy.rows()), ENERGY_NOTE)
+    pictures = strip_picture(model), lobes_picture(model)
+    return _page(model, _picture(model), *pictures, _table(model.energy.rows()), ENERGY_NOTE)
 
 
 def data_page() -> str:
@@ -182,20 +187,23 @@ def integrator_page() -> str:
     return _page(Shading, f"{picture}\n\nShaded above, path-traced below: one of the [scenes](../../scenes/shading).")
 
 
-def _page(plugin: type[Plugin], picture: str, strip: str = "", *more: str) -> str:
+def _page(plugin: type[Plugin], picture: str, strip: str = "", lobes: str = "", *more: str) -> str:
+    """Return a plugin's part of the reference: what it looks like, how to call it, and then what it computes."""
     name, aliases = plugin.plugins[0], plugin.plugins[1:]
     text, _, examples = plugin.page().partition(f"\n\n{EXAMPLE}")
     xml, _, dictionary = examples.partition("\n\n")
-    text = _code(text)
+    summary, _, text = _code(text).partition("\n\n")
     return "\n\n".join(
         [
             f"## {name}",
             *([f"Also as {', '.join(f'`{alias}`' for alias in aliases)}."] if aliases else []),
             picture,
-            text,
+            summary,
             f"```xml\n{xml}\n```",
             f"```python\n{dictionary}\n```",
             *([strip] if strip else []),
+            text,
+            *([lobes] if lobes else []),
             _table(own_rows(plugin)),
             *more,
         ]

@@ -58,7 +58,8 @@ def views(trial: Trial) -> Iterator[View]:
         held += [worst] if trial.test.p_value < SURE and here[worst] else []
         low, high = (np.array([(p[held] + sign * size[held]) for p in (x, y)]) for sign in (-1, 1))
         low, high = low.min(axis=1), high.max(axis=1)
-        half, (x_middle, y_middle) = float((high - low).max()) / 2, (low + high) / 2
+        # With room for the ring about where they deviate most.
+        half, (x_middle, y_middle) = 1.1 * float((high - low).max()) / 2, (low + high) / 2
         yield View(side, x_middle, y_middle, half) if half < 45 else View(side, 0, 0, HEMISPHERE)
 
 
@@ -108,13 +109,13 @@ def pictures(trial: Trial) -> Iterator[tuple[str, Figure, str, str]]:
         expected, impossible = palette(scale(density)), (density < 0) | (density >= LARGEST)
         expected[impossible] = IMPOSSIBLE
         shown = {
-            f"drawn, {side}": palette(scale(drawn)),
+            f"drawn {side.split()[0]}": palette(scale(drawn)),
             "pdf, red where negative or infinite" if impossible.any() else "pdf": expected,
             "difference": DIFFERENCE.resampled(LEVELS - 1)(Normalize(-5, 5)(deviation)),
         }
         # Without a layout that is computed, which takes ten times as long as the drawing.
         figure = Figure(figsize=(6.1, 2.3))
-        places = {"left": 0, "right": 1, "bottom": 0.09, "top": 0.92, "wspace": 0.05}
+        places = {"left": 0.012, "right": 0.988, "bottom": 0.09, "top": 0.92, "wspace": 0.06}
         for ax, (title, colours) in zip(figure.subplots(1, 3, gridspec_kw=places), shown.items(), strict=True):
             ax.set_title(title + ", zoomed" * (view.half < HEMISPHERE), loc="left", fontsize=SMALL, pad=3)
             _draw(ax, colours, trial, view)
@@ -136,7 +137,8 @@ def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:
     if trial.test.p_value < SURE and (worst := trial.partition.centres[trial.test.worst])[2] * view.side > 0:
         x, y = to_plane(worst[None], trial.axis)
         for colour, width in ("white", 2.6), ("black", 1.2):
-            ax.plot(x, -y, "o", color=colour, markersize=13, markeredgewidth=width, fillstyle="none")
+            ring = {"markersize": 13, "markeredgewidth": width, "fillstyle": "none", "clip_on": False}
+            ax.plot(x, -y, "o", color=colour, **ring)
     ax.set(xlim=(left, right), ylim=(bottom, top), yticks=[], frame_on=False)
     if view.half == HEMISPHERE:
         marked = [-60, 0, 60]
