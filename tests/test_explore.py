@@ -541,7 +541,9 @@ def test_each_material_of_a_scene_is_its_own(llvm_rgb, tmp_path):
 TWISTED = """<scene version="3.0.0"><integrator type="direct"/><emitter type="constant"/>
 <sensor type="perspective"><transform name="to_world"><lookat origin="0, 0, -4" target="0, 0, 0" up="0, 1, 0"/>
 </transform><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
-<bsdf type="twosided" id="outer"><bsdf type="diffuse" id="inner"/></bsdf>
+<default name="grey" value="0.5"/>
+<bsdf type="twosided" id="outer">
+<bsdf type="diffuse" id="inner"><float name="reflectance" value="$grey"/></bsdf></bsdf>
 <shape type="rectangle" id="behind"><transform name="to_world"><scale value="9"/></transform>{}</shape>
 <shape type="sphere" id="ball"><float name="radius" value="0.1"/><ref id="{}"/></shape></scene>"""
 

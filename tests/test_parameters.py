@@ -28,9 +28,9 @@ REJECTED = [
     ("kurt", {"alpha_u_1": 0.1}, "kurt: alpha_u_1 needs alpha_v_1 beside it; give both, or alpha_1 alone."),
     ("lafortune", {"cx_9": 1.0}, "lafortune: unknown parameter cx_9; did you mean cx_"),
     ("orennayar", {"sigma": 0.3, "alpha": 0.3}, "orennayar: sigma excludes alpha; give either sigma or alpha."),
-    ("microfacet", {"gamma": 2}, 'microfacet: gamma does not belong to distribution = "beckmann", which has alpha, alpha_u and alpha_v of its own.'),
+    ("microfacet", {"gamma": 2}, 'microfacet: gamma does not belong to distribution = "beckmann", which has alpha, alpha_u and alpha_v of its own, but to "gtr", "hepd", "epd" or "student-t".'),
     ("microfacet", {"distribution": "gtr", "alpha_u": 0.1}, 'alpha_u does not belong to distribution = "gtr", which has alpha and gamma'),
-    ("microfacet", {"kurt_exponent": 0.2}, 'kurt_exponent does not belong to shadowing = "smith", which has multiscatter of its own.'),
+    ("microfacet", {"kurt_exponent": 0.2}, 'kurt_exponent does not belong to shadowing = "smith", which has multiscatter of its own, but to "kurt".'),
     ("microfacet", {"distribution": "phong"}, 'microfacet: distribution = "phong" is unknown; it must be one of "beckmann", "ggx"'),
     ("microfacet", {"distribution": "abc"}, 'shadowing = "smith" is not known for distribution = "abc"; take it with beckmann, ggx or blinn,'),
     ("microfacet", {"distribution": "hepd", "shadowing": "schlick"}, 'shadowing = "schlick" is not known for distribution = "hepd"; take it with'),
@@ -40,7 +40,7 @@ REJECTED = [
     ("microfacet", {"distribution": "abc", "shadowing": "vcavity", "haze": 0.5}, 'haze is not known for distribution = "abc"; take it with'),
     ("microfacet", {"shadowing": "vcavity", "multiscatter": "walk"}, "multiscatter does not belong to shadowing"),
     ("metallicroughness", {"shadowing": "ibl", "multiscatter": "walk"}, "multiscatter does not belong to shadowing"),
-    ("nishino", {"variant": "dsbrdf", "f0": 0.1}, 'nishino: f0 does not belong to variant = "dsbrdf", which has no parameter of its own.'),
+    ("nishino", {"variant": "dsbrdf", "f0": 0.1}, 'nishino: f0 does not belong to variant = "dsbrdf", which has no parameter of its own, but to "'),
 ]  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import errno
 import ipaddress
 import logging
 import re
+import signal
 import socket
 import tempfile
 from collections import ChainMap
@@ -25,6 +26,7 @@ from ..mitsuba.errors import one_line
 from ..mitsuba.registry import all_models, presets
 from ..parameters.messages import brief, printable
 from ..probe.sources import BSDFSource, is_measured
+from ..starting import Terminated
 from .export import CLIENT, index
 from .materials import BALLS_ACROSS, Materials, kinds
 from .session import Engine, Session
@@ -288,7 +290,12 @@ def serve(
     names = [own, f"{own}.local", socket.getfqdn()] if host in ANY else []
     explorer = Explorer(engine, sources, initial, list(dict.fromkeys([*LOCAL, host, *names])), notebook)
 
-    async def run() -> None:
+    async def run() -> bool:
+        """Return whether SIGTERM ended it."""
+        terminated = asyncio.Event()
+        # An exception that a signal raises may end what it interrupts instead; Windows has nothing else.
+        with contextlib.suppress(NotImplementedError):
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, terminated.set)
         if user != UserScene():  # what is wrong with it is said before there is a page
             first = Setting.of(parse(initial, engine.stages.names, engine.stages.shapes))
             await asyncio.wrap_future(engine.call(lambda: engine.stages.stage(first)))
@@ -297,14 +304,17 @@ def serve(
         await web.SockSite(runner, on, shutdown_timeout=1).start()
         ready(f"http://{f'[{host}]' if ':' in host else host}:{port}/")
         try:
-            while engine.is_alive():
-                await asyncio.sleep(0.5)
+            while engine.is_alive() and not terminated.is_set():
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(terminated.wait(), 0.5)
         finally:
             await runner.cleanup()
+        return terminated.is_set()
 
     engine.start()
     try:
-        asyncio.run(run())
+        if asyncio.run(run()):
+            raise Terminated(128 + signal.SIGTERM)
     finally:
         engine.end()
         engine.join(10)

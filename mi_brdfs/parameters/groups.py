@@ -66,7 +66,9 @@ class OneOf(Chosen[str]):
         for name in (name for other in words for name in self.names_of(other)):
             if name in reader and name not in allowed:
                 has = f"has {listed(allowed, 'and')}" if allowed else "has no parameter"
-                raise reader.error(name, f'does not belong to {self.name} = "{word}", which {has} of its own')
+                owners = listed((it for it in words if name in self.names_of(it)), quote=True)
+                told = f'does not belong to {self.name} = "{word}", which {has} of its own, but to {owners}'
+                raise reader.error(name, told)
         return word
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:

@@ -110,7 +110,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     if isinstance(loaded, mi.Scene) and is_file:
         names = _distinct([name_of(bsdf) for bsdf in _materials(loaded)])
         if not names:
-            raise ValueError(f"{path}: the scene has no material")
+            raise ValueError(f"{path}: no shape of the scene has a material")
         for each in _chosen(source, names, wanted):
             yield each._replace(name=each.name + _suffix(parameters))
     elif isinstance(loaded, mi.BSDF) and not wanted:

@@ -174,7 +174,7 @@ def with_material(path: Path, id: str, xml: str) -> str:
         defined = {it.getAttribute("id") for it in document.getElementsByTagName("*") if it.tagName != "ref"}
         if lost.tagName != "ref" and lost.getAttribute("id") in referred - defined:
             root: Any = document.documentElement
-            root.insertBefore(lost.cloneNode(True), root.firstChild)
+            root.appendChild(lost.cloneNode(True))
     return "\n".join(node.toxml() for node in document.childNodes) + "\n"
 
 
