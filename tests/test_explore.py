@@ -574,6 +574,15 @@ def test_pictures_replacements_and_copies_are_the_same(llvm_rgb, tmp_path, word,
         np.testing.assert_allclose(it, pictures[0], rtol=1e-5)
 
 
+def test_a_material_and_a_shape_that_has_it_are_both_replaced(llvm_rgb, tmp_path):
+    path = tmp_path / "twins.xml"
+    path.write_text(TWINS)
+    grey = BSDFSource("lambert", "lambert", "lambert")
+    black = BSDFSource("ward", "ward", "ward")
+    scene = SceneFile(str(path), replaced={"one": grey, "left": black}).load()
+    assert [type(it.bsdf()).__name__ for it in scene.shapes()] == ["Ward", "Lambert", "BSDF"]
+
+
 def test_part_of_a_mixture_is_not_shown_in_part(llvm_rgb, tmp_path):
     path = tmp_path / "mixed.xml"
     mixture = '<bsdf type="blendbsdf"><float name="weight" value="0.5"/><ref id="outer"/><ref id="inner"/></bsdf>'

@@ -82,7 +82,7 @@ class SceneFile:
                 props[key] = names.get(props[key], props[key])
             config.merge_equivalent = config.merge_meshes = not (self.keeps_ids or self.replaced)
             mi.parser.transform_all(config, state)
-            _check_films(state)
+            _check_counts(state)
             for id, source in self.replaced.items():
                 bsdf = source.load()
                 _replace(state, id, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
@@ -91,12 +91,13 @@ class SceneFile:
             return instantiated(config, state)
 
 
-def _check_films(state: Any) -> None:
-    """Raise a ValueError if a film has no pixels, where Mitsuba would complain about the sensor."""
+def _check_counts(state: Any) -> None:
+    """Raise a ValueError if a film has no pixels, where Mitsuba would complain about the sensor, or no samples."""
+    kinds = {mi.ObjectType.Film: ("width", "height"), mi.ObjectType.Sampler: ("sample_count",)}
     for node in state.nodes:
-        for name in ("width", "height") if node.type == mi.ObjectType.Film else ():
+        for name in kinds.get(node.type, ()):
             if name in node.props and not node.props[name] > 0:
-                raise ValueError(f"the film's {name} is {node.props[name]}; give it at least 1 pixel")
+                raise ValueError(f"the {node.type.name.lower()}'s {name} is {node.props[name]}; give it at least 1")
 
 
 def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
@@ -117,6 +118,8 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
                 if usual.type == mi.ObjectType.BSDF if is_shape else value.index() == ids[id]:
                     node.props[name] = on_both_sides(bsdf) if usual.props.plugin_name() == "twosided" else bsdf
                     found = True
+            elif is_shape and isinstance(value, mi.BSDF):  # which took the place of another one
+                node.props[name], found = bsdf, True
     if is_shape and not found:
         state.nodes[ids[id]].props["bsdf"] = bsdf
     elif not found:
