@@ -340,6 +340,15 @@ def test_missing_files(upgraded, old, stand_in):
         assert '<scale value="2"/></transform><bsdf type="conductor">' in new.xml
 
 
+def test_files_are_found_from_where_a_link_leads(folder, upgraded, tmp_path):
+    (tmp_path / "deep").mkdir()
+    (folder / "link").symlink_to(tmp_path / "deep", target_is_directory=True)
+    new = upgraded(in_shape('<bsdf type="diffuse"><ref id="picture" name="reflectance"/></bsdf>', ["picture"]),
+                   folder=folder / "link")  # fmt: skip
+    name = re.search(r'value="([^"]*picture\.exr)"', new.xml)[1]
+    assert (folder / "link" / name).samefile(folder / "picture.exr")
+
+
 @pytest.fixture(scope="module")
 def opened():
     """What is opened, run and connected to, by Python."""

@@ -312,8 +312,9 @@ class Work:
         if given is None or element.tag not in STAND_INS:
             return False
         names = (given.value, given.value.replace("\\", "/"))  # which may have been written on Windows
-        if found := next((it for name in names if os.path.isfile(it := self.path.parent / name)), None):
-            given.value = str(found) if os.path.isabs(given.value) else os.path.relpath(found, self.folder)
+        here, there = map(os.path.realpath, (self.path.parent, self.folder))  # ".." goes up from where a link leads to
+        if found := next((it for name in names if os.path.isfile(it := os.path.join(here, name))), None):
+            given.value = found if os.path.isabs(given.value) else os.path.relpath(found, there)
             return False
         if not self.lenient:
             self.missing.append(f"{element.place}: there is no file {given.value}")
