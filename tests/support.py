@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import multiprocessing
 import os
 import tracemalloc
+from concurrent.futures import ProcessPoolExecutor
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -61,6 +63,10 @@ def turned(w: np.ndarray, phi: float) -> np.ndarray:
     """Directions turned about the normal by an angle in radians."""
     x, y, z = w.T
     return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
+
+
+def fresh_process():
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
 
 
 def spherical(theta, phi) -> np.ndarray:

@@ -1,6 +1,7 @@
 """What ``shading`` can be part of: derivatives, frozen functions, threads and other integrators; what it says of bad
 input, and its manual page."""
 
+import gc
 import re
 from concurrent.futures import ThreadPoolExecutor
 
@@ -9,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from plates import SKY, SUN, WHITE, film, from_above, lamp, noisy, plate, refused, shaded
+from support import fresh_process
 
 import mi_brdfs
 from mi_brdfs.mitsuba import integrator as adapter
@@ -63,21 +65,30 @@ def test_differentiable(lanes, opacity, keys, monkeypatch):
         assert abs(gradients[key]) > 1e-3
 
 
+FROZEN = {
+    "one pass": ("perspective", None, LANES),
+    "passes": ("perspective", None, 256),
+    "meter": ("radiancemeter", None, LANES),
+    "aov": ("perspective", "aov", LANES),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize(
-    ("kind", "around", "lanes"),
-    [
-        ("perspective", None, LANES),
-        ("perspective", None, 256),
-        ("radiancemeter", None, LANES),
-        ("perspective", "aov", LANES),
-    ],
-    ids=["one pass", "passes", "meter", "aov"],
-)
-def test_frozen_pictures(kind, around, lanes, monkeypatch):
+def test_frozen_pictures():
+    """In a process of their own: Dr.Jit records no picture while a BSDF that its scene does not hold is alive."""
+    with fresh_process() as process:
+        for name, case in FROZEN.items():
+            try:
+                process.submit(check_frozen_pictures, *case).result()
+            except Exception as error:
+                raise AssertionError(name) from error
+
+
+def check_frozen_pictures(kind, around, lanes):
     """Recorded, and replayed for other parameters: of a plate seen through a mask."""
-    monkeypatch.setattr(adapter, "LANES", lanes)
+    mi.set_variant("llvm_ad_rgb")
+    gc.collect()
+    adapter.LANES = lanes
     own = {"type": "shading", "ambient": 0.1, "clamp": False}
     T = mi.ScalarTransform4f
     pane = {"type": "mask", "opacity": 0.3, "inner": {"type": "twosided", "inner": WHITE}}

@@ -750,7 +750,7 @@ def test_command_on_xml_and_on_a_scene(tmp_path, monkeypatch, pytestconfig):
         (["ward", "--angles", "5,95"], "must be in [0, 90) degrees, not 95"),
         (["ward", "--angles", "5;10"], "write degrees, such as 10,40,70"),
         (["ward", "--significance", "1"], "--significance 1: it must be in (0, 1)"),
-        (["ward", "--against", "scenes/first_light.xml"], "name one of scenes/first_light.xml:Lambert 1, "),
+        (["ward", "--against", "scenes/first_light.xml"], "name one of scenes/first_light.xml:Lambert, "),
         (["ward", "--against", "phong", "--only", "pdf"], "--against compares values; --only"),
         (['<emitter type="constant"/>'], "is not a BSDF"),
     ],

@@ -4,17 +4,16 @@ import copy
 import functools
 import importlib
 import itertools
-import multiprocessing
 import os
 import signal
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 from catalogue import REPRESENTATIVES, ROWS
-from support import call, hemisphere, is_scalar, sphere
+from support import call, fresh_process, hemisphere, is_scalar, sphere
 
 import mi_brdfs
 from mi_brdfs import starting
@@ -61,10 +60,6 @@ def variant(request):
 def value_and_density(bsdf):
     """What a BSDF is at a few pairs of directions."""
     return call(bsdf.eval_pdf, mi.BSDFContext(), hemisphere(20, 1), hemisphere(20, 2))
-
-
-def fresh_process():
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
 
 
 def check_each(check, cases):
