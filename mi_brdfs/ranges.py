@@ -27,7 +27,7 @@ def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
         raise ValueError(f"{type(bsdf).__name__} is not a BSDF of {mi.variant()}; give a loaded BSDF.")
     if not _is_ours(bsdf):
         raise ValueError(f"{bsdf.class_name()} declares no ranges: it is not a BSDF of mi_brdfs.")
-    return dict(_ranges(mi.traverse(bsdf)))
+    return dict(limits_of(mi.traverse(bsdf)))
 
 
 def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | None = None) -> None:
@@ -52,7 +52,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     if any(hasattr(node, "model") and hasattr(node, "eval_pdf") and not _is_ours(node) for node in params.hierarchy):
         raise ValueError(f"These parameters are not of {mi.variant()}; activate the variant that they were loaded in.")
     source = params if optimizer is None else optimizer
-    inside = {key: _projected(source[key], limits) for key, limits in _ranges(params) if key in source}
+    inside = {key: _projected(source[key], limits) for key, limits in limits_of(params) if key in source}
     if optimizer is not None:
         for key, value in inside.items():
             optimizer[key] = value
@@ -60,7 +60,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     params.update(inside)
 
 
-def _ranges(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
+def limits_of(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
     """Yield ``(key, range)`` of the traversed parameters of our BSDFs."""
     for key, bsdf, _, name in declared(params):
         if name in bsdf.model.ranges:

@@ -83,7 +83,8 @@ class SceneFile:
             config.merge_equivalent = config.merge_meshes = not (self.keeps_ids or self.replaced)
             mi.parser.transform_all(config, state)
             _check_counts(state)
-            for id, source in self.replaced.items():
+            shapes = {node.props.id() for node in state.nodes if node.type == mi.ObjectType.Shape}
+            for id, source in sorted(self.replaced.items(), key=lambda it: it[0] in shapes):
                 bsdf = source.load()
                 _replace(state, id, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
             if self.box_filter:

@@ -14,7 +14,7 @@ from ..probe.arrays import Array, interaction, numbers, sample_arguments, vector
 from ..probe.bsdf import Part
 from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
-from ..ranges import ranges
+from ..ranges import declared, limits_of
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run
@@ -62,10 +62,8 @@ def gradients(run: Run) -> Findings:
         wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (12, 14))
         scale = np.full(COUNT, 2 * np.pi)
     wi, scale = np.ascontiguousarray(wi), scale[:, None]
-    edges, limits, turning = _edges(part), {}, set[str]()
-    if probe.is_ours:
-        limits, declared = ranges(probe.bsdf), nested(probe.bsdf.model.declared())
-        turning = {it.name for parameter in declared for way in parameter.spellings for it in way if it.turns}
+    edges, limits = _edges(part), dict(limits_of(params))
+    turning = {key for key, bsdf, _, name in declared(params) if name in _turning(bsdf.model)}
 
     for key in keys:
         with restored(params, key) as original:
@@ -92,7 +90,7 @@ def gradients(run: Run) -> Findings:
                     _check_way_back(run, outcome, params, key, limit, beyond, wi, wo)
             set_value(params, key, original)
             rounding = ROUNDING
-            if key.partition(".")[0] in turning:
+            if key in turning:
                 size = min(size, 1)  # many turns are as few
                 # Turned directions are rounded anew, which a narrow lobe sees.
                 rounding += 1e-7 / min(run.spread(part), 1)
@@ -112,7 +110,7 @@ def gradients(run: Run) -> Findings:
                 known = np.spacing(np.abs(np.array(original + shift, np.float32)).max()) < 0.01 * part_of * step
                 # Plugins other than ours may clip: look beside such ends.
                 shifted = _shifted(run, params, key, wi, wo)
-                tried = _differences(shifted, part_of * step, known, probe.is_ours, rounding)
+                tried = _differences(shifted, part_of * step, known, probe.is_ours or key in limits, rounding)
                 found.append((tried, derivative))
                 if tried.trusted.mean() > 0.95:
                     break
@@ -127,6 +125,11 @@ def gradients(run: Run) -> Findings:
         yield outcome.finding(f"Finite and equal to finite differences: {agreement}.")
     if not keys and not findings:
         yield Finding("gradients", "whole", "skip", "It has no parameters.")
+
+
+def _turning(model: Any) -> set[str]:
+    """Return the names of the parameters of a model that are angles of a whole turn."""
+    return {it.name for parameter in nested(model.declared()) for way in parameter.spellings for it in way if it.turns}
 
 
 def _judge(
