@@ -277,6 +277,7 @@ def test_runs_without_a_variant_for_it(ward):
         ("one", "ward", {}, "arrays: only one pair of directions has a value within the cut at 80°."),
         ("good", "ward", {"starts": 0}, "There is nothing to start from"),
         ("shapes", "ward", {}, "Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,) or (N, channels), not"),
+        ("short", "ward", {}, "Arrays (wi, wo, f): directions must have the length 1, not 0.5."),
         ("nothing", "ward", {}, "There are no data to fit."),
         ("file", "ward", {}, "none.bsdf: No such file or directory."),
     ],
@@ -285,7 +286,7 @@ def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_p
     wi, wo, f = (array[:50] for array in ward)
     sources = {
         "good": (wi, wo, f), "below": (-wi, wo, f), "dark": (wi, wo, -f), "shapes": (wi, wo[:4], f), "nothing": [],
-        "one": (wi[:1], wo[:1], f[:1]),
+        "short": (wi / 2, wo, f), "one": (wi[:1], wo[:1], f[:1]),
         "grazing": (wi, np.tile(np.float32([0.995, 0, 0.0999]), (50, 1)), f), "file": tmp_path / "none.bsdf",
     }  # fmt: skip
     with pytest.raises((FitError, FileError, ValueError)) as caught:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..measured import Axis, Grid, Measurement, read
-from ..measured.arrays import stacked
+from ..measured.arrays import components, stacked
 from ..measured.measurement import Quantity
 from ..measured.report.summary import azimuths, scatter
 from ..observer import to_srgb
@@ -158,6 +158,11 @@ def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
         raise FitError(f"Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,) or (N, channels), not {shapes}.")
     if f.shape[1] not in (1, 3):
         raise FitError(f"Arrays of f have one channel or three, linear sRGB, not {f.shape[1]}.")
+    for directions in (wi, wo):
+        try:
+            components(directions)
+        except ValueError as error:
+            raise FitError(f"Arrays (wi, wo, f): {error}.") from None
     return wi, wo, f, np.ones(len(f))
 
 
