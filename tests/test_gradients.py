@@ -304,7 +304,6 @@ WITH_STEPS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("bsdf", WITH_STEPS.values(), ids=WITH_STEPS)
 def test_direct_agrees_with_finite_differences(bsdf):
-    """Its weights of multiple importance sampling have derivatives of the density in them."""
     scene = scene_of(bsdf, {"type": "direct"})
     params = mi.traverse(scene)
 
@@ -316,3 +315,22 @@ def test_direct_agrees_with_finite_differences(bsdf):
         step = 0.03 * params[key].numpy().item()
         (expected,) = differences(params, key, [0], step, lambda: loss(seed=1).numpy().item())
         assert gradient.item() == pytest.approx(expected, rel=0.05), key
+
+
+@pytest.mark.parametrize("integrator", ["path", "direct"])
+def test_integrators_of_attached_densities_agree_with_prb(integrator):
+    """``blendbsdf`` divides by the density that its BSDFs return, and these integrators differentiate what it does."""
+    blend = {"type": "blendbsdf", "weight": 0.5, "a": {"type": "walter", "alpha": 0.4}, "b": {"type": "lambert"}}
+    scene = scene_of(blend, PATHS | {"max_depth": 2})
+    params = mi.traverse(scene)
+    (key,) = (name for name in params.keys() if "alpha" in name)
+
+    def gradient(integrator):
+        def loss():
+            return dr.mean(mi.render(scene, params, integrator=integrator, spp=256, seed=2, seed_grad=1), axis=None)
+
+        return gradients_of(params, [key], loss)[key].item()
+
+    # With the same seed they draw the same samples.
+    depth = {} if integrator == "direct" else {"max_depth": 2}
+    assert gradient(mi.load_dict({"type": integrator, **depth})) == pytest.approx(gradient(scene.integrator()), rel=0.01)

@@ -117,7 +117,9 @@ class ModelBSDF:
             axes = frame.stokes_axes(mixture.wi, local) if mi.is_polarized else ()
             side = mixture.eval_pdf(local, transmitted, *axes)
             value, pdf = value + select(here, side[0], 0), pdf + select(here, side[1], 0)
-        return value, pdf
+        # A density belongs to the estimator, as the sampled direction does, and has no derivative either: those of
+        # integrals are then unbiased within every BSDF and integrator that divides by it.
+        return value, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
 
     def _sample(
         self, valid: mi.Bool, mixture: Mixture, components: list[int], frame: LobeFrame, u: mi.Float, v: mi.Point2f
@@ -131,8 +133,8 @@ class ModelBSDF:
             wo = dr.detach(wo)
         value, pdf = self._eval_pdf(valid, mixture, frame, wo)
         # Drop samples that are hardly ever drawn: the derivatives of their weights would overflow.
-        drawn, density = pdf > 1e-15, dr.detach(pdf) if dr.is_diff_v(pdf) else pdf
-        weight = value / select(drawn, density, 1)
+        drawn = pdf > 1e-15
+        weight = value / select(drawn, pdf, 1)
 
         bs.wo, bs.pdf, bs.eta = wo, pdf, 1
         component, kind = mi.UInt32(components[0]), mi.UInt32(int(self.kinds[components[0]]))
