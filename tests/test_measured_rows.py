@@ -385,3 +385,11 @@ def test_written_tis_is_the_albedo(tmp_path):
     stated = read(tmp_path / "x.bsdf").stated_albedos
     assert len(stated) == 18
     np.testing.assert_allclose(list(stated.values()), 0.3, rtol=1e-3)
+
+
+def test_spectra_without_the_visible_are_announced(tmp_path):
+    """A sheet measured in the infrared is rendered as its nearest wavelength: this is said."""
+    rows = "\n".join(f"30,{o},180,0.2,0.1" for o in range(0, 61, 20))
+    with pytest.warns(UserWarning, match="wavelengths of 900 to 1700 nm leave out 100% of what the eye sees"):
+        measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,900,1700\n" + rows, "x.csv")
+    measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,450,650\n" + rows, "x.csv")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..observer import unseen
 from ..parameters.messages import brief, printable
 from .arrays import NUMPY, components, stacked
 from .coordinates import Coordinates, polar_angle
@@ -24,6 +26,8 @@ MOST = 1e36
 """The largest value: float32 holds it times a solid angle."""
 LEAST_NM = 12.0
 """In nm, between the 10.6 µm of carbon dioxide lasers and the 13.5 nm of extreme ultraviolet light."""
+MOST_UNSEEN = 0.2
+"""The share of the luminance that spectra may leave out without a warning."""
 
 
 class FileError(ValueError):
@@ -353,7 +357,7 @@ def usable(values: np.ndarray) -> np.ndarray:
 def representable(measurement: Measurement) -> Measurement:
     """Return a measurement that can be rendered, with NaN in place of values beyond ``MOST``, infinite ones among them.
     Raise a FileError if no value is left that is positive, or wavelengths are too many, no numbers, the same or in
-    micrometres."""
+    micrometres. Warn of spectra that leave out much of what the eye sees."""
     values, nm = measurement.data.values, measurement.wavelengths
     if values.shape[-1] > MOST_CHANNELS:
         raise FileError(
@@ -365,6 +369,11 @@ def representable(measurement: Measurement) -> Measurement:
     if nm is not None and nm[-1] < LEAST_NM:
         numbers = f"{nm[0]:g} to {nm[-1]:g}" if len(nm) > 1 else f"{nm[0]:g}"
         raise FileError(f"{measurement.path}: wavelengths of {numbers} look like micrometres; write nm.")
+    if nm is not None and len(nm) > 1 and (share := unseen(nm[0], nm[-1])) > MOST_UNSEEN:
+        warnings.warn(
+            f"{measurement.path}: its wavelengths of {nm[0]:g} to {nm[-1]:g} nm leave out {share:.0%} of what the eye "
+            "sees; there, the value of the nearest one is shown.", stacklevel=2,
+        )  # fmt: skip
     values[~((values >= -MOST) & (values <= MOST))] = np.nan
     # Samples with a missing channel are left out where others are interpolated.
     kept = values if isinstance(measurement.data, Grid) else values[np.isfinite(values).all(axis=1)]
