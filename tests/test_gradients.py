@@ -333,4 +333,6 @@ def test_integrators_of_attached_densities_agree_with_prb(integrator):
 
     # With the same seed they draw the same samples.
     depth = {} if integrator == "direct" else {"max_depth": 2}
-    assert gradient(mi.load_dict({"type": integrator, **depth})) == pytest.approx(gradient(scene.integrator()), rel=0.01)
+    assert gradient(mi.load_dict({"type": integrator, **depth})) == pytest.approx(
+        gradient(scene.integrator()), rel=0.01
+    )
