@@ -175,6 +175,10 @@ WRONG = {
     "size": ({"pictures": GREY[:20]}, "A picture has 32 x 20 pixels, and the film of its sensor 32 x 32."),
     "channels": ({"pictures": GREY[..., :1]}, "A picture has 1 channels, and the film of its sensor 3."),
     "shape": ({"pictures": np.ones(3)}, "A picture has the shape (height, width, channels), not (3,)."),
+    "integers": (
+        {"pictures": np.uint8(255 * GREY)},
+        "A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.",
+    ),
     "black": ({"pictures": 0 * GREY}, "A picture is black, or has no numbers."),
     "gaps": ({"pictures": np.nan * GREY}, "A picture is black, or has no numbers."),
     "file": ({"pictures": "missing.exr"}, "There is no file missing.exr."),

@@ -393,3 +393,12 @@ def test_spectra_without_the_visible_are_announced(tmp_path):
     with pytest.warns(UserWarning, match="wavelengths of 900 to 1700 nm leave out 100% of what the eye sees"):
         measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,900,1700\n" + rows, "x.csv")
     measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,450,650\n" + rows, "x.csv")
+
+
+def test_radians_that_are_called_degrees_are_announced(tmp_path):
+    rows = "\n".join(f"{theta_i},{theta_o},0,.3" for theta_i in (0.0, 0.5, 1.0) for theta_o in (0.0, 0.7, 1.5))
+    with pytest.warns(UserWarning, match="θ is at most 1.57°; if these are radians, call the columns _rad"):
+        measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows, "x.csv")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        measured(tmp_path, "theta_i_rad,theta_o_rad,delta_phi_rad,f\n" + rows, "x.csv")

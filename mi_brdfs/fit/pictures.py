@@ -303,7 +303,10 @@ def _pixels(picture: Picture) -> Array:
         formats = mi.Bitmap.PixelFormat
         colour = formats.Y if picture.pixel_format() in (formats.Y, formats.YA) else formats.RGB
         picture = picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)
-    pixels = np.array(picture, np.float64)
+    pixels = np.array(picture)
+    if pixels.dtype.kind in "iub":
+        raise FitError("A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.")
+    pixels = pixels.astype(np.float64)
     if pixels.ndim not in (2, 3):
         raise FitError(f"A picture has the shape (height, width, channels), not {pixels.shape}.")
     return pixels if pixels.ndim == 3 else pixels[..., None]

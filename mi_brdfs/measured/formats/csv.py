@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
@@ -68,6 +69,8 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     phi_o = angles["phi_o"] if "phi_o" in angles else phi_i + angles["delta_phi"]
     theta_i, theta_o = angles["theta_i"], angles["theta_o"]
     checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
+    if columns.angles["theta_i"][1] != 1 and 0 < np.abs([theta_i, theta_o]).max(initial=0) <= np.radians(np.pi / 2):
+        warnings.warn(f"{path}: θ is at most 1.57°; if these are radians, call the columns _rad.", stacklevel=2)
     values = table[:, columns.values]
     del table
     if columns.quantity == "f cos":
