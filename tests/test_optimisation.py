@@ -43,6 +43,7 @@ class Problem:
         self.wo = mi.Vector3f((near / np.linalg.norm(near, axis=1, keepdims=True)).T.astype(np.float32))
         self.set({name: self.draw(limits) for name, limits in self.limits().items()})
         self.target = dr.detach(self.values())
+        dr.eval(self.target)  # before the bitmaps change, which CUDA keeps in one place
         self.starts = {name: self.draw(limits) for name, limits in self.limits().items()}
 
     def limits(self):
