@@ -238,3 +238,14 @@ def test_files(tmp_path):
     for name, precision in {"picture.exr": 0.01, "picture.png": 0.02}.items():
         found = images(scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}), tmp_path / name)
         assert values(found)["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=precision)
+
+
+def test_pixels_that_were_clipped_do_not_count(tmp_path):
+    """A lamp so strong that a part of the picture is white in 8 bits."""
+    lamp = {"key": {"type": "point", "position": [-1, 2, 5], "intensity": 250.0}}
+    bsdf = {"type": "lambert", "reflectance": rgb(0.6, 0.3, 0.1)}
+    picture = mi.Bitmap(picture_of(scene_of(bsdf, lights=lamp)).astype(np.float32))
+    mi.util.write_bitmap(str(tmp_path / "picture.png"), picture, write_async=False)
+    assert 0.1 < (np.array(mi.Bitmap(str(tmp_path / "picture.png")))[..., 0] == 255).mean() < 0.7
+    start = scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}, lights=lamp)
+    assert values(images(start, tmp_path / "picture.png"))["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=0.02)

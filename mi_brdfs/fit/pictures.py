@@ -101,7 +101,7 @@ def images(
             if that is a ``prb``, and else by ``prb`` of the same depth.
         pictures: a picture, or a list of them: files, bitmaps, or arrays of linear values and shape
             (height, width, channels) as ``mi.render`` returns them, of the size of the film. Pixels that are NaN do not
-            count. Files with 8 bits are taken as sRGB.
+            count. Files of integers are taken as sRGB, and their pixels with a clipped channel do not count.
         parameters: keys of ``mi.traverse(scene)``, or the beginnings of some up to a dot, as ``"ball.bsdf"`` for all
             parameters of a BSDF, or ``"ball.bsdf.alpha"``. By default, all of the BSDFs of this package.
         sensors: for each picture, the index of the sensor that took it; by default the first ones, in order.
@@ -302,7 +302,13 @@ def _pixels(picture: Picture) -> Array:
     if isinstance(picture, mi.Bitmap):
         formats = mi.Bitmap.PixelFormat
         colour = formats.Y if picture.pixel_format() in (formats.Y, formats.YA) else formats.RGB
+        integers = np.array(picture)
         picture = picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)
+        if integers.dtype.kind == "u":
+            # What is brighter than white was clipped, too.
+            clipped = (integers == np.iinfo(integers.dtype).max).reshape(*integers.shape[:2], -1)
+            colours = 3 if clipped.shape[2] > 2 else 1
+            picture = np.where(clipped[..., :colours].any(-1)[..., None], np.nan, np.array(picture))
     pixels = np.array(picture)
     if pixels.dtype.kind in "iub":
         raise FitError("A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.")

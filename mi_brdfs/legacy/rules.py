@@ -184,6 +184,9 @@ def _map(work: Work, element: Element) -> Element | None:
     if not textures and inner:
         work.dropped(element, f"a {element.type} without a texture")
         return inner[0]
+    if element.type == "bumpmap" and inner and any(work.resolved(it).type != "bitmap" for it in textures):
+        work.dropped(element, "a bumpmap whose texture is no bitmap, of which Mitsuba 3 knows no slopes")
+        return inner[0]
     for texture in textures:
         if element.type == "normalmap":
             texture.name = "normalmap"
