@@ -340,6 +340,17 @@ def test_missing_files(upgraded, old, stand_in):
         assert '<scale value="2"/></transform><bsdf type="conductor">' in new.xml
 
 
+@pytest.mark.parametrize(
+    "bsdfs, said",
+    [("", "dropped: the materials of two.obj"), ("red green", "approximated: the obj has the first of its 2 BSDFs")],
+)
+def test_materials_of_an_obj_are_named(folder, upgraded, bsdfs, said):
+    (folder / "two.obj").write_text("# two\nmtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
+    inner = "".join(f'<bsdf name="{name}" type="diffuse"/>' for name in bsdfs.split())
+    new = upgraded(f'<shape type="obj"><string name="filename" value="two.obj"/>{inner}</shape>')
+    assert said in new.report() and new.xml.count('type="diffuse"') == min(len(bsdfs), 1)
+
+
 def test_files_are_found_from_where_a_link_leads(folder, upgraded, tmp_path):
     (tmp_path / "deep").mkdir()
     (folder / "link").symlink_to(tmp_path / "deep", target_is_directory=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 RULES: dict[tuple[str, str], Callable[[Work, Element], Element | None]] = {}
 """The functions that change a plugin of a kind and a type, whose parts are those of Mitsuba 3, in place, or return what
 replaces it. Under "" and a kind is the one for all its other types."""
+HEAD = 1 << 16
+"""The bytes of an OBJ file in which its library of materials is named."""
 
 
 def modernize(scene: Element, minor: int, say: Callable[[Element, str], None]) -> None:
@@ -307,6 +310,18 @@ def _perspective(work: Work, element: Element) -> None:
             raise transform.error("it is no transform, or looks nowhere") from None
         matrix[:3, :3] = u @ v
         transform.children = [Element("matrix", value=" ".join(f"{v:.9g}" for v in matrix.ravel()))]
+
+
+@rule("shape", "obj")
+def _obj(work: Work, element: Element) -> None:
+    bsdfs = [it for it in element.children if work.resolved(it).tag == "bsdf"]
+    if len(bsdfs) > 1:
+        element.children = [it for it in element.children if it not in bsdfs[1:]]
+        work.approximated(element, f"the obj has the first of its {len(bsdfs)} BSDFs; split its file by usemtl")
+    elif not bsdfs and (name := element["filename"]):
+        with (work.folder / name.value).open("rb") as file:
+            if re.search(rb"^\s*mtllib\s", file.read(HEAD), re.MULTILINE):
+                work.dropped(element, f"the materials of {name.value}; split it by usemtl, and give each part a BSDF")
 
 
 @rule("medium", "homogeneous")
