@@ -664,8 +664,13 @@ class ShareForgottenInOne(adapter.ModelBSDF):
         return value, pdf + dr.select(valid & (wo.z > 0), second, 0)
 
 
-def over_attached_density(bs, weight, si, u):
-    return weight * dr.detach(bs.pdf) / dr.select(bs.pdf > 0, bs.pdf, 1)
+def root_in_the_density(own, self, ctx, si, wo, active=True):
+    value, pdf = own(self, ctx, si, wo, active)
+    return value, pdf * (1 + 1e-6 * root_at_normal(si.wi))
+
+
+def half_attached(bs, weight, si, u):
+    return 0.5 * (weight + dr.detach(weight))
 
 
 def of_others(name, albedo=0.5, side=1, **members):
@@ -892,13 +897,9 @@ MUTANTS = [
         "gradients",
         diffuse(lambda wi, wo: 1 + 0.01 * root_at_normal(wi) * root_at_normal(wo)),
     ),
-    mutant(
-        "root at normal incidence in the density",
-        "gradients",
-        diffuse(density=lambda wi, wo: root_at_normal(wi) / root_at_normal(wi)),
-    ),
+    mutant("root at normal incidence in the density", "gradients", Lambert, adapted(eval_pdf=root_in_the_density)),
     mutant("weight detached", "gradients", Lambert, sampled(weight=lambda bs, w, si, u: dr.detach(w))),
-    mutant("weight over an attached density", "gradients", Phong, sampled(weight=over_attached_density)),
+    mutant("weight with half of its derivative", "gradients", Phong, sampled(weight=half_attached)),
     mutant("inactive lanes evaluated", "active", Ward, masked("eval_pdf")),
     mutant("inactive lanes sampled", "active", Lambert, masked("sample")),
     mutant("inactive lanes evaluated and sampled at once", "active", Lambert, masked("eval_pdf_sample")),

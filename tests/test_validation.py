@@ -507,6 +507,14 @@ def test_refraction(monkeypatch):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
+def test_the_way_to_directions_may_follow_the_tangent():
+    """As in ``bumpmap``, where values and densities stay when the surface is turned in the world."""
+    heights = 0.05 * np.random.default_rng(1).random((8, 8, 1), np.float32)
+    bumps = {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(heights)}
+    assert check({"type": "bumpmap", "bumps": bumps, "bsdf": {"type": "diffuse"}}, only=["calls"]).passed
+
+
+@pytest.mark.usefixtures("llvm_rgb")
 def test_kinks_have_the_derivatives_of_both_sides():
     """The largest of the lobe's three factors, which are equal by default, scales it."""
     report = check({"type": "lafortune"}, only=["gradients"])

@@ -189,10 +189,10 @@ def recorded(run: Run) -> Findings:
 
 def calls(run: Run) -> Findings:
     """Check that calls depend on what they are given alone: ``eval``, ``pdf`` and ``sample`` return the same for the
-    same arguments whatever was called before, in whatever lane, and where the surface is turned in the world, as their
-    directions are local: to float32's rounding, for 99 in a hundred. And they leave the surface point, directions and
-    context as they are; where Python defines ``to_string``, ``str`` of the BSDF does not raise; and ``has_attribute``
-    does not say yes to any name."""
+    same arguments whatever was called before, in whatever lane, to float32's rounding, for 99 in a hundred. Where the
+    surface is turned in the world, values and densities are the same, too, as directions are local. And they leave the
+    surface point, directions and context as they are; where Python defines ``to_string``, ``str`` of the BSDF does not
+    raise; and ``has_attribute`` does not say yes to any name."""
     probe, part = run.probe, run.probe.whole
     outcome, elsewhere = Outcome("calls", part.name), replace(probe, turned=True)
     wi, wo, u = scattered(COUNT, 76, part.sides), scattered(COUNT, 77, part.sides), random(COUNT, 78)
@@ -228,8 +228,18 @@ def calls(run: Run) -> Findings:
         order = slice(None, None, 1 if k % 2 else -1)
         before = "sample and eval" if before == "sample" else before  # as the probe calls them
         compare(f"after a call of {before} for other directions and points", method, *called(method, order=order))
-    for method in first:
+    for method in ("eval", "pdf"):
         compare("where the surface is turned in the world", method, *called(method, elsewhere))
+    # Which direction belongs to which variates may depend on the tangent, as in bumpmap; what is drawn may not.
+    it = elsewhere.sample(part, wi, u, uv)
+    stated = {
+        "a sample's density": it.density[:, None],
+        "a sample's weight times density": it.weight * it.density[:, None],
+    }
+    usual = probe.pdf(part, wi, it.wo, uv)[:, None], probe.eval(part, wi, it.wo, uv)
+    first["sample"] = dict(zip(stated, (value * it.lit[:, None] for value in usual), strict=True)), it.wo
+    got = {name: value * it.lit[:, None] for name, value in stated.items()}
+    compare("where the surface is turned in the world", "sample", got, it.wo)
     _check_arguments(run, outcome, wi, wo, u)
     try:
         with unwrapped_ctrl_c():
