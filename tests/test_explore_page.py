@@ -92,6 +92,7 @@ MALFORMED = [
     ('{"type": "fit", "subject": 0, "model": 3}', "A fit needs a model and a metric"),
     ('{"type": "save", "what": "everything"}', "What can be saved is exr, page or scene"),
     ('{"type": "save", "what": "page", "state": []}', "The state of a page is an object"),
+    ('{"type": "save", "what": "page", "state": {"subjects": "x"}}', "The state of a page is an object, with one"),
     (b"x" * 100_000_000, "A message has 65536 letters at most"),
 ]  # fmt: skip
 

@@ -62,6 +62,8 @@ def page(
     if missing := [name for name in vary if name not in ("theta", *baked.found)]:
         raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(baked.known, 'and')}.")
     told = page_state.get("subjects") or [{} for _ in state.subjects]
+    if len(told) != len(state.subjects):
+        raise StateError("The state of a page is of other materials than those shown.")
     subjects = [{**it, "bsdf": bsdf} for it, bsdf in zip(told, baked.subjects, strict=True)]
     is_same = state.axis == "theta_o"  # the cartesian plot has the curves of the polar one
     content = {

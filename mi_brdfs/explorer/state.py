@@ -125,8 +125,9 @@ def checked_request(message: Mapping[str, Any]) -> Mapping[str, Any]:
         raise StateError("A fit needs a model and a metric, which are words.")
     if kind == "save" and message.get("what") not in SAVED:
         raise StateError(f"What can be saved is {listed(SAVED)}.")
-    if kind == "save" and not isinstance(message.get("state", {}), Mapping):
-        raise StateError("The state of a page is an object.")
+    page = message.get("state", {})
+    if kind == "save" and not (isinstance(page, Mapping) and _are_objects(page.get("subjects", []))):
+        raise StateError("The state of a page is an object, with one for each material.")
     return message
 
 
@@ -137,7 +138,7 @@ def parse(data: Any, stages: Sequence[str], shapes: Sequence[str] = SHAPES) -> S
     subjects = data.get("subjects")
     if not isinstance(subjects, list) or not 1 <= len(subjects) <= SUBJECTS:
         raise StateError(f"A page has one to {SUBJECTS} materials.")
-    if not all(isinstance(it, Mapping) for it in subjects):
+    if not _are_objects(subjects):
         raise StateError("A material is an object with a bsdf.")
     views = data.get("views", State.views)
     if not isinstance(views, (list, tuple)) or any(it not in VIEWS for it in views):
@@ -176,6 +177,10 @@ def checked(bsdf: Any) -> Bsdf:
 def key_of(value: Any) -> str:
     """Return a text that is the same for equal values."""
     return json.dumps(value, sort_keys=True)
+
+
+def _are_objects(values: Any) -> bool:
+    return isinstance(values, list) and all(isinstance(it, Mapping) for it in values)
 
 
 def _is_plain(value: Any) -> bool:

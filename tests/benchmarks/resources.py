@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -48,6 +49,7 @@ def fresh_kernels(bsdf: Plugin) -> tuple[int, int, int]:
     """Return ``(parameters, changed, loaded)``: the number of parameters changed, and of kernels compiled for that and
     for loading the scene again."""
     scene = sphere(bsdf, FIRST_SIZE)
+    gc.collect()  # every BSDF that lives is part of a kernel, and would end in the middle
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         loaded = mi.load_dict(scene)
         known = _launched(loaded)
