@@ -33,7 +33,9 @@ def upgrade(
             fail(f"-D {define[0]}: {old} is a scene of Mitsuba 3, which stays as it is", Exit.USAGE)
         if output and not os.path.samefile(output.absolute().parent, old.absolute().parent):
             fail(
-                f"-o {output}: {old} is a scene of Mitsuba 3, and finds its files in its folder; stay there", Exit.USAGE
+                f"-o {output}: {old} is a scene of Mitsuba 3, which is copied as it is and would not find its files "
+                "there; write it into its own folder",
+                Exit.USAGE,
             )
     with failing(Exit.ERROR, ValueError, OSError):
         new = upgrade(old, lenient=lenient, folder=output and output.parent, **parameters_of(define))

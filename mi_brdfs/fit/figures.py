@@ -88,7 +88,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
     ticks, zero, label = np.arange(-90, 91, 45), 0.0, r"$\theta_o$"
     if np.ptp(curve.theta[curve.value > 0.5 * np.nanmax(curve.value)]) < NARROW:
         # A line at the scale of the hemisphere: its surroundings are stretched.
-        ticks, zero, label = np.array([-90, -40, -10, 0, 10, 40, 90]), theta_i, r"$\theta_o - \theta_i$"
+        ticks, zero, label = np.array([-90, -40, -10, 0, 10, 40, 90]), theta_i, r"$\theta_o - \theta_i$, stretched"
         ticks = ticks[abs(zero + ticks) <= 90]
         places = lambda x: np.sign(x - zero) * np.sqrt(abs(x - zero)), lambda y: zero + np.sign(y) * y * y
         ax.set_xscale("function", functions=places)

@@ -85,5 +85,9 @@ def weight(run: Run) -> Findings:
                 typical, largest = np.quantile(error[lit], 0.999), error.max()
                 worst = max(worst, typical)
                 if not (typical <= tolerance and largest <= max(0.1, 30 * tolerance)):
-                    outcome.wrong(error, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
+                    # Of those that are off by much, name the one that carries most light.
+                    carried = np.where(
+                        error >= 0.5 * largest, 1 + np.nan_to_num(abs(got.reshape(len(got), -1)).max(1)), 0
+                    )
+                    outcome.wrong(carried, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
         yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.")

@@ -107,7 +107,7 @@ class Summary:
             ("values", f"{above.values + self.below.values:,}, of {self.grid}"),
             ("measured", self._range()),
             ("negative", _share(above.negative, above.values) + lowest),
-            ("missing", _share(above.missing, above.values)),
+            ("missing", _share(above.missing, above.values) + (" above the horizon" if self.below.missing else "")),
             ("zero", _share(above.zero, above.values)),
         ]
         if self.below.values:
