@@ -173,7 +173,8 @@ def _overview(models: list[type[Model]]) -> str:
 def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
     pictures = strip_picture(model), lobes_picture(model)
-    return _page(model, _picture(model), *pictures, _table(model.energy.rows()), ENERGY_NOTE)
+    portrait = f"{_picture(model)}\n\n*In the colour of its family; the example below has its own.*"
+    return _page(model, portrait, *pictures, _table(model.energy.rows()), ENERGY_NOTE)
 
 
 def data_page() -> str:
