@@ -150,6 +150,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, str):
         return brief(value)
     try:
-        return ";".join(f"{number:.3g}" for number in value)
+        return ",\N{NO-BREAK SPACE}".join(f"{number:.3g}" for number in value)
     except TypeError:
         return type(value).__name__

@@ -23,7 +23,6 @@ from . import style
 from .given import by_channel, constants, is_sweep, named, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
-DOTTED = 0, (1, 2)
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
 MIRROR = {"marker": "+", "markersize": 8, "markeredgewidth": 1.1}
 HATCHED = {"facecolor": "white", "edgecolor": GRID, "hatch": "////", "linewidth": 0}
@@ -109,7 +108,7 @@ def albedo(
 def frame_albedo(ax: Axes, text: str) -> None:
     """Set the axes of albedo curves that are drawn, with a line at 1 unless they are far below."""
     top = largest(curve.get_ydata() for curve in ax.get_lines())
-    ax.axhline(1, color=FAINT, linewidth=0.8, linestyle=DOTTED)
+    ax.axhline(1, color=INK, linewidth=0.6, zorder=2.5)  # above curves, and thinner: those that reach 1 hide no part
     style.calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])

@@ -20,7 +20,7 @@ from ..measured.arrays import components, stacked
 from ..measured.coordinates import HalfDifference, polar_angle, spherical
 from ..measured.measurement import usable
 from ..measured.report.albedo import albedos
-from ..measured.report.counts import batches, census
+from ..measured.report.counts import batches, census, in_one_plane
 from ..measured.report.summary import azimuths, ends
 from ..measured.scattered import as_grid
 from ..observer import to_srgb
@@ -96,11 +96,12 @@ def _draw_slice(ax: Axes, it: LitTable) -> None:
     patch = Rectangle((0, 0), 90, 90, **HATCHED, zorder=-1)
     ax.add_patch(patch)
     ax.imshow(np.dstack([shown, seen]), extent=(0, 90, 0, 90), origin="lower")
-    add_bar(ScalarMappable(norm, palette), ax, it.quantity, location="top", extend="both")
+    made_up = ", interpolated" if in_one_plane(it.measurement.data) else ""
+    add_bar(ScalarMappable(norm, palette), ax, it.quantity + made_up, location="top", extend="both")
     calm(ax)
     ax.grid(False)
     turns = range(0, 91, 30)
-    for axis, name in ((ax.xaxis, r"$\theta_h$"), (ax.yaxis, r"$\theta_d$")):
+    for axis, name in ((ax.xaxis, r"$\theta_h$ at $\varphi_d$ = 90°"), (ax.yaxis, r"$\theta_d$")):
         axis.set_ticks(turns, [f"{turn}°" for turn in turns])
         axis.set_label_text(name, fontsize=TEXT, color=INK)
     if not seen.all():
@@ -152,7 +153,7 @@ def _draw_albedo(ax: Axes, it: LitTable) -> None:
 def _legend(ax: Axes, handles: list, labels: list[str]) -> None:
     """Add a legend below a panel."""
     columns = 2 if len(labels) in (2, 4) else 3
-    ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, frameon=False,
+    ax.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=columns, frameon=False,
               fontsize=SMALL, labelcolor=INK)  # fmt: skip
 
 

@@ -191,17 +191,18 @@ def _draw_polar(
     ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str, alike: list[LabelledCurve]
 ) -> None:
     low, high = _range(alike) if log else (0, largest(line.curve.value for line in alike))
-    end, most = 1.06 * (high - low), 12 // max(2, ax.get_gridspec().ncols)
+    most = 12 // max(2, ax.get_gridspec().ncols)
     if log:
-        powers = range(low, int(np.floor(high)) + 1)
-        rings = {power - low: f"$10^{{{power}}}$" for power in powers}
+        end = 1.06 * (high - low)
+        rings = {power - low: f"$10^{{{power}}}$" for power in range(low, int(np.floor(high)) + 1)}
     else:
-        rings = {ring: f"{ring:g}" for ring in MaxNLocator(4).tick_values(0, end) if ring <= end}
+        rings = {ring: f"{ring:g}" for ring in MaxNLocator(4).tick_values(0, 1.06 * high)}
+        end = max(rings)  # a round number at the rim, since panels differ in their scale
     turns = np.arange(-150, 181, 30) if whole else np.arange(-90, 91, 30)
     round_ = np.linspace(-180, 180, 361) if whole else np.linspace(-90, 90, 181)
     for k, (ring, number) in enumerate(rings.items()):
         ax.plot(*_at(round_, ring), color=GRID, linewidth=0.6)
-        if k % (1 + len(rings) // most) == 0 and ring < 0.95 * end and (ring > 0 or not whole):
+        if k % (1 + len(rings) // most) == 0 and not 0.95 * end < ring < end and (ring > 0 or not whole):
             ax.text(ring, -0.035 * end, number, color=INK, fontsize=SMALL - 1, ha="center", va="top")
     ax.plot(*_at(round_, end), color=FAINT, linewidth=0.6)
     for turn in turns:
@@ -220,7 +221,7 @@ def _draw_polar(
         ax.plot(*_at(line.curve.theta, radius), label=line.label, **line.look)
     ax.plot([-end, end], [0, 0], color=INK, linewidth=1.5)
     ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-1.25 if whole else -0.15) * end, 1.25 * end), xticks=[], yticks=[])
-    ax.set_aspect("equal")
+    ax.set_aspect("equal", anchor="S")  # in the middle, labels below would overlap the legend
     ax.spines[:].set_visible(False)
     radius = f"log radius, cut off below $10^{{{low}}}$" if log else "linear radius"
     ax.set_xlabel(f"{text},\n{radius}", fontsize=TEXT, color=INK)
