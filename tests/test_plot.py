@@ -230,7 +230,7 @@ def test_red_green_and_blue():
     """In a row for each angle, a style for each BSDF, and without the word luminance; one curve for what is grey."""
     figure = plot.cartesian(COLOURED, "lambert", angles=(0, 60), scale="linear", rgb=True)
     drawn = curves(figure)
-    assert list(drawn)[:3] == [f"lambert reflectance=0.2,\xa00.5,\xa00.8, {name}" for name in ("red", "green", "blue")]
+    assert list(drawn)[:3] == [f"lambert reflectance=0.2, 0.5, 0.8, {name}" for name in ("red", "green", "blue")]
     assert list(drawn)[3:] == ["lambert"] and legend(figure)[:4] == list(drawn)
     peaks = [value.max() for _, value in drawn.values()]
     assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5]) / np.pi, rel=1e-3)
@@ -362,13 +362,7 @@ def test_the_name_of_a_loaded_bsdf_and_of_those_of_a_file(tmp_path):
         '<shape type="sphere"><bsdf type="toon" id="fun"/></shape></scene>'
     )
     figure = plot.albedo(loaded, str(tmp_path / "two.xml"), '<bsdf type="lambert" id="text"/>', COLOURED)
-    assert legend(figure) == [
-        "brushed",
-        "two.xml:fun",
-        "two.xml:wall",
-        "text",
-        "lambert reflectance=0.2,\xa00.5,\xa00.8",
-    ]
+    assert legend(figure) == ["brushed", "two.xml:fun", "two.xml:wall", "text", "lambert reflectance=0.2, 0.5, 0.8"]
     assert legend(plot.albedo(loaded, labels=["mine"])) == ["mine"]
 
 

@@ -87,7 +87,8 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     """Return a line with what all dicts have in common, if anything: their labels tell the rest."""
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
     who = "all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds)
-    return [_told(f"{who} with", same)] if (same := _common(bsdfs)) else []
+    told = _told(f"{who} with", same) if (same := _common(bsdfs)) else ""
+    return [told.replace(", ", ",\N{NO-BREAK SPACE}")] if told else []  # a colour stays on its line
 
 
 def is_sweep(bsdfs: Sequence[Any]) -> bool:
@@ -150,6 +151,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, str):
         return brief(value)
     try:
-        return ",\N{NO-BREAK SPACE}".join(f"{number:.3g}" for number in value)
+        return ", ".join(f"{number:.3g}" for number in value)
     except TypeError:
         return type(value).__name__
