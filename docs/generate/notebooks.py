@@ -16,7 +16,7 @@ from .made import ROOT, Picture
 
 FOLDER = ROOT / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-COLOURS, GROUND, QUALITY, WIDTH = 128, 0.55, 88, 1500
+COLOURS, GROUND, QUALITY, WIDTH = 128, 0.55, 82, 1500
 SECONDS = 900
 ALONE = """\
 import importlib.metadata as metadata
