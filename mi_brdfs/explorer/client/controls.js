@@ -62,7 +62,7 @@ function drawList(host, bsdf) {
       element(
         "div",
         { class: "fixed" },
-        element("span", {}, name.replaceAll("_", " ")),
+        element("code", {}, name),
         element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
       ),
     );
@@ -92,7 +92,11 @@ function makeScrubber({ name, values }, k) {
     element(
       "div",
       { class: "name" },
-      element("label", { for: id }, ...subscripted(name === "theta" ? `θi in degrees${phi}` : name.replaceAll("_", " "))),
+      element(
+        "label",
+        { for: id },
+        ...(name === "theta" ? subscripted(`θi in degrees${phi}`) : [element("code", {}, name)]),
+      ),
     ),
     element(
       "div",
@@ -136,12 +140,12 @@ function makeRow(control, k) {
   const usual =
     control.default ??
     { number: middle(control), colour: 0.5, choice: control.words?.[0], flag: true, text: "" }[control.kind];
-  const named = control.name.replaceAll("_", " ");
   if (absent) {
     const node = element(
       "button",
       { class: "small", title: control.text ?? "", onclick: () => set(usual) },
-      `+ ${named}`,
+      "+ ",
+      element("code", {}, control.name),
     );
     return { control, node, absent, error, show: () => {} };
   }
@@ -149,15 +153,15 @@ function makeRow(control, k) {
     control.kind
   ];
   const { body, show } = make(control, id, set, described);
-  const [act, sign] = control.optional ? ["leave out", "×"] : ["reset", "↺"];
+  const act = control.optional ? "leave out" : "reset";
   const head = element(
     "div",
     { class: "name" },
-    element("label", { for: id, title: control.text ?? "" }, named),
+    element("label", { for: id, title: control.text ?? "" }, element("code", {}, control.name)),
     element(
       "button",
-      { class: "quiet small reset", "aria-label": `${act} ${control.name}`, title: act, onclick: () => set(null) },
-      sign,
+      { class: "quiet small reset", "aria-label": `${act} ${control.name}`, onclick: () => set(null) },
+      act,
     ),
   );
   const meaning = control.text ? element("p", { class: "meaning" }, ...subscripted(control.text)) : null;

@@ -75,7 +75,7 @@ export function attach(card, svg, angleAt, range, cross) {
   });
 }
 
-export const widthOf = (card, most = 620) => Math.max(Math.min(card.figure.clientWidth, most), 240);
+export const widthOf = (card, most) => Math.max(Math.min(card.figure.clientWidth, most), 240);
 
 let drawings = 0;
 

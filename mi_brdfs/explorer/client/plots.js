@@ -80,7 +80,7 @@ export function drawPolar() {
     curves.map(({ y }) => y),
     session.state.scale === "log",
   );
-  const width = widthOf(card);
+  const width = widthOf(card, Math.min(620, 0.45 * innerHeight));
   const margin = 26;
   const radius = (width - 2 * margin) / 2;
   const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
@@ -180,7 +180,7 @@ const valuesAt = (curves) =>
 /** Draw curves over an angle; `mark` adds to the drawing before them, `moved` tells of the crosshair. */
 function graph(card, curves, across, scale, what, mark, crossing) {
   const width = widthOf(card, 760);
-  const it = axes(width, Math.round(clamp(0.62 * width, 200, 380)), across, scale, what);
+  const it = axes(width, Math.round(clamp(Math.min(0.62 * width, 0.27 * innerHeight), 200, 380)), across, scale, what);
   mark?.(it);
   const inside = shape("g", { "clip-path": `url(#${it.clip})` });
   for (const curve of curves)
