@@ -353,6 +353,12 @@ function start() {
     if (session.hello && wantedSize() !== session.state.size) sendState();
     // Where the picture stays in sight on a phone, the bar above it does not.
     document.documentElement.style.setProperty("--above", `${byId("picture-bar").parentElement.offsetHeight + 12}px`);
+    // There, the polar plot stays with it, in sight of the sliders.
+    const before = cards[innerWidth > 700 ? "lobe" : "picture"].node;
+    if (before.nextElementSibling !== cards.polar.node) {
+      before.after(cards.polar.node);
+      redraw("polar");
+    }
     redraw("lobe");
     if (innerWidth > 700) byId("picture-bar").open = true;
     if (innerWidth !== width) redraw(...VIEWS);

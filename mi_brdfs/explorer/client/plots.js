@@ -80,7 +80,7 @@ export function drawPolar() {
     curves.map(({ y }) => y),
     session.state.scale === "log",
   );
-  const width = widthOf(card, Math.min(620, 0.45 * innerHeight));
+  const width = widthOf(card, Math.min(620, (innerWidth > 700 ? 0.45 : 0.3) * innerHeight));
   const margin = 26;
   const radius = (width - 2 * margin) / 2;
   const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
