@@ -233,7 +233,7 @@ function render(found) {
       const [x, y] = project(view, point, area);
       labels.append(element("span", { class: kind, style: `left:${x}px;top:${y}px` }, ...subscripted(text)));
     };
-    mark("ωi", scaled(wi, ARROW + 0.2), "direction");
+    mark("ωi", scaled(wi, ARROW + 0.17), "direction");
     mark("n", [0, 0, 1.15], "");
     mark("u", [1.07, 0, 0], "");
     if (side) mark(state.subjects[found[at].subject].name, places.whole ? [0, 0, -1.3] : [0, 0, -0.4], "name");
@@ -255,7 +255,8 @@ function listen() {
   const nearTip = (point, reach) => {
     const area = areaAt(point);
     if (!area) return null;
-    const tip = project(places.view, scaled(unit(session.state.theta, session.state.phi), ARROW), area);
+    // Between the tip and its label: both are taken hold of.
+    const tip = project(places.view, scaled(unit(session.state.theta, session.state.phi), ARROW + 0.08), area);
     return Math.hypot(point[0] - tip[0], point[1] - tip[1]) < reach ? area : null;
   };
   canvas.addEventListener("pointerdown", (event) => {
