@@ -2,7 +2,7 @@
 import { radians } from "./util.js";
 
 /** The length of the arrow of wi; the lobe's is 1 at most. */
-export const ARROW = 1.18;
+export const ARROW = 1.06;
 
 export const unit = (theta, phi) => [
   Math.sin(radians(theta)) * Math.cos(radians(phi)),

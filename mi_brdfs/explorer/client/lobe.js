@@ -16,7 +16,7 @@ void main() {
   float light = mix(1.0, 0.45 + 0.6 * abs(dot(normalize(facing + vec3(1e-6)), eye)), lit);
   seen = vec4(colour.rgb * light * colour.a, colour.a);
 }`;
-const camera = { yaw: 1.87, pitch: 0.42, distance: 4.1 };
+const camera = { yaw: 1.87, pitch: 0.42, distance: 3.8 };
 let gl, program, canvas, labels, places;
 const bodies = new Map();
 
@@ -96,10 +96,10 @@ function discard(body) {
 function look(aspect) {
   const { yaw, pitch, distance } = camera;
   const back = [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
-  const target = [0, 0, places.whole ? 0 : 0.42];
+  const target = [0, 0, places.whole ? 0 : 0.25];
   const right = [-Math.sin(yaw), Math.cos(yaw), 0];
   const up = cross(back, right);
-  const far = distance * Math.max(1, 1.15 / aspect) * (places.whole ? 1.25 : 1);
+  const far = distance * Math.max(1, 1 / aspect) * (places.whole ? 1.25 : 1);
   const eye = sum(target, scaled(back, far));
   const zoom = 1 / Math.tan(radians(16));
   const [near, end] = [0.1, 40];
@@ -233,7 +233,7 @@ function render(found) {
       const [x, y] = project(view, point, area);
       labels.append(element("span", { class: kind, style: `left:${x}px;top:${y}px` }, ...subscripted(text)));
     };
-    mark("ωi", scaled(wi, ARROW + 0.15), "direction");
+    mark("ωi", scaled(wi, ARROW + 0.17), "direction");
     mark("n", [0, 0, 1.15], "");
     mark("u", [1.07, 0, 0], "");
     if (side) mark(state.subjects[found[at].subject].name, places.whole ? [0, 0, -1.3] : [0, 0, -0.4], "name");
@@ -255,7 +255,8 @@ function listen() {
   const nearTip = (point, reach) => {
     const area = areaAt(point);
     if (!area) return null;
-    const tip = project(places.view, scaled(unit(session.state.theta, session.state.phi), ARROW), area);
+    // Between the tip and its label: both are taken hold of.
+    const tip = project(places.view, scaled(unit(session.state.theta, session.state.phi), ARROW + 0.08), area);
     return Math.hypot(point[0] - tip[0], point[1] - tip[1]) < reach ? area : null;
   };
   canvas.addEventListener("pointerdown", (event) => {
