@@ -21,13 +21,6 @@ def to_srgb(wavelengths: np.ndarray) -> np.ndarray:
     return result[:-1]
 
 
-def unseen(low: float, high: float) -> float:
-    """Return the share of a white reflectance's luminance that lies below or above two wavelengths in nm."""
-    fine, weights = observer()
-    luminance = weights @ [0.212671, 0.715160, 0.072169]
-    return float(luminance[(fine < low) | (fine > high)].sum())
-
-
 @functools.cache
 def observer() -> tuple[np.ndarray, np.ndarray]:
     """Return ``(wavelengths, weights)``: each nm, and the linear sRGB of a reflectance under D65 as seen by the CIE

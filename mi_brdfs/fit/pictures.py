@@ -299,20 +299,20 @@ def _pixels(picture: Picture) -> Array:
         if not Path(picture).is_file():
             raise FitError(f"There is no file {picture}.")
         picture = mi.Bitmap(str(picture))
+    clips = False
     if isinstance(picture, mi.Bitmap):
         formats = mi.Bitmap.PixelFormat
         colour = formats.Y if picture.pixel_format() in (formats.Y, formats.YA) else formats.RGB
-        integers = np.array(picture)
+        clips = np.array(picture).dtype.kind == "u"
         picture = picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)
-        if integers.dtype.kind == "u":
-            # What is brighter than white was clipped, too.
-            clipped = (integers == np.iinfo(integers.dtype).max).reshape(*integers.shape[:2], -1)
-            colours = 3 if clipped.shape[2] > 2 else 1
-            picture = np.where(clipped[..., :colours].any(-1)[..., None], np.nan, np.array(picture))
     pixels = np.array(picture)
     if pixels.dtype.kind in "iub":
         raise FitError("A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.")
     pixels = pixels.astype(np.float64)
     if pixels.ndim not in (2, 3):
         raise FitError(f"A picture has the shape (height, width, channels), not {pixels.shape}.")
-    return pixels if pixels.ndim == 3 else pixels[..., None]
+    pixels = pixels if pixels.ndim == 3 else pixels[..., None]
+    if clips:
+        # What is white may be brighter. The value below is 3e-5 less even of 16 bits.
+        pixels[(pixels > 1 - 1e-6).any(axis=2)] = np.nan
+    return pixels

@@ -13,8 +13,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..observer import unseen
+from ..observer import observer
 from ..parameters.messages import brief, printable
+from ..probe.arrays import luminance
 from .arrays import NUMPY, components, stacked
 from .coordinates import Coordinates, polar_angle
 
@@ -369,7 +370,7 @@ def representable(measurement: Measurement) -> Measurement:
     if nm is not None and nm[-1] < LEAST_NM:
         numbers = f"{nm[0]:g} to {nm[-1]:g}" if len(nm) > 1 else f"{nm[0]:g}"
         raise FileError(f"{measurement.path}: wavelengths of {numbers} look like micrometres; write nm.")
-    if nm is not None and len(nm) > 1 and (share := unseen(nm[0], nm[-1])) > MOST_UNSEEN:
+    if nm is not None and len(nm) > 1 and (share := _unseen(nm[0], nm[-1])) > MOST_UNSEEN:
         warnings.warn(
             f"{measurement.path}: its wavelengths of {nm[0]:g} to {nm[-1]:g} nm leave out {share:.0%} of what the eye "
             "sees; there, the value of the nearest one is shown.", stacklevel=2,
@@ -380,3 +381,9 @@ def representable(measurement: Measurement) -> Measurement:
     if not np.any(kept > np.finfo(np.float32).tiny):
         raise FileError(f"{measurement.path}: no value is positive and at most {MOST:g}; there is nothing to render.")
     return measurement
+
+
+def _unseen(low: float, high: float) -> float:
+    """Return the share of a white reflectance's luminance that lies below or above two wavelengths in nm."""
+    fine, weights = observer()
+    return float(luminance(weights)[(fine < low) | (fine > high)].sum())

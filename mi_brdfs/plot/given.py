@@ -87,8 +87,9 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     """Return a line with what all dicts have in common, if anything: their labels tell the rest."""
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
     who = "all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds)
-    told = _told(f"{who} with", same) if (same := _common(bsdfs)) else ""
-    return [told.replace(", ", ",\N{NO-BREAK SPACE}")] if told else []  # a colour stays on its line
+    same = _common(bsdfs)
+    # A colour stays on its line.
+    return [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
 
 
 def is_sweep(bsdfs: Sequence[Any]) -> bool:

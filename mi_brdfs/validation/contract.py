@@ -150,13 +150,12 @@ def mode(run: Run) -> Findings:
                 why = "it is not flagged NonSymmetric" if symmetric else "that is its adjoint, f from wo to wi"
                 why = f"is needed, as {why}; {off:.1%} of the pairs are wrong"
                 outcome.wrong(error, "in the mode Importance eval", got, why, wi, wo, expected=expected)
-            # What is wrong with a weight in any mode is said once.
-            if samples.lit.any() and not any(
-                it.subject == part.name and it.verdict == "fail" for it in sampling.weight(run)
-            ):
+            if samples.lit.any():
                 reflected, value = samples.weight * samples.pdf[:, None], samples.value
                 error = abs(reflected - value).max(axis=1) / np.maximum(abs(value).max(axis=1), 1e-9) * samples.lit
-                if np.quantile(error[samples.lit], 0.99) > tolerance:
+                off = np.quantile(error[samples.lit], 0.99) > tolerance
+                # What is wrong with a weight in any mode is said once.
+                if off and not sampling.failing(run, part, sampling.weight):
                     name = "in the mode Importance a weight times pdf"
                     outcome.wrong(error, name, reflected, "is eval", wi, samples.wo, expected=value, seed=67)
         yield outcome.finding("Light may be traced from either end.")

@@ -56,7 +56,7 @@ def albedo(run: Run) -> Findings:
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
         finding = _judged(part, outcome, found, limits)
-        if outcome.faults and (failing := _failing(run, part)):
+        if outcome.faults and (failing := sampling.failing(run, part, sampling.weight, sampling.pdf, sampling.chi2)):
             words = f"Not judged: mend {listed(failing, 'and')} first; only then the mean of the weights is the albedo."
             finding = Finding("albedo", part.name, "skip", words, outcome.data)
         yield finding
@@ -69,16 +69,6 @@ def _brightest_azimuth(run: Run, part: Part, theta: float, side: int) -> float:
     wi = on_side(direction(np.full(len(AZIMUTHS), theta), AZIMUTHS).T, side)
     means = luminance(run.probe.weights(part, wi, lattice(5, 5))).mean(axis=1)
     return float(AZIMUTHS[np.argmax(np.nan_to_num(means))])
-
-
-def _failing(run: Run, part: Part) -> list[str]:
-    """Return the checks of the sampler that fail: then that is the fault, and not the energy."""
-    return [
-        finding.check
-        for check in (sampling.weight, sampling.pdf, sampling.chi2)
-        for finding in check(run)
-        if finding.subject == part.name and finding.verdict == "fail"
-    ]
 
 
 TOLERANCE = 1e-3

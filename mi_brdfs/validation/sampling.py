@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import erfc, sqrt
 
 import numpy as np
 
+from ..probe.bsdf import Part
 from ..probe.chi_square import in_words
 from .outcome import Findings, Outcome
 from .report import Finding
@@ -91,3 +93,8 @@ def weight(run: Run) -> Findings:
                     )
                     outcome.wrong(carried, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
         yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.")
+
+
+def failing(run: Run, part: Part, *checks: Callable[[Run], Findings]) -> list[str]:
+    """Return those of the checks that fail for a part: what follows from a fault is not another one."""
+    return [it.check for check in checks for it in check(run) if it.subject == part.name and it.verdict == "fail"]
