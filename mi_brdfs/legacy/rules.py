@@ -324,6 +324,18 @@ def _obj(work: Work, element: Element) -> None:
                 work.dropped(element, f"the materials of {name.value}; split it by usemtl, and give each part a BSDF")
 
 
+@rule("shape", "instance")
+def _instance(work: Work, element: Element) -> None:
+    """Put shape groups beside the instances that they are in: Mitsuba 3 takes references alone."""
+    for k, group in enumerate(element.children):
+        if group.type == "shapegroup":
+            group.id = group.id or f"shapegroup_{len(work.lifted)}"
+            work.ids[group.id] = group
+            work.lifted.append(group)
+            element.children[k] = Element("ref", id=group.id)
+            work.changed(group, "the shapegroup in an instance stands beside it")
+
+
 @rule("medium", "homogeneous")
 def _homogeneous(work: Work, element: Element) -> None:
     names = "sigma_s", "sigma_a", "sigma_t", "albedo"

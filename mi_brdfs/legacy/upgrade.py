@@ -116,6 +116,8 @@ class Work:
         self.changes: list[Change] = []
         self.ids: dict[str, Element | None] = {}
         """What became of the elements with an id; None of those that were left out."""
+        self.lifted: list[Element] = []
+        """What stands in the scene itself, and was inside something else."""
         self.missing: list[str] = []
 
     def said(self, kind: Kind, element: Element, text: str) -> None:
@@ -134,6 +136,7 @@ class Work:
         self._complete(root)
         self.has_media = any(it.tag == "medium" for it in root.walk())
         scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
+        scene.children += self.lifted
         if self.missing:
             first = self.missing[0] + f", and {len(self.missing) - 1} more" * (len(self.missing) > 1)
             raise ValueError(f"{first}; put the files there, or let stand-ins take their place (--lenient).")
