@@ -9,8 +9,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from .arrays import stacked
+from .axis import Axis
 from .coordinates import TWO_PI, Spherical, spherical, wrapped
-from .measurement import Axis, Grid, Samples
+from .grid import Grid
+from .scattered import Samples
 from .text import TextFile
 
 SAME = 1e-6

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .measurement import FileError
+from .files import FileError
 
 LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""

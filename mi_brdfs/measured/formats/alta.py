@@ -12,7 +12,8 @@ import numpy as np
 
 from ..arrays import vector
 from ..coordinates import HalfDifference, SpecularPolar, polar_angle, spherical
-from ..measurement import FileError, Measurement, Quantity
+from ..files import FileError
+from ..measurement import Measurement, Quantity
 from ..rows import arranged, checked_angles, without_cosine
 from ..text import TextFile, opening, shortened, whole
 from .zemax import srgb_of

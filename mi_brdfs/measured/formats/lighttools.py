@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..coordinates import Spherical
-from ..measurement import FileError, Grid, Measurement
+from ..files import FileError
+from ..grid import Grid
+from ..measurement import Measurement
 from ..text import TextFile, opening, shortened
 from .zemax import Header, blocks, has_incidence_lines, is_table, srgb_of
 

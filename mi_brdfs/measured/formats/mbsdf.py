@@ -18,9 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..axis import Axis
 from ..coordinates import Spherical
 from ..files import BinaryFile
-from ..measurement import Axis, Grid, Measurement
+from ..grid import Grid
+from ..measurement import Measurement
 from ..text import decoded
 from .merl import centres
 

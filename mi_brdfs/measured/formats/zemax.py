@@ -12,8 +12,11 @@ import numpy as np
 
 from ...parameters.messages import listed
 from ..arrays import stacked
+from ..axis import Axis
 from ..coordinates import TWO_PI, SpecularPolar, wrapped
-from ..measurement import Axis, FileError, Grid, Measurement
+from ..files import FileError
+from ..grid import Grid
+from ..measurement import Measurement
 from ..report.albedo import hemisphere
 from ..rows import sector_start, warn_of_a_sector
 from ..source import Source
