@@ -194,15 +194,21 @@ def number(value: float | None) -> str:
     return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
-def values(fit: Fit) -> list[tuple[str, float, float | None]]:
-    """Return ``(name, value, standard deviation)`` of each fitted number: of a colour "name.r", ".g" and ".b"."""
+def values(fit: Fit) -> list[tuple[str, float, str]]:
+    """Return ``(name, value, how sure it is)`` of each fitted number: of a colour "name.r", ".g" and ".b"."""
     found = []
     for name, sigma in fit.sigma.items():
         value = fit.bsdf[name]
         numbers = value["value"] if isinstance(value, dict) else [value]
-        labels = [f"{name}.r", ".g", ".b"] if len(numbers) == 3 else [name]
-        for k, (label, own) in enumerate(zip(labels, numbers, strict=True)):
-            found.append((label, own, sigma[k] if isinstance(sigma, list) else sigma))
+        channels = [f".{channel}" for channel in "rgb"] if len(numbers) == 3 else [""]
+        deviations = sigma if isinstance(sigma, list) else [sigma]
+        for k, (channel, number, deviation) in enumerate(zip(channels, numbers, deviations, strict=True)):
+            sure = "" if deviation is None else f"± {deviation:.2g}"
+            if name + channel in fit.bounds:
+                sure = "at its limit"
+            elif name + channel in fit.undetermined:
+                sure = "undetermined"
+            found.append((name + channel if k == 0 else channel, number, sure))
     return found
 
 
