@@ -23,6 +23,8 @@ Source: TypeAlias = str | Path | Measurement | Arrays
 
 CUT, PAIRS = 80.0, 4096
 """The largest angle to the normal, in degrees, and the most pairs of directions, where nothing else is asked for."""
+DARKEST = 3e-6
+"""The f below which no material is: that of a Lambertian surface with the least reflectance that is sought."""
 TRIED = 8
 """Nodes of a large grid that are looked at for each pair that is wanted: many lie below the horizon."""
 STEP = 1e-2
@@ -114,8 +116,8 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
     missing = ~np.isfinite(f)
     negative = ~missing & (f < 0) & (not signed)
     usable = ~missing & ~negative
-    if not f[usable].any():
-        raise FitError(f"{name}: no value within the cut at {cut:g}° is a positive number.")
+    if not np.any(abs(f[usable]) > DARKEST):
+        raise FitError(f"{name}: no value within the cut at {cut:g}° is above {DARKEST:g}/sr: nothing is so dark.")
     some = np.flatnonzero(usable.any(axis=1))
     if len(some) < 2:
         raise FitError(f"{name}: only one pair of directions has a value within the cut at {cut:g}°.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from statistics import median
 from typing import Any, NamedTuple
@@ -28,11 +28,6 @@ FEW = 5
 """Pairs of directions in a highlight below which its width is a guess."""
 CORRELATED = 0.95
 """The correlation from which two parameters are told to be hard to tell apart."""
-ROW = (
-    "file", "model", "metric", "bsdf", "errors", "flip", "sigma", "starts", "bic", "correlations", "undetermined",
-    "bounds", "albedo", "resolved", "scatter", "cut", "pairs", "negative", "missing",
-)  # fmt: skip
-"""What JSON has of a fit, besides the remarks."""
 
 
 class Starts(NamedTuple):
@@ -142,17 +137,16 @@ class Fit(Data):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as what JSON can hold; ``bsdf`` is the dict for ``mi.load_dict``."""
-        row = {name: getattr(self, name) for name in ROW}
-        row["errors"] = {
-            name: {part: value if np.isfinite(value) else None for part, value in parts.items()}
-            for name, parts in self.errors.items()
-        }
-        row["starts"] = self.starts._asdict()
-        row["scatter"] = [
+        scatter = [
             {"theta_i": theta, "stated": stated, "values": values, "fit": own}
             for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True)
         ]
-        return row | {"remarks": self.remarks()}
+        errors = {
+            name: {part: value if np.isfinite(value) else None for part, value in parts.items()}
+            for name, parts in self.errors.items()
+        }
+        words = {"albedo": self.albedo, "resolved": self.resolved, "remarks": self.remarks()}
+        return asdict(self) | {"starts": self.starts._asdict(), "errors": errors, "scatter": scatter} | words
 
     def to_xml(self, id: str = "") -> str:
         """Return the BSDF as XML, to paste into a scene; with an id, to be a file of its own."""

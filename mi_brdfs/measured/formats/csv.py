@@ -121,7 +121,7 @@ class Columns:
             elif match := VALUE.fullmatch(word):
                 colour, grey, wavelength, cos = match.groups()
                 kind = (colour or "")[:1] or (grey and "f") or f"{float(wavelength):.17g}"
-                if wavelength and not 0 < float(wavelength) < np.inf:
+                if wavelength and not float(wavelength):
                     raise file.error(f"the wavelength {shortened(wavelength)} is none")
                 if kind in found:
                     raise file.error(f"the header has two columns of the same values, {shortened(name)} the second")

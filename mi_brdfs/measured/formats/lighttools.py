@@ -48,7 +48,7 @@ def read(path: Path) -> Measurement:
         if tristimulus not in TRISTIMULUS:
             raise file.error(f"TristimulusValue {shortened(tristimulus)} is none of TrisX, TrisY and TrisZ")
         incidence, plane, wavelength = (
-            float(file.numbers([head.get(name, "0")], f"the number of {name.upper()}")[0])
+            file.numbers([head.get(name, "0")], f"the number of {name.upper()}")[0]
             for name in ("aoi", "poi", "wavelength")
         )
         planes.add(plane)

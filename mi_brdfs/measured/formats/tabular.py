@@ -152,7 +152,7 @@ class Table(TextFile):
                 if word == "tis":
                     head["tis"] = float(said) if is_number(said) else np.nan
             elif word not in ("databegin", "dataend"):
-                values += self.numbers(words, "a value, or a keyword of a block").tolist()
+                values += self.numbers(words, "a value, or a keyword of a block")
                 whole_blocks = len(values) // size * size
                 for start in range(0, whole_blocks, size):
                     yield dict(head), np.array(values[start : start + size])
