@@ -104,28 +104,22 @@ class Fit(Data):
             probe = BSDFProbe(mi.load_dict(self.bsdf))
             return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
 
-    @property
-    def cautions(self) -> list[str]:
-        """Why not to trust its parameters, in sentences."""
+    def remarks(self, shown: bool = False) -> list[str]:
+        """Return what to know of this fit, in sentences; without what tables say if these are ``shown``."""
         found = []
         if self.albedo > 1:
             found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
         if not self.resolved:
             found.append(f"The highlight is narrower than the data resolve: {self.in_highlight} pairs lie in it.")
-        if self.undetermined:
+        if self.undetermined and not shown:
             found.append(f"Not determined by the data: {whole(self.undetermined)}.")
-        if self.bounds:
+        if self.bounds and not shown:
             found.append(f"At the end of the range: {whole(self.bounds)}.")
         close = {" and ".join(sorted(pair)) for a, row in self.correlations.items() for b, r in row.items()
                  if abs(r) > CORRELATED and len(pair := {_colour(a), _colour(b)}) > 1}  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(sorted(close))}.")
-        return found
-
-    def remarks(self, scatter: bool = True) -> list[str]:
-        """Return what to know of this fit, in sentences, with or without those of the ``scatter``."""
-        found = self.cautions
-        for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True) if scatter else ():
+        for (theta, stated, values), own in () if shown else zip(self.scatter, self.scattered, strict=True):
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
                 found.append(f"At {theta:g}° the albedo is {own:.3g}; {told}.")
