@@ -10,14 +10,14 @@ from ..coordinates import Spherical
 from ..files import FileError
 from ..grid import Grid
 from ..measurement import Measurement
-from ..text import opening, shortened
+from ..text import opening
 from .tabular import Table, has_incidence_lines, is_table, srgb_of
 
 NAME = "LightTools"
 DESCRIPTION = "as Zemax, with the lines AOI, POI, Side above each block of data"
-TRISTIMULUS = ("trisx", "trisy", "trisz")
-Channel = tuple[int, float]
-"""The tristimulus value, 0 to 2, and the wavelength in nm, 0 where there is none."""
+TRISTIMULUS = ["trisx", "trisy", "trisz"]
+Channel = tuple[str, float]
+"""The tristimulus value, and the wavelength in nm, 0 where there is none."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -39,29 +39,9 @@ def read(path: Path) -> Measurement:
     content = file.setting("SpectralContent", "Monochrome", "XYZ")
     symmetry = file.setting("Symmetry", "PlaneSymmetrical", "Asymmetric", "Asymmetrical")
     radials, azimuths = (file.require(name) for name in ("ScatterRadial", "ScatterAzimuth"))
-    table: dict[tuple[float, Channel], tuple[np.ndarray, float]] = {}
-    planes = set()
-    for head, values in file.blocks(len(radials) * len(azimuths)):
-        if head.get("side", "front") != "front" or head.get("scattertype", "brdf") != "brdf":
-            continue
-        tristimulus = head.get("tristimulusvalue", TRISTIMULUS[0])
-        if tristimulus not in TRISTIMULUS:
-            raise file.error(f"TristimulusValue {shortened(tristimulus)} is none of TrisX, TrisY and TrisZ")
-        incidence, plane, wavelength = (
-            file.numbers([head.get(name, "0")], f"the number of {name.upper()}")[0]
-            for name in ("aoi", "poi", "wavelength")
-        )
-        planes.add(plane)
-        key = incidence, (TRISTIMULUS.index(tristimulus), wavelength)
-        if key in table:
-            raise file.error(f"a second block has the AOI {incidence:g} and the same wavelength or tristimulus value")
-        table[key] = values, head["tis"]
-    if not table:
-        raise FileError(f"{path} has no block with Side Front and ScatterType BRDF.")
-    if len(planes) > 1:
-        raise FileError(f"{path} has several planes of incidence (POI); only tables of one can be read.")
+    table = _front(file, len(radials) * len(azimuths))
     channels = sorted({channel for _, channel in table})
-    if content != "Monochrome" and [tristimulus for tristimulus, _ in channels] != [0, 1, 2]:
+    if content != "Monochrome" and [tristimulus for tristimulus, _ in channels] != TRISTIMULUS:
         raise FileError(f"{path}: its SpectralContent needs the blocks TrisX, TrisY and TrisZ.")
     incidences = file.angles["AOI"] = np.unique([incidence for incidence, _ in table])
     if len(table) < len(incidences) * len(channels):
@@ -90,3 +70,26 @@ def read(path: Path) -> Measurement:
         },
         notes=file.notes,
     )
+
+
+def _front(file: Table, size: int) -> dict[tuple[float, Channel], tuple[np.ndarray, float]]:
+    """Return the blocks of the front side and their TIS, by the angle of incidence and the channel."""
+    table: dict[tuple[float, Channel], tuple[np.ndarray, float]] = {}
+    planes = set()
+    for head, values in file.blocks(size):
+        if head.get("side", "front") != "front" or head.get("scattertype", "brdf") != "brdf":
+            continue
+        incidence, plane, wavelength = (
+            file.numbers([head.get(name, "0")], f"the number of {name.upper()}")[0]
+            for name in ("aoi", "poi", "wavelength")
+        )
+        planes.add(plane)
+        key = incidence, (head.get("tristimulusvalue", ""), wavelength)
+        if key in table:
+            raise file.error(f"a second block has the AOI {incidence:g} and the same wavelength or tristimulus value")
+        table[key] = values, head["tis"]
+    if not table:
+        raise FileError(f"{file.path} has no block with Side Front and ScatterType BRDF.")
+    if len(planes) > 1:
+        raise FileError(f"{file.path} has several planes of incidence (POI); only tables of one can be read.")
+    return table
