@@ -36,15 +36,19 @@ def measured(
     """Return the rows of a file, of values of shape (N, channels), as a measurement, with what else is ``said`` of it.
     Values of f cosθ are divided by the cosine. Raise a FileError for angles that no direction above the surface has."""
     for name, column, most in zip("θφθφ", angles, (90, 720, 90, 720), strict=True):
-        degrees = np.degrees(column)
-        good = abs(degrees) <= most + math.degrees(SAME)
-        if not np.all(good):
-            k = int(np.argmin(good))
-            raise file.error(f"{name} is {degrees[k]:.4g}°; it must be from -{most}° to {most}°", file.row_lines[k])
+        _check(file, name, column, most)
     if said.get("quantity") == "f cos":
         values = without_cosine(values, np.cos(angles[2]))
     said["material"] = said.get("material") or file.path.stem
     return Measurement(file.path, format, arranged(angles, values), wavelengths, **said)
+
+
+def _check(file: TextFile, name: str, angles: np.ndarray, most: int) -> None:
+    good = abs(angles) <= math.radians(most) + SAME
+    if not np.all(good):
+        k = int(np.argmin(good))
+        found = math.degrees(angles[k])
+        raise file.error(f"{name} is {found:.4g}°; it must be from -{most}° to {most}°", file.row_lines[k])
 
 
 def arranged(angles: Angles, values: np.ndarray) -> Grid | Samples:
