@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
+from mi_brdfs.measured import FileError, read
 from mi_brdfs.probe import directions
 from mi_brdfs.probe.arrays import context as context
 from mi_brdfs.probe.arrays import floats as floats
@@ -90,6 +91,15 @@ def traced(function) -> tuple:
         return result, *tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
+
+
+def refused(path: Path) -> str:
+    """Return the sentence by which a measured file is refused, which begins with its name."""
+    with pytest.raises(FileError) as caught:
+        read(path)
+    text = str(caught.value)
+    assert text.startswith(str(path)) and text.endswith(".") and text.isprintable(), text
+    return text
 
 
 class Page(HTMLParser):

@@ -44,6 +44,7 @@ def test_fits_are_files_that_scenes_include(tmp_path):
     ]
     best, *_ = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
     assert best["bounds"] == ["specular_reflectance"] and best["bsdf"]["specular_reflectance"] == 1
+    assert re.search(r"^specular_reflectance +1 +at its limit$", done.stdout, re.MULTILINE)
     (tmp_path / "scene.xml").write_text(
         '<scene version="3.0.0"><include filename="best.xml"/>'
         f'<shape type="sphere"><ref id="{LOFT.stem}"/></shape></scene>'

@@ -262,7 +262,8 @@ def test_runs_without_a_variant_for_it(ward):
     [
         ("below", "ward", {}, "arrays: no pair of directions has both above the horizon."),
         ("grazing", "ward", {}, "arrays: all pairs of directions are beyond the cut at 80°; give a larger one."),
-        ("dark", "ward", {}, "arrays: no value within the cut at 80° is a positive number."),
+        ("negative", "ward", {}, "arrays: no value within the cut at 80° is above 3e-06/sr: nothing is so dark."),
+        ("dark", "ward", {}, "arrays: no value within the cut at 80° is above 3e-06/sr: nothing is so dark."),
         ("good", "lambert", {"given": {"reflectance": 0.5}}, "lambert has nothing to fit: all its parameters are"),
         ("good", "ward", {"given": {"alfa": 0.5}}, "ward: there is no parameter alfa; did you mean alpha?"),
         ("good", "ward", {"given": {"variant": "wards"}}, "ward: variant = 'wards' is unknown; it is balanced, ward, "
@@ -285,7 +286,8 @@ def test_runs_without_a_variant_for_it(ward):
 def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_path):
     wi, wo, f = (array[:50] for array in ward)
     sources = {
-        "good": (wi, wo, f), "below": (-wi, wo, f), "dark": (wi, wo, -f), "shapes": (wi, wo[:4], f), "nothing": [],
+        "good": (wi, wo, f), "below": (-wi, wo, f), "negative": (wi, wo, -f), "dark": (wi, wo, 1e-6 * f / f.max()),
+        "shapes": (wi, wo[:4], f), "nothing": [],
         "short": (wi / 2, wo, f), "one": (wi[:1], wo[:1], f[:1]),
         "grazing": (wi, np.tile(np.float32([0.995, 0, 0.0999]), (50, 1)), f), "file": tmp_path / "none.bsdf",
     }  # fmt: skip

@@ -16,8 +16,8 @@ from test_cli import invoke
 
 from mi_brdfs.fit import FitError, appearance, fit, observe, report
 from mi_brdfs.fit.figures import Residuals
-from mi_brdfs.fit.html import Card, Section
-from mi_brdfs.fit.result import whole
+from mi_brdfs.fit.html import Card, Section, page_of, section_of
+from mi_brdfs.fit.result import values, whole
 from mi_brdfs.measured import read
 from mi_brdfs.probe.bsdf import BSDFProbe
 
@@ -172,6 +172,25 @@ def test_how_far_a_fit_is_from_the_data_is_told(fits):
     told = Residuals(replace(pairs, f=f, usable=f > 0), replace(fits[0], metric="log"), probe).told
     assert told.startswith(f"The fit is off by {lacks:.2g} % of the reflected light, most at θi ≈")
     assert int(re.search(r"≈ (\d+)°", told)[1]) >= 60 and "4 times too dark" in told
+
+
+def test_fits_without_a_picture_are_folded(fits):
+    """They have no empty cards beside those with pictures, and links lead to all."""
+    many = [replace(fits[0], model=f"model {k}") for k in range(11)]
+    shown = Page(page_of([section_of(many)]))
+    kinds = [tag for tag, attributes in shown.elements if re.fullmatch(r"material-1-\d+", attributes.get("id") or "")]
+    assert kinds == ["article"] * 9 + ["details"] * 2 and "11. model 10" in shown.text
+
+
+def test_how_sure_each_parameter_is(fits):
+    """A value at the end of its range, or one that the data do not tell, is no measured one."""
+    fit = replace(fits[0], bsdf={"f0": 0.0, "ior": 1.5, "ks": {"type": "rgb", "value": [1.0, 0.5, 0.25]}},
+                  sigma={"f0": None, "ior": None, "ks": [None, 0.01, 0.02]}, bounds=["f0", "ks.r"],
+                  undetermined=["ior"])  # fmt: skip
+    assert values(fit) == [
+        ("f0", 0, "at its limit"), ("ior", 1.5, "undetermined"),
+        ("ks.r", 1, "at its limit"), (".g", 0.5, "± 0.01"), (".b", 0.25, "± 0.02"),
+    ]  # fmt: skip
 
 
 def test_colours_are_named_once():

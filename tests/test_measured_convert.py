@@ -6,8 +6,8 @@ from support import pairs
 from test_cli import invoke
 
 from mi_brdfs.measured import Grid, Measurement, Samples, bake, convert, read
+from mi_brdfs.measured.axis import Axis
 from mi_brdfs.measured.coordinates import Spherical
-from mi_brdfs.measured.measurement import Axis
 from mi_brdfs.probe.bsdf import BSDFProbe
 
 import mitsuba as mi  # isort: skip

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from support import ROOT, rows, traced, written
+from support import ROOT, refused, rows, traced, written
 
 from mi_brdfs.measured import FileError, read, summarize
 
@@ -64,10 +64,7 @@ def damage():
 def test_damage_is_one_sentence(tmp_path, text, ending, at_a_line):
     path = tmp_path / f"x.{ending}"
     path.write_bytes(text.encode("latin-1"))
-    with pytest.raises(FileError) as caught:
-        read(path)
-    message = str(caught.value)
-    assert message.startswith(str(path)) and message.endswith(".") and "\n" not in message
+    message = refused(path)
     assert len(message) < len(str(path)) + 200 and ("in line " in message) == at_a_line
 
 
@@ -153,7 +150,7 @@ def test_memory(tmp_path, text, ending):
         ("# light " + "1" * 50_000 + "\n" + ZEMAX, "bsdf", ""),
         ("# A" + " " * 50_000 + "b\n" + ZEMAX, "bsdf", ""),
         ("theta_i_deg,theta_o_deg,phi_o_deg,450" + " " * 50_000 + "x\n0,0,0,1\n", "csv", "is no angle such as"),
-        ("NVIDIA ARC MBSDF V1\n" + "\n" * 1_000_000, "mbsdf", "more than 10,000 lines of text"),
+        ("NVIDIA ARC MBSDF V1\n" + "\n" * 1_000_000, "mbsdf", "below it a block of data"),
     ],
     ids=["digits", "spaces", "spaces in a name", "lines"],
 )

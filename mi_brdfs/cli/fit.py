@@ -19,6 +19,7 @@ from ..probe.sources import value_of
 from .app import command
 from .files import check_output
 from .options import (
+    PAGES,
     TracingVariant,
     file_option,
     parameters_of,
@@ -73,7 +74,9 @@ def fit_(
     ] = False,
     output: Annotated[
         Path | None,
-        file_option("-o", "Also write a page with pictures, or the best fit.", "FILE.html|FILE.xml", (), "--html"),
+        file_option(
+            "-o", "Also write a page with pictures, or the best fit.", "FILE.html|FILE.xml", (*PAGES, ".xml"), "--html"
+        ),
     ] = None,
     save: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Also write each fit there: FILE-MODEL.xml.")
@@ -89,8 +92,6 @@ def fit_(
 
     best = output if output and output.suffix.lower() == ".xml" else None
     report = None if best else output
-    if report and report.suffix.lower() not in (".html", ".htm"):
-        fail(f"-o {output}: give the report a name that ends in .html, or the best fit one in .xml", Exit.USAGE)
     if best and len(files) > 1:
         fail(f"-o {output}: it holds one fit, and there are {len(files)} files; give --save FOLDER", Exit.USAGE)
     if save and save.suffix.lower() == ".xml":
@@ -289,8 +290,8 @@ def print_ranking(fits: list[Fit]) -> None:
         out.print("FLIP (Andersson et al. 2020) is that of a picture of the fit, beside one of the data.")
     out.print()
     parameters = Table(best.model, "", "", box=None, pad_edge=False)
-    for name, value, sigma in values(best):
-        parameters.add_row(name, f"{value:.4g}", "" if sigma is None else f"± {sigma:.2g}")
+    for name, value, sure in values(best):
+        parameters.add_row(name, f"{value:.4g}", sure)
     print_table(parameters)
     out.print(f"\n{best.to_xml()}\n")
     for sentence in best.remarks():

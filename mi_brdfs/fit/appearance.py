@@ -23,7 +23,7 @@ from .result import Fit
 SIZE, SAMPLES, DEPTH, SEED = 256, 36, 3, 1
 """Of pictures: their width and height, the samples of a pixel, the length of paths, and the seed, which is the same for
 data and fits: their noise is then alike, and almost none of it is in their difference."""
-MOST = 8
+MOST = 9
 """The most fits to a material that a report shows, and does not only list."""
 
 

@@ -39,7 +39,6 @@ NOTICED = 2.3
 M. Mahy, L. Van Eycken, A. Oosterlinck, Evaluation of uniform color spaces developed after the adoption of CIELAB and
 CIELUV, Color Research & Application 19(2), 1994, doi:10.1111/j.1520-6378.1994.tb00070.x.
 """
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SCALES = 1, 2, 5, 10, 20, 50, 100
 """The ends of the scale of differences of lightness."""
 
@@ -149,6 +148,7 @@ def page_of(sections: Sequence[Section], unfinished: str = "") -> str:
         flip=any(it.flip is not None for own in everything for it in own),
         unfinished=unfinished,
         curves=CURVES,
+        most=MOST,
         steepest=ANGLES[-1],
         notes=notes,
         noticed=NOTICED,
@@ -180,21 +180,14 @@ def _draw(section: Section, shown: Appearance) -> None:
         most = np.quantile(abs(difference), 0.99)
         seen = "a visible difference" if most > NOTICED else "hardly a visible difference"
         where = f"In the rendering{section.changed and f', {section.changed}'}"
-        card.told = f"{each.told} {where}, L* is within {most:.2g} in 99 % of the pixels: {seen}."
+        told = f"{each.told} {where}, L* is within {most:.2g} in 99 % of the pixels: {seen}."
+        card.told = told.replace(" %", "\u00a0%").replace("≈ ", "≈\u00a0")
 
 
 def _smooth(picture: np.ndarray) -> np.ndarray:
     """Return a picture in sRGB, denoised where the denoiser loads."""
     denoise = denoiser()
     return encoded(denoise(decoded(picture))) if denoise else picture
-
-
-def _number(value: float | None) -> str:
-    """Return a number as text, a small one with a power of ten."""
-    if not value or not np.isfinite(value) or abs(value) >= 1e-4:
-        return number(value)
-    digits, power = f"{value:.2e}".split("e")
-    return f"{digits}·10{str(int(power)).translate(SUPERSCRIPTS)}"
 
 
 def _error(fit: Fit) -> float:
@@ -209,4 +202,4 @@ def _told(measurement: Measurement) -> str:
     return ", ".join(word for word in words if word)
 
 
-environment.filters |= {"number": _number, "error": _error, "name": lambda file: Path(file).name}
+environment.filters |= {"number": number, "error": _error, "name": lambda file: Path(file).name}

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..measured import Axis, Grid, Measurement, read
+from ..measured import Axis, Grid, Measurement, Samples, read
 from ..measured.arrays import components, stacked
 from ..measured.measurement import Quantity
 from ..measured.report.summary import azimuths, scatter
@@ -23,6 +23,8 @@ Source: TypeAlias = str | Path | Measurement | Arrays
 
 CUT, PAIRS = 80.0, 4096
 """The largest angle to the normal, in degrees, and the most pairs of directions, where nothing else is asked for."""
+DARKEST = 3e-6
+"""The f below which no material is: that of a Lambertian surface with the least reflectance that is sought."""
 TRIED = 8
 """Nodes of a large grid that are looked at for each pair that is wanted: many lie below the horizon."""
 STEP = 1e-2
@@ -46,9 +48,9 @@ class Data:
     """Values within the cut that are no numbers, which have none either."""
     cut: float
     """The largest angle of wi and wo to the normal, in degrees."""
-    quantity: Quantity = "stated"
+    quantity: Quantity
     """What the file holds, by itself or because that was asked for."""
-    scatter: list[tuple[float, float, float]] = field(default_factory=list)
+    scatter: list[tuple[float, float, float]]
     """``(θi, albedo that the file states, what its values integrate to)``, θi in degrees, at the first azimuth, where
     it states any."""
 
@@ -82,24 +84,18 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
     """
     if isinstance(source, (str, Path)):
         source = read(source)
-    rng = np.random.default_rng(seed)
-    told: dict[str, Any] = {}
-    if isinstance(source, Measurement):
-        name, signed, anisotropic = str(source.path), False, source.data.anisotropic
-        told["quantity"] = source.quantity
-        if isinstance(source.data, Grid):
-            signed = source.data.signed
-            wi, wo, f, solid_angle = _nodes(source.data, pairs, rng)
-            stated = scatter(source, source.data, azimuths(source.data)[:1])
-            told["scatter"] = [(it.theta_i, it.stated, it.integrated) for it in stated]
-        else:
-            wi, wo, f = source.data.pairs()
-            solid_angle = np.ones(len(f))
-        f, converted = _colours(f, source.wavelengths)
-        signed = signed or converted
+    elif not isinstance(source, Measurement):
+        source = _of_arrays(source)
+    name, data, rng = str(source.path), source.data, np.random.default_rng(seed)
+    stated = []
+    if isinstance(data, Grid):
+        wi, wo, f, solid_angle = _nodes(data, pairs, rng)
+        stated = scatter(source, data, azimuths(data)[:1])
     else:
-        name, signed, anisotropic = "arrays", False, False
-        wi, wo, f, solid_angle = _arrays(source)
+        wi, wo, f = data.pairs()
+        solid_angle = np.ones(len(f))
+    f, converted = _colours(f, source.wavelengths)
+    signed = converted or (isinstance(data, Grid) and data.signed)
     lowest = math.cos(math.radians(cut))
     if not np.any((wi[:, 2] > 0) & (wo[:, 2] > 0)):
         raise FitError(f"{name}: no pair of directions has both above the horizon.")
@@ -114,8 +110,8 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
     missing = ~np.isfinite(f)
     negative = ~missing & (f < 0) & (not signed)
     usable = ~missing & ~negative
-    if not f[usable].any():
-        raise FitError(f"{name}: no value within the cut at {cut:g}° is a positive number.")
+    if not np.any(abs(f[usable]) > DARKEST):
+        raise FitError(f"{name}: no value within the cut at {cut:g}° is above {DARKEST:g}/sr: nothing is so dark.")
     some = np.flatnonzero(usable.any(axis=1))
     if len(some) < 2:
         raise FitError(f"{name}: only one pair of directions has a value within the cut at {cut:g}°.")
@@ -127,12 +123,13 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
         f=np.where(usable, f, 0)[some],
         usable=usable[some],
         solid_angle=solid_angle[some],
-        anisotropic=anisotropic,
+        anisotropic=data.anisotropic,
         fitted=fitted,
         negative=int(negative.sum()),
         missing=int(missing.sum()),
         cut=cut,
-        **told,
+        quantity=source.quantity,
+        scatter=[(it.theta_i, it.stated, it.integrated) for it in stated],
     )
 
 
@@ -147,8 +144,8 @@ def _halves(rows: np.ndarray, values: np.ndarray, rng: np.random.Generator) -> t
     return np.concatenate([rng.permutation(sorted_rows[first]), rng.permutation(sorted_rows[~first])]), int(fitted)
 
 
-def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return checked arrays, with equal solid angles."""
+def _of_arrays(source: Any) -> Measurement:
+    """Return checked arrays as a measurement."""
     if not isinstance(source, tuple) or len(source) != 3:
         raise FitError(f"Data are files, measurements or tuples of arrays (wi, wo, f), not {type(source).__name__}.")
     wi, wo, f = (np.asarray(array, np.float64) for array in source)
@@ -163,7 +160,7 @@ def _arrays(source: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray
             components(directions)
         except ValueError as error:
             raise FitError(f"Arrays (wi, wo, f): {error}.") from None
-    return wi, wo, f, np.ones(len(f))
+    return Measurement(Path("arrays"), "arrays", Samples(wi, wo, f, anisotropic=False))
 
 
 def _colours(f: np.ndarray, wavelengths: np.ndarray | None) -> tuple[np.ndarray, bool]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from statistics import median
 from typing import Any, NamedTuple
@@ -28,11 +28,6 @@ FEW = 5
 """Pairs of directions in a highlight below which its width is a guess."""
 CORRELATED = 0.95
 """The correlation from which two parameters are told to be hard to tell apart."""
-ROW = (
-    "file", "model", "metric", "bsdf", "errors", "flip", "sigma", "starts", "bic", "correlations", "undetermined",
-    "bounds", "albedo", "resolved", "scatter", "cut", "pairs", "negative", "missing",
-)  # fmt: skip
-"""What JSON has of a fit, besides the remarks."""
 
 
 class Starts(NamedTuple):
@@ -109,28 +104,22 @@ class Fit(Data):
             probe = BSDFProbe(mi.load_dict(self.bsdf))
             return probe.weights(probe.whole, np.array(wi), sobol(LOG2_COUNT, 1)).mean(axis=1)
 
-    @property
-    def cautions(self) -> list[str]:
-        """Why not to trust its parameters, in sentences."""
+    def remarks(self, shown: bool = False) -> list[str]:
+        """Return what to know of this fit, in sentences; without what tables say if these are ``shown``."""
         found = []
         if self.albedo > 1:
             found.append(f"The albedo is {self.albedo:.3g}: more light is reflected than arrives.")
         if not self.resolved:
             found.append(f"The highlight is narrower than the data resolve: {self.in_highlight} pairs lie in it.")
-        if self.undetermined:
+        if self.undetermined and not shown:
             found.append(f"Not determined by the data: {whole(self.undetermined)}.")
-        if self.bounds:
+        if self.bounds and not shown:
             found.append(f"At the end of the range: {whole(self.bounds)}.")
         close = {" and ".join(sorted(pair)) for a, row in self.correlations.items() for b, r in row.items()
                  if abs(r) > CORRELATED and len(pair := {_colour(a), _colour(b)}) > 1}  # fmt: skip
         if close:
             found.append(f"Hard to tell apart: {', '.join(sorted(close))}.")
-        return found
-
-    def remarks(self, scatter: bool = True) -> list[str]:
-        """Return what to know of this fit, in sentences, with or without those of the ``scatter``."""
-        found = self.cautions
-        for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True) if scatter else ():
+        for (theta, stated, values), own in () if shown else zip(self.scatter, self.scattered, strict=True):
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
                 found.append(f"At {theta:g}° the albedo is {own:.3g}; {told}.")
@@ -142,17 +131,16 @@ class Fit(Data):
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as what JSON can hold; ``bsdf`` is the dict for ``mi.load_dict``."""
-        row = {name: getattr(self, name) for name in ROW}
-        row["errors"] = {
-            name: {part: value if np.isfinite(value) else None for part, value in parts.items()}
-            for name, parts in self.errors.items()
-        }
-        row["starts"] = self.starts._asdict()
-        row["scatter"] = [
+        scatter = [
             {"theta_i": theta, "stated": stated, "values": values, "fit": own}
             for (theta, stated, values), own in zip(self.scatter, self.scattered, strict=True)
         ]
-        return row | {"remarks": self.remarks()}
+        errors = {
+            name: {part: value if np.isfinite(value) else None for part, value in parts.items()}
+            for name, parts in self.errors.items()
+        }
+        words = {"albedo": self.albedo, "resolved": self.resolved, "remarks": self.remarks()}
+        return asdict(self) | {"starts": self.starts._asdict(), "errors": errors, "scatter": scatter} | words
 
     def to_xml(self, id: str = "") -> str:
         """Return the BSDF as XML, to paste into a scene; with an id, to be a file of its own."""
@@ -194,15 +182,21 @@ def number(value: float | None) -> str:
     return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
-def values(fit: Fit) -> list[tuple[str, float, float | None]]:
-    """Return ``(name, value, standard deviation)`` of each fitted number: of a colour "name.r", ".g" and ".b"."""
+def values(fit: Fit) -> list[tuple[str, float, str]]:
+    """Return ``(name, value, how sure it is)`` of each fitted number: of a colour "name.r", ".g" and ".b"."""
     found = []
     for name, sigma in fit.sigma.items():
         value = fit.bsdf[name]
         numbers = value["value"] if isinstance(value, dict) else [value]
-        labels = [f"{name}.r", ".g", ".b"] if len(numbers) == 3 else [name]
-        for k, (label, own) in enumerate(zip(labels, numbers, strict=True)):
-            found.append((label, own, sigma[k] if isinstance(sigma, list) else sigma))
+        channels = [f".{channel}" for channel in "rgb"] if len(numbers) == 3 else [""]
+        deviations = sigma if isinstance(sigma, list) else [sigma]
+        for k, (channel, number, deviation) in enumerate(zip(channels, numbers, deviations, strict=True)):
+            sure = "" if deviation is None else f"± {deviation:.2g}"
+            if name + channel in fit.bounds:
+                sure = "at its limit"
+            elif name + channel in fit.undetermined:
+                sure = "undetermined"
+            found.append((name + channel if k == 0 else channel, number, sure))
     return found
 
 

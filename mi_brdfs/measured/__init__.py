@@ -1,9 +1,13 @@
 """Measured BRDFs: files, tables, and what they say."""
 
+from .axis import Axis
 from .conversion import Conversion, bake, convert
+from .files import FileError
 from .formats import read
-from .measurement import Axis, FileError, Grid, Measurement, Samples
+from .grid import Grid
+from .measurement import Measurement
 from .report.summary import Summary, summarize
+from .scattered import Samples
 from .source import Source
 
 __all__ = [

@@ -10,7 +10,7 @@ from ..probe.arrays import luminance
 from .adaptive import on_phi, on_theta
 from .arrays import NUMPY, stacked
 from .coordinates import TWO_PI, HalfDifference, polar_angle
-from .measurement import usable
+from .grid import usable
 from .source import Source, pairs
 from .warp import Map
 

@@ -21,7 +21,8 @@ from .arrays import NUMPY, components, stacked
 from .coordinates import turned_about_normal
 from .files import named
 from .formats import ENDINGS, FORMATS, read
-from .measurement import Grid, Measurement, usable
+from .grid import Grid, usable
+from .measurement import Measurement
 from .report.counts import census, in_one_plane
 from .report.summary import ends, percent
 from .scattered import as_grid

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..parameters.messages import printable
-from .measurement import FileError
+
+
+class FileError(ValueError):
+    """A file that cannot be read. The message is one sentence that names the file and, where there is one, the offset
+    or the line, without what would control a terminal in the file's name or its text."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(printable(message))
 
 
 def checked(path: str | Path) -> Path:

@@ -1,18 +1,25 @@
-"""Rows of directions and values: a grid where they fill one, and single samples otherwise."""
+"""Rows of directions and values, as text files have them: a grid where they fill one, and single samples otherwise.
+
+Angles are θi, φi, θo and φo in radians, four arrays of shape (N,)."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from .arrays import stacked
+from .axis import Axis
 from .coordinates import TWO_PI, Spherical, spherical, wrapped
-from .measurement import Axis, Grid, Samples
+from .grid import Grid
+from .measurement import Measurement
+from .scattered import Samples
 from .text import TextFile
 
+Angles: TypeAlias = Sequence[np.ndarray]
 SAME = 1e-6
 """By how much, in radians, angles of one node may differ."""
 COARSE = math.radians(25)
@@ -23,28 +30,34 @@ LEAST_COSINE = 1e-4
 """Below it, f cosθ says nothing of f."""
 
 
-def checked_angles(file: TextFile, polar: Iterable[np.ndarray], azimuths: Iterable[np.ndarray]) -> None:
-    """Raise a FileError for rows with angles, in radians and of shape (N,), that no direction above the surface has."""
-    for name, columns, most in (("θ", polar, np.pi / 2), ("φ", azimuths, 4 * np.pi)):
-        for angles in columns:
-            good = abs(angles) <= most + SAME
-            if not np.all(good):
-                k = int(np.argmin(good))
-                found, end = math.degrees(angles[k]), math.degrees(most)
-                raise file.error(
-                    f"{name} is {found:.4g}°; it must be from {-end:.0f}° to {end:.0f}°", file.row_lines[k]
-                )
+def measured(
+    file: TextFile, format: str, angles: Angles, values: np.ndarray, wavelengths: np.ndarray | None, **said: Any
+) -> Measurement:
+    """Return the rows of a file, of values of shape (N, channels), as a measurement, with what else is ``said`` of it.
+    Values of f cosθ are divided by the cosine. Raise a FileError for angles that no direction above the surface has."""
+    for name, column, most in zip("θφθφ", angles, (90, 720, 90, 720), strict=True):
+        _check(file, name, column, most)
+    if said.get("quantity") == "f cos":
+        values = without_cosine(values, np.cos(angles[2]))
+    said["material"] = said.get("material") or file.path.stem
+    return Measurement(file.path, format, arranged(angles, values), wavelengths, **said)
 
 
-def arranged(
-    theta_i: np.ndarray, phi_i: np.ndarray, theta_o: np.ndarray, phi_o: np.ndarray, values: np.ndarray
-) -> Grid | Samples:
-    """Return rows of angles in radians, shape (N,), and values, shape (N, channels), as a grid of
-    :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with each other, and as samples if
-    not. Rows of a single φi or φo, or in a single plane, are of an isotropic material. A negative θ means the other
-    side of the normal. Rows of the same angles are averaged, with a warning if one is more than twice another.
-    """
-    warn_of_contradictions((theta_i, phi_i, theta_o, phi_o), values)
+def _check(file: TextFile, name: str, angles: np.ndarray, most: int) -> None:
+    good = abs(angles) <= math.radians(most) + SAME
+    if not np.all(good):
+        k = int(np.argmin(good))
+        found = math.degrees(angles[k])
+        raise file.error(f"{name} is {found:.4g}°; it must be from -{most}° to {most}°", file.row_lines[k])
+
+
+def arranged(angles: Angles, values: np.ndarray) -> Grid | Samples:
+    """Return rows as a grid of :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with
+    each other, and as samples if not. Rows of a single φi or φo, or in a single plane, are of an isotropic material. A
+    negative θ means the other side of the normal. Rows of the same angles are averaged, with a warning if one is more
+    than twice another."""
+    warn_of_contradictions(angles, values)
+    theta_i, phi_i, theta_o, phi_o = angles
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
     turned_i, turned_o = phi_i[theta_i > SAME], phi_o[theta_o > SAME]
@@ -56,12 +69,12 @@ def arranged(
         phi_i = np.zeros_like(phi_i)
     else:
         warn_of_a_sector(nodes_of(around_zero(turned_i))[0])
-    return gathered(theta_i, phi_i, theta_o, phi_o, values, anisotropic) or Samples(
+    return gathered((theta_i, phi_i, theta_o, phi_o), values, anisotropic) or Samples(
         stacked(spherical(theta_i, phi_i)), stacked(spherical(theta_o, phi_o)), values, anisotropic
     )
 
 
-def warn_of_contradictions(angles: tuple[np.ndarray, ...], values: np.ndarray) -> None:
+def warn_of_contradictions(angles: Angles, values: np.ndarray) -> None:
     """Warn of rows that say of the same directions what is no noise: two runs in one file, perhaps."""
     order = np.lexsort(angles)
     one, next_ = order[:-1], order[1:]
@@ -98,16 +111,10 @@ def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return (abs(theta), np.where(theta < 0, phi + np.pi, phi)) if np.any(theta < 0) else (theta, phi)
 
 
-def gathered(
-    theta_i: np.ndarray,
-    phi_i: np.ndarray,
-    theta_o: np.ndarray,
-    phi_o: np.ndarray,
-    values: np.ndarray,
-    anisotropic: bool,
-) -> Grid | None:
+def gathered(angles: Angles, values: np.ndarray, anisotropic: bool) -> Grid | None:
     """Return the grid that rows fill, None if they do not, or if isotropic ones are so far apart, as in the plane of
     incidence or with a single θi, that highlights of a table would stay where they were measured."""
+    theta_i, phi_i, theta_o, phi_o = angles
     delta = np.pi - around_zero(np.pi - phi_o + phi_i)
     mirrored = not anisotropic and bool(np.all(delta > -SAME) or np.all((delta < SAME) | (delta > np.pi - SAME)))
     delta = abs(delta) if mirrored else around_zero(delta)

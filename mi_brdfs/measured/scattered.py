@@ -1,13 +1,21 @@
-"""Scattered samples as a grid: what lies between them."""
+"""Scattered samples, and a grid of what lies between them."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from .arrays import NUMPY, components, stacked
-from .coordinates import HalfDifference
-from .measurement import Axis, Extrapolation, Grid, Samples
+from .axis import Axis
+from .coordinates import HalfDifference, polar_angle
+from .grid import Extrapolation, Grid
 
+THINNEST = np.radians(6)
+"""Half of the least range of angles that counts as measured."""
+LEEWAY = 1e-3
+"""By how much an angle may miss the range of samples, whose angles are written with few digits."""
 NEIGHBOURS = 10
 """How many samples a value is interpolated between."""
 NODES_PER_SAMPLE, LEAST_NODES, MOST_NODES = 100, 20_000, 120_000
@@ -20,6 +28,47 @@ PAIRS, CHUNK, CHUNK_VALUES = 1 << 14, 8192, 1 << 18
 RIDGE = 1e-2
 """How much the weights prefer their start to balancing, in units of the neighbourhood: the samples around a node at the
 rim of what was measured cannot balance."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Values at single pairs of directions: shapes (N, 3), (N, 3) and (N, channels)."""
+
+    wi: np.ndarray
+    wo: np.ndarray
+    values: np.ndarray
+    anisotropic: bool
+
+    def pairs(self, chosen: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.wi[chosen], self.wo[chosen], self.values[chosen]
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """Which samples have values in all channels."""
+        return np.isfinite(self.values).all(axis=1)
+
+    def measured(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        """Return whether directions are above the horizon, and their polar angles, exchanged or not, within the ranges
+        of the samples' own. Shapes are those of :meth:`Grid.measured`."""
+        (low_i, high_i), (low_o, high_o) = self._ranges
+        theta_i, theta_o = polar_angle(components(wi)), polar_angle(components(wo))
+
+        def within(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+            return (low_i <= first) & (first <= high_i) & (low_o <= second) & (second <= high_o)
+
+        above = (theta_i < np.pi / 2) & (theta_o < np.pi / 2)
+        return above & (within(theta_i, theta_o) | within(theta_o, theta_i))
+
+    seen = measured
+    """Samples are no table that has zeros where nothing was measured."""
+
+    @cached_property
+    def _ranges(self) -> list[tuple[float, float]]:
+        """The ends of the polar angles of wi and of wo, and a little more: nodes between samples of a single angle are
+        next to it."""
+        angles = [polar_angle(components(it[self.known])) for it in (self.wi, self.wo)]
+        margins = [max(LEEWAY, THINNEST - np.ptp(each) / 2) for each in angles]
+        return [(each.min() - more, each.max() + more) for each, more in zip(angles, margins, strict=True)]
 
 
 def as_grid(data: Grid | Samples, extrapolate: Extrapolation = "hold") -> Grid:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .measurement import FileError
+from .files import FileError
 
 LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""
@@ -59,10 +59,10 @@ class TextFile:
     def error(self, problem: str, line: int | None = None) -> FileError:
         return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")
 
-    def numbers(self, words: Sequence[str], what: str = "a number") -> np.ndarray:
+    def numbers(self, words: Sequence[str], what: str = "a number") -> list[float]:
         """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
         try:
-            return np.array(floats(words))
+            return floats(words)
         except ValueError:
             bad = next(word for word in words if not is_number(word))
             raise self.error(f"{shortened(bad)} should be {what}") from None
@@ -78,10 +78,7 @@ class TextFile:
                 continue
             if len(words) < columns or (len(words) > columns and not more):
                 raise self.error(f"there are {len(words)} numbers, but should be {columns}: {what}")
-            try:
-                numbers.extend(floats(words[:columns]))
-            except ValueError:
-                self.numbers(words)
+            numbers.extend(self.numbers(words[:columns]))
             self.row_lines.append(self.line)
         if not numbers:
             raise self.error("the file ends without a row of numbers")
@@ -92,7 +89,7 @@ class TextFile:
         or more; ``what`` says in plural what they are, and ``each`` what one is."""
         found: list[float] = []
         for row in rows:
-            found += self.numbers(row, each).tolist()
+            found += self.numbers(row, each)
             if len(found) > count:
                 raise self.error(f"there are {len(found)} {what}, but {count} were announced")
             if len(found) == count:

@@ -9,7 +9,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from .measurement import Axis, corners
+from .axis import Axis, corners
 
 
 class Warp:

@@ -18,7 +18,7 @@ from matplotlib.patches import Rectangle
 from ..measured import Measurement, Samples, read
 from ..measured.arrays import components, stacked
 from ..measured.coordinates import HalfDifference, polar_angle, spherical
-from ..measured.measurement import usable
+from ..measured.grid import usable
 from ..measured.report.albedo import albedos
 from ..measured.report.counts import batches, census, in_one_plane
 from ..measured.report.summary import azimuths, ends

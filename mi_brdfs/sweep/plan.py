@@ -17,8 +17,7 @@ from .. import __version__
 from ..cluster import Failed, run
 from ..fit import STARTS, Observations, find_metric, fit, observe
 from ..fit.observations import CUT
-from ..measured.files import checked, content_hash
-from ..measured.measurement import FileError
+from ..measured.files import FileError, checked, content_hash
 from ..mitsuba.registry import find_models, is_own
 from ..model import Model
 from .store import Store, row_of

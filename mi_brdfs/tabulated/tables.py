@@ -14,10 +14,12 @@ import mitsuba as mi
 import numpy as np
 
 from ..measured.arrays import DRJIT
+from ..measured.axis import Axis, Interpolation, corners
 from ..measured.coordinates import Coordinates
 from ..measured.files import checked, content_hash
 from ..measured.formats import read
-from ..measured.measurement import Axis, Extrapolation, Grid, Interpolation, Measurement, Quantity, corners
+from ..measured.grid import Extrapolation, Grid
+from ..measured.measurement import Measurement, Quantity
 from ..measured.report.albedo import albedos
 from ..measured.scattered import as_grid
 from ..observer import to_srgb

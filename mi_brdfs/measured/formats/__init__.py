@@ -6,8 +6,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import get_args
 
-from ..files import checked
-from ..measurement import FileError, Measurement, Quantity, representable
+from ..files import FileError, checked
+from ..measurement import Measurement, Quantity, representable
 from ..text import shortened
 from . import alta, cornell, csv, lighttools, mbsdf, merl, rgl, utia, zemax
 

@@ -12,10 +12,11 @@ import numpy as np
 
 from ..arrays import vector
 from ..coordinates import HalfDifference, SpecularPolar, polar_angle, spherical
-from ..measurement import FileError, Measurement, Quantity
-from ..rows import arranged, checked_angles, without_cosine
+from ..files import FileError
+from ..measurement import Measurement, Quantity
+from ..rows import measured
 from ..text import TextFile, opening, shortened, whole
-from .zemax import srgb_of
+from .tabular import srgb_of
 
 NAME = "ALTA"
 DESCRIPTION = "text with the lines #DIM, #PARAM_IN and #PARAM_OUT"
@@ -88,21 +89,15 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     phi_i, phi_o = (np.arctan2(w.y, w.x) for w in (light, view))
     if not anisotropic:
         phi_i, phi_o = 0 * phi_i, phi_o - phi_i
-    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
-    values = table[:, inputs:].copy()
+    values = srgb_of(table[:, inputs:]) if output == "XYZ_COLOR" else table[:, inputs:].copy()
     del light, view, table
-    held = OUTPUTS[output] or ("f" if quantity == "stated" else quantity)
-    if held == "f cos":
-        values = without_cosine(values, np.cos(theta_o))
-    return Measurement(
-        path,
-        NAME,
-        arranged(theta_i, phi_i, theta_o, phi_o, srgb_of(values) if output == "XYZ_COLOR" else values),
-        np.array([np.nan]) if outputs == 1 else None,
-        material=notes.get("sample", path.stem),
-        quantity=held,
-        notes=notes,
-    )
+    said = {
+        "quantity": OUTPUTS[output] or ("f" if quantity == "stated" else quantity),
+        "material": notes.get("sample"),
+        "notes": notes,
+    }
+    wavelengths = np.array([np.nan]) if outputs == 1 else None
+    return measured(file, NAME, (theta_i, phi_i, theta_o, phi_o), values, wavelengths, **said)
 
 
 def projected(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Pair:

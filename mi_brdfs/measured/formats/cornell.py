@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..measurement import Measurement
-from ..rows import arranged, checked_angles
+from ..rows import measured
 from ..text import TextFile, first_words, is_number, opening, whole
 
 NAME = "Cornell"
@@ -41,7 +41,4 @@ def read(path: Path) -> Measurement:
     end = next((k for k, comment in enumerate(file.comments) if "wl" in comment.lower()), 0)
     material = " ".join(comment for comment in file.comments[:end] if "university" not in comment.lower())
     table = file.table(rows, 4 + count, f"four angles and {count} values")
-    theta_i, phi_i, theta_o, phi_o = table[:, :4].T
-    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
-    data = arranged(theta_i, phi_i, theta_o, phi_o, table[:, 4:])
-    return Measurement(path, NAME, data, wavelengths, material=material or path.stem)
+    return measured(file, NAME, table[:, :4].T, table[:, 4:], wavelengths, material=material)

@@ -15,7 +15,7 @@ from ...parameters.messages import brief
 from ..arrays import stacked
 from ..coordinates import spherical
 from ..measurement import Measurement, Quantity
-from ..rows import arranged, checked_angles, without_cosine
+from ..rows import measured
 from ..source import Source
 from ..text import NOTED, TextFile, opening, shortened
 
@@ -68,21 +68,11 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     phi_i = angles.get("phi_i", np.zeros(len(table)))
     phi_o = angles["phi_o"] if "phi_o" in angles else phi_i + angles["delta_phi"]
     theta_i, theta_o = angles["theta_i"], angles["theta_o"]
-    checked_angles(file, (theta_i, theta_o), (phi_i, phi_o))
     if columns.angles["theta_i"][1] != 1 and 0 < np.abs([theta_i, theta_o]).max(initial=0) <= np.radians(np.pi / 2):
         warnings.warn(f"{path}: θ is at most 1.57°; if these are radians, call the columns _rad.", stacklevel=2)
-    values = table[:, columns.values]
+    values, said = table[:, columns.values], {"material": file.stated("material"), "quantity": columns.quantity}
     del table
-    if columns.quantity == "f cos":
-        values = without_cosine(values, np.cos(theta_o))
-    return Measurement(
-        path,
-        NAME,
-        arranged(theta_i, phi_i, theta_o, phi_o, values),
-        columns.wavelengths,
-        material=file.stated("material") or path.stem,
-        quantity=columns.quantity,
-    )
+    return measured(file, NAME, (theta_i, phi_i, theta_o, phi_o), values, columns.wavelengths, **said)
 
 
 def write(path: Path, source: Source) -> None:
@@ -131,7 +121,7 @@ class Columns:
             elif match := VALUE.fullmatch(word):
                 colour, grey, wavelength, cos = match.groups()
                 kind = (colour or "")[:1] or (grey and "f") or f"{float(wavelength):.17g}"
-                if wavelength and not 0 < float(wavelength) < np.inf:
+                if wavelength and not float(wavelength):
                     raise file.error(f"the wavelength {shortened(wavelength)} is none")
                 if kind in found:
                     raise file.error(f"the header has two columns of the same values, {shortened(name)} the second")

@@ -18,25 +18,23 @@ from pathlib import Path
 
 import numpy as np
 
+from ..axis import Axis
 from ..coordinates import Spherical
 from ..files import BinaryFile
-from ..measurement import Axis, Grid, Measurement
+from ..grid import Grid
+from ..measurement import Measurement
 from ..text import decoded
 from .merl import centres
 
 NAME = "MBSDF"
 MAGIC = "NVIDIA ARC MBSDF V1"
 DESCRIPTION = f'the line "{MAGIC}"'
-BLOCKS = {
-    "MBSDF_DATA=": "reflection",
-    "MBSDF_DATA_REFLECTION=": "reflection",
-    "MBSDF_DATA_TRANSMISSION=": "transmission",
-}
-"""The lines above blocks of data, and what these are of."""
+BLOCK = re.compile(rb"^MBSDF_DATA(_REFLECTION|_TRANSMISSION|)=\r?\n", re.MULTILINE)
+"""The lines above blocks of data."""
 CHANNELS = 1, 3
 """Of the types of blocks."""
-LONGEST, LINES = 1 << 12, 10_000
-"""The most bytes of a line of text, and the most lines."""
+LONGEST = 1 << 20
+"""The most bytes of text above a block."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -45,24 +43,27 @@ def recognizes(path: Path, head: bytes) -> bool:
 
 def read(path: Path) -> Measurement:
     file = BinaryFile(path)
-    if _line(file) != MAGIC:
-        raise file.error(f'the first line must be "{MAGIC}"', 0)
     metadata: dict[str, str] = {}
     found: dict[str, np.ndarray] = {}
-    lines = 0
     while file.left:
-        start, line, lines = file.offset, _line(file), lines + 1
-        key, equals, text = line.partition("=")
-        if lines > LINES:
-            raise file.error(f"there are more than {LINES:,} lines of text", start)
-        if line in BLOCKS:
-            if BLOCKS[line] in found:
-                raise file.error(f"a second block of {BLOCKS[line]} follows", start)
-            found[BLOCKS[line]] = _block(file)
-        elif found and line.strip():
-            raise file.error("another block of data or the end of the file should follow", start)
-        elif equals:
-            metadata[key.strip()] = _unquoted(text)
+        start = file.offset
+        text = file.take("u1", min(file.left, LONGEST), "text").tobytes()
+        if not start and text.splitlines()[0] != MAGIC.encode():
+            raise file.error(f'the first line must be "{MAGIC}"', 0)
+        if found and not text.strip():
+            break
+        block = BLOCK.search(text)
+        if not block:
+            raise file.error("text should follow, and below it a block of data", start)
+        for line in decoded(text[: block.start()]).splitlines():
+            key, equals, value = line.partition("=")
+            if equals:
+                metadata[key.strip()] = _unquoted(value)
+        kind = "transmission" if b"TRANS" in block[0] else "reflection"
+        if kind in found:
+            raise file.error(f"a second block of {kind} follows", start + block.start())
+        file.offset = start + block.end()
+        found[kind] = _block(file)
     if "reflection" not in found:
         raise file.error("the file ends, and it has no data of reflection")
     if "transmission" in found:
@@ -84,16 +85,6 @@ def _block(file: BinaryFile) -> np.ndarray:
         raise file.error(f"there are {theta} steps of θ and {phi} of φ; there must be some", file.offset - 8)
     values = file.take("f4", theta * theta * phi * CHANNELS[kind], "values").reshape(theta, theta, phi, -1)
     return values if kind else np.repeat(values, 3, axis=-1)
-
-
-def _line(file: BinaryFile) -> str:
-    """Return the next line, and move behind it."""
-    start = file.offset
-    line, end, _ = file.take("u1", min(file.left, LONGEST), "text").tobytes().partition(b"\n")
-    if not end:
-        raise file.error("a line of text should follow, or a block of data", start)
-    file.offset = start + len(line) + 1
-    return decoded(line).rstrip("\r")
 
 
 def _unquoted(text: str) -> str:

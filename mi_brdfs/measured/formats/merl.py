@@ -27,9 +27,11 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import stacked
+from ..axis import Axis
 from ..coordinates import HalfDifference
 from ..files import BinaryFile
-from ..measurement import Axis, Grid, Measurement
+from ..grid import Grid
+from ..measurement import Measurement
 from ..source import Source
 
 NAME = "MERL"

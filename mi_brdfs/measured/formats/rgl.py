@@ -15,8 +15,10 @@ from ...parameters.messages import brief
 from ..adaptation import LAST, adapted, brightness, turned
 from ..adaptive import Adaptive
 from ..arrays import NUMPY, components, stacked
-from ..files import BinaryFile
-from ..measurement import Axis, FileError, Grid, Measurement
+from ..axis import Axis
+from ..files import BinaryFile, FileError
+from ..grid import Grid
+from ..measurement import Measurement
 from ..source import Source
 from ..text import decoded, shortened
 

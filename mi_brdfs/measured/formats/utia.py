@@ -21,9 +21,11 @@ from typing import Literal
 
 import numpy as np
 
+from ..axis import Axis
 from ..coordinates import TWO_PI, Spherical
 from ..files import BinaryFile
-from ..measurement import Axis, Grid, Measurement, Quantity
+from ..grid import Grid
+from ..measurement import Measurement, Quantity
 
 NAME = "UTIA"
 DESCRIPTION = "a .bin of three planes of 288 × 288 float64"

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import stacked
 from ..coordinates import TWO_PI, spherical
-from ..measurement import Extrapolation, Grid
+from ..grid import Extrapolation, Grid
 
 RADII = 96
 """The nodes along a radius."""

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..arrays import components
 from ..coordinates import polar_angle
-from ..measurement import Grid, Samples
+from ..grid import Grid
+from ..scattered import Samples
 
 AT_ONCE = 1 << 18
 """The most pairs of directions in memory together."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import NUMPY, components
 from ..coordinates import Spherical
-from ..measurement import Grid, Samples, usable
+from ..grid import Grid, usable
+from ..scattered import Samples
 
 PAIRS = 1 << 17
 """The most nodes that are compared."""

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..files import named
-from ..measurement import Axis, FileError, Grid, Measurement, Samples
-from ..scattered import as_grid
+from ..axis import Axis
+from ..files import FileError, named
+from ..grid import Grid
+from ..measurement import Measurement
+from ..scattered import Samples, as_grid
 from .albedo import albedos, coverage
 from .counts import Counts, Range, census, in_one_plane
 from .reciprocity import ReciprocityError, reciprocity_error
