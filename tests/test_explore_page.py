@@ -493,7 +493,8 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     divider = tab.get_by_role("slider", name="Divider")
     divider.focus()
     divider.press("Home")
-    assert divider.get_attribute("aria-valuenow") == "0"
+    assert divider.input_value() == "0"
+    tab.locator(".divider[aria-valuetext='ward up to 0\u00a0%']").wait_for()
     tab.locator("#compare").select_option("difference")
     tab.wait_for_selector(".pictures canvas")
 
@@ -523,6 +524,26 @@ def test_models_and_published_materials_open_one_after_the_other(tab, address):
     assert models[0] / len(own_models()) == models[1]
     tab.get_by_label("ngan/ward/blue-acrylic", exact=True).click()
     tab.wait_for_function("() => document.querySelector('#subject-type').innerText === 'ward'")
+
+
+def test_a_picture_that_is_awaited_says_so(tab, address):
+    """Until it is there; one that cannot come is not awaited."""
+    told = "() => getComputedStyle(document.querySelector('.frame'), '::after').content"
+    state = {"subjects": [{"bsdf": {"type": "ward", "alpha": 0.3}, "name": "ward"}], **STILL}
+    tab.route_web_socket(re.compile("/socket"), relayed_without_pictures)
+    tab.goto(f"{address}#{json.dumps(state)}")
+    tab.locator("#view-polar .curve").first.wait_for(state="attached")
+    assert "Compiling" in tab.evaluate(told)
+    tab.get_by_label("alpha, as a number").fill("-1")
+    tab.get_by_label("alpha, as a number").press("Enter")
+    tab.wait_for_function(f"() => ({told})() === 'none'")
+
+
+def relayed_without_pictures(socket):
+    server = socket.connect_to_server()
+    server.on_message(
+        lambda it: socket.send(it) if isinstance(it, str) or b'"type": "picture"' not in it[:400] else None
+    )
 
 
 def test_each_kind_of_control_changes_the_picture(tab, address):
