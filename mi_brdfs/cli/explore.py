@@ -53,7 +53,7 @@ def explore(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE,…",
-            help="With --export: a parameter to scrub through, or theta, which is always there; may be repeated.",
+            help="With --export: a parameter to scrub through; twice at most, and theta, which is always there.",
         ),
     ] = None,
     host: Annotated[str, typer.Option(help="Who may connect: by default only this machine.")] = "127.0.0.1",
@@ -183,6 +183,8 @@ def _varied(texts: list[str]) -> dict[str, tuple[float, ...]]:
         if not all(low <= it <= high and math.isfinite(it) for it in found[name]):
             limits = f" from {low} to {high} degrees" if name == "theta" else ""
             fail(f"--vary {text}: give finite numbers{limits}", Exit.USAGE)
+    if len(found.keys() - {"theta"}) > 2:
+        fail("--vary takes two parameters at most, besides theta", Exit.USAGE)
     return found
 
 
