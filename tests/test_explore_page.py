@@ -563,6 +563,8 @@ def test_each_kind_of_control_changes_the_picture(tab, address):
     red = tab.get_by_label("specular_reflectance, red")
     moved(lambda: (red.fill("0.9"), red.press("Enter")))
     moved(lambda: (tab.locator("#theta-field").fill("70"), tab.locator("#theta-field").press("Enter")))
+    moved(lambda: tab.locator("#component").select_option("1"))
+    moved(lambda: tab.get_by_label("× cosθo").uncheck())
     number.fill("-1"), number.press("Enter")
     tab.wait_for_function("() => document.querySelector('#editor').innerText.includes('alpha = -1 is not allowed')")
     letters = "location.hash.slice(1).replaceAll('-', '+').replaceAll('_', '/')"

@@ -66,21 +66,21 @@ const redrawAll = () => redraw("bars", "subjects", "tour", ...VIEWS);
 
 // --- Bars -----------------------------------------------------------------------------------------------------------
 
-const valueIn = ({ type, checked, value, valueAsNumber }) =>
-  type === "checkbox" ? checked : type === "range" || type === "number" ? valueAsNumber || 0 : value;
-
 /** Tie a field to the member of the state that its `data-member` names. */
 function tie(field) {
   const { member } = field.dataset;
   const isMoved = field.type === "range" || field.type === "checkbox";
-  if (member in LIMITS && field.type !== "select-one") {
+  const isNumber = member in LIMITS;
+  if (isNumber && field.type !== "select-one") {
     const [low, high] = LIMITS[member];
     field.min ||= low;
     field.max ||= high;
   }
+  const number = () => (field.value === "" ? null : Number(field.value));
+  const chosen = () => (field.type === "checkbox" ? field.checked : isNumber ? number() : field.value);
   field.addEventListener(isMoved ? "input" : "change", () => {
     if (field.value === CHOOSE) chooseFile(field);
-    else change({ [member]: valueIn(field) });
+    else change({ [member]: chosen() });
   });
   on("draw-bars", () => {
     const shown = session.state[member];
@@ -115,9 +115,7 @@ function startBars() {
         {
           class: "toggle",
           "data-view": view,
-          onclick: () => {
-            change({ views: withOrWithout(session.state.views, view) });
-          },
+          onclick: () => change({ views: withOrWithout(session.state.views, view) }),
         },
         view,
       ),
@@ -203,9 +201,9 @@ function startMessages() {
     byId("alert-text").textContent = text;
     byId("alert").hidden = false;
   });
-  on("connection", () => {
-    byId("lost").hidden = session.connected;
-    if (!session.connected) say("");
+  on("connection", (connected) => {
+    byId("lost").hidden = connected;
+    if (!connected) say("");
   });
 }
 

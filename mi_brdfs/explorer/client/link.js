@@ -35,13 +35,11 @@ export function connect() {
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     pause = 500;
-    session.connected = true;
-    emit("connection");
+    emit("connection", true);
   };
   socket.onmessage = ({ data }) => receive(unpacked(data));
   socket.onclose = () => {
-    session.connected = false;
-    emit("connection");
+    emit("connection", false);
     setTimeout(connect, pause);
     pause = Math.min(2 * pause, 5000);
   };

@@ -16,7 +16,6 @@ export const session = {
   sent: [],
   selected: 0,
   exported: document.getElementById("exported") !== null,
-  connected: false,
   /** What an exported page holds: its views, and its scrubbers with their places. */
   baked: [],
   scrubbers: [],
