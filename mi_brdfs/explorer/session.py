@@ -134,7 +134,8 @@ class Session:
                     bsdf = self.materials.expanded(given)
                     told["bsdf"] = None if key_of(bsdf) == key else bsdf
                     told["controls"] = self.materials.controls(bsdf)
-                    told |= self.materials.written(bsdf) | self.materials.described(bsdf)
+                    told |= self.materials.written(bsdf)
+                    told |= self.materials.described(bsdf)
                     self._broken.discard(key)
                 except StateError as error:
                     told["error"] = str(error)
