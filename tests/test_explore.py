@@ -334,8 +334,9 @@ def test_views_hold_the_plugins_values(client):
     views = ["lobe", "polar", "albedo", "slice", "hemisphere", "sampler"]
     found = client.show({"type": "lambert", "reflectance": 0.5}, views=views)
     lobe, cut, albedo, cells, disc, sampler = (of(found, name)[0] for name in views)
-    values = np.frombuffer(lobe["payload"], np.float32).reshape(len(lobe["theta"]), len(lobe["phi"]))
-    expected = 0.5 / np.pi * np.cos(np.radians(lobe["theta"]))
+    (part,) = lobe["parts"]
+    values = np.frombuffer(lobe["payload"], np.float32).reshape(len(part["theta"]), len(part["phi"]))
+    expected = 0.5 / np.pi * np.cos(np.radians(part["theta"]))
     np.testing.assert_allclose(values, expected[:, None] + 0 * values, atol=1e-5)
     curve = cut["curves"][0]
     np.testing.assert_allclose(curve["y"], 0.5 / np.pi * np.cos(np.radians(curve["x"])), atol=1e-5)
@@ -343,13 +344,24 @@ def test_views_hold_the_plugins_values(client):
     f = np.frombuffer(cells["payload"], np.float32)
     np.testing.assert_allclose(f[np.isfinite(f)], 0.5 / np.pi, rtol=1e-4)
     assert np.isfinite(f).mean() > 0.99  # all but grazing directions
-    disc_values = np.frombuffer(disc["payload"], np.float32).reshape(disc["height"], -1)
-    assert disc_values[disc["height"] // 2, disc["width"] // 2] == pytest.approx(0.5 / np.pi, rel=1e-3)
+    (part,) = disc["parts"]
+    disc_values = np.frombuffer(disc["payload"], np.float32).reshape(part["height"], -1)
+    assert disc_values[part["height"] // 2, part["width"] // 2] == pytest.approx(0.5 / np.pi, rel=1e-3)
     assert sampler["efficiency"] == pytest.approx(1, abs=1e-5) and len(sampler["dots"]) > 100
     found = client.show({"type": "lambert", "reflectance": 0.5}, views=["lobe", "polar", "hemisphere"], cosine=False)
     for payload in (of(found, it)[0]["payload"] for it in ("lobe", "hemisphere")):
         np.testing.assert_allclose(np.frombuffer(payload, np.float32), 0.5 / np.pi, rtol=1e-3)
     np.testing.assert_allclose(of(found, "polar")[0]["curves"][0]["y"], 0.5 / np.pi, rtol=1e-3)
+
+
+def test_a_view_has_both_sides_of_a_surface_that_transmits(client):
+    """The upper one first, and as many values as their sizes say."""
+    found = client.show({"type": "roughdielectric"}, views=["lobe", "hemisphere"])
+    for view in (of(found, name)[0] for name in ("lobe", "hemisphere")):
+        above, below = view["parts"]
+        values = np.frombuffer(view["payload"], np.float32)
+        assert len(values) == above["size"] + below["size"]
+        assert 0 < np.nanmax(values[: above["size"]]) < np.nanmax(values[above["size"] :])  # most light is transmitted
 
 
 def test_curves_go_along_other_angles(client):

@@ -493,7 +493,8 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     divider = tab.get_by_role("slider", name="Divider")
     divider.focus()
     divider.press("Home")
-    assert divider.get_attribute("aria-valuenow") == "0"
+    assert divider.input_value() == "0"
+    tab.locator(".divider[aria-valuetext='ward up to 0\u00a0%']").wait_for()
     tab.locator("#compare").select_option("difference")
     tab.wait_for_selector(".pictures canvas")
 
@@ -525,6 +526,26 @@ def test_models_and_published_materials_open_one_after_the_other(tab, address):
     tab.wait_for_function("() => document.querySelector('#subject-type').innerText === 'ward'")
 
 
+def test_a_picture_that_is_awaited_says_so(tab, address):
+    """Until it is there; one that cannot come is not awaited."""
+    told = "() => getComputedStyle(document.querySelector('.frame'), '::after').content"
+    state = {"subjects": [{"bsdf": {"type": "ward", "alpha": 0.3}, "name": "ward"}], **STILL}
+    tab.route_web_socket(re.compile("/socket"), relayed_without_pictures)
+    tab.goto(f"{address}#{json.dumps(state)}")
+    tab.locator("#view-polar .curve").first.wait_for(state="attached")
+    assert "Compiling" in tab.evaluate(told)
+    tab.get_by_label("alpha, as a number").fill("-1")
+    tab.get_by_label("alpha, as a number").press("Enter")
+    tab.wait_for_function(f"() => ({told})() === 'none'")
+
+
+def relayed_without_pictures(socket):
+    server = socket.connect_to_server()
+    server.on_message(
+        lambda it: socket.send(it) if isinstance(it, str) or b'"type": "picture"' not in it[:400] else None
+    )
+
+
 def test_each_kind_of_control_changes_the_picture(tab, address):
     ward = {"type": "ward", "alpha": 0.2, "specular_reflectance": [0.3, 0.3, 0.3]}
     opened(tab, address, {"subjects": [{"bsdf": ward, "name": "ward"}], **STILL, "views": ["picture", "polar"]})
@@ -542,6 +563,8 @@ def test_each_kind_of_control_changes_the_picture(tab, address):
     red = tab.get_by_label("specular_reflectance, red")
     moved(lambda: (red.fill("0.9"), red.press("Enter")))
     moved(lambda: (tab.locator("#theta-field").fill("70"), tab.locator("#theta-field").press("Enter")))
+    moved(lambda: tab.locator("#component").select_option("1"))
+    moved(lambda: tab.get_by_label("× cosθo").uncheck())
     number.fill("-1"), number.press("Enter")
     tab.wait_for_function("() => document.querySelector('#editor').innerText.includes('alpha = -1 is not allowed')")
     letters = "location.hash.slice(1).replaceAll('-', '+').replaceAll('_', '/')"

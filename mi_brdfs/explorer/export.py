@@ -21,7 +21,7 @@ from . import stages
 from .controls import LOBES, with_value
 from .materials import Materials
 from .state import Bsdf, State, StateError, declared
-from .views import VIEWS, Frame, frames, packed, text
+from .views import VIEWS, Frame, frame, packed, text
 
 SPP = 64
 """Samples per pixel of its pictures."""
@@ -57,9 +57,8 @@ def page(
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
     baked = _Baked(state, materials, scenes, vary)
-    frames = [(at, frame.encode() if isinstance(frame, str) else frame, isinstance(frame, str))
-              for at, frame in baked.frames()]  # fmt: skip
-    if missing := [name for name in vary if name not in ("theta", *baked.found)]:
+    frames = [(at, it.encode() if isinstance(it, str) else it, isinstance(it, str)) for at, it in baked.frames()]
+    if missing := [name for name in vary if name not in baked.start]:
         raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(baked.known, 'and')}.")
     told = page_state.get("subjects") or [{} for _ in state.subjects]
     if len(told) != len(state.subjects):
@@ -70,8 +69,8 @@ def page(
         "state": {**page_state, "subjects": subjects},
         "scrubbers": [{"name": name, "values": values, "start": baked.start[name]} for name, values in vary.items()],
         "views": ["picture", *baked.views, *(["cartesian"] if "polar" in baked.views and is_same else [])],
-        "frames": [(at, len(frame), is_text) for at, frame, is_text in frames],
-        "data": base64.b64encode(gzip.compress(b"".join(frame for _, frame, _ in frames), mtime=0)).decode(),
+        "frames": [(at, len(it), is_text) for at, it, is_text in frames],
+        "data": base64.b64encode(gzip.compress(b"".join(it for _, it, _ in frames), mtime=0)).decode(),
     }
     data = json.dumps(content).replace("<", "\\u003c")
     found = _inlined(f'<script type="application/json" id="exported">{data}</script>')
@@ -92,10 +91,9 @@ class _Baked:
     subjects: list[Bsdf] = field(default_factory=list)
     """The plugin dicts with all their values."""
     known: list[str] = field(default_factory=list)
-    """The numbers that may be varied, and those that are."""
-    found: set[str] = field(default_factory=set)
+    """The numbers that may be varied."""
     start: dict[str, int] = field(default_factory=dict)
-    """Where each scrubber stands at first: where it is nearest to the state."""
+    """Where each scrubber of something stands at first: where it is nearest to the state."""
 
     def frames(self) -> Iterator[tuple[At, Frame]]:
         """Yield frames, each with the places of the scrubbers at which it is shown, None for any."""
@@ -110,7 +108,7 @@ class _Baked:
             yield nowhere, text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told)
             numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
             self.known += [name for name in numbers if name not in self.known]
-            varied = [numbers.get(name) for name in self.vary if name != "theta"]
+            varied = [numbers.get(name) if name != "theta" else None for name in self.vary]
             for each in filter(None, varied):
                 self._begin(each["name"], each["value"])
             ways = [enumerate(self.vary[it["name"]]) if it else [(None, 0.0)] for it in varied]
@@ -122,17 +120,13 @@ class _Baked:
 
     def _begin(self, name: str, value: float | None) -> None:
         """Take the value that is nearest to what a subject has."""
-        self.found.add(name)
         values = self.vary[name]
         nearest = min(range(len(values)), key=lambda at: abs(values[at] - (values[0] if value is None else value)))
         self.start.setdefault(name, nearest)
 
     def _views(self, k: int, bsdf: Bsdf, places: At) -> Iterator[tuple[At, Frame]]:
-        names = [name for name in self.vary if name != "theta"]
-        elsewhere = dict(zip(names, places, strict=True))
-
-        def at(theta: int | None) -> At:
-            return tuple(theta if name == "theta" else elsewhere[name] for name in self.vary)
+        def at(theta: int) -> At:
+            return tuple(theta if name == "theta" else it for name, it in zip(self.vary, places, strict=True))
 
         with self.materials.loaded(bsdf) as loaded:
             for name in self.views:
@@ -140,8 +134,8 @@ class _Baked:
                 shown = [replace(self.state, theta=theta) for theta in self.vary["theta"]]
                 is_same = len({view.depends(it) for it in shown}) == 1
                 for theta, state in enumerate(shown[:1] if is_same else shown):
-                    for frame in frames(name, loaded, self.materials.data(bsdf), state, 0, k):
-                        yield at(None if is_same else theta), frame if isinstance(frame, str) else _rounded(frame)
+                    drawn = frame(name, loaded, self.materials.data(bsdf), state, 0, k)
+                    yield places if is_same else at(theta), drawn if isinstance(drawn, str) else _rounded(drawn)
         progress = self.scenes.progress(stages.Setting.of(self.state))
         while progress.spp < SPP:
             with self.materials.loaded(bsdf) as loaded:
@@ -150,7 +144,7 @@ class _Baked:
         rgb = np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3]
         payload = encoded(mi.Bitmap(np.ascontiguousarray(rgb)), "JPEG", 92)
         header |= {"type": "picture", "serial": 0, "subject": k, "final": True, "mime": "image/jpeg"}
-        yield at(None), packed(payload, **header)
+        yield places, packed(payload, **header)
 
     @property
     def views(self) -> list[str]:
@@ -162,11 +156,11 @@ class _Baked:
         return [name for name in VIEWS if name in wanted]
 
 
-def _rounded(frame: bytes) -> bytes:
+def _rounded(drawn: bytes) -> bytes:
     """Return a frame of float32 with 12 bits of their mantissas, which can be compressed."""
-    end = 4 + int.from_bytes(frame[:4], "little")
-    bits = np.frombuffer(frame[end:], np.uint32)
-    return frame[:end] + ((bits + np.uint32(0x400)) & np.uint32(0xFFFFF800)).tobytes()
+    end = 4 + int.from_bytes(drawn[:4], "little")
+    bits = np.frombuffer(drawn[end:], np.uint32)
+    return drawn[:end] + ((bits + np.uint32(0x400)) & np.uint32(0xFFFFF800)).tobytes()
 
 
 def _inlined(data: str) -> str:

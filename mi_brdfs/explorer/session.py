@@ -11,10 +11,10 @@ import ctypes
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
 from queue import SimpleQueue
@@ -32,7 +32,7 @@ from . import stages
 from .export import page
 from .materials import Materials, plain
 from .state import EVERY, GIVEN, MEASURED, UPLOAD, Bsdf, State, StateError, key_of
-from .views import VIEWS, Frame, frames, packed, text
+from .views import VIEWS, Frame, frame, packed, text
 
 PAUSE = 0.15
 """The seconds without an edit after which pictures are refined: a pass at work would hold up the next one."""
@@ -54,18 +54,6 @@ class Disturbed(Exception):
     """The page has changed what it shows, or does not wait for a fit any more."""
 
 
-@dataclass
-class Fits:
-    """Fits of some models to what was measured, one after the other."""
-
-    metric: str
-    observed: Any
-    models: list[str]
-    total: int
-    skipped: list[str] = field(default_factory=list)
-    """What was said of models that cannot be fitted."""
-
-
 class Session:
     """What ``materials`` has, shown in ``scenes``: ``send`` takes frames to the page, and ``waiting`` tells how many of
     them have not arrived. The engine's thread calls :meth:`step`, the server's all others."""
@@ -79,7 +67,7 @@ class Session:
         self._latest: tuple[State, int] | None = None
         self._edited = 0.0
         self._requests: list[Mapping[str, Any]] = []
-        self._fits: Fits | None = None
+        self._fits: Iterator[None] | None = None
         self._told: dict[int, str] = {}
         self._broken: set[str] = set()
         self._shown: dict[tuple[str, int], Any] = {}
@@ -141,19 +129,18 @@ class Session:
             key = key_of(given)
             if self._told.get(k) != key:
                 self._told[k] = key
-                message: dict[str, Any] = {"type": "subject", "serial": serial, "subject": k, "bsdf": None}
-                message |= {"controls": [], "components": [], "notes": [], "error": None}
+                told: dict[str, Any] = {"bsdf": None, "controls": [], "error": None}
                 try:
                     bsdf = self.materials.expanded(given)
-                    message["bsdf"] = None if key_of(bsdf) == key else bsdf
-                    message["controls"] = self.materials.controls(bsdf)
-                    message |= self.materials.written(bsdf)
-                    message |= self.materials.described(bsdf)
+                    told["bsdf"] = None if key_of(bsdf) == key else bsdf
+                    told["controls"] = self.materials.controls(bsdf)
+                    told |= self.materials.written(bsdf)
+                    told |= self.materials.described(bsdf)
                     self._broken.discard(key)
                 except StateError as error:
-                    message["error"] = str(error)
+                    told["error"] = str(error)
                     self._broken.add(key)
-                self.send(text(**message))
+                self.send(text(type="subject", serial=serial, subject=k, **told))
                 return True
         return False
 
@@ -198,8 +185,7 @@ class Session:
             self._send_picture(k, state, serial)
             return
         with self.materials.loaded(bsdf) as loaded:
-            for frame in frames(view, loaded, self.materials.data(bsdf), state, serial, k):
-                self.send(frame)
+            self.send(frame(view, loaded, self.materials.data(bsdf), state, serial, k))
 
     def _refine(self, state: State, serial: int) -> bool:
         """Add a pass to the picture that has the fewest."""
@@ -281,41 +267,44 @@ class Session:
             raise StateError("This file is not here any more; drop it in again.")
         find_metric(request["metric"])
         chosen = find_models([] if request["model"] == EVERY else [request["model"]])
-        models = [it.plugins[0] for it in chosen]
-        self._fits = Fits(request["metric"], observe(source.source), models, len(models))
+        self._fits = self._fitting(observe(source.source), [it.plugins[0] for it in chosen], request["metric"])
 
     def _fit_next(self) -> bool:
-        """Fit the next model, and say how good it is, unless the page changes meanwhile: then it begins anew."""
+        """Go on with the fits, if there are any."""
         fits = self._fits
-        if not fits:
-            return False
+        if fits and next(fits, True) and self._fits is fits:
+            self._fits = None
+        return fits is not None
+
+    def _fitting(self, observed: Any, models: list[str], metric: str) -> Iterator[None]:
+        """Fit one model after the other, and say how good each is; begin with it anew if the page changes."""
         from ..fit import fit
 
-        edited, past = self._edited, fits.total - len(fits.models)
+        own, skipped = self._fits, []
+        for past, model in enumerate(models):
+            found: dict[str, Any] | None = None
+            while found is None:
+                edited = self._edited
 
-        def progress(done: int, total: int) -> None:
-            if self._edited != edited or self._fits is not fits or self.closed:
-                raise Disturbed
-            self.send(text(type="fit", done=past + done / total, total=fits.total))
+                def progress(done: int, total: int, past: int = past, edited: float = edited) -> None:
+                    if self._edited != edited or self._fits is not own or self.closed:
+                        raise Disturbed
+                    self.send(text(type="fit", done=past + done / total, total=len(models)))
 
-        if fits.models:
-            found: dict[str, Any] = {}
-            try:
-                best = fit(fits.observed, fits.models[0], metric=fits.metric, starts=STARTS, progress=progress)[0]
-                error = best.held_out if math.isfinite(best.held_out) else None
-                found = {"bsdf": plain(best.bsdf), "model": best.model, "error": error}
-                found["text"] = " ".join(best.remarks())
-            except Disturbed:
-                return True
-            except (RuntimeError, ValueError) as error:
-                fits.skipped.append(one_line(error))
-            if self._fits is fits:
-                del fits.models[0]
-                self.send(text(type="fit", done=past + 1, total=fits.total, **found))
-            return True
-        self._fits = None
-        self.send(text(type="fitted", error=fits.skipped[0] if len(fits.skipped) == fits.total else None))
-        return True
+                try:
+                    best = fit(observed, model, metric=metric, starts=STARTS, progress=progress)[0]
+                    error = best.held_out if math.isfinite(best.held_out) else None
+                    found = {"bsdf": plain(best.bsdf), "model": best.model, "error": error}
+                    found["text"] = " ".join(best.remarks())
+                except Disturbed:
+                    yield
+                except (RuntimeError, ValueError) as error:
+                    found = {}
+                    skipped.append(one_line(error))
+            if self._fits is own:  # and is not cancelled
+                self.send(text(type="fit", done=past + 1, total=len(models), **found))
+            yield
+        self.send(text(type="fitted", error=skipped[0] if len(skipped) == len(models) else None))
 
     def _save_exr(self, k: int, state: State) -> None:
         if k not in self._pictures:

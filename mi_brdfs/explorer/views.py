@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -83,22 +83,22 @@ class View:
     """One kind of view: what it depends on, besides the BSDF and the component, and how it is drawn."""
 
     depends: Callable[[State], Any]
-    frames: Callable[[ComponentProbe, State], Iterator[dict[str, Any]]]
-    """Yield what goes into frames, with the ``payload`` of binary ones."""
+    content: Callable[[ComponentProbe, State], dict[str, Any]]
+    """Return what goes into a frame; of a binary one, ``parts`` with their ``values``."""
 
 
-def _lobe(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+def _lobe(probe: ComponentProbe, state: State) -> dict[str, Any]:
     parallels = COARSE if state.dragged else PARALLELS
     meshes = lobes.meshes(probe, state.theta, state.phi, parallels, state.channels[0][1])
-    for k, (theta, phi, value) in enumerate(meshes):
-        yield {"payload": np.nan_to_num(value).astype("<f4").tobytes(), "theta": theta, "phi": phi, "below": k > 0}
+    parts = [{"theta": theta, "phi": phi, "values": np.nan_to_num(value)} for theta, phi, value in meshes]
+    return {"parts": parts}
 
 
-def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> Iterator[dict[str, Any]]:
+def _curves(state: State, of_channel: Callable[[int | None], lobes.Curve]) -> dict[str, Any]:
     drawn = [(name, of_channel(channel)) for name, channel in state.channels]
     if state.dragged:
         drawn = [(name, _thinned(curve)) for name, curve in drawn]
-    yield {"curves": [{"channel": name, "x": curve.theta, "y": curve.value} for name, curve in drawn]}
+    return {"curves": [{"channel": name, "x": curve.theta, "y": curve.value} for name, curve in drawn]}
 
 
 def _thinned(curve: lobes.Curve) -> lobes.Curve:
@@ -108,15 +108,15 @@ def _thinned(curve: lobes.Curve) -> lobes.Curve:
     return lobes.Curve(curve.theta[kept], curve.value[kept])
 
 
-def _cut(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+def _cut(probe: ComponentProbe, state: State) -> dict[str, Any]:
     return _curves(state, lambda channel: lobes.in_plane_of_incidence(probe, state.theta, state.phi, channel))
 
 
-def _albedo(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+def _albedo(probe: ComponentProbe, state: State) -> dict[str, Any]:
     return _curves(replace(state, dragged=False), lambda channel: lobes.albedo(probe, state.phi, channel, LOG2_COUNT))
 
 
-def _graph(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+def _graph(probe: ComponentProbe, state: State) -> dict[str, Any]:
     if state.axis == "theta_o":
         return _cut(probe, state)
     even = np.linspace(0, 1, STEPS)
@@ -151,24 +151,23 @@ def _half_difference(theta_h: Array, theta_d: Array, phi_h: float) -> tuple[Arra
     return wi.astype(np.float32), wo.astype(np.float32)
 
 
-def _slice(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+def _slice(probe: ComponentProbe, state: State) -> dict[str, Any]:
     at = (np.arange(PIXELS) + 0.5) * (np.pi / 2) / PIXELS
     theta_h, theta_d = (it.ravel() for it in np.meshgrid(at, at))
     pair = _half_difference(theta_h, theta_d, 0)
     seen = np.minimum(pair[0][:, 2], pair[1][:, 2]) > 1e-3
     wi_seen, wo_seen = (np.where(seen[:, None], w, np.array([0, 0, 1], np.float32)) for w in pair)
     f = lobes.value(replace(probe, cosine=False), wi_seen, wo_seen, state.channels[0][1])
-    values = np.where(seen, f, np.nan)
-    yield {"payload": values.astype("<f4").tobytes(), "width": PIXELS, "height": PIXELS}
+    return {"parts": [{"width": PIXELS, "height": PIXELS, "values": np.where(seen, f, np.nan)}]}
 
 
-def _hemisphere(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
-    for side in (1, -1) if lobes.transmits(probe) else (1,):
-        picture = lobes.disc(probe, state.theta, state.phi, side, PIXELS, state.channels[0][1])
-        yield {"payload": picture.astype("<f4").tobytes(), "width": PIXELS, "height": PIXELS, "below": side < 0}
+def _hemisphere(probe: ComponentProbe, state: State) -> dict[str, Any]:
+    sides = (1, -1) if lobes.transmits(probe) else (1,)
+    discs = [lobes.disc(probe, state.theta, state.phi, side, PIXELS, state.channels[0][1]) for side in sides]
+    return {"parts": [{"width": PIXELS, "height": PIXELS, "values": it} for it in discs]}
 
 
-def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
+def _sampler(probe: ComponentProbe, state: State) -> dict[str, Any]:
     wi, points = direction(state.theta, state.phi), lattice(8, 3)
     samples = probe.sample(probe.whole, wi, points)
     weight = luminance(samples.weight)
@@ -176,7 +175,7 @@ def _sampler(probe: ComponentProbe, state: State) -> Iterator[dict[str, Any]]:
     counts, edges = np.histogram(np.minimum(weight / (mean or 1), HEAVIEST), BINS, (0, HEAVIEST))
     angles = np.array([direction(theta, state.phi) for theta in ANGLES])
     eta = sampling_efficiency(luminance(probe.weights(probe.whole, angles, lattice(7, 5))))
-    yield {
+    return {
         "eta": {"x": np.array(ANGLES, float), "y": eta},
         "histogram": {"edges": edges, "count": counts.tolist()},
         "dots": [[round(float(it), 4) for it in w] for w in samples.wo[samples.lit][:DOTS]],
@@ -200,14 +199,13 @@ VIEWS = {
 """By name, in the order in which they are drawn."""
 
 
-def frames(
-    name: str, bsdf: mi.BSDF, data: Grid | Samples | None, state: State, serial: int, subject: int
-) -> Iterable[Frame]:
-    """Yield the frames of a view of a subject, which says nothing where measured data do not."""
+def frame(name: str, bsdf: mi.BSDF, data: Grid | Samples | None, state: State, serial: int, subject: int) -> Frame:
+    """Return a view of a subject, which says nothing where measured data do not. Of its parts, the first is above the
+    surface and the second below."""
     probe = ComponentProbe(bsdf, state.component, state.cosine, data=data)
-    for found in VIEWS[name].frames(probe, state):
-        common = {"serial": serial, "subject": subject}
-        if "payload" in found:
-            yield packed(found.pop("payload"), type=name, **common, **found)
-        else:
-            yield text(type="view", view=name, **common, **found)
+    content = VIEWS[name].content(probe, state)
+    values = [part.pop("values").astype("<f4") for part in content.get("parts", [])]
+    for part, it in zip(content.get("parts", []), values, strict=True):
+        part["size"] = it.size
+    header = {"type": "view", "view": name, "serial": serial, "subject": subject, **content}
+    return packed(b"".join(it.tobytes() for it in values), **header) if values else text(**header)

@@ -1,38 +1,41 @@
 // The page: its cards, its bars, and what is drawn when.
-import { byId, element, format } from "./util.js";
+import { byId, element, phone } from "./util.js";
 import { LIMITS, VIEWS, WORDS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
-import { connect, post, sendState } from "./link.js";
+import { connect, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
-import { colourOf, isDark } from "./drawing.js";
-import { AXES, drawAlbedo, drawCartesian, drawPolar, table } from "./plots.js";
-import { drawSampler } from "./sampler.js";
+import { isDark } from "./drawing.js";
+import { AXES, curveTable, drawAlbedo, drawCartesian, drawPolar } from "./plots.js";
+import { drawSampler, samplerTable, startSampler } from "./sampler.js";
 import { drawMaps, mapsImage } from "./maps.js";
-import { drawLobe, startLobe } from "./lobe.js";
-import { drawPicture, pairOf, startPicture, wantedSize } from "./picture.js";
+import { drawLobe, lobeImage, startLobe } from "./lobe.js";
+import { drawPicture, pairOf, pictureImage, startPicture, wantedSize } from "./picture.js";
 import { drawSubjects, startSubjects } from "./subjects.js";
 import { startDialogs } from "./dialogs.js";
 import { drawTour, startTours } from "./tour.js";
 
-const TITLES = {
-  picture: ["Picture", "", ["PNG"]],
-  lobe: ["Lobe", "", ["PNG"]],
-  polar: ["Plane of incidence, polar", "", ["SVG", "CSV"]],
-  cartesian: ["Plane of incidence", "", ["SVG", "CSV"]],
-  albedo: ["Albedo", "over the angle of incidence", ["SVG", "CSV"]],
-  slice: ["Slice", "f over half and difference angle, φd = 90°", ["PNG"]],
-  hemisphere: ["Hemisphere", "", ["PNG"]],
-  sampler: ["Sampler", "", ["SVG", "CSV"]],
+const CARDS = {
+  picture: { title: "Picture", draw: drawPicture, image: pictureImage },
+  lobe: { title: "Lobe", draw: drawLobe, image: lobeImage },
+  polar: { title: "Plane of incidence, polar", draw: drawPolar, table: () => curveTable("polar") },
+  cartesian: { title: "Plane of incidence", draw: drawCartesian, table: () => curveTable("cartesian") },
+  albedo: {
+    title: "Albedo",
+    note: "over the angle of incidence",
+    draw: drawAlbedo,
+    table: () => curveTable("albedo"),
+  },
+  slice: {
+    title: "Slice",
+    note: "f over half and difference angle, φd = 90°",
+    draw: () => drawMaps("slice"),
+    image: () => mapsImage("slice"),
+  },
+  hemisphere: { title: "Hemisphere", draw: () => drawMaps("hemisphere"), image: () => mapsImage("hemisphere") },
+  sampler: { title: "Sampler", draw: drawSampler, table: samplerTable },
 };
-const DRAW = {
-  picture: drawPicture,
-  lobe: drawLobe,
-  polar: drawPolar,
-  cartesian: drawCartesian,
-  albedo: drawAlbedo,
-  slice: () => drawMaps("slice"),
-  hemisphere: () => drawMaps("hemisphere"),
-  sampler: () => drawSampler(chi2Box()),
-};
+
+/** The value of an option that asks for a file. */
+const CHOOSE = "file …";
 
 /** What changes how the page shows what it has. */
 const LOOKS = ["scale", "normalise", "dark", "lobes", "wire"];
@@ -51,8 +54,8 @@ function drawAll() {
   const parts = [...stale];
   stale.clear();
   for (const part of parts) {
-    if (part in DRAW) {
-      if (session.state.views.includes(part)) DRAW[part]();
+    if (part in cards) {
+      if (session.state.views.includes(part)) cards[part].draw();
     } else {
       ({ bars: drawBars, subjects: drawSubjects, tour: drawTour })[part]();
     }
@@ -63,57 +66,37 @@ const redrawAll = () => redraw("bars", "subjects", "tour", ...VIEWS);
 
 // --- Bars -----------------------------------------------------------------------------------------------------------
 
-/** Tie a field to a name of the state. */
-function tie(id, name, read = (field) => field.value, write = (field, value) => (field.value = value)) {
-  const field = byId(id);
-  const event = field.type === "range" || field.type === "checkbox" ? "input" : "change";
-  field.addEventListener(event, () => change({ [name]: read(field) }));
+/** Tie a field to the member of the state that its `data-member` names. */
+function tie(field) {
+  const { member } = field.dataset;
+  const isMoved = field.type === "range" || field.type === "checkbox";
+  const isNumber = member in LIMITS;
+  if (isNumber && field.type !== "select-one") {
+    const [low, high] = LIMITS[member];
+    field.min ||= low;
+    field.max ||= high;
+  }
+  const number = () => (field.value === "" ? null : Number(field.value));
+  const chosen = () => (field.type === "checkbox" ? field.checked : isNumber ? number() : field.value);
+  field.addEventListener(isMoved ? "input" : "change", () => {
+    if (field.value === CHOOSE) chooseFile(field);
+    else change({ [member]: chosen() });
+  });
   on("draw-bars", () => {
-    const shown = session.state[name];
-    if (document.activeElement !== field || field.type === "range" || field.type === "checkbox") write(field, shown);
+    const shown = session.state[member];
+    if (field.type === "checkbox") field.checked = shown;
+    else if (isMoved || document.activeElement !== field) field.value = shown ?? "";
   });
 }
 
-const asNumber = (field) => (Number.isFinite(field.valueAsNumber) ? field.valueAsNumber : 0);
-const asFlag = (field) => field.checked;
-const showFlag = (field, value) => (field.checked = value);
-
 function startBars() {
-  for (const [name, ...ids] of [
-    ["theta", "theta-slider", "theta-field"],
-    ["phi", "phi-slider", "phi-field"],
-    ["exposure", "exposure-slider", "exposure-field"],
-    ["turn", "turn"],
-  ]) {
-    for (const id of ids) {
-      const [low, high] = LIMITS[name];
-      byId(id).min ||= low;
-      byId(id).max ||= high;
-      tie(id, name, asNumber);
-    }
-  }
-  for (const name of ["channel", "scale", "compare"]) setWords(name, WORDS[name], { side: "side by side" });
+  for (const name of ["channel", "scale", "compare", "lobes"])
+    setWords(name, WORDS[name], { side: "side by side", over: "overlaid" });
   setOptions(
     byId("axis"),
     WORDS.axis.map((word) => [word, AXES[word].symbol]),
   );
-  for (const name of ["channel", "scale", "compare", "axis"]) tie(name, name);
-  for (const name of ["stage", "shape"]) tie(name, name, ({ value }) => value || chooseFile(name));
-  tie(
-    "component",
-    "component",
-    ({ value }) => (value === "" ? null : Number(value)),
-    (field, value) => (field.value = value ?? ""),
-  );
-  tie("normalise", "normalise", asFlag, showFlag);
-  tie("cosine", "cosine", asFlag, showFlag);
-  tie(
-    "side",
-    "lobes",
-    ({ checked }) => (checked ? "side" : "over"),
-    (field, value) => (field.checked = value === "side"),
-  );
-  tie("wire", "wire", asFlag, showFlag);
+  for (const field of document.querySelectorAll("[data-member]")) tie(field);
   for (const [at, id] of ["first", "second"].entries()) {
     byId(id).onchange = ({ target }) => {
       const pair = [...pairOf()];
@@ -132,9 +115,7 @@ function startBars() {
         {
           class: "toggle",
           "data-view": view,
-          onclick: () => {
-            change({ views: withOrWithout(session.state.views, view) });
-          },
+          onclick: () => change({ views: withOrWithout(session.state.views, view) }),
         },
         view,
       ),
@@ -142,10 +123,10 @@ function startBars() {
   );
 }
 
-/** Ask for a file in place of a word, and meanwhile return the word that holds. */
-function chooseFile(name) {
+/** Ask for a file in place of a word, which meanwhile holds. */
+function chooseFile(field) {
   byId("file").click();
-  return (byId(name).value = session.state[name]);
+  field.value = session.state[field.dataset.member];
 }
 
 /** Return views without one, or with it: in its usual place, or last where a tour has put them in another order. */
@@ -167,7 +148,7 @@ const setWords = (id, words, told = {}, ...more) =>
 
 function drawBars() {
   const { state, hello, info } = session;
-  const own = session.exported ? [] : [["", "file …"]];
+  const own = session.exported ? [] : [[CHOOSE, CHOOSE]];
   setWords("stage", hello?.stages ?? [state.stage], { incidence: "from ωi" }, ...own);
   setWords("shape", hello?.shapes ?? [state.shape], { scene: hello?.scene }, ...own);
   byId("stage").parentElement.hidden = state.shape === "scene";
@@ -196,34 +177,13 @@ function drawBars() {
     setOptions(field, names);
     field.value = k;
   });
-  byId("side-row").hidden = !several;
+  byId("lobes").hidden = !several;
   if (state.dark === null) delete document.documentElement.dataset.dark;
   else document.documentElement.dataset.dark = state.dark;
   byId("theme").textContent = isDark() ? "Light" : "Dark";
   const told = state.subjects.map(({ name }) => name).join(", ");
   document.title = `${told || "Explorer"} · mi_brdfs`;
   if (session.exported) byId("version").textContent = `${told}: move a slider, turn the lobe, point at a curve`;
-}
-
-// --- The sampler's test ---------------------------------------------------------------------------------------------
-
-const verdicts = [];
-
-function chi2Box() {
-  const row = (k) => {
-    const test = () => {
-      verdicts[k] = "testing …";
-      post({ type: "chi2", subject: k });
-      redraw("sampler");
-    };
-    const button = session.exported ? null : element("button", { onclick: test }, "χ² test");
-    const { efficiency } = session.shown.sampler[k] ?? {};
-    const told = [session.state.subjects[k].name];
-    if (efficiency !== undefined) told.push(`efficiency η ${format(efficiency)}`);
-    if (verdicts[k]) told.push(verdicts[k]);
-    return element("p", { class: "marked", style: `--mark:${colourOf(k)}` }, button, ` ${told.join(": ")}`);
-  };
-  return element("div", { class: "verdicts" }, ...visible().map(row));
 }
 
 // --- Messages -------------------------------------------------------------------------------------------------------
@@ -237,17 +197,13 @@ function startMessages() {
   on("busy", ({ text }) => say(text));
   on("reloaded", () => (byId("alert").hidden = true));
   on("idle", () => say(""));
-  on("error", (text) => {
+  on("error", ({ text }) => {
     byId("alert-text").textContent = text;
     byId("alert").hidden = false;
   });
-  on("chi2", ({ subject, passed, text }) => {
-    verdicts[subject] = `${passed === undefined ? "" : passed ? "passed: " : "failed: "}${text}`;
-    redraw("sampler");
-  });
-  on("connection", () => {
-    byId("lost").hidden = session.connected;
-    if (!session.connected) say("");
+  on("connection", (connected) => {
+    byId("lost").hidden = connected;
+    if (!connected) say("");
   });
 }
 
@@ -276,43 +232,14 @@ function openAddress() {
   goTo(found, false);
 }
 
-function start() {
-  for (const view of VIEWS) {
-    const card = makeCard(view, ...TITLES[view]);
-    byId(view === "picture" ? "picture-place" : "grid").append(card.node);
-    if (view === "slice" || view === "hemisphere") card.image = (done) => mapsImage(view).toBlob(done);
-  }
-  for (const view of ["polar", "cartesian", "albedo"]) cards[view].table = () => table(view);
-  cards.sampler.table = () => [
-    ["material", "theta_i_degrees", "efficiency"],
-    ...visible().flatMap((k) =>
-      (session.shown.sampler[k]?.eta.x ?? []).map((angle, at) => [
-        session.state.subjects[k].name,
-        angle,
-        session.shown.sampler[k].eta.y[at],
-      ]),
-    ),
-  ];
-  cards.lobe.image = (done) => {
-    drawLobe();
-    cards.lobe.figure.querySelector("canvas")?.toBlob(done);
-  };
-  for (const view of ["picture", "lobe", "cartesian"]) cards[view].tools.before(byId(`${view}-bar`));
-  startPicture();
-  startLobe();
-  startSubjects();
-  startDialogs();
-  startTours();
-  startBars();
-  startMessages();
-
+function startListening() {
   on("sending", () => (session.state.size = wantedSize()));
   on("state", (push, names) => {
     keepAddress(push);
     if (names?.every((name) => name === "wipe")) return redraw("picture");
     redrawAll();
     if (names?.every((name) => LOOKS.includes(name))) return;
-    verdicts.length = 0;
+    emit("stale");
     sendState();
   });
   on("selected", () => redraw("bars", "subjects"));
@@ -332,9 +259,8 @@ function start() {
     session.state = session.state.subjects.length
       ? clean(session.state)
       : (readFragment(location.hash) ?? clean(session.hello.state));
-    if (!session.exported) emit("state", false);
+    emit("state", false);
     for (const id of ["tours", "share", "add"]) byId(id).disabled = false;
-    byId("tours").hidden = !session.hello.tours?.length;
     byId("version").textContent = `${session.hello.version} · ${session.hello.variant}`;
   });
   // What is under a moving hand is drawn coarsely, and anew when the hand lets go.
@@ -348,23 +274,33 @@ function start() {
   addEventListener("hashchange", openAddress);
   addEventListener("popstate", openAddress);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
+}
+
+/** Arrange what has another place on a phone: there, pictures and polar plot stay in sight of the sliders, without the
+ * bar of the pictures. */
+function arrangeCards() {
+  const { picture, lobe, polar } = cards;
+  const bar = byId("picture-bar");
+  bar.open = !phone.matches;
+  if (phone.matches) byId("picture-place").before(bar);
+  else picture.tools.before(bar);
+  (phone.matches ? picture : lobe).node.after(polar.node);
+}
+
+function start() {
+  for (const view of VIEWS) byId(view === "picture" ? "picture-place" : "grid").append(makeCard(view, CARDS[view]).node);
+  for (const view of ["lobe", "cartesian"]) cards[view].tools.before(byId(`${view}-bar`));
+  arrangeCards();
+  phone.addEventListener("change", arrangeCards);
+  for (const begin of [startPicture, startLobe, startSampler, startSubjects, startDialogs, startTours, startBars]) begin();
+  startMessages();
+  startListening();
   let width = innerWidth;
-  const observer = new ResizeObserver(() => {
+  new ResizeObserver(() => {
     if (session.hello && wantedSize() !== session.state.size) sendState();
-    // Where the picture stays in sight on a phone, the bar above it does not.
-    document.documentElement.style.setProperty("--above", `${byId("picture-bar").parentElement.offsetHeight + 12}px`);
-    // There, the polar plot stays with it, in sight of the sliders.
-    const before = cards[innerWidth > 700 ? "lobe" : "picture"].node;
-    if (before.nextElementSibling !== cards.polar.node) {
-      before.after(cards.polar.node);
-      redraw("polar");
-    }
-    redraw("lobe");
-    if (innerWidth > 700) byId("picture-bar").open = true;
-    if (innerWidth !== width) redraw(...VIEWS);
+    redraw(...(innerWidth === width ? ["lobe"] : VIEWS));
     width = innerWidth;
-  });
-  for (const node of [document.body, byId("picture-bar")]) observer.observe(node);
+  }).observe(document.body);
   redrawAll();
   connect();
 }

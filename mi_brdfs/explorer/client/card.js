@@ -4,13 +4,13 @@ import { session } from "./session.js";
 
 export const cards = {};
 
-/** Add a card for a view; `files` names the kinds of files that it makes of itself. */
-export function makeCard(view, title, note, files = []) {
+/** Add a card for a view, which `draw` draws; it can be saved if there is an `image`, a canvas, or a `table` of curves. */
+export function makeCard(view, { title, note = "", draw, image, table }) {
   const tools = element("div", { class: "tools" });
   const figure = element("div", { class: `figure ${view}` });
   const readout = element("output", { class: "readout" });
-  const card = { view, title, figure, readout, tools, legend: [] };
-  for (const kind of files) {
+  const card = { view, title, draw, image, table, figure, readout, tools, legend: [] };
+  for (const kind of image ? ["PNG"] : ["SVG", "CSV"]) {
     tools.append(
       element(
         "button",
@@ -51,7 +51,7 @@ function saveAs(card, kind) {
       "text/csv",
     );
   } else {
-    card.image((blob) => save(`${name}.png`, blob));
+    card.image()?.toBlob((blob) => save(`${name}.png`, blob));
   }
 }
 

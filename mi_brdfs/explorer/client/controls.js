@@ -1,5 +1,5 @@
 // Controls of a subject's parameters, made from what the server declares of them.
-import { byId, clamp, element, format, fromDisplay, subscripted, toDisplay } from "./util.js";
+import { byId, clamp, element, format, fromDisplay, onArrows, rgbOf, subscripted, toDisplay } from "./util.js";
 import { changeSubject, session, setParameter } from "./session.js";
 import { scrub } from "./link.js";
 
@@ -23,15 +23,7 @@ export function drawControls() {
   const form = JSON.stringify([
     k,
     session.state.subjects[k].bsdf.type,
-    controls.map(({ name, kind, words, low, high, optional }) => [
-      name,
-      kind,
-      words,
-      low,
-      high,
-      optional,
-      valueOf({ name, value: null }, k) === null && optional,
-    ]),
+    controls.map(({ value, also, ...control }) => [control, isAbsent({ ...control, value }, k)]),
   ]);
   if (info && form !== built) {
     built = form;
@@ -131,19 +123,25 @@ function valueOf({ name, value }, k) {
   return session.state.subjects[k].bsdf[name] ?? value ?? null;
 }
 
+/** Return whether a parameter is left out, by the page or, as far as that says nothing, by the server. */
+const isAbsent = (control, k) => control.optional && valueOf(control, k) === null;
+
 function makeRow(control, k) {
   const id = `control-${control.name}`;
-  const set = (value) => setParameter(k, control, value);
-  const absent = control.optional && valueOf({ name: control.name, value: null }, k) === null && control.value == null;
+  const now = () => session.info[k]?.controls.find(({ name }) => name === control.name) ?? control;
+  const set = (value) => setParameter(k, now(), value);
+  const absent = isAbsent(control, k);
   const error = element("p", { class: "error", id: `${id}-error`, role: "alert" });
   const described = { "aria-describedby": `${id}-error` };
-  const usual =
-    control.default ??
-    { number: middle(control), colour: 0.5, choice: control.words?.[0], flag: true, text: "" }[control.kind];
   if (absent) {
+    const usual = { number: middle, colour: () => 0.5, choice: ({ words }) => words[0], flag: () => true, text: () => "" };
     const node = element(
       "button",
-      { class: "small", title: control.text ?? "", onclick: () => set(usual) },
+      {
+        class: "small",
+        title: control.text ?? "",
+        onclick: () => set(control.default ?? usual[control.kind](control)),
+      },
       "+ ",
       element("code", {}, control.name),
     );
@@ -175,120 +173,94 @@ function makeRow(control, k) {
 
 // --- Numbers --------------------------------------------------------------------------------------------------------
 
-const highOf = ({ low, high, value, default: usual }) =>
-  high ?? Math.max(10 * Math.abs(usual ?? 0), 4 * Math.abs(Number(value) || 0), (low ?? 0) + 1);
-const lowOf = ({ low, default: usual }) => low ?? -Math.max(1, 10 * Math.abs(usual ?? 0));
-
 /** Return maps between a number and a slider's place in 0…1. */
-function slide(control) {
-  const [low, high] = [lowOf(control), highOf(control)];
-  if (control.scale !== "log") return [(value) => (value - low) / (high - low), (place) => low + place * (high - low)];
-  const first = low > 0 ? low : high * 1e-6;
-  const reach = Math.log(high / first);
-  return [
-    (value) => Math.log(Math.max(value, first) / first) / reach,
-    (place) => (place <= 0 ? low : first * Math.exp(place * reach)),
-  ];
+function slide({ low, high, scale }) {
+  if (scale !== "log") return [(value) => (value - low) / (high - low), (place) => low + place * (high - low)];
+  const reach = Math.log(high / low);
+  return [(value) => Math.log(Math.max(value, low) / low) / reach, (place) => low * Math.exp(place * reach)];
 }
 
-function middle(control) {
-  return Number(slide(control)[1](0.5).toPrecision(2));
-}
-
+const middle = (control) => Number(slide(control)[1](0.5).toPrecision(2));
 const rounded = (value) => Number(value.toPrecision(4));
 const settled = (input, text) => {
   if (document.activeElement !== input) input.value = text;
 };
 
-function makeNumber(control, id, set, described) {
+/** Return a slider that gives what is chosen to `choose`, and what shows a number on it. Arrow keys move it by a
+ * hundredth, with Shift by a thousandth. */
+function makeSlider(control, id, described, choose) {
   const [place, value] = slide(control);
   const slider = element("input", { type: "range", id, min: 0, max: STEPS, step: 1, ...described });
-  const field = element("input", {
+  slider.oninput = () => choose(rounded(value(slider.value / STEPS)));
+  onArrows(slider, (right, up, { shiftKey }) => {
+    slider.value = Number(slider.value) + (right + up) * (shiftKey ? 1 : STEPS / 100);
+    slider.oninput();
+  });
+  const show = (number) => {
+    settled(slider, Math.round(clamp(place(number ?? 0), 0, 1) * STEPS));
+    slider.setAttribute("aria-valuetext", format(number, 4));
+  };
+  return [slider, show];
+}
+
+const makeField = (attributes, choose) =>
+  element("input", {
     type: "number",
     step: "any",
-    "aria-label": `${control.name}, as a number`,
-    ...described,
+    ...attributes,
+    onchange: ({ target }) => target.value !== "" && choose(target.valueAsNumber),
   });
-  slider.oninput = () => {
-    const chosen = rounded(value(slider.value / STEPS));
+
+function makeNumber(control, id, set, described) {
+  const [slider, slideTo] = makeSlider(control, id, described, (chosen) => {
     field.value = chosen;
     set(chosen);
-  };
-  slider.onkeydown = coarse(slider);
-  field.onchange = () => field.value !== "" && set(Number(field.value));
+  });
+  const field = makeField({ "aria-label": `${control.name}, as a number`, ...described }, set);
   const show = (given) => {
     const number = typeof given === "number" ? given : control.default;
-    settled(slider, Math.round(clamp(place(number ?? 0), 0, 1) * STEPS));
+    slideTo(number);
     settled(field, number == null ? "" : rounded(number));
-    slider.setAttribute("aria-valuetext", format(number, 4));
   };
   return { body: element("div", { class: "pair" }, slider, field), show };
 }
 
-/** Arrow keys move a slider by a hundredth, with Shift by a thousandth. */
-const coarse = (slider) => (event) => {
-  const way = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
-  if (!way || event.shiftKey) return;
-  event.preventDefault();
-  slider.value = Number(slider.value) + way * (STEPS / 100);
-  slider.oninput();
-};
-
 // --- Colours --------------------------------------------------------------------------------------------------------
 
 const asColour = (value) => (Array.isArray(value) ? value : [value ?? 0, value ?? 0, value ?? 0]);
-const hex = (colour) =>
-  "#" +
-  colour
-    .map((v) =>
-      Math.round(255 * toDisplay(clamp(v, 0, 1)))
-        .toString(16)
-        .padStart(2, "0"),
-    )
-    .join("");
+const byte = (value) => Math.round(255 * toDisplay(clamp(value, 0, 1)));
+const hex = (colour) => "#" + colour.map((value) => byte(value).toString(16).padStart(2, "0")).join("");
 
 /** A colour in linear rgb: a level for all three channels, a number for each, and a picker where they are in 0…1. */
 function makeColour(control, id, set, described) {
   let current = asColour(control.value);
-  const [place, value] = slide({
-    ...control,
-    value: Math.max(...current),
-    default: Math.max(...asColour(control.default ?? 0)),
-  });
-  const level = element("input", { type: "range", id, min: 0, max: STEPS, step: 1, ...described });
-  const picker = element("input", { type: "color", "aria-label": `${control.name}, as a colour` });
-  const fields = ["red", "green", "blue"].map((channel, c) => {
-    const field = element("input", {
-      type: "number",
-      step: "any",
-      "aria-label": `${control.name}, ${channel}`,
-      class: channel,
-    });
-    field.onchange = () => field.value !== "" && put(current.map((v, at) => (at === c ? Number(field.value) : v)));
-    return field;
-  });
   const put = (colour) => {
     current = colour.map(rounded);
     set(current);
   };
-  level.oninput = () => {
-    const [wanted, most] = [value(level.value / STEPS), Math.max(...current)];
-    put(most > 0 ? current.map((v) => (v / most) * wanted) : [wanted, wanted, wanted]);
-  };
-  level.onkeydown = coarse(level);
-  picker.oninput = () => put([1, 3, 5].map((at) => fromDisplay(parseInt(picker.value.slice(at, at + 2), 16) / 255)));
+  const [level, slideTo] = makeSlider(control, id, described, (wanted) => {
+    const most = Math.max(...current);
+    put(most > 0 ? current.map((value) => (value / most) * wanted) : [wanted, wanted, wanted]);
+  });
+  const picker = element("input", {
+    type: "color",
+    "aria-label": `${control.name}, as a colour`,
+    oninput: () => put(rgbOf(picker.value).map(fromDisplay)),
+  });
+  const fields = ["red", "green", "blue"].map((channel, c) =>
+    makeField({ "aria-label": `${control.name}, ${channel}`, class: channel }, (number) => put(current.with(c, number))),
+  );
   const show = (given) => {
     current = asColour(given);
-    settled(level, Math.round(clamp(place(Math.max(...current)), 0, 1) * STEPS));
+    slideTo(Math.max(...current));
     settled(picker, hex(current));
-    fields.forEach((field, c) => settled(field, rounded(Number(current[c]))));
+    fields.forEach((field, c) => settled(field, rounded(current[c])));
   };
-  const bounded = (control.high ?? Infinity) <= 1;
   return {
     body: element(
       "div",
       { class: "colours" },
-      element("div", { class: "pair" }, level, bounded ? picker : null),
+      element("div", { class: "pair" }, level, control.high <= 1 ? picker : null),
       element("div", { class: "three" }, ...fields),
     ),
     show,

@@ -1,13 +1,13 @@
 // Data out, and fits: "Share" and "Fit this".
-import { byId, element, format } from "./util.js";
+import { byId, element, format, save } from "./util.js";
 import { addSubject, change, changeSubject, fragment, hasRoom, on, session, tellFull } from "./session.js";
 import { post } from "./link.js";
 import { cards } from "./card.js";
 
 export function startDialogs() {
+  const written = ["xml", "dict", "command"];
   const offer = () => {
-    for (const what of ["xml", "dict", "command"])
-      byId(`copy-${what}`).disabled = !session.info[session.selected]?.[what];
+    for (const what of written) byId(`copy-${what}`).disabled = !session.info[session.selected]?.[what];
   };
   on("subject", offer);
   byId("share").onclick = () => {
@@ -15,8 +15,7 @@ export function startDialogs() {
     byId("share-of").textContent = session.state.subjects[session.selected]?.name ?? "";
     byId("share-dialog").showModal();
   };
-  for (const what of ["xml", "dict", "command"])
-    byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
+  for (const what of written) byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
   byId("copy-link").onclick = () => {
     const uploaded = session.state.subjects.filter(({ bsdf }) => bsdf.file?.startsWith("upload-"));
     const warning = uploaded.length ? ` It works only while this server runs, which has the uploaded ${uploaded[0].name}.` : "";
@@ -28,11 +27,12 @@ export function startDialogs() {
   byId("write-scene").onclick = () => ask({ type: "save", what: "scene", subject: session.selected });
   on("hello", () => (byId("scene-row").hidden = !session.hello.scene));
   for (const event of ["written", "error"])
-    on(event, (told) => byId("share-dialog").open && (byId("shared").textContent = told.text ?? told));
-  on("saved", () => (byId("shared").textContent = "Saved."));
+    on(event, ({ text }) => byId("share-dialog").open && (byId("shared").textContent = text));
+  on("file", ({ name, data, mime }) => {
+    save(name, data, mime);
+    byId("shared").textContent = "Saved.";
+  });
   startFit();
-  for (const button of document.querySelectorAll("dialog .close"))
-    button.onclick = () => button.closest("dialog").close();
   for (const dialog of document.querySelectorAll("dialog")) {
     dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
     dialog.addEventListener("close", () => (byId("shared").textContent = ""));

@@ -1,6 +1,7 @@
 // What plots are drawn with: paths, labels, axes, and a crosshair that pointer and keys move.
-import { PALETTE, clamp, format, largest, shape, subscripted } from "./util.js";
+import { PALETTE, clamp, format, interpolate, largest, onArrows, onPointer, shape, subscripted } from "./util.js";
 import { session } from "./session.js";
+import { tell } from "./card.js";
 
 export const isDark = () => session.state.dark ?? matchMedia("(prefers-color-scheme: dark)").matches;
 export const colourOf = (k) => PALETTE[session.state.subjects[k]?.colour ?? k][Number(isDark())];
@@ -43,36 +44,30 @@ export function stroke(curve, points) {
   });
 }
 
-export function summary(curves, what, unit) {
+export function summary(curves, what) {
   const parts = curves.map(({ name, x, y }) => {
     const peak = largest([y]);
-    return `${name}: at most ${format(peak)}${unit} at ${format(x[y.findIndex((value) => value === peak)] ?? 0)}°`;
+    return `${name}: at most ${format(peak)} at ${format(x[y.findIndex((value) => value === peak)] ?? 0)}°`;
   });
   return `${what}. ${parts.join("; ") || "No data yet"}.`;
 }
 
 /** A crosshair that pointer and arrow keys move: `angleAt` maps a place to an angle, `cross` draws it. */
-export function attach(card, svg, angleAt, range, cross) {
+export function attach(svg, angleAt, range, cross) {
   let angle = null;
   const move = (to) => {
     angle = to;
     cross(to);
   };
-  const follow = (event) => {
-    const box = svg.getBoundingClientRect();
-    const scale = svg.viewBox.baseVal.width / box.width;
-    move(angleAt((event.clientX - box.left) * scale, (event.clientY - box.top) * scale));
-  };
-  svg.addEventListener("pointermove", follow);
-  svg.addEventListener("pointerdown", follow);
-  svg.addEventListener("pointerleave", () => move(null));
-  svg.addEventListener("blur", () => move(null));
-  svg.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -10, ArrowUp: 10 }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    move(clamp((angle ?? session.state.theta) + step * (event.shiftKey ? 0.1 : 1), ...range));
-  });
+  const { width, height } = svg.viewBox.baseVal;
+  onPointer(
+    svg,
+    (x, y) => move(angleAt(x * width, y * height)),
+    () => move(null),
+  );
+  onArrows(svg, (right, up, { shiftKey }) =>
+    move(clamp((angle ?? session.state.theta) + (right + 10 * up) * (shiftKey ? 0.1 : 1), ...range)),
+  );
 }
 
 export const widthOf = (card, most) => Math.max(Math.min(card.figure.clientWidth, most), 240);
@@ -110,3 +105,42 @@ export function axes(width, height, across, scale, what, unit = "°") {
     clamp(across.low + ((place - left) / (width - left - right)) * (across.high - across.low), across.low, across.high);
   return { svg, x, y, at, clip, top, bottom: height - bottom };
 }
+
+/** Draw curves over an angle, after what `mark` draws; return the drawing, and what moves its crosshair: to an angle, or
+ * with null away. `pointed` is told where the pointer is. */
+export function plot(card, [width, height], curves, across, scale, what, symbol, mark, pointed = null) {
+  const it = axes(width, height, across, scale, what);
+  mark(it);
+  const inside = shape("g", { "clip-path": `url(#${it.clip})` });
+  for (const curve of curves)
+    inside.append(
+      stroke(
+        curve,
+        curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])]),
+      ),
+    );
+  const overlay = shape("g");
+  it.svg.append(inside, overlay);
+  const cross = (angle) => {
+    overlay.replaceChildren();
+    if (angle === null) return tell(card, []);
+    overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
+    dots(overlay, curves, angle, (value) => [it.x(angle), it.y(value)]);
+    tell(card, [[null, `${symbol} ${format(angle)}°`], ...valuesAt(curves, angle)]);
+  };
+  attach(it.svg, it.at, [across.low, across.high], pointed ?? cross);
+  return { svg: it.svg, cross };
+}
+
+/** Mark the values of curves at an angle. */
+export function dots(overlay, curves, angle, place) {
+  for (const curve of curves) {
+    const value = interpolate(curve.x, curve.y, angle);
+    if (!Number.isFinite(value)) continue;
+    const [cx, cy] = place(value);
+    overlay.append(shape("circle", { cx, cy, r: 4, fill: curve.colour, class: "dot" }));
+  }
+}
+
+export const valuesAt = (curves, angle) =>
+  curves.map(({ colour, name, x, y, dash }) => [colour, `${name} ${format(interpolate(x, y, angle), 4)}`, dash]);

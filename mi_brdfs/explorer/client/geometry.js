@@ -14,8 +14,8 @@ export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const scaled = (a, factor) => a.map((value) => value * factor);
 export const sum = (a, b) => a.map((value, k) => value + b[k]);
 
-/** Return the surface of a grid of values, with radii as `radius` maps them. */
-export function makeBody({ theta, phi, values, below }, radius) {
+/** Return the surface of a grid of values above or below the surface, with radii as `radius` maps them. */
+export function makeBody({ theta, phi, values }, below, radius) {
   const [rows, columns] = [theta.length, phi.length];
   const closed = phi[columns - 1] - phi[0] > 359.9;
   const across = closed ? columns : columns + 1;

@@ -1,5 +1,5 @@
 // The connection to the server, or the frames that an exported page carries.
-import { element, save } from "./util.js";
+import { element } from "./util.js";
 import { adopt, change, emit, session, setParameter, stateForServer } from "./session.js";
 
 let socket = null;
@@ -35,16 +35,11 @@ export function connect() {
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     pause = 500;
-    session.connected = true;
-    emit("connection");
+    emit("connection", true);
   };
-  socket.onmessage = ({ data }) => {
-    if (typeof data === "string") receive(JSON.parse(data));
-    else receiveBinary(data);
-  };
+  socket.onmessage = ({ data }) => receive(unpacked(data));
   socket.onclose = () => {
-    session.connected = false;
-    emit("connection");
+    emit("connection", false);
     setTimeout(connect, pause);
     pause = Math.min(2 * pause, 5000);
   };
@@ -64,10 +59,9 @@ async function replay({ state, scrubbers, views, frames, data }) {
   baked = await Promise.all(
     frames.map(async ([at, length, isText]) => {
       const buffer = bytes.slice(end, (end += length));
-      if (isText) return { at, message: JSON.parse(new TextDecoder().decode(buffer)) };
-      const [header, offset] = opened(buffer);
-      if (header.mime) header.pixels = await decoded(new Blob([new Uint8Array(buffer, offset)], { type: header.mime }));
-      return { at, header, buffer, offset };
+      const message = unpacked(isText ? new TextDecoder().decode(buffer) : buffer);
+      if (message.type === "picture") message.pixels = await decoded(new Blob([message.pixels], { type: message.mime }));
+      return { at, message };
     }),
   );
   showBaked(() => true);
@@ -83,11 +77,10 @@ async function decoded(blob) {
 }
 
 function showBaked(concerned) {
-  for (const { at, message, header, buffer, offset } of baked) {
+  for (const { at, message } of baked) {
     if (!concerned(at) || !at.every((place, k) => place === null || place === session.scrubbers[k].at)) continue;
-    if (header) receivePayload(header, buffer, offset);
-    else receive(structuredClone(message));
-    if (message?.view === "polar" && session.state.axis === "theta_o") receive({ ...message, view: "cartesian" });
+    receive(message);
+    if (message.view === "polar" && session.state.axis === "theta_o") receive({ ...message, view: "cartesian" });
   }
 }
 
@@ -111,62 +104,31 @@ export function aimAt(theta, phi) {
   scrub(k, off.indexOf(Math.min(...off)));
 }
 
-/** Keep an answer, unless a newer one is shown; return whether it was kept. */
-function keep(view, subject, answer) {
-  const list = session.shown[view];
-  const before = list?.[subject];
-  if (!list || subject >= session.state.subjects.length) return;
-  if (answer.serial < session.oldest[subject] || answer.serial < before?.serial) return;
-  // A part below the surface belongs to the part above it, or to the one before, until the next one has come.
-  answer.former = before?.serial ?? 0;
-  list[subject] = answer;
-  emit("view", view.replace("Below", ""), subject);
+/** Return the message of a frame: JSON, or the length of a header, the header and bytes, which are the values of its
+ * parts, the pixels of a picture or a file. */
+function unpacked(frame) {
+  if (typeof frame === "string") return JSON.parse(frame);
+  const start = 4 + new DataView(frame).getUint32(0, true);
+  const message = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, start - 4)));
+  if (message.type === "file") return { ...message, data: new Uint8Array(frame, start) };
+  if (message.type === "picture") return { ...message, pixels: new Uint8ClampedArray(frame, start) };
+  let at = start;
+  for (const part of message.parts) {
+    part.values = new Float32Array(frame, at, part.size);
+    at += part.values.byteLength;
+  }
+  return message;
 }
 
+/** Take a message. What is older than what is shown of a subject is about another state. */
 function receive(message) {
-  if (message.type === "hello") {
-    session.hello = message;
-    emit("hello");
-  } else if (message.type === "subject") {
-    if (message.serial < session.oldest[message.subject] || message.serial < session.info[message.subject]?.serial)
-      return;
-    session.info[message.subject] = message;
-    emit("subject", message.subject);
-    adopt(message.subject, message.bsdf);
-  } else if (message.type === "view") {
-    keep(message.view, message.subject, message);
-  } else {
-    emit(message.type, message.type === "error" ? message.text : message);
-  }
-}
-
-function receiveBinary(buffer) {
-  const [header, offset] = opened(buffer);
-  receivePayload(header, buffer, offset);
-}
-
-/** Return the header of a binary frame, and where its payload begins. */
-function opened(buffer) {
-  const length = new DataView(buffer).getUint32(0, true);
-  return [JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length))), 4 + length];
-}
-
-function receivePayload(header, buffer, offset) {
-  if (header.type === "file") {
-    save(header.name, new Uint8Array(buffer, offset), header.mime);
-    emit("saved", header.name);
-  } else if (header.type === "picture") {
-    const pixels = header.pixels ?? new Uint8ClampedArray(buffer, offset, 4 * header.width * header.height);
-    keep("picture", header.subject, { ...header, pixels });
-  } else {
-    const values = new Float32Array(buffer, offset);
-    keep(header.type + (header.below ? "Below" : ""), header.subject, { ...header, values });
-  }
-}
-
-/** Return the part below the surface that belongs to what is shown of a view, if there is one. */
-export function belowOf(view, subject) {
-  const above = session.shown[view][subject];
-  const below = session.shown[view + "Below"][subject];
-  return above && below && below.serial >= Math.min(above.former || above.serial, above.serial) ? below : null;
+  const { type, view = type, subject, serial } = message;
+  if (type === "hello") session.hello = message;
+  if (serial === undefined) return emit(type, message);
+  const list = type === "subject" ? session.info : session.shown[view];
+  if (serial < session.oldest[subject] || serial < list[subject]?.serial) return;
+  list[subject] = message;
+  if (type !== "subject") return emit("view", view);
+  emit("subject");
+  adopt(subject, message.bsdf);
 }

@@ -1,9 +1,9 @@
 // The lobe as a body to turn, drawn by WebGL; the arrow of wi can be dragged.
-import { clamp, decades, degrees, element, format, largest, radians, subscripted } from "./util.js";
+import { clamp, decades, degrees, element, format, largest, onArrows, radians, rgbOf, subscripted, wrapped } from "./util.js";
 import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geometry.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { aimAt, belowOf } from "./link.js";
+import { aimAt } from "./link.js";
 import { colourOf } from "./drawing.js";
 import { quantity } from "./plots.js";
 
@@ -20,7 +20,7 @@ const camera = { yaw: 1.87, pitch: 0.42, distance: 3.8 };
 let gl, program, canvas, labels, places;
 const bodies = new Map();
 
-/** Put the canvas into its card; return whether there is WebGL. */
+/** Put the canvas into its card. */
 export function startLobe() {
   const card = cards.lobe;
   canvas = element("canvas", { tabindex: 0, role: "img" });
@@ -29,7 +29,7 @@ export function startLobe() {
     card.figure.append(
       element("p", {}, "This browser has no WebGL 2, which the lobe needs; the polar plot shows its cut."),
     );
-    return false;
+    return;
   }
   card.legend = [
     [null, "Drag ωi to move it, or elsewhere to rotate. Arrow keys rotate; Shift+arrows move ωi."],
@@ -45,7 +45,6 @@ export function startLobe() {
     drawLobe();
   });
   listen();
-  return true;
 }
 
 function setUp() {
@@ -126,7 +125,7 @@ export function drawLobe() {
   const { state } = session;
   const found = visible()
     .filter((k) => session.shown.lobe[k])
-    .map((k) => ({ subject: k, parts: [session.shown.lobe[k], belowOf("lobe", k)].filter(Boolean) }));
+    .map((k) => ({ subject: k, parts: session.shown.lobe[k].parts }));
   const arrays = found.map(({ parts }) => parts.map(({ values }) => values));
   const peaks = arrays.map((values) => largest(values));
   const common = Math.max(...peaks, 0) || 1;
@@ -144,14 +143,14 @@ export function drawLobe() {
       const share = value / over[k];
       return !(share > 0) ? 0 : Math.min(log ? Math.max((Math.log10(share) - low) / (high - low), 0) : share, 1);
     };
-    for (const part of parts) {
-      const slot = `${subject}${part.below ? "-" : "+"}`;
-      const stamp = `${part.serial} ${over[k]} ${low} ${log}`;
+    for (const [at, part] of parts.entries()) {
+      const slot = `${subject} ${at}`;
+      const stamp = `${over[k]} ${low} ${log}`;
       used.add(slot);
       const before = bodies.get(slot);
-      if (before?.stamp === stamp && before.of === part.values) continue;
+      if (before?.stamp === stamp && before.of === part) continue;
       if (before) discard(before);
-      bodies.set(slot, Object.assign(upload(makeBody(part, radius)), { stamp, of: part.values }));
+      bodies.set(slot, Object.assign(upload(makeBody(part, at > 0, radius)), { stamp, of: part }));
     }
   });
   for (const [slot, body] of bodies) {
@@ -171,6 +170,12 @@ export function drawLobe() {
     log ? `, logarithmic from ${format(10 ** low * (state.normalise ? 1 : common), 2)}` : "",
     state.normalise ? ", over their peaks" : `, at most ${format(common)}`,
   );
+}
+
+/** Return the canvas, just drawn, or null without WebGL. */
+export function lobeImage() {
+  drawLobe();
+  return gl && canvas;
 }
 
 function render(found) {
@@ -219,10 +224,10 @@ function render(found) {
     const shown = side ? [found[at]] : found;
     const alone = shown.length === 1;
     for (const { subject, parts } of shown) {
-      const colour = [1, 3, 5].map((k) => parseInt(colourOf(subject).slice(k, k + 2), 16) / 255);
+      const colour = rgbOf(colourOf(subject));
       const faded = session.info[subject]?.error ? 0.3 : 1;
-      for (const { below } of parts) {
-        const body = bodies.get(`${subject}${below ? "-" : "+"}`);
+      for (const at of parts.keys()) {
+        const body = bodies.get(`${subject} ${at}`);
         gl.depthMask(alone && !state.wire && faded === 1);
         if (!state.wire) paint(body, colour, (alone ? 0.94 : 0.38) * faded, 1);
         gl.depthMask(true);
@@ -264,6 +269,9 @@ function listen() {
     fingers.set(event.pointerId, local(event));
     dragged = nearTip(local(event), event.pointerType === "touch" ? 40 : 24);
   });
+  // A thumb that scrolls the page past the lobe neither turns it nor moves wi; one on wi does not scroll.
+  const hold = (event) => (dragged || event.touches.length > 1) && event.preventDefault();
+  canvas.addEventListener("touchstart", hold, { passive: false });
   canvas.addEventListener("pointermove", (event) => {
     const point = local(event);
     const before = fingers.get(event.pointerId);
@@ -296,19 +304,14 @@ function listen() {
     { passive: false },
   );
   canvas.addEventListener("keydown", (event) => {
-    if (event.key === "+" || event.key === "-") return zoomBy(event.key === "+" ? 0.9 : 1.1);
-    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-    if (!way) return;
-    event.preventDefault();
-    if (!event.shiftKey) return turn(way[0] * 0.1, way[1] * 0.1);
-    const { theta, phi } = session.state;
-    const step = session.exported ? 10 : 2;
-    aimAt(theta - step * way[1], wrapped(phi + 5 * way[0]));
+    if (event.key === "+" || event.key === "-") zoomBy(event.key === "+" ? 0.9 : 1.1);
   });
-  canvas.addEventListener("pointerleave", () => tell(cards.lobe, []));
+  onArrows(canvas, (right, up, { shiftKey }) => {
+    if (!shiftKey) return turn(0.1 * right, 0.1 * up);
+    const { theta, phi } = session.state;
+    aimAt(theta - (session.exported ? 10 : 2) * up, wrapped(phi + 5 * right));
+  });
 }
-
-const wrapped = (phi) => ((phi + 540) % 360) - 180;
 
 function turn(yaw, pitch) {
   camera.yaw += yaw;

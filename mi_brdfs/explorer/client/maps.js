@@ -1,17 +1,15 @@
 // Maps in false colours: the θh × θd slice and the hemisphere.
-import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, power, shape, subscripted } from "./util.js";
+import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, onArrows, onPointer, power, shape, subscripted, wrapped } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { belowOf } from "./link.js";
 import { quantity } from "./plots.js";
 
 /** Draw the maps of a view beside each other, on one logarithmic scale of colours. */
 export function drawMaps(view) {
   const card = cards[view];
-  const found = visible().flatMap((k) => {
-    const below = view === "hemisphere" && belowOf(view, k);
-    return [session.shown[view][k], below].filter(Boolean).map((map) => ({ ...map, subject: k }));
-  });
+  const found = visible().flatMap((subject) =>
+    (session.shown[view][subject]?.parts ?? []).map((part, at) => ({ ...part, subject, below: at > 0 })),
+  );
   const arrays = found.map(({ values }) => values);
   const peak = largest(arrays);
   const [low, high] = decades(arrays, peak);
@@ -56,20 +54,8 @@ function addBox(card, view) {
     frame.querySelector(".spot").hidden = true;
     tell(card, []);
   };
-  const follow = (event) => {
-    const area = canvas.getBoundingClientRect();
-    show((event.clientX - area.left) / area.width, (event.clientY - area.top) / area.height);
-  };
-  canvas.addEventListener("pointermove", follow);
-  canvas.addEventListener("pointerdown", follow);
-  canvas.addEventListener("pointerleave", hide);
-  canvas.addEventListener("blur", hide);
-  canvas.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    show(spot[0] + step[0] / 45, spot[1] + step[1] / 45);
-  });
+  onPointer(canvas, show, hide);
+  onArrows(canvas, (right, up) => show(spot[0] + right / 45, spot[1] - up / 45));
   return box;
 }
 
@@ -83,7 +69,7 @@ function where(view, map, x, y) {
   const [along, across] = [2 * x - 1, 2 * y - 1];
   const theta = 90 * Math.hypot(along, across);
   if (theta > 90) return `${name}: outside the hemisphere`;
-  const azimuth = ((degrees(Math.atan2(-across, -along)) + session.state.phi + 540) % 360) - 180;
+  const azimuth = wrapped(degrees(Math.atan2(-across, -along)) + session.state.phi);
   return `${name}: θo ${format(map.below ? 180 - theta : theta)}°, φ ${format(azimuth)}°: ${told(map, quantity(), value)}`;
 }
 

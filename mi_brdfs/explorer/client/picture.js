@@ -1,45 +1,28 @@
 // The pictures: side by side, wiped over each other, or their difference.
-import { clamp, element, format, fromDisplay } from "./util.js";
+import { clamp, element, format, fromDisplay, onArrows, onPointer, wrapped } from "./util.js";
 import { change, session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { colourOf } from "./drawing.js";
 
 const SIZES = [128, 192, 256, 384, 512];
 const canvases = new Map();
-let stack, handle;
+let stack, divider;
 
 export function startPicture() {
   const card = cards.picture;
   stack = element("div", { class: "pictures" });
-  handle = element("div", {
+  divider = element("input", {
+    type: "range",
     class: "divider",
-    role: "slider",
-    tabindex: 0,
+    min: 0,
+    max: 1,
+    step: 0.01,
     "aria-label": "Divider between the two pictures",
-    "aria-valuemin": 0,
-    "aria-valuemax": 100,
+    oninput: () => change({ wipe: divider.valueAsNumber }),
   });
   card.figure.append(stack);
-  handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
-  handle.addEventListener("pointermove", (event) => {
-    if (!handle.hasPointerCapture(event.pointerId)) return;
-    const box = handle.parentElement.getBoundingClientRect();
-    slideTo((event.clientX - box.left) / box.width);
-  });
-  handle.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: -0.02, ArrowRight: 0.02, ArrowDown: -0.02, ArrowUp: 0.02, Home: -1, End: 1 }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    slideTo(session.state.wipe + step);
-  });
   if (!session.exported) card.legend = [[null, "Drag or use the arrow keys to orbit; double-click to reset."]];
   tell(card, []);
-  card.image = (done) => stack.querySelector("canvas") && flat().toBlob(done);
-}
-
-function slideTo(share) {
-  change({ wipe: clamp(share, 0, 1) });
-  drawPicture();
 }
 
 /** Return the size in pixels to ask for: what the layout shows, as far as pictures can follow edits. */
@@ -68,6 +51,7 @@ export function drawPicture() {
     const canvas = canvases.get(k);
     if (answer && canvas.answer !== answer) put(canvas, answer);
     else if (!answer) canvas.width = canvas.width;
+    canvas.classList.toggle("awaited", !answer && !session.info[k]?.error);
     canvas.closest(".frame").classList.toggle("dimmed", Boolean(session.info[k]?.error));
     canvas.setAttribute(
       "aria-label",
@@ -81,13 +65,12 @@ export function drawPicture() {
       : "";
   }
   if (mode === "wipe") {
-    const share = session.state.wipe;
-    canvases.get(shown[0]).style.clipPath = `inset(0 ${100 * (1 - share)}% 0 0)`;
-    handle.style.left = `${100 * share}%`;
-    handle.setAttribute("aria-valuenow", Math.round(100 * share));
-    handle.setAttribute(
+    const { wipe } = session.state;
+    stack.style.setProperty("--wipe", wipe);
+    divider.value = wipe;
+    divider.setAttribute(
       "aria-valuetext",
-      `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * share)}\u00a0%`,
+      `${session.state.subjects[shown[0]].name} up to ${Math.round(100 * wipe)}\u00a0%`,
     );
   }
   if (mode === "difference") drawDifference(shown);
@@ -97,16 +80,15 @@ function build(mode, shown, layout) {
   stack.dataset.layout = layout;
   cards.picture.node.classList.toggle("wide", mode === "side" && shown.length > 1);
   stack.className = `pictures ${mode} of-${mode === "side" ? shown.length : 1}`;
-  for (const k of shown) if (!canvases.has(k)) canvases.set(k, element("canvas", { role: "img" }));
+  for (const k of shown) if (!canvases.has(k)) canvases.set(k, makeCanvas(k));
   const caption = (k) => element("figcaption", { "data-subject": k, class: "marked" }, element("b"), element("small"));
-  for (const k of shown) canvases.get(k).style.clipPath = "";
   if (mode === "side") {
     stack.replaceChildren(
-      ...shown.map((k) => element("figure", {}, element("div", { class: "frame" }, watched(k)), caption(k))),
+      ...shown.map((k) => element("figure", {}, element("div", { class: "frame" }, canvases.get(k)), caption(k))),
     );
   } else {
-    const frame = element("div", { class: "frame" }, watched(shown[1]), watched(shown[0]));
-    if (mode === "wipe") frame.append(handle);
+    const frame = element("div", { class: "frame" }, canvases.get(shown[1]), canvases.get(shown[0]));
+    if (mode === "wipe") frame.append(divider);
     else frame.append(element("canvas", { class: "difference", role: "img" }));
     stack.replaceChildren(
       element(
@@ -120,35 +102,28 @@ function build(mode, shown, layout) {
   }
 }
 
-function watched(k) {
-  const canvas = canvases.get(k);
-  canvas.onpointermove = (event) => {
+function makeCanvas(k) {
+  const canvas = element("canvas", { role: "img" });
+  const at = (x, y, event) => {
     if (canvas.hasPointerCapture(event.pointerId)) goAround(event.movementX, event.movementY);
-    point(canvas, k, event);
+    point(k, x, y);
   };
-  canvas.onpointerleave = () => tell(cards.picture, []);
+  onPointer(canvas, at, () => tell(cards.picture, []));
   if (session.exported) return canvas;
   canvas.tabIndex = 0;
   canvas.onpointerdown = (event) => canvas.setPointerCapture(event.pointerId);
   canvas.ondblclick = () => change({ yaw: 0, pitch: 0 });
-  canvas.onkeydown = (event) => {
-    const way = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
-    if (!way) return;
-    event.preventDefault();
-    goAround(...way);
-  };
+  onArrows(canvas, (right, up) => goAround(10 * right, -10 * up));
   return canvas;
 }
 
 /** Let the camera go around, so that what is shown follows the hand, half a degree a pixel. */
 function goAround(right, down) {
   const { yaw, pitch } = session.state;
-  change({ yaw: ((yaw - right / 2 + 540) % 360) - 180, pitch: pitch + down / 2 });
+  change({ yaw: wrapped(yaw - right / 2), pitch: pitch + down / 2 });
 }
 
-function point(canvas, k, event) {
-  const box = canvas.getBoundingClientRect();
-  const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+function point(k, x, y) {
   const shown = modeOf() === "side" ? [k] : pairOf();
   tell(
     cards.picture,
@@ -211,9 +186,10 @@ function drawDifference([a, b]) {
   canvas.setAttribute("aria-label", told.textContent);
 }
 
-/** Return the pictures as they are shown, on one canvas. */
-function flat() {
+/** Return the pictures as they are shown, on one canvas, or null if all are hidden. */
+export function pictureImage() {
   const frames = [...stack.querySelectorAll(".frame")];
+  if (!frames.length) return null;
   const { width, height } = [...stack.querySelectorAll("canvas")].sort((a, b) => b.width - a.width)[0];
   const result = element("canvas", { width: width * frames.length, height });
   const context = result.getContext("2d");

@@ -1,8 +1,8 @@
 // Curves: the plane of incidence as polar and cartesian plots; and albedo.
-import { CHANNELS, DASHES, clamp, degrees, format, interpolate, largest, radians, shape, subscripted, valueScale } from "./util.js";
+import { CHANNELS, DASHES, clamp, degrees, format, largest, phone, radians, shape, subscripted, valueScale } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
-import { LETTER, attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
+import { LETTER, attach, colourOf, dots, drawing, label, line, path, plot, stroke, summary, valuesAt, widthOf } from "./drawing.js";
 
 /** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
 function curvesOf(view) {
@@ -49,6 +49,9 @@ function describe(card, curves, axis = AXES.theta_o) {
   card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}`));
 }
 
+/** Return whether curves go on below the surface. */
+const isWhole = (curves) => curves.some(({ x }) => x[0] < -91 || x.at(-1) > 91);
+
 export const quantity = () => (session.state.cosine ? "f cosθo" : "f");
 const unitOf = () => quantity() + (session.state.normalise ? " / maximum" : ", 1/sr");
 
@@ -75,12 +78,12 @@ export function drawPolar() {
   const card = cards.polar;
   const curves = lobesOf("polar");
   describe(card, curves);
-  const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
+  const whole = isWhole(curves);
   const scale = valueScale(
     curves.map(({ y }) => y),
     session.state.scale === "log",
   );
-  const width = widthOf(card, Math.min(620, (innerWidth > 700 ? 0.45 : 0.3) * innerHeight));
+  const width = widthOf(card, Math.min(620, (phone.matches ? 0.3 : 0.45) * innerHeight));
   const margin = 26;
   const radius = (width - 2 * margin) / 2;
   const height = whole ? 2 * (radius + margin) : radius + 2 * margin + 4;
@@ -89,7 +92,7 @@ export function drawPolar() {
     middle[0] + radius * Math.max(reach, 0) * Math.sin(radians(angle)),
     middle[1] - radius * Math.max(reach, 0) * Math.cos(radians(angle)),
   ];
-  const svg = drawing(width, height, summary(curves, `Polar plot of ${unitOf()} in the plane of incidence`, ""));
+  const svg = drawing(width, height, summary(curves, `Polar plot of ${unitOf()} in the plane of incidence`));
 
   const ring = (reach, kind) => {
     const [x, y] = place(-90, reach);
@@ -142,11 +145,10 @@ export function drawPolar() {
     overlay.replaceChildren();
     if (cursor === null) return tell(card, []);
     overlay.append(shape("path", { d: path([middle, place(cursor, 1)]), class: "cross" }));
-    dots(overlay, curves, (value) => place(cursor, scale.of(value)));
-    tell(card, [[null, `θo ${format(cursor)}°`], ...valuesAt(curves)]);
+    dots(overlay, curves, cursor, (value) => place(cursor, scale.of(value)));
+    tell(card, [[null, `θo ${format(cursor)}°`], ...valuesAt(curves, cursor)]);
   };
   attach(
-    card,
     svg,
     (x, y) => {
       const angle = degrees(Math.atan2(x - middle[0], middle[1] - y));
@@ -159,65 +161,12 @@ export function drawPolar() {
   crosses.polar();
 }
 
-function dots(overlay, curves, place) {
-  for (const curve of curves) {
-    const value = interpolate(curve.x, curve.y, cursor);
-    if (!Number.isFinite(value)) continue;
-    const [cx, cy] = place(value);
-    overlay.append(shape("circle", { cx, cy, r: 4, fill: curve.colour, class: "dot" }));
-  }
-}
-
-const valuesAt = (curves) =>
-  curves.map((curve) => [
-    curve.colour,
-    `${curve.name} ${format(interpolate(curve.x, curve.y, cursor), 4)}`,
-    curve.dash,
-  ]);
-
 // --- Cartesian ------------------------------------------------------------------------------------------------------
 
-/** Draw curves over an angle; `mark` adds to the drawing before them, `moved` tells of the crosshair. */
-function graph(card, curves, across, scale, what, mark, crossing) {
+const sizeOf = (card) => {
   const width = widthOf(card, 760);
-  const it = axes(width, Math.round(clamp(Math.min(0.62 * width, 0.27 * innerHeight), 200, 380)), across, scale, what);
-  mark?.(it);
-  const inside = shape("g", { "clip-path": `url(#${it.clip})` });
-  for (const curve of curves)
-    inside.append(
-      stroke(
-        curve,
-        curve.x.map((angle, k) => [it.x(angle), it.y(curve.y[k])]),
-      ),
-    );
-  it.svg.append(inside);
-  const overlay = shape("g");
-  it.svg.append(overlay);
-  const cross = (angle, symbol) => {
-    overlay.replaceChildren();
-    if (angle === null) return tell(card, []);
-    overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
-    cursorAt(angle, () => dots(overlay, curves, (value) => [it.x(angle), it.y(value)]));
-    tell(card, [[null, `${symbol} ${format(angle)}°`], ...cursorAt(angle, () => valuesAt(curves))]);
-  };
-  attach(
-    card,
-    it.svg,
-    (x) => it.at(x),
-    [across.low, across.high],
-    (angle) => crossing(angle, cross),
-  );
-  replaceFigure(card, it.svg);
-  return cross;
-}
-
-function cursorAt(angle, act) {
-  const before = cursor;
-  cursor = angle;
-  const result = act();
-  cursor = before;
-  return result;
-}
+  return [width, Math.round(clamp(Math.min(0.62 * width, 0.27 * innerHeight), 200, 380))];
+};
 
 export function drawCartesian() {
   const curves = lobesOf("cartesian");
@@ -225,10 +174,9 @@ export function drawCartesian() {
   const inPlane = axis === AXES.theta_o;
   describe(cards.cartesian, curves, axis);
   cards.cartesian.node.querySelector("h2").replaceChildren(...subscripted(axis.title));
-  const whole = curves.some(({ x }) => x.length && (x[0] < -91 || x[x.length - 1] > 91));
   const across = !inPlane
     ? axis
-    : whole
+    : isWhole(curves)
     ? { low: -180, high: 180, marks: [-180, -90, 0, 90, 180] }
     : { low: -90, high: 90, marks: [-90, -60, -30, 0, 30, 60, 90] };
   // At grazing angles, f may be without end.
@@ -245,16 +193,19 @@ export function drawCartesian() {
     );
     svg.append(line(x(theta), top, x(theta), bottom, "mirror"));
   };
-  const cross = graph(
+  const { svg, cross } = plot(
     cards.cartesian,
+    sizeOf(cards.cartesian),
     curves,
     across,
     scale,
-    summary(curves, `Plot of ${unitOf()} over ${axis.symbol}`, ""),
+    summary(curves, `Plot of ${unitOf()} over ${axis.symbol}`),
+    axis.symbol,
     mark,
-    inPlane ? pointAt : (angle, cross) => cross(angle, axis.symbol),
+    inPlane ? pointAt : null,
   );
-  crosses.cartesian = () => cross(inPlane ? cursor : null, axis.symbol);
+  replaceFigure(cards.cartesian, svg);
+  crosses.cartesian = () => cross(inPlane ? cursor : null);
   crosses.cartesian();
 }
 
@@ -273,21 +224,23 @@ export function drawAlbedo() {
     if (!dark) svg.append(line(x(0), y(1), x(90), y(1), "unity"));
     svg.append(line(x(session.state.theta), top, x(session.state.theta), bottom, "incident"));
   };
-  graph(
+  const { svg } = plot(
     cards.albedo,
+    sizeOf(cards.albedo),
     curves,
     quarter,
     scale,
-    summary(curves, `Albedo over the angle of incidence${dark ? "" : ", with a line at 1"}`, ""),
+    summary(curves, `Albedo over the angle of incidence${dark ? "" : ", with a line at 1"}`),
+    "θi",
     mark,
-    (angle, cross) => cross(angle, "θi"),
   );
+  replaceFigure(cards.albedo, svg);
   cards.albedo.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
   tell(cards.albedo, []);
 }
 
 /** Return the curves of a view as rows of a table. */
-export function table(view) {
+export function curveTable(view) {
   return [
     [
       "material",

@@ -1,11 +1,46 @@
 // The sampler's view: directions drawn, a histogram of weights, the efficiency over the angle.
-import { DASHES, clamp, degrees, element, format, interpolate, radians, shape, subscripted, ticks, valueScale } from "./util.js";
-import { session, visible } from "./session.js";
+import { DASHES, clamp, degrees, element, format, onPointer, radians, shape, subscripted, ticks, valueScale, wrapped } from "./util.js";
+import { emit, on, session, visible } from "./session.js";
+import { post } from "./link.js";
 import { cards, tell } from "./card.js";
-import { attach, axes, colourOf, drawing, label, line, path, stroke, summary, widthOf } from "./drawing.js";
+import { attach, axes, colourOf, drawing, label, line, path, plot, summary, widthOf } from "./drawing.js";
 
-/** Draw the directions, weights and efficiencies of the samplers, with a box of tests above. */
-export function drawSampler(chi2) {
+/** What the χ² tests said of the subjects. */
+const verdicts = [];
+
+export function startSampler() {
+  on("stale", () => (verdicts.length = 0));
+  on("chi2", ({ subject, passed, text }) => {
+    verdicts[subject] = `${passed === undefined ? "" : passed ? "passed: " : "failed: "}${text}`;
+    emit("view", "sampler");
+  });
+}
+
+function verdictOf(k) {
+  const test = () => {
+    verdicts[k] = "testing …";
+    post({ type: "chi2", subject: k });
+    drawSampler();
+  };
+  const button = session.exported ? null : element("button", { onclick: test }, "χ² test");
+  const { efficiency } = session.shown.sampler[k] ?? {};
+  const told = [session.state.subjects[k].name];
+  if (efficiency !== undefined) told.push(`efficiency η ${format(efficiency)}`);
+  if (verdicts[k]) told.push(verdicts[k]);
+  return element("p", { class: "marked", style: `--mark:${colourOf(k)}` }, button, ` ${told.join(": ")}`);
+}
+
+/** Return the efficiencies as rows of a table. */
+export function samplerTable() {
+  const rows = visible().flatMap((k) => {
+    const { x = [], y } = session.shown.sampler[k]?.eta ?? {};
+    return x.map((angle, at) => [session.state.subjects[k].name, angle, y[at]]);
+  });
+  return [["material", "theta_i_degrees", "efficiency"], ...rows];
+}
+
+/** Draw the directions, weights and efficiencies of the samplers, with their tests above. */
+export function drawSampler() {
   const card = cards.sampler;
   const found = visible()
     .filter((k) => session.shown.sampler[k])
@@ -20,7 +55,7 @@ export function drawSampler(chi2) {
     titled("Weight ÷ mean weight", drawHistogram(found, width, height)),
     titled("Efficiency η over θi", drawEfficiency(found, width, height)),
   ];
-  card.figure.replaceChildren(chi2, ...figures);
+  card.figure.replaceChildren(element("div", { class: "verdicts" }, ...visible().map(verdictOf)), ...figures);
 }
 
 function drawDots(found, width, height) {
@@ -47,18 +82,17 @@ function drawDots(found, width, height) {
     }
     svg.append(group);
   }
-  const at = x - (radius * session.state.theta) / 90;
-  svg.append(shape("circle", { cx: at, cy: y, r: 4, class: "source" }), label(at, y - 12, "ωi", "middle", "direction"));
-  svg.addEventListener("pointermove", (event) => {
-    const box = svg.getBoundingClientRect();
-    const scale = width / box.width;
-    const place = [(event.clientX - box.left) * scale - x, (event.clientY - box.top) * scale - y];
+  const left = x - (radius * session.state.theta) / 90;
+  svg.append(shape("circle", { cx: left, cy: y, r: 4, class: "source" }), label(left, y - 12, "ωi", "middle", "direction"));
+  const away = () => tell(cards.sampler, []);
+  const at = (right, down) => {
+    const place = [right * width - x, down * height - y];
     const theta = (90 * Math.hypot(...place)) / radius;
-    if (theta > 90) return tell(cards.sampler, []);
-    const azimuth = ((degrees(Math.atan2(place[1], -place[0])) + session.state.phi + 540) % 360) - 180;
+    if (theta > 90) return away();
+    const azimuth = wrapped(degrees(Math.atan2(place[1], -place[0])) + session.state.phi);
     tell(cards.sampler, [[null, `θo ${format(theta)}°, φ ${format(azimuth)}°`]]);
-  });
-  svg.addEventListener("pointerleave", () => tell(cards.sampler, []));
+  };
+  onPointer(svg, at, away);
   return svg;
 }
 
@@ -90,9 +124,8 @@ function drawHistogram(found, width, height) {
     it.svg.append(shape("path", { d: path(closed), fill: colourOf(k), class: "area", stroke: colourOf(k) }));
   }
   attach(
-    cards.sampler,
     it.svg,
-    (x) => it.at(x),
+    it.at,
     [0, high],
     (weight) => {
       if (weight === null) return tell(cards.sampler, []);
@@ -109,46 +142,21 @@ function drawHistogram(found, width, height) {
 
 function drawEfficiency(found, width, height) {
   const scale = { of: (value) => value / 1.04, marks: [0, 0.25, 0.5, 0.75, 1].map((value) => [value, format(value)]) };
-  const it = axes(
-    width,
-    height,
+  const curves = found.map(([k, { eta }]) => ({
+    ...eta,
+    name: session.state.subjects[k].name,
+    colour: colourOf(k),
+    dash: DASHES[session.state.subjects[k].colour],
+  }));
+  const { svg } = plot(
+    cards.sampler,
+    [width, height],
+    curves,
     { low: 0, high: 90, marks: [0, 30, 60, 90] },
     scale,
-    summary(
-      found.map(([k, { eta }]) => ({ name: session.state.subjects[k].name, ...eta })),
-      "Efficiency of the samplers, 1 is perfect",
-      "",
-    ),
+    summary(curves, "Efficiency of the samplers, 1 is perfect"),
+    "θi",
+    ({ svg, x, top, bottom }) => svg.append(line(x(session.state.theta), top, x(session.state.theta), bottom, "incident")),
   );
-  it.svg.append(line(it.x(session.state.theta), it.top, it.x(session.state.theta), it.bottom, "incident"));
-  for (const [k, { eta }] of found) {
-    const curve = { colour: colourOf(k), dash: DASHES[session.state.subjects[k].colour] };
-    it.svg.append(
-      stroke(
-        curve,
-        eta.x.map((angle, at) => [it.x(angle), it.y(eta.y[at])]),
-      ),
-    );
-  }
-  const overlay = shape("g");
-  it.svg.append(overlay);
-  attach(
-    cards.sampler,
-    it.svg,
-    (x) => it.at(x),
-    [0, 90],
-    (angle) => {
-      overlay.replaceChildren();
-      if (angle === null) return tell(cards.sampler, []);
-      overlay.append(line(it.x(angle), it.top, it.x(angle), it.bottom, "cross"));
-      tell(cards.sampler, [
-        [null, `θi ${format(angle)}°`],
-        ...found.map(([k, { eta }]) => [
-          colourOf(k),
-          `${session.state.subjects[k].name} η ${format(interpolate(eta.x, eta.y, angle))}`,
-        ]),
-      ]);
-    },
-  );
-  return it.svg;
+  return svg;
 }

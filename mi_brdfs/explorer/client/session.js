@@ -16,7 +16,6 @@ export const session = {
   sent: [],
   selected: 0,
   exported: document.getElementById("exported") !== null,
-  connected: false,
   /** What an exported page holds: its views, and its scrubbers with their places. */
   baked: [],
   scrubbers: [],
@@ -24,7 +23,7 @@ export const session = {
   /** The server's account of each subject: error, controls, xml … */
   info: [],
   /** The latest answer of each view, by subject. */
-  shown: Object.fromEntries([...VIEWS, "lobeBelow", "hemisphereBelow"].map((view) => [view, []])),
+  shown: Object.fromEntries(VIEWS.map((view) => [view, []])),
   /** For each subject the first state that it is in: answers to older ones are about another. */
   oldest: [],
 };
@@ -98,7 +97,7 @@ export const hasRoom = () => session.state.subjects.length < MOST_SUBJECTS;
 
 /** Say that there is none, and what to do after removing a subject. */
 export const tellFull = (then = "first") =>
-  emit("error", `There is room for ${MOST_SUBJECTS} materials: remove one ${then}.`);
+  emit("error", { text: `There is room for ${MOST_SUBJECTS} materials: remove one ${then}.` });
 
 export function addSubject(bsdf, name) {
   if (!hasRoom()) return tellFull();
@@ -123,18 +122,17 @@ export function visible() {
   return [...session.state.subjects.keys()].filter((k) => !session.state.subjects[k].hidden);
 }
 
+/** Return whether a value is of the kind of a usual one; none is of any. */
+const isLike = (value, usual) =>
+  usual === null ||
+  (typeof value === typeof usual && Array.isArray(value) === Array.isArray(usual) && !Number.isNaN(value));
+
 /** Return a state without what has no place in one: it may come from an address. */
 export function clean(given) {
-  const state = { ...structuredClone(DEFAULTS) };
+  const state = structuredClone(DEFAULTS);
   for (const [name, value] of Object.entries(given ?? {})) {
-    if (!(name in DEFAULTS) || value === undefined) continue;
-    const usual = DEFAULTS[name];
-    if (typeof usual === "number" && !Number.isFinite(value)) continue;
-    if (typeof usual === "boolean" && typeof value !== "boolean") continue;
-    if (typeof usual === "string" && typeof value !== "string") continue;
-    if (WORDS[name] && !WORDS[name].includes(value)) continue;
-    if (Array.isArray(usual) && !Array.isArray(value)) continue;
-    state[name] = value;
+    if (!(name in DEFAULTS) || !isLike(value, DEFAULTS[name])) continue;
+    if (!WORDS[name] || WORDS[name].includes(value)) state[name] = value;
   }
   state.subjects = state.subjects
     .slice(0, MOST_SUBJECTS)

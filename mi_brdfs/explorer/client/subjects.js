@@ -1,6 +1,6 @@
 // The subjects: chips, the editor's head, and the dialog that adds one.
 import { PALETTE, byId, element } from "./util.js";
-import { addSubject, change, changeSubject, emit, hasRoom, on, removeSubject, session, tellFull } from "./session.js";
+import { addSubject, change, changeSubject, emit, hasRoom, on, removeSubject, session } from "./session.js";
 import { colourOf } from "./drawing.js";
 import { drawControls, drawScrubbers, resetAll } from "./controls.js";
 
@@ -103,55 +103,41 @@ function showFound() {
   if (!hello) return;
   const words = byId("search").value.toLowerCase().split(/\s+/).filter(Boolean);
   const fits = (...texts) => words.every((word) => texts.join(" ").toLowerCase().includes(word));
-  const kinds = {};
+  const groups = {};
+  const offer = (group, make) => (groups[group] ??= []).push(make);
   const own = hello.types.filter(({ group }) => group === "mi_brdfs").length;
   hello.types.forEach(({ name, title, group }, at) => {
-    const ball = at < own ? ballOf("models", at, own, own) : null;
-    if (fits(name, title, group)) (kinds[group] ??= []).push([name, title === name ? "" : title, { type: name }, ball]);
+    const ball = () => (at < own ? ballOf("models", at, own, own) : null);
+    const text = title === name ? "" : title;
+    if (fits(name, title, group)) offer(group, () => foundItem({ type: name }, name, text, ball()));
   });
-  const files = hello.files.filter(({ name }) => fits(name, "file measured"));
+  for (const { file, name, kind } of hello.files) {
+    const type = kind === "material" ? "given" : "tabulated";
+    if (fits(name, "file measured")) offer("Files", () => foundItem({ type, file }, name));
+  }
   const presets = {};
   hello.presets.forEach((name, at) => {
-    const [material] = name.split("/").slice(-1);
+    const material = name.split("/").at(-1);
     if (fits(name, material.replaceAll("-", " "), "preset")) (presets[material] ??= []).push([name, at]);
   });
-  const groups = [
-    ...Object.entries(kinds),
-    [
-      "Files",
-      files.map(({ file, name, kind }) => [name, "", { type: kind === "material" ? "given" : "tabulated", file }]),
-    ],
-    ["Presets", Object.entries(presets).sort(([a], [b]) => (a < b ? -1 : 1))],
-  ];
+  for (const material of Object.keys(presets).sort()) offer("Presets", () => ballsOf(material, presets[material]));
   let room = words.length ? MOST_FOUND : 400;
-  const nodes = [];
-  for (const [title, items] of groups) {
-    if (!items.length) continue;
-    const shown = items.slice(0, Math.min(room, words.length || title !== "Presets" ? room : 12));
+  const nodes = Object.entries(groups).flatMap(([title, makers]) => {
+    const shown = makers.slice(0, words.length || title !== "Presets" ? room : Math.min(room, 12));
     room -= shown.length;
-    const more = items.length - shown.length;
-    nodes.push(
+    const more = makers.length - shown.length;
+    return [
       element("h3", {}, title),
-      element(
-        "ul",
-        {},
-        ...shown.map(([name, text, bsdf, ball]) =>
-          Array.isArray(text) ? ballsOf(name, text) : element(
-            "li",
-            {},
-            element(
-              "button",
-              { class: "found", onclick: () => choose(bsdf, name) },
-              ball,
-              element("div", {}, element("b", {}, name), text ? element("span", {}, text) : null),
-            ),
-          ),
-        ),
-      ),
-    );
-    if (more) nodes.push(element("p", { class: "note" }, `and ${more} more: type to search`));
-  }
+      element("ul", {}, ...shown.map((make) => make())),
+      ...(more ? [element("p", { class: "note" }, `and ${more} more: type to search`)] : []),
+    ];
+  });
   byId("found").replaceChildren(...(nodes.length ? nodes : [element("p", {}, "Nothing has this name.")]));
+}
+
+function foundItem(bsdf, name, text = "", ball = null) {
+  const told = element("div", {}, element("b", {}, name), text ? element("span", {}, text) : null);
+  return element("li", {}, element("button", { class: "found", onclick: () => choose(bsdf, name) }, ball, told));
 }
 
 /** Return a ball of a sheet, by its number in rows of `across`. */
@@ -235,10 +221,10 @@ async function uploadAll(files) {
         change(answer);
       }
     } catch (error) {
-      emit(
-        "error",
-        error instanceof TypeError ? `${file.name} could not be sent: the server does not answer.` : error.message,
-      );
+      const isUnanswered = error instanceof TypeError;
+      emit("error", {
+        text: isUnanswered ? `${file.name} could not be sent: the server does not answer.` : error.message,
+      });
     }
     emit("idle", {});
   }

@@ -39,9 +39,33 @@ export function subscripted(text, tag = (index) => element("sub", {}, index)) {
 }
 
 export const byId = (id) => document.getElementById(id);
+/** Whether the window is that of a phone, as the style sheet asks, too. */
+export const phone = matchMedia("(max-width: 700px)");
 export const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 export const radians = (degrees) => (degrees * Math.PI) / 180;
 export const degrees = (angle) => (angle * 180) / Math.PI;
+/** Return an azimuth in -180°…180°. */
+export const wrapped = (azimuth) => ((azimuth + 540) % 360) - 180;
+
+/** Tell where the pointer is in a node, in 0…1 to the right and down, and when it leaves. */
+export function onPointer(node, at, away) {
+  const follow = (event) => {
+    const box = node.getBoundingClientRect();
+    at((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height, event);
+  };
+  for (const event of ["pointermove", "pointerdown"]) node.addEventListener(event, follow);
+  for (const event of ["pointerleave", "blur"]) node.addEventListener(event, away);
+}
+
+/** Tell of the steps of arrow keys, to the right and up. */
+export function onArrows(node, move) {
+  node.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    move(...step, event);
+  });
+}
 
 /** Return a number in a few letters, with a power of ten where it is very large or small. */
 export function format(value, digits = 3) {
@@ -98,20 +122,13 @@ export function valueScale(arrays, log, least = 0) {
   const peak = Math.max(largest(arrays), least);
   if (!log) {
     const marks = ticks(0, 1.04 * peak, 4);
-    return { of: (value) => value / (1.04 * peak), marks: marks.map((value) => [value, format(value)]), log, peak };
+    return { of: (value) => value / (1.04 * peak), marks: marks.map((value) => [value, format(value)]) };
   }
   const [low, high] = decades(arrays, peak);
   const reach = high - low + 0.08;
   const marks = [];
   for (let k = low; k <= high; k++) marks.push([10 ** k, power(k)]);
-  return {
-    of: (value) => Math.max((Math.log10(Math.max(value, 1e-300)) - low) / reach, -0.1),
-    marks,
-    log,
-    peak,
-    low,
-    high,
-  };
+  return { of: (value) => Math.max((Math.log10(Math.max(value, 1e-300)) - low) / reach, -0.1), marks };
 }
 
 /** Return the value of a curve at x, straight between its points, or null outside it. */
@@ -149,6 +166,8 @@ export const COLOUR_MAP = (() => {
   return table;
 })();
 
+/** Return the channels of a colour such as #0072B2, in 0…1. */
+export const rgbOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
 export const toDisplay = (v) => (v <= 0.0031308 ? 12.92 * v : 1.055 * Math.pow(v, 1 / 2.4) - 0.055);
 export const fromDisplay = (v) => (v <= 0.04045 ? v / 12.92 : Math.pow((v + 0.055) / 1.055, 2.4));
 
