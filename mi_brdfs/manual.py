@@ -31,7 +31,7 @@ def show(plugin: type[Plugin], console: Console) -> None:
     console.print(Markdown(text, "ansi_dark"))
     if example:
         _print_title("Example", console)
-        console.print(Text(example), soft_wrap=True)
+        console.print(Text(example))
     for title, rows, note in plugin.sections():
         _print_title(title, console)
         names = rows[0] if rows else ()

@@ -84,7 +84,7 @@ def test_examples_on_the_manual_pages_load(name):
     page = mi_brdfs.info(name)
     xml = re.search(r"<bsdf .*?</bsdf>", page, re.S).group().replace("<bsdf", '<bsdf version="3.0.0"', 1)
     given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
-    assert all(len(line) <= 100 for line in page.replace(given, "").splitlines())
+    assert all(len(line) <= 100 for line in page.splitlines())
     with mi.variant_context("scalar_rgb"):
         assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
 
