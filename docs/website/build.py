@@ -42,7 +42,7 @@ SETTINGS = {
         }
         for scheme, accent, plots, blend in (
             ("light", "#0b5fa5", "none", "multiply"),
-            ("dark", "#6db4f2", "invert(1) hue-rotate(180deg) brightness(1.4)", "screen"),
+            ("dark", "#6db4f2", "invert(1) hue-rotate(180deg)", "screen"),
         )
     },
     "html_css_files": ["site.css"],

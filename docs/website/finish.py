@@ -16,7 +16,7 @@ TABLE = re.compile(r"<table class=\"(.*?)</table>", re.DOTALL)
 ROW = re.compile(r"<tr\b.*?</tr>", re.DOTALL)
 HEADING = re.compile(r"<th\b[^>]*>(.*?)</th>", re.DOTALL)
 SHELL = '<div class="highlight-sh notranslate"><div class="highlight"><pre>'
-COMMANDS = re.compile(rf"(?<={SHELL}).*?(?=\n</pre>)", re.DOTALL)
+COMMANDS = re.compile(rf"(?<={SHELL}).*?(?=</pre>)", re.DOTALL)
 WORD = re.compile(r'<span class="w">[^<]*</span>|((?:(?!<span class="w">)<span[^>]*>[^<]*</span>|[^<\s])+)')
 
 
@@ -46,7 +46,7 @@ def _described(context: dict) -> str:
 
 def _with_words(commands: re.Match) -> str:
     words = WORD.sub(lambda found: f'<span class="word">{found[1]}</span>' if found[1] else found[0], commands[0])
-    return "".join(f'<span class="command">{line}</span>' for line in words.split("\n"))
+    return "".join(f'<span class="command">{line}</span>' for line in words.splitlines())
 
 
 def _with_headings(table: re.Match) -> str:
