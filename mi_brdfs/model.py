@@ -33,7 +33,7 @@ FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to meas
 MEMBERS = "parameters", "textures", "ranges", "constants", "arrays", "captured", "uniform"
 """What an instance of a plugin holds, besides its choices."""
 
-Section = tuple[str, list[tuple[str, ...]], str]
+Section = tuple[str, Sequence[tuple[str, ...]], str]
 
 Values = SimpleNamespace
 """The values of the declared parameters at a surface point, by name."""
@@ -169,13 +169,7 @@ class Plugin:
     @classmethod
     def sections(cls) -> list[Section]:
         """Return the tables of the manual page: the title, rows below a heading, and what is said of them."""
-        short = ((*it[:3], it.range if len(it.range) <= 45 else "see above", it.text) for it in cls.parameter_rows())
-        return [("Parameters", list(short), "")]
-
-    @classmethod
-    def manual(cls) -> str:
-        """Return the manual page: that of the docstring, and the tables."""
-        return "\n\n".join([cls.page(), *(_section(*it) for it in cls.sections())]) + "\n"
+        return [("Parameters", cls.parameter_rows(), "" if cls.declared() else "None.")]
 
 
 class Model(Plugin):
@@ -243,13 +237,6 @@ class Model(Plugin):
     @classmethod
     def sections(cls) -> list[Section]:
         """Return them with that of the largest albedos."""
-        rows: list[tuple[str, ...]] = list(cls.energy.rows()) if cls.energy else []
+        rows = cls.energy.rows() if cls.energy else []
         note = ENERGY_NOTE if cls.energy else f"Not measured. ``mi-brdfs energy {cls.plugins[0]}`` does it."
         return [*super().sections(), ("Largest albedo", rows, note)]
-
-
-def _section(title: str, table: list[tuple[str, ...]], note: str) -> str:
-    """Return a table under a title, with its columns aligned, and a note."""
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)][:-1]
-    lines = ["  ".join([*map(str.ljust, row, widths), row[-1]]).rstrip() for row in table]
-    return "\n".join([title, "-" * len(title), *lines, *([""] if lines and note else []), *([note] if note else [])])

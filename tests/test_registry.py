@@ -74,6 +74,7 @@ def test_list_and_info():
     assert not any("``" in mi_brdfs.info(name) or ":func:" in mi_brdfs.info(name) for name in mi_brdfs.list_models())
     for part in ("doi:10.1145/133994.134078", "alpha_u, alpha_v", "balanced | ward | ward-duer", "Reciprocal"):
         assert part in page
+    assert "alpha: type number, default 0.1, range [0.0001, 2]\n    roughness α" in page
     with pytest.raises(ValueError, match="There is no model 'phnog'; did you mean 'phong'"):
         mi_brdfs.info("phnog")
 
@@ -83,6 +84,7 @@ def test_examples_on_the_manual_pages_load(name):
     page = mi_brdfs.info(name)
     xml = re.search(r"<bsdf .*?</bsdf>", page, re.S).group().replace("<bsdf", '<bsdf version="3.0.0"', 1)
     given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
+    assert all(len(line) <= 100 for line in page.splitlines())
     with mi.variant_context("scalar_rgb"):
         assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
 

@@ -1,17 +1,21 @@
 """The site builds without a warning, all of its links lead somewhere, and it needs no network."""
 
 import importlib.util
+import io
 import re
 import subprocess
 import sys
 from urllib.parse import unquote
 
 import mitsuba as mi
+import numpy as np
 import pytest
 import typer
 from generate import models
 from generate.made import ROOT
+from PIL import Image
 from support import Page
+from test_explore_page import browser as browser
 from typer.testing import CliRunner
 from website import live
 from website.__main__ import main
@@ -122,7 +126,23 @@ def test_reference_pages_are_the_manual_pages(site):
             assert all(cell in shown for cell in row[:4]), row
         words = re.findall(r"[A-Za-z]{4,}", mi_brdfs.info(model.plugins[0]).split("\nParameters\n")[0])
         assert not {word for word in words if word not in shown} - {"Example", "Cmax"}, model
-        assert "<math" in path.read_text(encoding="utf-8") or model.plugins[0] == "roughdiffuse"
+        text = path.read_text(encoding="utf-8")
+        assert "<math" in text or model.plugins[0] == "roughdiffuse"
+        headings = ["Definition", "Properties", "Lobes", "Parameters", "Largest albedo"]
+        assert re.findall(r"<h2>([\w ]+)", text) == headings
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_phone_shows_commands_and_tables_whole_and_plots_in_the_scheme(site, browser, scheme):
+    page = browser.new_page(viewport={"width": 390, "height": 844}, color_scheme=scheme)
+    for name in ("index", "guide/command_line", "gallery", "reference/ward"):
+        page.goto((site / f"{name}.html").as_uri())
+        scrolled = "elements => elements.filter(it => it.scrollWidth > it.clientWidth + 1).map(it => it.textContent)"
+        assert page.eval_on_selector_all("html, .highlight-sh pre, .table-wrapper", scrolled) == [], name
+    corner = np.array(Image.open(io.BytesIO(page.locator('img[alt^="Lobes"]').screenshot())))[0, 0]
+    assert (corner[:3] > 200).all() if scheme == "light" else (corner[:3] < 60).all()
+    page.close()
 
 
 def command(*arguments):

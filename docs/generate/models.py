@@ -16,7 +16,7 @@ from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
 from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
-from mi_brdfs.model import ENERGY_NOTE, EXAMPLE, Model, Plugin
+from mi_brdfs.model import EXAMPLE, Model, Plugin
 from mi_brdfs.plot.given import named
 from mi_brdfs.preview import body, studio
 from mi_brdfs.probe.curves import in_plane_of_incidence
@@ -172,9 +172,8 @@ def _overview(models: list[type[Model]]) -> str:
 
 def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
-    pictures = strip_picture(model), lobes_picture(model)
-    portrait = f"{_picture(model)}\n\n*In the colour of its family; the example below has its own.*"
-    return _page(model, portrait, *pictures, _table(model.energy.rows()), ENERGY_NOTE)
+    strip = f"*The picture at the top has the colour of the model's family.*\n\n{strip_picture(model)}"
+    return _page(model, _picture(model), strip, f"### Lobes\n\n{lobes_picture(model)}")
 
 
 def data_page() -> str:
@@ -188,27 +187,28 @@ def integrator_page() -> str:
     return _page(Shading, f"{picture}\n\nShaded above, path-traced below: one of the [scenes](../../scenes/shading).")
 
 
-def _page(plugin: type[Plugin], picture: str, strip: str = "", lobes: str = "", *more: str) -> str:
+def _page(plugin: type[Plugin], picture: str, strip: str = "", lobes: str = "") -> str:
     """Return a plugin's part of the reference: what it looks like, how to call it, and then what it computes."""
     name, aliases = plugin.plugins[0], plugin.plugins[1:]
     text, _, examples = plugin.page().partition(f"\n\n{EXAMPLE}")
     xml, _, dictionary = examples.partition("\n\n")
     summary, _, text = _code(text).partition("\n\n")
-    return "\n\n".join(
-        [
-            f"## {name}",
-            *([f"Also as {', '.join(f'`{alias}`' for alias in aliases)}."] if aliases else []),
-            picture,
-            summary,
-            f"```xml\n{xml}\n```",
-            f"```python\n{dictionary}\n```",
-            *([strip] if strip else []),
-            text,
-            *([lobes] if lobes else []),
-            _table(own_rows(plugin)),
-            *more,
-        ]
-    )
+    with _own_words():
+        tables = [f"### {title}\n\n{_table(rows)}\n\n{note}".rstrip() for title, rows, note in plugin.sections()]
+    parts = [
+        f"## {name}",
+        f"Also as {', '.join(f'`{alias}`' for alias in aliases)}." if aliases else "",
+        picture,
+        summary,
+        f"```xml\n{xml}\n```",
+        f"```python\n{dictionary}\n```",
+        strip,
+        "### Definition",
+        re.sub(r"\n\n(?=(?:Reciprocal|Not reciprocal)\b)", "\n\n### Properties\n\n", text),
+        lobes,
+        *tables,
+    ]
+    return "\n\n".join(filter(None, parts))
 
 
 def own_rows(plugin: type[Plugin]) -> list:

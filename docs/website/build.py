@@ -37,8 +37,13 @@ SETTINGS = {
             "color-brand-primary": accent,
             "color-brand-content": accent,
             "color-brand-visited": accent,
+            "plot-filter": plots,
+            "plot-blend": blend,
         }
-        for scheme, accent in (("light", "#0b5fa5"), ("dark", "#6db4f2"))
+        for scheme, accent, plots, blend in (
+            ("light", "#0b5fa5", "none", "multiply"),
+            ("dark", "#6db4f2", "invert(1) hue-rotate(180deg)", "screen"),
+        )
     },
     "html_css_files": ["site.css"],
     "html_copy_source": False,

@@ -15,6 +15,9 @@ MANY = 4
 TABLE = re.compile(r"<table class=\"(.*?)</table>", re.DOTALL)
 ROW = re.compile(r"<tr\b.*?</tr>", re.DOTALL)
 HEADING = re.compile(r"<th\b[^>]*>(.*?)</th>", re.DOTALL)
+SHELL = '<div class="highlight-sh notranslate"><div class="highlight"><pre>'
+COMMANDS = re.compile(rf"(?<={SHELL}).*?(?=</pre>)", re.DOTALL)
+WORD = re.compile(r'<span class="w">[^<]*</span>|((?:(?!<span class="w">)<span[^>]*>[^<]*</span>|[^<\s])+)')
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -24,9 +27,11 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 def _finish(context: dict) -> None:
     """Describe the page to sites that show links to it, name the heading in each cell of a wide table, name strips of
-    pictures, and let links show pictures, which MyST makes downloads."""
+    pictures, commands and their words, which browsers would break at hyphens, and let links show pictures, which MyST
+    makes downloads."""
     if body := context.get("body"):
         body = TABLE.sub(_with_headings, body)
+        body = COMMANDS.sub(_with_words, body)
         body = re.sub(r'<img (?=alt="(?:\w+: |Lobes of \w+ in ))', '<img class="strip" ', body)
         context["metatags"] += _described(context)
         context["body"] = re.sub(r' download=""(?= href="[^"]+\.(?:jpg|png)")', "", body)
@@ -37,6 +42,11 @@ def _described(context: dict) -> str:
     title, card = re.sub(r"<.*?>", "", context["title"]), context["pathto"](CARD, resource=True)
     words = {"title": title, "type": "website", "description": escape(DESCRIPTION), "image": card}
     return "".join(f'<meta property="og:{name}" content="{text}" />\n' for name, text in words.items())
+
+
+def _with_words(commands: re.Match) -> str:
+    words = WORD.sub(lambda found: f'<span class="word">{found[1]}</span>' if found[1] else found[0], commands[0])
+    return "".join(f'<span class="command">{line}</span>' for line in words.splitlines())
 
 
 def _with_headings(table: re.Match) -> str:

@@ -215,7 +215,7 @@ def _summary(name: str) -> str:
 
 def _model(plugin: type[Plugin], page: Callable[[type[Plugin]], str]) -> str:
     parameters = {word for row in models.own_rows(plugin)[1:] for word in re.findall(r"\w+", row[0])}
-    text = with_formulas(page(plugin).removeprefix("#"), parameters)
+    text = with_formulas(re.sub(r"^#(?=#+ )", "", page(plugin), flags=re.MULTILINE), parameters)
     large = re.sub(r"\[!\[(\w+)\]\(\S+?\)\]\((\S+?)\)", r"[![\1](\2){.portrait}](\2)", text, count=1)
     return "\n\n".join(_references(it) for it in large.split("\n\n")) + "\n"
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated
 
 import typer
-from rich.markdown import Markdown
-from rich.markup import escape
-from rich.padding import Padding
-from rich.table import Column, Table
-from rich.text import Text
+from rich.table import Table
 
+from ..manual import WIDEST, plain, show
 from ..mitsuba.registry import DATA, all_models, find_plugin
-from ..mitsuba.registry import info as plain_page
-from ..model import EXAMPLE, Plugin
+from ..model import Plugin
 from ..parameters import nested
 from ..parameters.vocabulary import OTHERS, key
 from .app import command
@@ -59,21 +54,7 @@ def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or ali
     """Show the manual page of a BRDF."""
     with failing(Exit.ERROR):
         plugin = find_plugin(type)
-    if not out.is_terminal:
-        out.print(plain_page(type))
-        return
-    text, heading, example = re.sub(r":\w+:`([^`]+)`", r"\1", plugin.page()).partition(EXAMPLE)
-    terminal = Terminal(emoji=False, highlight=False)  # which folds lines, unlike the others
-    terminal.print(Markdown(f"{text}{heading}\n```\n{example}\n```" if example else text, "ansi_dark"))
-    for title, rows, note in plugin.sections():
-        terminal.print(f"\n[bold]{title}")
-        names = rows[0] if rows else ()
-        table = Table(*(Column(name, overflow="fold") for name in names), box=None, pad_edge=False)
-        for first, *cells, last in rows[1:]:
-            if len(names) > 3:  # too many columns for a narrow terminal
-                said = ", ".join(f"{name} {cell}" for name, cell in zip(names[1:], cells, strict=False))
-                terminal.print(Text.assemble((first, "cyan"), ": ", said))
-                terminal.print(Padding(Text(last), (0, 0, 0, 4)))
-            else:
-                table.add_row(escape(first), *cells, last)
-        terminal.print(*[table] * bool(table.row_count), Markdown(note), sep="\n")
+    if out.is_terminal:  # the console folds lines, unlike `out`
+        show(plugin, Terminal(width=min(out.width, WIDEST), emoji=False, highlight=False))
+    else:
+        out.print(plain(plugin))

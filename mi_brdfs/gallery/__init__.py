@@ -27,7 +27,7 @@ try:
 except ImportError:
     raise ImportError("the gallery needs Jinja2, Pillow and mitsuba-oidn: pip install 'mi_brdfs[gallery]'") from None
 
-from ..mitsuba.registry import find_models, presets
+from ..mitsuba.registry import find_models, info, presets
 from ..model import Model
 from ..pages import environment
 from ..parameters.published import preset
@@ -199,7 +199,7 @@ def page(entries: list[Entry], spp: int) -> str:
     families = [(family, list(group)) for family, group in groupby(entries, key=lambda it: it.model.family)]
     quality = f"{mi.variant()}: {power_of_4(spp)} samples per pixel, denoised"
     return environment.get_template("gallery.html").render(
-        entries=entries, families=families, year=year, quality=quality
+        entries=entries, families=families, year=year, quality=quality, info=info
     )
 
 

@@ -218,7 +218,9 @@ def info(name: str) -> str:
     Raises:
         ValueError: if there is no such plugin, with the closest name there is.
     """
-    return re.sub(r":\w+:`([^`]+)`", r"\1", find_plugin(name).manual()).replace("``", "")
+    from ..manual import plain  # on first use: it takes time
+
+    return plain(find_plugin(name))
 
 
 def find_plugin(name: str) -> type[Plugin]:

@@ -29,7 +29,7 @@ class Burley(Model):
         fd   = (1 + (d-1) w(cosθ_i)) (1 + (d-1) w(cosθ_o)),    d = 0.5 + 2 roughness (wi·h)²
         fss  = 1.25 (s (1/(cosθ_i + cosθ_o) - 0.5) + 0.5),    s as fd with d = roughness (wi·h)²
         f0   = mix(0.08 specular mix(1, C/L, spec_tint), C, metallic)
-        D, G = those of ``walter`` (GGX, separable), α = roughness²: αu = α/a, αv = α a, both at least 0.001,
+        D, G = those of walter (GGX, separable), α = roughness²: αu = α/a, αv = α a, both at least 0.001,
                with a = √(1 - 0.9 anisotropic)
         Dc   = (αc²-1) / (π log(αc²) (1 + (αc²-1) h_z²)),    αc = mix(0.1, 0.001, clearcoat_gloss)
         Gc   = G for α = 0.25
