@@ -15,7 +15,7 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe
-from ..probe.directions import angles_of, hemisphere, on_side, scattered
+from ..probe.directions import hemisphere, on_side, scattered
 from ..probe.variates import random
 from . import sampling
 from .outcome import Findings, Outcome, Skipped, told
@@ -259,17 +259,13 @@ def null(run: Run) -> Findings:
         raise Skipped("Nothing goes straight through.")
     outcome, u = Outcome("null", part.name), random(1 << 14, 75)
     for incident in run.incidents(part):
-        si = interaction(np.tile(incident.wi, (len(u), 1)))
+        wi = np.tile(incident.wi, (len(u), 1))
+        si = interaction(wi)
         bs, weight = probe.bsdf.sample(mi.BSDFContext(), si, *sample_arguments(u), True)
         through = (bs.sampled_type & int(mi.BSDFFlags.Null)) != 0
-        weight = dr.select(through, weight, 0)
-        bent = numbers(dr.select(through, dr.norm(bs.wo + si.wi), 0), len(u)).ravel()
-        if bent.max() > 1e-3:
-            wo = np.stack([numbers(x, len(u)).ravel() for x in bs.wo])[:, np.argmax(bent)]
-            words = f"samples of type Null go to {angles_of(wo)} for light from {incident.name}, and not straight on"
-            outcome.fault(words, float(bent.max()), wi=incident.wi, seed=75)
+        wo, each = (numbers(dr.select(through, it, 0), len(u)) for it in (bs.wo, weight))
+        outcome.astray("of type Null", wo, -wi, "is straight on", wi, 75, but_for=0)
         got = numbers(probe.bsdf.eval_null_transmission(si, True), len(u))[0]
-        each = numbers(weight, len(u))
         # Six standard errors: a false alarm once in 1e8.
         error = abs(got - each.mean(axis=0)) - 6 * each.std(axis=0) / np.sqrt(len(u)) - 1e-4
         if (error > 0).any():
