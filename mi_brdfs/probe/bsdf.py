@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..loading import check_plugin
-from ..mitsuba.errors import unwrapped_ctrl_c
 from .arrays import (
     CENTRE,
     WAVELENGTHS,
@@ -239,8 +238,7 @@ class BSDFProbe:
     def diffuse_reflectance(self, wi: Array, uv: ArrayLike = CENTRE, active: bool | mi.Bool = True) -> Array:
         """Return ``eval_diffuse_reflectance``, shape (len(wi), channels); black if it is not implemented."""
         try:
-            with unwrapped_ctrl_c():
-                return numbers(self.bsdf.eval_diffuse_reflectance(interaction(wi, uv), active), len(wi))
+            return numbers(self.bsdf.eval_diffuse_reflectance(interaction(wi, uv), active), len(wi))
         except RuntimeError:
             return np.zeros((len(wi), 1))
 

@@ -129,8 +129,8 @@ def mode(run: Run) -> Findings:
             if symmetric:
                 expected, why = run.probe.eval(part, wi, wo), "is needed, as it is not flagged NonSymmetric"
             else:
-                expected, why = run.probe.eval(part, wo, wi), "is needed, as that is its adjoint, f from wo to wi"
-                expected *= abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
+                expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
+                why = "is needed, as that is its adjoint, f from wo to wi"
             name = "in the mode Importance eval"
             # What grazing facets transmit is faint and has few digits.
             outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
