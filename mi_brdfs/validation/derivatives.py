@@ -25,6 +25,8 @@ TOLERANCE = 0.02
 LOST = 3
 """How many times its last digit a value may be off, as of formulas whose terms cancel."""
 COUNT = 2000
+DARK = 1e-5
+"""What part of the light is rounding, as where an index of refraction of 1 reflects nothing."""
 TURN = 0.01
 """The step by which directions are turned, in parts of the width of a lobe."""
 
@@ -228,7 +230,7 @@ def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u
         lost = 1 - np.isfinite(of_weight).mean()
         outcome.fault(f"{lost:.1%} of the derivatives of sample's weight are not finite", np.inf)
     size = abs(expected).mean()
-    if not size > 1e-5:  # less is rounding, as where an index of refraction of 1 reflects nothing
+    if not size > DARK:
         return
     # Plugins other than ours may differentiate their density, too.
     accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(attached)]
@@ -330,6 +332,8 @@ def _compare_directional(run: Run, outcome: Outcome, pairs: Pairs) -> str:
     def at(angle: float) -> Array:
         return probe.eval(part, *(np.cos(angle) * directions + np.sin(angle) * axes).astype(np.float32))
 
+    if not abs(at(0) * pairs.scale).mean() > DARK:
+        return ""
     angle, si = mi.Float(0), interaction(pairs.wi)
     dr.enable_grad(angle)
     si.wi, towards = (vectors(w) + angle * vectors(axis) for w, axis in zip(directions, axes, strict=True))
