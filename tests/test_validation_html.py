@@ -8,15 +8,16 @@ from dataclasses import replace
 import mitsuba as mi
 import numpy as np
 import pytest
-from mutants import MUTANTS
+from mutants import MUTANTS, Mutant, sampled
 from support import Page, von_mises_fisher
 
+from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.probe.directions import direction, on_side
 from mi_brdfs.probe.partition import partitions
 from mi_brdfs.validation import Finding, Report, check
 from mi_brdfs.validation.html import page
 from mi_brdfs.validation.incidents import Incident
-from mi_brdfs.validation.pictures import HEMISPHERE, View, rasters, views
+from mi_brdfs.validation.pictures import HEMISPHERE, View, rasters, views, weights
 from mi_brdfs.validation.trial import COUNT, Trial
 
 HOSTILE = """</h2><script>alert("1")</script> 'x' & <b"""
@@ -28,7 +29,8 @@ def lobe(width: float, turn: float = 0, theta: float = 60, side: int = 1) -> tup
     wi = direction(60, 20)
     w, pdf = von_mises_fisher(on_side(direction(theta, 200 + turn), side), width, COUNT)
     (cells,) = partitions(lambda _, wo: pdf(wo), [w], [wi], COUNT)
-    return Trial("whole", Incident("60°", wi), cells, cells.histogram(w)), w
+    counts = cells.histogram(w)
+    return Trial("whole", Incident("60°", wi), cells, counts, np.stack([counts, counts])), w
 
 
 # --- The page -------------------------------------------------------------------------------------------------------
@@ -194,7 +196,7 @@ def test_pictures_show_the_samples(width, turn, side):
         assert inside.sum() > 0.99 * here.sum()
         assert view == (view.side, 0, 0, HEMISPHERE) if width == 1 else view.half < 10 * np.degrees(width)
         x, y = grid(view)
-        drawn, density, deviation = rasters(trial, view)
+        (drawn, density, deviation), _ = rasters(trial, view)
         assert (np.isnan(drawn) == (np.hypot(x, y) >= 90)).all()
         weights = np.nan_to_num(drawn) * solid_angles(x, y)
         assert weights.sum() == pytest.approx(inside.mean(), rel=0.02)
@@ -213,11 +215,30 @@ def test_pictures_show_where_samples_are_wrong():
     turned = w @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]
     wrong = replace(trial, counts=trial.partition.histogram(turned))
     (view,) = views(wrong)
-    deviation = rasters(wrong, view)[2]
+    deviation = rasters(wrong, view)[0][2]
     x, y = grid(view)
     lit = abs(x - 60) < 3
     assert np.median(deviation[lit & (y < -5) & (y > -10)]) > 5
     assert np.median(deviation[lit & (y > 2) & (y < 7)]) < -5
+
+
+def test_pictures_show_where_weights_are_wrong():
+    """Of a sampler that forgets the cosine: one over it too large, wherever there are samples. Only the page of a
+    report in which ``weight`` fails has them."""
+    forgotten = sampled(weight=lambda bs, weight, si, u: weight / bs.wo.z)
+    with mi.variant_context("llvm_ad_rgb"):
+        report = check(Mutant("cosine forgotten", ("weight",), Lambert, forgotten).register(), only="weight", angles=30)
+    trial = report.trials[0]
+    (view,) = views(trial)
+    (weight, quotient, difference), _ = rasters(trial, view, weights)
+    x, y = grid(view)
+    cosine = np.cos(np.radians(np.hypot(x, y)))
+    seen = (cosine > 0.3) & np.isfinite(difference)
+    assert seen.mean() > 0.4
+    assert abs((1 + difference[seen]) * cosine[seen] - 1).mean() < 0.04
+    assert weight[seen] == pytest.approx((1 + difference[seen]) * quotient[seen])
+    told = "the weights, eval/pdf, and the difference"
+    assert told in page([report]) and told not in page([replace(report, findings=[])])
 
 
 @pytest.mark.slow
@@ -225,7 +246,7 @@ def test_dots_are_not_missed():
     """A lobe far smaller than a pixel is one in a picture of the hemisphere, of the density that the pixel has."""
     trial, _ = lobe(1e-3)
     view = View(1, 0, 0, HEMISPHERE)
-    drawn, density, _ = rasters(trial, view)
+    (drawn, density, _), _ = rasters(trial, view)
     for picture in (drawn, density):
         x, y = grid(view)
         assert 0.3 < (np.nan_to_num(picture) * solid_angles(x, y)).sum() < 3
@@ -266,7 +287,7 @@ def test_impossible_densities_are_marked(below):
     with np.errstate(all="raise", under="ignore"):
         text = page([Report("x", [], [impossible])])
     chance = f"= {p:.2g}" if p else "&lt; 1e-300"
-    assert f'<span class="fail">p {chance}</span>' in text and text.count("red where negative or infinite") == 1
+    assert f'<span class="fail">p {chance}</span>' in text and text.count("red where &lt; 0 or infinite") == 1
     assert ["below" in told for told in Page(text).pictures()] == [False, True]
     scales = [float(scale) for scale in re.findall(r">([^<>]+) per sr<", text)]
     assert len(scales) == 4 and max(scales) < 10

@@ -37,7 +37,7 @@ from .options import (
     write_json,
     write_text,
 )
-from .terminal import Exit, err, fail, out, progress, stdout_to_stderr
+from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
     from ..probe.sources import BSDFSource
@@ -131,10 +131,8 @@ def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
 
     options: dict[str, Any] = {}
     if angles is not None:
-        try:
+        with failing(Exit.USAGE, ValueError, about="--angles"):
             options["angles"] = angles_of_incidence(degrees_of(angles))
-        except ValueError as error:
-            fail(f"--angles {angles}: {str(error).removeprefix(f'{angles}: ')}", Exit.USAGE)
     if significance is not None:
         if not 0 < significance < 1:
             fail(f"--significance {significance:g}: it must be in (0, 1)", Exit.USAGE)

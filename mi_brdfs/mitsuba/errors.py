@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ..parameters.messages import brief, printable
-from ..parameters.vocabulary import hint
+from ..parameters.vocabulary import plugin_hint
 from ..starting import Terminated
 from .registry import plugin_names
 
@@ -59,8 +59,7 @@ def _unknown_type(text: str) -> str | None:
     if not found:
         return None
     kind, name = found[1].replace("unknown", "").strip(), brief(found[2])
-    question = hint(name, plugin_names())
-    return f'there is no {f"{kind} " if kind else ""}plugin "{name}"{question and f"; {question}"}'
+    return f'there is no {f"{kind} " if kind else ""}plugin "{name}"; {plugin_hint(name, plugin_names())}'
 
 
 def _last_of_traceback(text: str) -> str:

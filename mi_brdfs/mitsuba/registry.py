@@ -24,7 +24,7 @@ from ..microfacet.terms import Term
 from ..model import Energy, Model, Plugin, full_name
 from ..models.microfacet import Microfacet
 from ..parameters import published
-from ..parameters.vocabulary import hint
+from ..parameters.vocabulary import plugin_hint
 from ..starting import signals_held
 from ..tabulated.tabulated import Tabulated
 from . import llvm
@@ -243,8 +243,7 @@ def presets(model: str | None = None) -> list[str]:
 
 def _find(name: str, plugins: dict) -> Any:
     if name not in plugins:
-        question = hint(str(name), plugins, "'") or f"there are {', '.join(sorted(plugins))}."
-        raise ValueError(f"There is no model {name!r}; {question}")
+        raise ValueError(f"There is no model {name!r}; " + plugin_hint(str(name), plugins, "'"))
     return plugins[name]
 
 

@@ -56,11 +56,11 @@ def listed(words: Iterable[str], last: str = "or", quote: bool = False) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
-def meant(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that may have been meant by another one: a close one, with the same letters if there is
-    such, or one that begins with it. Return None if there is none."""
+def meant(name: str, known: Iterable[str], likeness: float = 0.6) -> str | None:
+    """Return the known name that may have been meant by another one: a close one, of at least that ``likeness``, with
+    the same letters if there is such, or one that begins with it. Return None if there is none."""
     known = list(known)
-    close = difflib.get_close_matches(name, known, n=3)
+    close = difflib.get_close_matches(name, known, n=3, cutoff=likeness)
     same = [it for it in close if sorted(it) == sorted(name)]
     longer = [it for it in known if len(name) > 2 and it.startswith(name)]
     return next(iter([*same, *close, *longer]), None)

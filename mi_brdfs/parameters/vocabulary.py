@@ -38,7 +38,7 @@ def key(name: str) -> str:
     return "".join(filter(str.isalnum, name.lower()))
 
 
-def hint(name: str, known: Iterable[str], quote: str = '"') -> str:
+def hint(name: str, known: Iterable[str], quote: str = '"', likeness: float = 0.6) -> str:
     """Return the question whether a known name was meant by another one, with the option that it needs: ``did you mean
     "walter" with material=Au?``; nothing if there is none."""
     known = list(known)
@@ -46,5 +46,11 @@ def hint(name: str, known: Iterable[str], quote: str = '"') -> str:
         word, _, option = other.partition(" ")
         if word in known:
             return f"did you mean {quote}{word}{quote}" + (f" with {option}?" if option else "?")
-    near = meant(name, known)
+    near = meant(name, known, likeness)
     return f"did you mean {quote}{near}{quote}?" if near else ""
+
+
+def plugin_hint(name: str, known: Iterable[str], quote: str = '"') -> str:
+    """Return whether the name of a plugin is another one misspelt, or else how to bring a plugin of one's own, which
+    may be called anything: only what is much alike is a slip."""
+    return hint(name, known, quote, likeness=0.7) or "if it is your own, import it: --import FILE.py"

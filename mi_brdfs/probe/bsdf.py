@@ -24,6 +24,8 @@ from .arrays import (
     sample_arguments,
     vectors,
 )
+from .directions import hemisphere, on_side
+from .variates import random
 
 if TYPE_CHECKING:
     from ..model import Model
@@ -50,6 +52,13 @@ class Part(NamedTuple):
     def has(self, flag: int) -> bool:
         """Return whether a flag is among those of the part."""
         return bool(self.flags & int(flag))
+
+    @property
+    def passages(self) -> list[tuple[int, int]]:
+        """The sides that light may go from and to, and back."""
+        flags = mi.BSDFFlags
+        ways = [1] * self.has(flags.Reflection) + [-1] * (self.has(flags.Transmission) and len(self.sides) > 1)
+        return [(side, side * way) for side in self.sides for way in ways]
 
 
 class Samples(NamedTuple):
@@ -208,6 +217,17 @@ class BSDFProbe:
         density, component, kind, eta, pdf, smooth = (column[:, 0] for column in columns)
         return Samples(wo.astype(np.float32), weight, density, component, kind, eta, value, pdf, smooth > 0)
 
+    def pairs(
+        self, part: Part, count: int, seed: int, sides: tuple[int, int] | None = None, uv: ArrayLike = CENTRE
+    ) -> tuple[Array, Array]:
+        """Return directions all over a side, by default the first that a part is seen from, and others on the same or
+        another side, half of them as they are drawn."""
+        side, other = sides or (part.sides[0],) * 2
+        wi, wo = on_side(hemisphere(count, seed), side), on_side(hemisphere(count, seed + 1), other)
+        drawn = self.sample(part, wi, random(count, seed + 2), uv).wo
+        near = (np.arange(count) % 2 == 0) & (drawn[:, 2] * other > 0.01)
+        return wi, np.where(near[:, None], drawn, wo)
+
     def weights(self, part: Part, wi: Array, variates: Array) -> Array:
         """Return the weights that ``sample`` returns for each of some directions by the same variates, shape
         (len(wi), len(variates), channels)."""
@@ -215,10 +235,10 @@ class BSDFProbe:
         _, weight = self.bsdf.sample(part.context, si, *sample_arguments(np.tile(variates, (len(wi), 1))), True)
         return numbers(weight, len(wi) * len(variates)).reshape(len(wi), len(variates), -1)
 
-    def diffuse_reflectance(self, wi: Array, uv: ArrayLike = CENTRE) -> Array:
+    def diffuse_reflectance(self, wi: Array, uv: ArrayLike = CENTRE, active: bool | mi.Bool = True) -> Array:
         """Return ``eval_diffuse_reflectance``, shape (len(wi), channels); black if it is not implemented."""
         try:
-            return numbers(self.bsdf.eval_diffuse_reflectance(interaction(wi, uv), True), len(wi))
+            return numbers(self.bsdf.eval_diffuse_reflectance(interaction(wi, uv), active), len(wi))
         except RuntimeError:
             return np.zeros((len(wi), 1))
 

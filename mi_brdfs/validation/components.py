@@ -51,7 +51,7 @@ def _check_sampled(run: Run, outcome: Outcome, part: Part, incident: Incident) -
             told = f"component is {k} in {share:.1%} of the samples, where only {', '.join(map(str, allowed))} may be"
         if wrong.any():
             told = f"for light from {incident.name} sampled_{told}"
-            outcome.fault(told, wi=incident.vector(int(wrong.argmax())), seed=SEED)
+            outcome.fault(told, wi=incident.at(int(wrong.argmax())), seed=SEED)
     check_eta(outcome, incident, samples, samples.lit)
     if len(allowed) > 1 and samples.lit.any():
         _check_drawn(run, outcome, incident, samples)
@@ -72,7 +72,7 @@ def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Sample
     """Check that the samples said to be those of a component lie where it can send one, and that where only one can,
     its share of the samples is that of its density in the mixture's."""
     lit = np.flatnonzero(samples.lit)
-    wi, wo = incident.at(lit), np.ascontiguousarray(samples.wo[lit])
+    wi, wo = incident.at(lit), samples.wo[lit]
     densities = [run.probe.pdf(part, wi, wo) for part in run.probe.components]
     for part, own in zip(run.probe.components, densities, strict=True):
         said = samples.component[lit] == part.component
@@ -81,11 +81,11 @@ def _check_drawn(run: Run, outcome: Outcome, incident: Incident, samples: Sample
         if stray.sum() > 1e-3 * said.sum():
             share = stray.sum() / said.sum()
             told = f"{start} {share:.1%} of the samples said to be those of {part.name} lie where it draws none"
-            outcome.fault(told, share, wi=incident.vector(int(lit[stray][0])), seed=SEED)
+            outcome.fault(told, share, wi=incident.at(int(lit[stray][0])), seed=SEED)
         if alone.sum() >= 200 and said[alone].mean() < 0.9:
             share = said[alone].mean()
             told = f"{start} only {share:.1%} of the samples where nothing but {part.name} draws any are said to be its"
-            outcome.fault(f"{told} own", 1 - share, wi=incident.vector(int(lit[alone][0])), seed=SEED)
+            outcome.fault(f"{told} own", 1 - share, wi=incident.at(int(lit[alone][0])), seed=SEED)
 
 
 def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
@@ -224,8 +224,7 @@ def turned(w: Array) -> Array:
 
 def _check_differentials(run: Run, outcome: Outcome, part: Part) -> None:
     """Check that f does not change with the differentials of uv, which nobody computes unless flags ask for them."""
-    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (10, 11))
-    wo[::2] = run.probe.sample(part, wi, random(COUNT, 12)).wo[::2]
+    wi, wo = run.probe.pairs(part, COUNT, 10)
     si = interaction(wi)
     si.duv_dx, si.duv_dy = mi.Vector2f(0.3, 0.1), mi.Vector2f(-0.1, 0.2)
     value = numbers(run.probe.bsdf.eval(part.context, si, vectors(wo), True), COUNT)

@@ -15,13 +15,13 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe
-from ..probe.directions import angles_of, hemisphere, on_side, scattered
+from ..probe.directions import hemisphere, on_side, scattered
 from ..probe.variates import random
 from . import sampling
-from .outcome import Findings, Outcome, Skipped, relative, told
+from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding
 from .run import Run
-from .updates import attach, restored, traced_floats
+from .updates import traced_floats
 
 COUNT = 2000
 AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
@@ -37,83 +37,76 @@ def active(run: Run) -> Findings:
     probe, part = run.probe, run.probe.whole
     outcome = Outcome("active", part.name)
     wi, u = scattered(COUNT, 61, part.sides), random(COUNT, 62)
-    samples = probe.sample(part, wi, u)
-    wo = np.where(np.arange(COUNT)[:, None] % 3, samples.wo, on_side(hemisphere(COUNT, 63), part.sides[0]))
+    wo = np.where(np.arange(COUNT)[:, None] % 3, probe.sample(part, wi, u).wo,
+                  on_side(hemisphere(COUNT, 63), part.sides[0]))  # fmt: skip
     half = np.random.default_rng(64).random(COUNT) < 0.5
-    bsdf, si, towards = probe.bsdf, interaction(wi), vectors(wo)
-
-    try:
-        with unwrapped_ctrl_c():
-            bsdf.eval_diffuse_reflectance(si, True)
-        reflects = True
-    except RuntimeError:  # not implemented
-        reflects = False
-
-    def called(mask: bool | mi.Bool) -> dict[str, Array]:
-        bs, weight = bsdf.sample(part.context, si, *sample_arguments(u), mask)
-        value, density = bsdf.eval_pdf(part.context, si, towards, mask)
-        also = bsdf.eval_pdf_sample(part.context, si, towards, *sample_arguments(u), mask)
-        found = {
-            "eval": bsdf.eval(part.context, si, towards, mask),
-            "pdf": bsdf.pdf(part.context, si, towards, mask),
-            "eval_pdf's value": value,
-            "eval_pdf's density": density,
-            "the weight of sample": dr.select(probe.is_smooth(bs), weight, 0),
-            "the density of sample": bs.pdf,
-            "eval_pdf_sample's value": also[0],
-            "eval_pdf_sample's density": also[1],
-            "the weight of eval_pdf_sample": dr.select(probe.is_smooth(also[2]), also[3], 0),
-            "the density of eval_pdf_sample": also[2].pdf,
-        }
-        if reflects:
-            found["eval_diffuse_reflectance"] = bsdf.eval_diffuse_reflectance(si, mask)
-        dr.eval(found)
-        return {name: numbers(value, COUNT) for name, value in found.items()}
-
-    every = called(True)
+    every = _results(probe, wi, wo, u, True)
     for mask, lit, words in (
         (mi.Bool(half), half, "where half of the lanes are not active"),
         (mi.Bool(False), np.zeros(COUNT, bool), "where no lane is active"),
         (False, np.zeros(COUNT, bool), "where active is False"),
     ):
-        for name, value in called(mask).items():
+        for name, value in _results(probe, wi, wo, u, mask).items():
             stray = (value != 0) & ~lit[:, None]
             if probe.is_ours or not (name == "pdf" or "density" in name or "reflectance" in name):
                 outcome.wrong(stray, name, value, f"{words}, but must be 0", wi, wo, seed=62)
-            changed = abs(value - every[name])
-            changed = np.where(lit[:, None] & (changed > 1e-5 * abs(every[name]) + 1e-12), changed, 0)
-            outcome.wrong(changed, f"{words}, {name}", value, "when all are", wi, wo, expected=every[name], seed=62)
+            why = "when all are"
+            outcome.differing(1e-5, f"{words}, {name}", value, every[name], why, wi, wo, where=lit, seed=62)
     _check_derivatives(run, outcome, wi, wo, half)
     yield outcome.finding("Inactive lanes get no light, no weight and no derivative.")
+
+
+def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.Bool) -> dict[str, Array]:
+    """Return what all methods return where a mask is active, by name, without the weights of delta functions."""
+    bsdf, ctx, si, towards = probe.bsdf, mi.BSDFContext(), interaction(wi), vectors(wo)
+    value, density = bsdf.eval_pdf(ctx, si, towards, mask)
+    bs, weight = bsdf.sample(ctx, si, *sample_arguments(u), mask)
+    also = bsdf.eval_pdf_sample(ctx, si, towards, *sample_arguments(u), mask)
+    found = {
+        "eval": bsdf.eval(ctx, si, towards, mask),
+        "pdf": bsdf.pdf(ctx, si, towards, mask),
+        "eval_pdf's value": value,
+        "eval_pdf's density": density,
+        "the weight of sample": dr.select(probe.is_smooth(bs), weight, 0),
+        "the density of sample": bs.pdf,
+        "eval_pdf_sample's value": also[0],
+        "eval_pdf_sample's density": also[1],
+        "the weight of eval_pdf_sample": dr.select(probe.is_smooth(also[2]), also[3], 0),
+        "the density of eval_pdf_sample": also[2].pdf,
+    }
+    dr.eval(found)
+    reflectance = {"eval_diffuse_reflectance": probe.diffuse_reflectance(wi, active=mask)}
+    return {name: numbers(value, len(wo)) for name, value in found.items()} | reflectance
 
 
 def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Array) -> None:
     """Check that reverse derivatives of all parameters are those of the values of active lanes alone. Some inactive
     lanes have directions of length 0, as those of rays that hit nothing."""
-    probe, part = run.probe, run.probe.whole
-    params, keys, _ = traced_floats(run, "active")
+    parameters, _ = traced_floats(run, "active", differentiable=True)
     kept = (lit | (np.arange(len(lit)) % 4 > 0))[:, None]
-    found = []
+
+    def gradients(wi: Array, wo: Array, mask: bool | mi.Bool, counted: bool | Array) -> tuple[list[Array], float]:
+        """Return the derivatives of the sum of the values in the lanes that are counted, and the sum."""
+        for each in parameters:
+            each.attach()
+        value = run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), mask)
+        value = dr.select(mi.Bool(counted), value, 0)
+        if dr.grad_enabled(value):
+            dr.backward(dr.sum(value, axis=None))
+        return [each.gradient for each in parameters], float(np.sum(np.array(dr.detach(value), np.float64)))
+
     with ExitStack() as stack:
-        for key in keys:
-            stack.enter_context(restored(params, key))
+        for each in parameters:
+            stack.enter_context(each.restored())
         # Both have the same lanes in the same order: large terms of a sum that is 0 cancel alike.
-        for directions, mask, counted in (([w * kept for w in (wi, wo)], mi.Bool(lit), True), ([wi, wo], True, lit)):
-            for key in keys:
-                attach(params, key)
-            value = probe.bsdf.eval(part.context, interaction(directions[0]), vectors(directions[1]), mask)
-            value = dr.select(mi.Bool(counted), value, 0)
-            if dr.grad_enabled(value):
-                dr.backward(dr.sum(value, axis=None))
-            total = float(np.sum(np.array(dr.detach(value), np.float64)))
-            found.append({key: np.array(dr.grad(params[key]), np.float64).ravel() for key in keys})
-    for key in keys:
-        masked, alone = (each[key] for each in found)
+        found, _ = gradients(wi * kept, wo * kept, mi.Bool(lit), True)
+        expected, total = gradients(wi, wo, True, lit)
+    for each, masked, alone in zip(parameters, found, expected, strict=True):
         if not np.isfinite(masked).all() and np.isfinite(alone).all():
-            outcome.fault(f"the derivative for {key} is not finite with inactive lanes", np.inf)
+            outcome.fault(f"the derivative for {each.key} is not finite with inactive lanes", np.inf)
         elif abs(masked - alone).max(initial=0) > 1e-3 * abs(alone).max(initial=0) + 1e-6 * total:
             words = f"is {masked.sum():.4g} with inactive lanes, but {alone.sum():.4g} without"
-            outcome.fault(f"the derivative for {key} {words}", abs(masked - alone).max())
+            outcome.fault(f"the derivative for {each.key} {words}", abs(masked - alone).max())
 
 
 def mode(run: Run) -> Findings:
@@ -123,41 +116,32 @@ def mode(run: Run) -> Findings:
     ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
     not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
     for part in run.probe.parts:
-        ways = [1] * part.has(mi.BSDFFlags.Reflection)
-        ways += [-1] * (part.has(mi.BSDFFlags.Transmission) and len(part.sides) > 1)
-        if not ways:
+        if not part.passages:
             yield Finding("mode", part.name, "skip", "Not checked, as it transmits from one side only.")
             continue
         outcome, tolerance = Outcome("mode", part.name), 10 * run.rounding(part)
-        traced = context(part.component)
-        traced.mode = mi.TransportMode.Importance
-        traced = part._replace(context=traced)
+        traced = part._replace(context=context(part.component))
+        traced.context.mode = mi.TransportMode.Importance
         symmetric = not part.has(mi.BSDFFlags.NonSymmetric)
-        for side, way in ((side, way) for side in part.sides for way in ways):
-            wi, wo = on_side(hemisphere(COUNT, 65), side), on_side(hemisphere(COUNT, 66), side * way)
-            samples = run.probe.sample(traced, wi, random(COUNT, 67))
-            near = (np.arange(COUNT) % 2 == 0) & (samples.wo[:, 2] * side * way > 0.01)
-            wo[near] = samples.wo[near]
+        for sides in part.passages:
+            wi, wo = run.probe.pairs(traced, COUNT, 65, sides)
             got = run.probe.eval(traced, wi, wo)
             if symmetric:
-                expected = run.probe.eval(part, wi, wo)
+                expected, why = run.probe.eval(part, wi, wo), "is needed, as it is not flagged NonSymmetric"
             else:
                 expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
+                why = "is needed, as that is its adjoint, f from wo to wi"
+            name = "in the mode Importance eval"
             # What grazing facets transmit is faint and has few digits.
-            error = relative(got, expected, 1e-3, unknown=0)
-            off = (error.max(axis=1) > tolerance).mean()
-            if off > 1e-3:
-                why = "it is not flagged NonSymmetric" if symmetric else "that is its adjoint, f from wo to wi"
-                why = f"is needed, as {why}; {off:.1%} of the pairs are wrong"
-                outcome.wrong(error, "in the mode Importance eval", got, why, wi, wo, expected=expected)
-            if samples.lit.any():
-                reflected, value = samples.weight * samples.pdf[:, None], samples.value
-                error = abs(reflected - value).max(axis=1) / np.maximum(abs(value).max(axis=1), 1e-9) * samples.lit
-                off = np.quantile(error[samples.lit], 0.99) > tolerance
-                # What is wrong with a weight in any mode is said once.
-                if off and not sampling.failing(run, part, sampling.weight):
-                    name = "in the mode Importance a weight times pdf"
-                    outcome.wrong(error, name, reflected, "is eval", wi, samples.wo, expected=value, seed=67)
+            outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
+            samples = run.probe.sample(traced, wi, random(COUNT, 67))
+            # What is wrong with a weight in any mode is said once.
+            if not sampling.failing(run, part, sampling.weight):
+                name, reflected = "in the mode Importance a weight times pdf", samples.weight * samples.pdf[:, None]
+                pair, lit = (reflected, samples.value), samples.lit
+                outcome.differing(
+                    tolerance, name, *pair, "is eval", wi, samples.wo, unknown=0, where=lit, but_for=0.01, seed=67
+                )
         yield outcome.finding("Light may be traced from either end.")
 
 
@@ -204,7 +188,7 @@ def calls(run: Run) -> Findings:
 
     def called(method: str, probe: BSDFProbe = probe, order: slice = slice(None)) -> tuple[dict[str, Array], Array]:
         """Return what a method returns, by name, and the directions that it goes to, in the usual order."""
-        i, o, variates, at = (np.ascontiguousarray(it[order]) for it in (wi, wo, u, uv))
+        i, o, variates, at = (it[order] for it in (wi, wo, u, uv))
         if method == "sample":
             it = probe.sample(part, i, variates, at)
             wanted = {"a sample's weight": it.weight, "a sample's density": it.density[:, None]}
@@ -217,15 +201,9 @@ def calls(run: Run) -> Findings:
     def compare(when: str, method: str, got: dict[str, Array], towards: Array) -> None:
         usual, usually_towards = first[method]
         for name, value in got.items():
-            error = relative(value, usual[name])
-            if np.quantile(error.max(axis=1), 0.99) > 10 * run.rounding(part):
-                outcome.wrong(error, f"{when} {name}", value, "else", wi, towards, expected=usual[name], seed=78)
-        turned = np.linalg.norm(towards - usually_towards, axis=1) * (towards.any(axis=1) & usually_towards.any(axis=1))
-        if np.quantile(turned, 0.99) > 1e-3:
-            k = int(np.argmax(turned))
-            words = f"{when} sample draws {angles_of(towards[k])} for light from {angles_of(wi[k])}"
-            other = f"but {angles_of(usually_towards[k])} by the same variates else"
-            outcome.fault(f"{words}, {other}", np.inf, wi=wi[k], seed=78)
+            pair, tolerance = (value, usual[name]), 10 * run.rounding(part)
+            outcome.differing(tolerance, f"{when} {name}", *pair, "else", wi, towards, but_for=0.01, seed=78)
+        outcome.astray(when, towards, usually_towards, "by the same variates else", wi, 78)
 
     for k, (before, method) in enumerate(pairwise(AFTER_EACH_OTHER)):
         order = slice(None, None, 1 if k % 2 else -1)
@@ -281,17 +259,13 @@ def null(run: Run) -> Findings:
         raise Skipped("Nothing goes straight through.")
     outcome, u = Outcome("null", part.name), random(1 << 14, 75)
     for incident in run.incidents(part):
-        si = interaction(np.tile(incident.wi, (len(u), 1)))
+        wi = np.tile(incident.wi, (len(u), 1))
+        si = interaction(wi)
         bs, weight = probe.bsdf.sample(mi.BSDFContext(), si, *sample_arguments(u), True)
         through = (bs.sampled_type & int(mi.BSDFFlags.Null)) != 0
-        weight = dr.select(through, weight, 0)
-        bent = numbers(dr.select(through, dr.norm(bs.wo + si.wi), 0), len(u)).ravel()
-        if bent.max() > 1e-3:
-            wo = np.stack([numbers(x, len(u)).ravel() for x in bs.wo])[:, np.argmax(bent)]
-            words = f"samples of type Null go to {angles_of(wo)} for light from {incident.name}, and not straight on"
-            outcome.fault(words, float(bent.max()), wi=incident.wi, seed=75)
+        wo, each = (numbers(dr.select(through, it, 0), len(u)) for it in (bs.wo, weight))
+        outcome.astray("of type Null", wo, -wi, "is straight on", wi, 75, but_for=0)
         got = numbers(probe.bsdf.eval_null_transmission(si, True), len(u))[0]
-        each = numbers(weight, len(u))
         # Six standard errors: a false alarm once in 1e8.
         error = abs(got - each.mean(axis=0)) - 6 * each.std(axis=0) / np.sqrt(len(u)) - 1e-4
         if (error > 0).any():

@@ -7,16 +7,13 @@ import numpy as np
 
 from ..probe.arrays import Array, context
 from ..probe.bsdf import BSDFProbe, Part, Samples
-from ..probe.directions import angles_of, scattered
+from ..probe.directions import scattered
 from ..probe.variates import random
 from .components import check_eta, turned
 from .incidents import SCATTERED, Incident
-from .outcome import Findings, Outcome, relative
+from .outcome import KNOWN, Findings, Outcome
 from .report import Finding
 from .run import SEED, Run
-
-KNOWN = 1e-3
-"""What direction and light of a sample are known to, at angles that are not near grazing."""
 
 
 def deltas(run: Run) -> Findings:
@@ -93,28 +90,20 @@ def _check_paths(run: Run, outcome: Outcome, part: Part) -> None:
     seen = stays if len(part.sides) < 2 else np.ones(len(wi), bool)
     back = run.probe.sample(part, np.where(steep[:, None], wo, wi), u)
     same = lit & steep & seen & (stays == (back.wo[:, 2] * wo[:, 2] > 0))
-    if not same.any():
-        return
-    error = relative(_light(back), _light(there), 1e-3) * same[:, None]
-    if np.quantile(error[same], 0.99) > 10 * KNOWN:
-        name, why = "the light of a sample back to wi", "is what goes there"
-        outcome.wrong(error, name, _light(back), why, wi, wo, expected=_light(there), seed=82)
-    apart = np.linalg.norm(back.wo - wi, axis=1) * (same & back.weight.any(axis=1))
-    if np.quantile(apart[same], 0.99) > KNOWN:
-        why = "from wi, where light from wo must go, as that from wi goes to wo"
-        outcome.wrong(apart, "the distance of a sample", apart, why, wi, wo, seed=82)
+    name, pair = "the light of a sample back to wi", (_light(back), _light(there))
+    outcome.differing(
+        10 * KNOWN, name, *pair, "is what goes there", wi, wo, floor=1e-3, where=same, but_for=0.01, seed=82
+    )
+    returns = back.wo * back.weight.any(axis=1, keepdims=True)
+    outcome.astray("on the way back", returns[same], wi[same], "where the light came from", wo[same], 82)
 
 
 def _check_turned(run: Run, outcome: Outcome, part: Part, wi: Array, there: Samples) -> None:
     """Check that samples turn with the light about the normal."""
     after = run.probe.sample(part, turned(wi), random(SCATTERED, 82))
-    lit = there.weight.any(axis=1) & after.weight.any(axis=1)
-    apart = np.linalg.norm(after.wo - turned(there.wo), axis=1) * lit
-    if np.quantile(apart, 0.99) > KNOWN:
-        k = int(np.argmax(apart))
-        ways = (angles_of(w[k]) for w in (wi, there.wo, turned(wi), after.wo))
-        told = "light from {} goes to {}, but light from {} to {}: it does not turn with the light".format(*ways)
-        outcome.fault(f"{told} about the normal, and is not flagged anisotropic", apart.max(), wi=wi[k], seed=82)
+    lit = np.logical_and(there.weight.any(axis=1), after.weight.any(axis=1))[:, None]
+    when, why = "turned about the normal", "if it turned with the light: it is not flagged anisotropic"
+    outcome.astray(when, after.wo * lit, turned(there.wo) * lit, why, turned(wi), 82)
 
 
 def _light(samples: Samples) -> Array:

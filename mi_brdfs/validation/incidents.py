@@ -26,13 +26,9 @@ class Incident(NamedTuple):
     uv: tuple[float, float] = CENTRE
     """Where on the surface statistical tests look."""
 
-    def at(self, lanes: Array) -> Array:
-        """Return the directions of some lanes, shape (3,) if they all have the same."""
-        return self.wi if self.wi.ndim == 1 else np.ascontiguousarray(self.wi[lanes])
-
-    def vector(self, lane: int = 0) -> Array:
-        """Return the direction of a lane."""
-        return self.wi if self.wi.ndim == 1 else self.wi[lane]
+    def at(self, lanes: Array | int) -> Array:
+        """Return the directions of some lanes, shape (3,) if they all have the same, or that of one."""
+        return self.wi if self.wi.ndim == 1 else self.wi[lanes]
 
 
 def incidents(part: Part, angles: Sequence[float]) -> list[Incident]:

@@ -13,6 +13,9 @@ from ..probe.arrays import Array
 from ..probe.directions import angles_of
 from .report import Finding
 
+KNOWN = 1e-3
+"""What the direction of a sample is known to, at angles that are not near grazing."""
+
 
 class Fault(NamedTuple):
     """One thing that is wrong."""
@@ -48,6 +51,7 @@ class Outcome:
         *,
         expected: Array | None = None,
         uv: Array | None = None,
+        wavelengths: Array | None = None,
         seed: int | None = None,
         digits: int = 4,
     ) -> None:
@@ -61,6 +65,7 @@ class Outcome:
             wi: the directions of incidence, shape (3,) or (N, 3).
             wo: the others.
             uv: the texture coordinates, shape (N, 2), if they matter.
+            wavelengths: those of the channels, of the shape of ``got``, if they matter.
         """
         if not np.any(lanes):
             return
@@ -75,6 +80,7 @@ class Outcome:
             channel = np.argmax(abs(values - wanted))
             why = f"but {wanted[channel]:.{digits}g} {why}"
         name = name if uv is None else f"at uv = ({uv[k, 0]:.3g}, {uv[k, 1]:.3g}) {name}"
+        name = name if wavelengths is None else f"at {np.atleast_1d(wavelengths[k])[channel]:.0f} nm {name}"
         told = f"{name} is {values[channel]:.{digits}g} for light from {angles_of(wi)} towards {angles_of(wo)}, {why}"
         self.fault(told, float(np.sum(lanes)), wi=wi, wo=wo, seed=seed)
 
@@ -90,13 +96,35 @@ class Outcome:
         *,
         floor: float = 1e-7,
         unknown: float = np.inf,
-        where: Array | bool = True,
+        where: Array | None = None,
+        but_for: float = 0,
         **reproduces: Any,
+    ) -> float:
+        """Add a fault for the lane that differs most from what is ``expected``, if more than a part of them do by more
+        than a relative tolerance: of those ``where`` it matters, as :func:`relative` has it. All else is as in
+        :meth:`wrong`. Return what all ``but_for`` that part do not exceed."""
+        error = relative(got, expected, floor, unknown).reshape(len(got), -1)
+        where = np.ones(len(error), bool) if where is None else where
+        if not where.any():
+            return 0.0
+        largest = error.max(axis=1)[where]
+        usual = float(np.quantile(largest, 1 - but_for))
+        if usual > tolerance:
+            many = f"; {(largest > tolerance).mean():.1%} of those tried differ" if but_for else ""
+            over = error * (error > tolerance) * where[:, None]
+            self.wrong(over, name, got, why + many, wi, wo, expected=expected, **reproduces)
+        return usual
+
+    def astray(
+        self, when: str, got: Array, expected: Array, why: str, wi: Array, seed: int, but_for: float = 0.01
     ) -> None:
-        """Add a fault for the lane that differs most from what is ``expected``, if one does by more than a relative
-        tolerance: of those ``where`` it matters, as :func:`relative` has it. All else is as in :meth:`wrong`."""
-        error = relative(got, expected, floor, unknown) * where
-        self.wrong(error * (error > tolerance), name, got, why, wi, wo, expected=expected, **reproduces)
+        """Add a fault for the sample that is farthest from where it is ``expected``, if more than a part of them are
+        not where they are. Those that are zero on either hand do not count."""
+        apart = np.linalg.norm(got - expected, axis=1) * got.any(axis=1) * expected.any(axis=1)
+        if apart.size and np.quantile(apart, 1 - but_for) > KNOWN:
+            k = int(np.argmax(apart))
+            told = f"{when} sample draws {angles_of(got[k])} for light from {angles_of(wi[k])}"
+            self.fault(f"{told}, but {angles_of(expected[k])} {why}", apart.sum(), wi=wi[k], seed=seed)
 
     def finding(self, message: str, remark: str = "", tried: int = 0) -> Finding:
         """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case. Of each of the

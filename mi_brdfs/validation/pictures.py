@@ -1,8 +1,10 @@
-"""Pictures of what a sampler draws beside its density, by the histograms of the statistical tests, and of energy."""
+"""Pictures of what a sampler draws beside its density, and of its weights beside eval/pdf, by the histograms of the
+statistical tests; and of energy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +18,7 @@ from ..pages.figures import DENSITY, DIFFERENCE, SERIES
 from ..plot.style import FAINT, INK, SMALL, STYLES, calm, new_figure
 from ..probe.arrays import Array
 from ..probe.directions import from_plane, to_plane
-from .trial import Trial
+from .trial import LARGEST, Trial
 
 SURE = 1e-6
 """A p-value below which no luck is to blame."""
@@ -28,8 +30,23 @@ IMPOSSIBLE = 230 / 255, 0, 60 / 255, 1
 """The red of what no density may be."""
 HEMISPHERE = 92.0
 """Half the size of a window, in degrees, that shows a side of the surface from horizon to horizon."""
-LARGEST = 2.0**127
-"""A density that float32 cannot tell from an infinite one."""
+
+
+class Maps(NamedTuple):
+    """Two maps that should look alike, and how much the first is above the second; a value for each cell."""
+
+    told: str
+    names: tuple[str, str]
+    unit: str
+    """Of both."""
+    values: Array
+    """Shape (3, cells)."""
+    reach: float
+    """Where the scale of the difference ends."""
+    ends: tuple[str, str]
+    """That in words, at either end."""
+    worst: Array | None = None
+    """The direction in which they differ most, if that is no chance."""
 
 
 class View(NamedTuple):
@@ -71,9 +88,36 @@ def _ends(values: Array, weights: Array, tail: float) -> tuple[int, int]:
     return first, last
 
 
-def rasters(trial: Trial, view: View) -> Array:
-    """Return the density of the samples drawn, what ``pdf`` says of it, and their difference in standard deviations, in
-    each pixel of a window; NaN outside the hemisphere. Cells smaller than a pixel are merged, so that none is missed.
+Summed = Callable[[Array], Array]
+"""A function that sums the values of cells over those that a pixel holds."""
+
+
+def densities(trial: Trial, summed: Summed) -> Maps:
+    """Return the density of the samples drawn, what ``pdf`` says of it, and their difference in standard deviations."""
+    cells = trial.partition
+    each = trial.counts, np.fmin(trial.expected, LARGEST), cells.integrals, cells.solid_angles
+    counts, expected, integrals, solid_angles = map(summed, each)
+    deviation = (counts - expected) / np.sqrt(np.maximum(expected, 1))
+    values = np.array([counts / trial.count / solid_angles, integrals / solid_angles, deviation])
+    told, ends = "the samples drawn, their pdf, and the difference", ("−5σ, too few", "too many, +5σ")
+    worst = cells.centres[trial.test.worst] if trial.test.p_value < SURE else None
+    return Maps(told, ("drawn", "pdf"), " per sr", values, 5, ends, worst)
+
+
+def weights(trial: Trial, summed: Summed) -> Maps:
+    """Return the mean weight of the samples, the mean of eval/pdf, and by which part of it the first is above."""
+    weight, quotient, counts = map(summed, (*trial.weights, trial.counts))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = np.array([weight / counts, quotient / counts, weight / quotient - 1])
+    off = abs(values[2][np.isfinite(values[2])])
+    reach = float(np.clip(np.quantile(off, 0.99), 0.01, 1)) if off.size else 1
+    ends = f"−{reach:.0%}", f"too large, +{reach:.0%}"
+    return Maps("the weights, eval/pdf, and the difference", ("weight", "eval/pdf"), "", values, reach, ends)
+
+
+def rasters(trial: Trial, view: View, maps: Callable[[Trial, Summed], Maps] = densities) -> tuple[Array, Maps]:
+    """Return three pictures of a window, NaN outside the hemisphere, and the maps that they are of. Cells smaller than
+    a pixel are merged, so that none is missed.
 
     Shape (3, PIXELS, PIXELS), in rows from the top.
     """
@@ -82,47 +126,49 @@ def rasters(trial: Trial, view: View) -> Array:
     inside = np.hypot(x, y) < 90
     cells = trial.partition
     merged = cells.merged(int(np.log2(90 * PIXELS / view.half)))
-    counts, expected, integrals, solid_angles = (
-        np.bincount(merged, each)
-        for each in (trial.counts, np.fmin(trial.expected, LARGEST), cells.integrals, cells.solid_angles)
-    )
+    made = maps(trial, partial(np.bincount, merged))
     pictures = np.full((3, PIXELS, PIXELS), np.nan)
-    pictures[:, inside] = np.array([
-        counts / trial.count / solid_angles,
-        integrals / solid_angles,
-        (counts - expected) / np.sqrt(np.maximum(expected, 1)),
-    ])[:, merged[cells.cells(from_plane(x[inside], -y[inside], view.side, trial.axis))]]  # fmt: skip
-    return pictures
+    places = from_plane(x[inside], -y[inside], view.side, trial.axis)
+    pictures[:, inside] = made.values[:, merged[cells.cells(places)]]
+    return pictures, made
 
 
-def pictures(trial: Trial) -> Iterator[tuple[str, Figure, str, str]]:
-    """Yield the side of each window, what the sampler draws there, what ``pdf`` says of it and their difference side by
-    side, and the densities at the ends of the scale."""
-    for view in views(trial):
-        drawn, density, deviation = rasters(trial, view)
-        samples = np.concatenate([drawn, density])
-        samples = samples[(samples > 0) & (samples < LARGEST)]
-        low, high = (samples[k] for k in _ends(samples, samples, 1e-3)) if samples.size else (0.1, 1)
-        low = min(low, high / 10)
-        side = f"{'above' if view.side > 0 else 'below'} the surface"
-        scale, palette = LogNorm(low, high), DENSITY.resampled(LEVELS)
-        expected, impossible = palette(scale(density)), (density < 0) | (density >= LARGEST)
-        expected[impossible] = IMPOSSIBLE
-        shown = {
-            f"drawn {side.split()[0]}": palette(scale(drawn)),
-            "pdf, red where negative or infinite" if impossible.any() else "pdf": expected,
-            "difference": DIFFERENCE.resampled(LEVELS - 1)(Normalize(-5, 5)(deviation)),
-        }
-        # Without a layout that is computed, which takes ten times as long as the drawing.
-        figure = Figure(figsize=(6.1, 2.3))
-        places = {"left": 0.012, "right": 0.988, "bottom": 0.09, "top": 0.92, "wspace": 0.06}
-        for ax, (title, colours) in zip(figure.subplots(1, 3, gridspec_kw=places), shown.items(), strict=True):
-            ax.set_title(title + ", zoomed" * (view.half < HEMISPHERE), loc="left", fontsize=SMALL, pad=3)
-            _draw(ax, colours, trial, view)
-        yield side, figure, _brief(low), _brief(high)
+def pictures(trial: Trial, weighed: bool = False) -> Iterator[tuple[str, Figure, tuple[str, str], tuple[str, str]]]:
+    """Yield for each window what it shows, in words; what the sampler draws there, what ``pdf`` says of it and their
+    difference side by side; and what the ends of the two scales stand for. Then the same of its weights if they are to
+    be ``weighed``."""
+    for maps in (densities, weights) if weighed else (densities,):
+        for view in views(trial):
+            drawn, made = rasters(trial, view, maps)
+            if np.isfinite(drawn[2]).any():  # there are weights only where samples are
+                yield _figure(trial, view, drawn, made)
 
 
-def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:
+def _figure(
+    trial: Trial, view: View, pictures: Array, maps: Maps
+) -> tuple[str, Figure, tuple[str, str], tuple[str, str]]:
+    first, second, difference = pictures
+    shown = pictures[:2][(pictures[:2] > 0) & (pictures[:2] < LARGEST)]
+    low, high = (shown[k] for k in _ends(shown, shown, 1e-3)) if shown.size else (0.1, 1)
+    low = min(low, high / 10)
+    side, scale, palette = "above" if view.side > 0 else "below", LogNorm(low, high), DENSITY.resampled(LEVELS)
+    expected, impossible = palette(scale(second)), (second < 0) | (second >= LARGEST)
+    expected[impossible] = IMPOSSIBLE
+    colours = {
+        f"{maps.names[0]} {side}": palette(scale(first)),
+        f"{maps.names[1]}, red where < 0 or infinite" if impossible.any() else maps.names[1]: expected,
+        "difference": DIFFERENCE.resampled(LEVELS - 1)(Normalize(-maps.reach, maps.reach)(difference)),
+    }
+    # Without a layout that is computed, which takes ten times as long as the drawing.
+    figure = Figure(figsize=(6.1, 2.3))
+    places = {"left": 0.012, "right": 0.988, "bottom": 0.09, "top": 0.92, "wspace": 0.06}
+    for ax, (title, each) in zip(figure.subplots(1, 3, gridspec_kw=places), colours.items(), strict=True):
+        ax.set_title(title + ", zoomed" * (view.half < HEMISPHERE), loc="left", fontsize=SMALL, pad=3)
+        _draw(ax, each, trial, view, maps.worst)
+    return f"{side} the surface: {maps.told}", figure, (_brief(low) + maps.unit, _brief(high) + maps.unit), maps.ends
+
+
+def _draw(ax: Axes, colours: Array, trial: Trial, view: View, worst: Array | None) -> None:
     """Draw a picture, with where the light comes from and where a mirror sends it."""
     left, right, size = view.x - view.half, view.x + view.half, 2 * view.half
     top, bottom = view.y - view.half, view.y + view.half
@@ -134,7 +180,7 @@ def _draw(ax: Axes, colours: Array, trial: Trial, view: View) -> None:
         ax.plot(theta, 0, "+", color=colour, markersize=7, markeredgewidth=width)
         if wi[2] * view.side > 0:
             ax.plot(-theta, 0, "o", color=colour, markersize=5, markeredgewidth=width, fillstyle="none")
-    if trial.test.p_value < SURE and (worst := trial.partition.centres[trial.test.worst])[2] * view.side > 0:
+    if worst is not None and worst[2] * view.side > 0:
         x, y = to_plane(worst[None], trial.axis)
         for colour, width in ("white", 2.6), ("black", 1.2):
             ring = {"markersize": 13, "markeredgewidth": width, "fillstyle": "none", "clip_on": False}

@@ -180,12 +180,12 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
         k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
         if error[k, channel] > largest or (scale.any() and not largest):
             largest = float(error[k, channel])
-            light = incident.name if incident.wi.ndim == 1 else angles_of(incident.vector(lanes[k]))
+            light = incident.name if incident.wi.ndim == 1 else angles_of(incident.at(lanes[k]))
             words = (
                 f"the largest relative difference is {largest:.2g}, for light from {light} towards "
                 f"{angles_of(wo[k])}: {ours[k, channel]:.6g}, but {theirs[k, channel]:.6g} of {name}"
             )
-            at = {"wi": incident.vector(lanes[k]), "wo": wo[k]}
+            at = {"wi": incident.at(lanes[k]), "wo": wo[k]}
     outcome.data = {"difference": largest, "tolerance": tolerance}
     words += f"; float32 rounds by up to {tolerance:.2g}"
     if largest > tolerance:

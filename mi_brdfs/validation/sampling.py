@@ -92,6 +92,8 @@ def weight(run: Run) -> Findings:
                         error >= 0.5 * largest, 1 + np.nan_to_num(abs(got.reshape(len(got), -1)).max(1)), 0
                     )
                     outcome.wrong(carried, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
+        if outcome.faults and run.angles:
+            run.trials(part)  # whose pictures show where
         yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.")
 
 

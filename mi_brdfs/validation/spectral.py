@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -13,7 +13,6 @@ from ..parameters.colours import rgb_texture
 from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
 from ..probe.bsdf import BSDFProbe, load
 from ..probe.directions import hemisphere, on_side
-from ..probe.variates import random
 from . import sampling, values
 from .outcome import Findings, Outcome, Skipped, relative, told
 from .run import Run
@@ -56,15 +55,13 @@ def spectral(run: Run) -> Findings:
     rgb, other = (f"{mi.variant().rpartition('_')[0]}_{kind}" for kind in ("rgb", "spectral"))
     if mi.variant() not in (rgb, other) or not {rgb, other} <= set(mi.variants()):
         raise Skipped(f"It takes the variants {rgb} and {other}.")
-    wi = on_side(hemisphere(COUNT, 81), part.sides[0])
     expected: dict[str, Array] = {}
     try:
         with unwrapped_ctrl_c(), mi.variant_context(rgb):
             probe = _load(described)
             greys = _greys(probe, described)
             tried = _tried(probe, described, greys)
-            wo = _load(tried[""]).sample(part, wi, random(COUNT, 82)).wo
-            wo[::2] = on_side(hemisphere(COUNT, 83), part.sides[0])[::2]
+            wi, wo = _load(tried[""]).pairs(part, COUNT, 81)
             expected = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
     except Exception as failure:  # it was checked in the other
         without = f"It does not work in {rgb}: {told(failure)}. "
@@ -98,12 +95,10 @@ def spectral(run: Run) -> Findings:
             outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
     for words in tried:
         wanted = np.broadcast_to(expected[words].mean(axis=1, keepdims=True), got[words].shape)
-        error, typical = _error(got[words], wanted)
-        worst = max(worst, typical)
-        if typical > TOLERANCE:
-            lane, channel = np.unravel_index(int(np.argmax(error)), error.shape)
-            name = f"in grey{words}, at {hero_wavelengths(COUNT)[lane, channel]:.0f} nm in {other} eval"
-            outcome.wrong(error, name, got[words], f"in {rgb}", wi, wo, expected=wanted)
+        places = Places(wi, wo, hero_wavelengths(COUNT))
+        worst = max(
+            worst, _compare(outcome, f"in {other}, in grey{words}, eval", got[words], wanted, f"in {rgb}", places)
+        )
     grey = f"Grey is the same in {rgb} and {other}, to {worst:.1g}. " if tried else ""
     yield outcome.finding(f"{without}{grey}Wavelengths follow their own.")
 
@@ -111,11 +106,11 @@ def spectral(run: Run) -> Findings:
 def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None:
     """Check that channels, or wavelengths, follow their own values of the colours."""
     part, given = run.probe.whole, run.given or {}
-    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (84, 85))
     wavelengths = hero_wavelengths(COUNT)
     textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
-    coloured, si = load(given | textures), interaction(wi, wavelengths=wavelengths)
-    wo[::2] = BSDFProbe(coloured).sample(part, wi, random(COUNT, 86)).wo[::2]
+    coloured = load(given | textures)
+    wi, wo = BSDFProbe(coloured).pairs(part, COUNT, 84)
+    si, places = interaction(wi, wavelengths=wavelengths), Places(wi, wo, wavelengths)
 
     def evaluated(bsdf: mi.BSDF, wavelengths: Array) -> Array:
         return numbers(bsdf.eval(part.context, interaction(wi, wavelengths=wavelengths), vectors(wo), True), COUNT)
@@ -127,19 +122,15 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
         evaluated(load(given | {name: pinned(texture, si, k) for name, texture in textures.items()}), alike[k])
         for k in range(count)
     ]
-    errors = np.array([[_error(got[:, k], grey[other][:, k])[1] for other in range(count)] for k in range(count)])
+    errors = np.array([[_error(got[:, k], grey[other][:, k]) for other in range(count)] for k in range(count)])
     if mi.is_spectral:
         rolled = np.roll(evaluated(coloured, np.roll(wavelengths, 1, axis=1)), -1, axis=1)
-        error, typical = _error(rolled, got)
-        if typical > TOLERANCE:
-            name = f"in another order of the wavelengths {_at(wavelengths, error)}"
-            outcome.wrong(error, name, rolled, "in the first: it takes another's value", wi, wo, expected=got)
+        name, why = "in another order of the wavelengths eval", "in the first: it takes another's value"
+        _compare(outcome, name, rolled, got, why, places)
         # Asked at any wavelengths, these textures have the values of the light's, also to make a tint of.
         bound = evaluated(load(given | {name: pinned(texture, si) for name, texture in textures.items()}), wavelengths)
-        error, typical = _error(got, bound)
-        if typical > TOLERANCE:
-            name, why = _at(wavelengths, error), "if all colours have their values of the light's wavelengths"
-            outcome.wrong(error, name, got, f"{why}: they are looked up at others", wi, wo, expected=bound)
+        why = "if all colours have their values of the light's wavelengths: they are looked up at others"
+        _compare(outcome, "eval", got, bound, why, places)
     for k in range(count):
         channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
         difference, why = abs(got[:, k] - grey[k][:, k]), "where all colours are grey of their value there"
@@ -148,20 +139,29 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
             outcome.wrong(difference, name, got[:, k], of_other, wi, wo, expected=grey[k][:, k])
         if mi.is_spectral:
             # Of four equal wavelengths no tint can depend on the others.
-            alone = evaluated(coloured, alike[k])[:, k]
-            error, typical = _error(alone, grey[k][:, k])
-            if typical > TOLERANCE:
-                outcome.wrong(error, _at(wavelengths[:, k], error), alone, why, wi, wo, expected=grey[k][:, k])
+            alone, place = evaluated(coloured, alike[k])[:, k], Places(wi, wo, wavelengths[:, k])
+            _compare(outcome, "eval", alone, grey[k][:, k], why, place)
 
 
-def _at(wavelengths: Array, error: Array) -> str:
-    return f"eval at {wavelengths.flat[np.argmax(error)]:.0f} nm"
+class Places(NamedTuple):
+    """Where values are compared: pairs of directions, and the wavelengths of each."""
+
+    wi: Array
+    wo: Array
+    wavelengths: Array
 
 
-def _error(got: Array, expected: Array) -> tuple[Array, float]:
-    """Return the relative errors, and what 99 of 100 do not exceed."""
-    error = relative(got, expected, 1e-6)
-    return error, float(np.quantile(error, 0.99))
+def _compare(outcome: Outcome, name: str, got: Array, expected: Array, why: str, places: Places) -> float:
+    """Add a fault if values differ; return by how much 99 in 100 do at most."""
+    wi, wo, wavelengths = places
+    return outcome.differing(
+        TOLERANCE, name, got, expected, why, wi, wo, floor=1e-6, but_for=0.01, wavelengths=wavelengths
+    )
+
+
+def _error(got: Array, expected: Array) -> float:
+    """Return the relative error that 99 in 100 values do not exceed."""
+    return float(np.quantile(relative(got, expected, 1e-6), 0.99))
 
 
 def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ..probe.arrays import Array
+from ..probe.arrays import Array, luminance
 from ..probe.bsdf import BSDFProbe, Part, Samples
 from ..probe.chi_square import ChiSquare, chi_square, lone_cell, surprise
 from ..probe.directions import angles_of, azimuth_axis
@@ -29,6 +29,8 @@ DOUBTFUL = 64
 """The most cells of a suspect over which the density is integrated anew."""
 HORIZON = 6e-8
 """The |cosθ| at which float32 tells a direction from the horizon."""
+LARGEST = 2.0**127
+"""A number that float32 cannot tell from an infinite one."""
 CONFIRMED = 2
 """Directions that fail before the others need no second look."""
 
@@ -42,6 +44,8 @@ class Trial:
     partition: Partition
     counts: Array
     """How many of the samples are drawn in each cell."""
+    weights: Array
+    """The sums of the luminance of their weights, and of eval/pdf for them, in each cell: shape (2, cells)."""
     count: int = COUNT
     """How many samples there are."""
     seed: int = 0
@@ -177,13 +181,22 @@ def _trials(
         counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
         # No cell holds the density of what a rounding error lifts out of the horizon.
         counted &= abs(samples.wo[:, 2]) > HORIZON
-        counts = partition.histogram(samples.wo[counted])
-        trial = Trial(part.name, incident, partition, counts, count, 1 + 2 * (k - k % at_once))
+        counts, weights = _sums(partition, Samples(*(field[counted] for field in samples)))
+        trial = Trial(part.name, incident, partition, counts, weights, count, 1 + 2 * (k - k % at_once))
         if turn:
             if len(doubtful := trial.doubtful):
                 trial = replace(trial, partition=partition.refined(partial(density, k), doubtful))
-            settled = trial.settled
-            rest = replace(trial, partition=trial.partition.only(settled), counts=counts[settled])
+            kept = trial.settled
+            rest = replace(trial, partition=trial.partition.only(kept), counts=counts[kept], weights=weights[:, kept])
             trial = replace(rest, left_out=trial.share - rest.share, doubt=float(rest.partition.errors.sum()))
         found.append(trial)
     return found
+
+
+def _sums(partition: Partition, samples: Samples) -> tuple[Array, Array]:
+    """Return :attr:`Trial.counts` and :attr:`Trial.weights` of some samples."""
+    own, count = partition.cells(samples.wo), len(partition.starts)
+    with np.errstate(divide="ignore"):
+        both = luminance(samples.weight), luminance(samples.value / samples.pdf[:, None])
+    sums = [np.bincount(own, np.nan_to_num(each, posinf=LARGEST), count) for each in both]
+    return np.bincount(own, minlength=count), np.array(sums)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -13,13 +11,24 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, launched_kernels, numbers
 from ..probe.bsdf import BSDFProbe, load
-from ..probe.directions import angles_of, hemisphere, on_side
+from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run
+from .traced import Parameter, traced_floats
 
 COUNT = 1000
+SEED = 92
+UNNOTICED = "parameters_changed without names must take up any change"
+
+
+class Drawn(NamedTuple):
+    """Pairs of directions that a BSDF draws, and the variates."""
+
+    wi: Array
+    wo: Array
+    u: Array
 
 
 def updates(run: Run) -> Findings:
@@ -27,123 +36,111 @@ def updates(run: Run) -> Findings:
     value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. And what
     is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change, and
     of texels and tables no more than with their names. For this the BSDF must be given as a dict."""
-    probe, part = run.probe, run.probe.whole
     described = run.described("To load it with another value")
-    params, keys, _ = traced_floats(run, "updates")
-    wi, u = on_side(hemisphere(COUNT, 91), part.sides[0]), random(COUNT, 92)
-    wo = probe.sample(part, wi, u).wo
-    tried, tolerance = 0, 10 * run.rounding(part)
-    for key in keys:
-        name, _, rest = key.partition(".")
-        outcome = Outcome("updates", key)
-        with restored(params, key) as original:
-            if rest not in ("", "value") or dr.width(original) != 1:
-                _check_taken_up(run.probe, outcome, tolerance, params, key, wi, wo, u)
-                tried += 1
-                yield outcome.finding("Once it is changed, all of it is taken up.")
-                continue
-            value = original * 0.95 + 1e-3
-            number = numbers(value, 1)[0]
-            given = float(number[0]) if len(number) == 1 else {"type": "rgb", "value": number.tolist()}
-            if len(number) != 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
-                continue
-            before = probe.eval(part, wi, wo)
-            if (other := loaded_or_none(described | {name: given})) is None:  # it is given otherwise
-                continue
-            fresh = BSDFProbe(other)
-            told = ", ".join(f"{each:.4g}" for each in number)
-            after, first = (each.eval(part, wi, wo) for each in (probe, fresh))
-            set_value(params, key, value)
-            tried += 1
-            once, as_loaded = f"once it is set to {told}, ", "if it is loaded with that"
-            shared, unnoticed = "they share something", "parameters_changed without names must take up any change"
-            mine, last = (each.eval(part, wi, wo) for each in (probe, fresh))
-            pdf, expected_pdf = (each.pdf(part, wi, wo) for each in (probe, fresh))
-            params[key] = original
-            probe.bsdf.parameters_changed()
-            back = probe.eval(part, wi, wo)
-            for row in (
-                (f"{once}eval", mine, last, as_loaded),
-                (f"{once}pdf", pdf, expected_pdf, as_loaded),
-                (f"{once}eval of another that was loaded with that", last, first, f"before: {shared}"),
-                (f"once another is loaded with {told}, eval", after, before, f"before: {shared}"),
-                ("once it is set back, eval", back, before, f"before: {unnoticed}"),
-            ):
-                outcome.differing(tolerance, *row, wi, wo)
-            set_value(params, key, value)
-            ours, loaded = (each.sample(part, wi, u) for each in (probe, fresh))
-            # What sample keeps of former values shows beside pdf, which has the new ones.
-            error, others = (relative(each.pdf, each.density, unknown=0) * each.lit for each in (ours, loaded))
-            over = error * (error > tolerance) * (np.quantile(others, 0.99) <= tolerance)
-            why = "is the density that sample states"
-            outcome.wrong(over, f"{once}pdf", ours.pdf, why, wi, ours.wo, expected=ours.density, seed=92)
-            turned = np.linalg.norm(ours.wo - loaded.wo, axis=1) * (ours.lit & loaded.lit)
-            # A choice among lobes may fall otherwise where a rounding error decides it.
-            if np.quantile(turned, 0.9) > 1e-3:
-                k = int(np.argmax(turned))
-                words = f"{once}sample draws {angles_of(ours.wo[k])} for light from {angles_of(wi[k])}"
-                other = f"but {angles_of(loaded.wo[k])} by the same variates {as_loaded}"
-                outcome.fault(f"{words}, {other}", turned.sum(), wi=wi[k], seed=92)
-        yield outcome.finding("Set and updated, it acts as loaded.")
-    if not tried:
-        yield Finding("updates", "whole", "skip", "It has no parameters that could be given as a number or a colour.")
+    parameters, _ = traced_floats(run, "updates")
+    wi, u = on_side(hemisphere(COUNT, 91), run.probe.whole.sides[0]), random(COUNT, SEED)
+    drawn = Drawn(wi, run.probe.sample(run.probe.whole, wi, u).wo, u)
+    findings = [finding for each in parameters if (finding := _updated(run, each, described, drawn))]
+    words = "It has no parameters that could be given as a number or a colour."
+    yield from findings or [Finding("updates", "whole", "skip", words)]
 
 
-def _check_taken_up(
-    probe: BSDFProbe,
-    outcome: Outcome,
-    tolerance: float,
-    params: mi.SceneParameters,
-    key: str,
-    wi: Array,
-    wo: Array,
-    u: Array,
-) -> None:
+def _updated(run: Run, parameter: Parameter, described: dict[str, Any], drawn: Drawn) -> Finding | None:
+    """Return what is found of updates of a parameter, or None if no dict gives it another value."""
+    outcome, (name, _, rest) = Outcome("updates", parameter.key), parameter.key.partition(".")
+    with parameter.restored() as original:
+        if rest not in ("", "value") or dr.width(original) != 1:
+            _check_taken_up(run, outcome, parameter, drawn)
+            return outcome.finding("Once it is changed, all of it is taken up.")
+        value = original * 0.95 + 1e-3
+        number = numbers(value, 1)[0]
+        if len(number) > 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
+            return None
+        given = float(number[0]) if len(number) == 1 else {"type": "rgb", "value": number.tolist()}
+        before = run.probe.eval(run.probe.whole, drawn.wi, drawn.wo)
+        if (other := loaded_or_none(described | {name: given})) is None:  # it is given otherwise
+            return None
+        told = ", ".join(f"{each:.4g}" for each in number)
+        why = "before: they share something"
+        fresh, after = BSDFProbe(other), run.probe.eval(run.probe.whole, drawn.wi, drawn.wo)
+        _compare(run, outcome, drawn, f"once another is loaded with {told}, eval", after, before, why)
+        first = fresh.eval(run.probe.whole, drawn.wi, drawn.wo)
+        parameter.set(value)
+        last = fresh.eval(run.probe.whole, drawn.wi, drawn.wo)
+        _compare(run, outcome, drawn, f"once it is set to {told}, eval of another with that", last, first, why)
+        _check_as_loaded(run, outcome, fresh, drawn, f"once it is set to {told},")
+        parameter.params[parameter.key] = original
+        run.probe.bsdf.parameters_changed()
+        back = run.probe.eval(run.probe.whole, drawn.wi, drawn.wo)
+        _compare(run, outcome, drawn, "once it is set back, eval", back, before, f"before: {UNNOTICED}")
+    return outcome.finding("Set and updated, it acts as loaded.")
+
+
+def _compare(run: Run, outcome: Outcome, drawn: Drawn, name: str, got: Array, expected: Array, why: str) -> None:
+    outcome.differing(10 * run.rounding(run.probe.whole), name, got, expected, why, drawn.wi, drawn.wo, seed=SEED)
+
+
+def _check_as_loaded(run: Run, outcome: Outcome, fresh: BSDFProbe, drawn: Drawn, once: str) -> None:
+    """Check that the BSDF acts as a fresh one, which was loaded with its parameters."""
+    part, (wi, wo, u), as_loaded = run.probe.whole, drawn, "if it is loaded with that"
+    for name in ("eval", "pdf"):
+        got, expected = (getattr(each, name)(part, wi, wo) for each in (run.probe, fresh))
+        _compare(run, outcome, drawn, f"{once} {name}", got, expected, as_loaded)
+    ours, loaded = (each.sample(part, wi, u) for each in (run.probe, fresh))
+    # What sample keeps of former values shows beside pdf, which has the new ones.
+    if np.quantile(relative(loaded.pdf, loaded.density, unknown=0) * loaded.lit, 0.99) <= 10 * run.rounding(part):
+        tolerance, why = 10 * run.rounding(part), "is the density that sample states"
+        outcome.differing(
+            tolerance, f"{once} pdf", ours.pdf, ours.density, why, wi, ours.wo, unknown=0, where=ours.lit, seed=SEED
+        )
+    # A choice among lobes may fall otherwise where a rounding error decides it.
+    got, expected = (each.wo * each.lit[:, None] for each in (ours, loaded))
+    outcome.astray(once, got, expected, f"by the same variates {as_loaded}", wi, SEED, but_for=0.1)
+
+
+def _check_taken_up(run: Run, outcome: Outcome, parameter: Parameter, drawn: Drawn) -> None:
     """Check that new texels or entries of a table, which no dict need give, are all taken up once they are set: then
     ``parameters_changed`` without names changes nothing more."""
-    value = np.array(params[key])
-    set_value(params, key, value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
+    probe, value = run.probe, np.array(parameter.value)
+    parameter.set(value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
 
     def found() -> list[tuple[str, Array, Array]]:
-        samples = probe.sample(probe.whole, wi, u)
-        values, densities = probe.eval(probe.whole, wi, wo), probe.pdf(probe.whole, wi, wo)
-        return [("eval", wo, values), ("pdf", wo, densities), ("a sample's density", samples.wo, samples.density)]
+        samples = probe.sample(probe.whole, drawn.wi, drawn.u)
+        values, densities = (call(probe.whole, drawn.wi, drawn.wo) for call in (probe.eval, probe.pdf))
+        return [
+            ("eval", drawn.wo, values),
+            ("pdf", drawn.wo, densities),
+            ("a sample's density", samples.wo, samples.density),
+        ]
 
     named = found()
     probe.bsdf.parameters_changed()
     why = "after parameters_changed without names: what is kept of it is out of date"
-    for (name, towards, got), (_, _, expected) in zip(named, found(), strict=True):
-        outcome.differing(tolerance, f"once it is changed, {name}", got, expected, why, wi, towards, seed=92)
+    for (name, wo, got), (_, _, expected) in zip(named, found(), strict=True):
+        _compare(run, outcome, drawn._replace(wo=wo), f"once it is changed, {name}", got, expected, why)
 
 
 def recompiles(run: Run) -> Findings:
     """Check that a new value of a parameter compiles no kernel, after its first update."""
-    probe, part = run.probe, run.probe.whole
-    params, keys, findings = traced_floats(run, "recompiles")
+    parameters, findings = traced_floats(run, "recompiles")
     yield from findings
-    wi, u = on_side(hemisphere(64, 1), part.sides[0]), random(64, 2)
+    wi, u = on_side(hemisphere(64, 1), run.probe.whole.sides[0]), random(64, 2)
 
-    def launched() -> set[int]:
-        return launched_kernels(lambda: probe.sample(part, wi, u))
+    def launched(parameter: Parameter, value: Any) -> set[int]:
+        dr.make_opaque(value)
+        parameter.set(value)
+        return launched_kernels(lambda: run.probe.sample(run.probe.whole, wi, u))
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-        for key in keys:
-            outcome = Outcome("recompiles", key)
-            kernels: list[set[int]] = []
-            with restored(params, key) as original:
-                for step in range(4):
-                    value = original * (0.97 - 0.01 * step) + 1e-4
-                    dr.make_opaque(value)
-                    set_value(params, key, value)
-                    kernels.append(launched())
-            fresh = len(set.union(*kernels) - kernels[0])
-            if not kernels[0]:
+        for each in parameters:
+            outcome = Outcome("recompiles", each.key)
+            with each.restored() as original:
+                first, *later = [launched(each, original * (0.97 - 0.01 * step) + 1e-4) for step in range(4)]
+            if not first:
                 outcome.fault("no kernel was launched at all")
-            if fresh:
-                outcome.fault(f"{fresh} kernels are compiled for three new values")
+            if fresh := set.union(*later) - first:
+                outcome.fault(f"{len(fresh)} kernels are compiled for three new values")
             yield outcome.finding("No kernel is compiled for a new value.")
-    if not keys and not findings:
-        yield Finding("recompiles", "whole", "skip", "It has no parameters.")
 
 
 def loaded_or_none(given: dict[str, Any]) -> Any:
@@ -153,58 +150,3 @@ def loaded_or_none(given: dict[str, Any]) -> Any:
             return load(given)
     except (RuntimeError, TypeError):
         return None
-
-
-# --- The parameters, as mi.traverse lists them ----------------------------------------------------------------------
-
-
-def traced_floats(run: Run, check: str) -> tuple[mi.SceneParameters, list[str], list[Finding]]:
-    """Return ``(params, keys, findings)``: the parameters that are floats, and what a check says of the others."""
-    params = mi.traverse(run.probe.bsdf)
-    keys, findings = [], []
-    for key in params.keys():
-        if not _is_traced(params, key):
-            findings.append(Finding(check, key, "skip", "Not a number of floating point that Dr.Jit traces."))
-        elif check in ("gradients", "active") and int(params.flags(key)) & int(mi.ParamFlags.NonDifferentiable):
-            findings.append(Finding(check, key, "skip", "Declared not differentiable."))
-        else:
-            keys.append(key)
-    return params, keys, findings
-
-
-def _is_traced(params: mi.SceneParameters, key: str) -> bool:
-    try:
-        value = params[key]
-    except TypeError:  # it may be None, which Mitsuba does not expect itself
-        return False
-    is_float = dr.is_arithmetic_v(value) and dr.is_float_v(value) and dr.is_jit_v(value)
-    return is_float and not dr.is_matrix_v(value) and dr.width(value) > 0
-
-
-def value_of(params: mi.SceneParameters, key: str) -> Any:
-    """Return a copy of the value of a parameter."""
-    return type(params[key])(params[key])
-
-
-def set_value(params: mi.SceneParameters, key: str, value: Any) -> None:
-    """Set a parameter to a copy of a value."""
-    params[key] = type(params[key])(value)
-    params.update()
-
-
-def attach(params: mi.SceneParameters, key: str) -> None:
-    """Make a parameter what derivatives are taken for."""
-    value = type(params[key])(dr.detach(params[key]))
-    dr.enable_grad(value)
-    params[key] = value
-    params.update()
-
-
-@contextmanager
-def restored(params: mi.SceneParameters, key: str) -> Iterator[Any]:
-    """Yield the value of a parameter, and set the parameter to it in the end."""
-    original = value_of(params, key)
-    try:
-        yield original
-    finally:
-        set_value(params, key, original)

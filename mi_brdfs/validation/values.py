@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache, partial
 
 import mitsuba as mi
 import numpy as np
@@ -29,7 +30,7 @@ def _pairs(part: Part) -> tuple[Array, Array]:
     wi, wo = np.concatenate([wi, exact, generic[0]]), np.concatenate([wo, mirrored, generic[1]])
     sides = [(i, o) for i in part.sides for o in (1, -1)]
     wi, wo = (np.concatenate([on_side(w, side[which]) for side in sides]) for which, w in enumerate((wi, wo)))
-    return np.ascontiguousarray(wi), np.ascontiguousarray(wo)
+    return wi, wo
 
 
 def _bad(values: Array, signed: bool = False) -> Array:
@@ -151,19 +152,19 @@ def eval_pdf(run: Run) -> Findings:
             pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
             drawn = samples.drawn
             for name, of, got, expected, which in (
-                ("eval_pdf", "eval", pair[0], value, ...),
-                ("eval_pdf", "pdf", pair[1], density, ...),
-                ("eval_pdf_sample", "eval", triple[0], value, ...),
-                ("eval_pdf_sample", "pdf", triple[1], density, ...),
+                ("eval_pdf", "eval", pair[0], value, None),
+                ("eval_pdf", "pdf", pair[1], density, None),
+                ("eval_pdf_sample", "eval", triple[0], value, None),
+                ("eval_pdf_sample", "pdf", triple[1], density, None),
                 ("eval_pdf_sample", "sample's density", triple[3], samples.density, drawn),
-                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, ...),
+                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, None),
                 ("eval_pdf_sample", "sample's direction", triple[2] + 2.0, samples.wo + 2.0, drawn),
             ):
-                error = np.zeros(got.shape)
-                error[which] = relative(got[which], expected[which])
-                worst = max(worst, error.max())
-                over, why = error * (error > tolerance), f"by {of}"
-                outcome.wrong(over, f"{of} of {name}", got, why, wi, wo, expected=expected, seed=6, digits=6)
+                name = f"{of} of {name}"
+                error = outcome.differing(
+                    tolerance, name, got, expected, f"by {of}", wi, wo, where=which, seed=6, digits=6
+                )
+                worst = max(worst, error)
         yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
 
 
@@ -171,31 +172,23 @@ def reciprocity(run: Run) -> Findings:
     """Check that f(wi, wo) = f(wo, wi), unless the component is flagged NonSymmetric: at generic pairs, and at pairs
     that the sampler draws, where narrow lobes are."""
     for part in run.probe.parts:
-        places = [(side, side) for side in part.sides] if part.has(mi.BSDFFlags.Reflection) else []
-        if part.has(mi.BSDFFlags.Transmission):
-            places.append((1, -1))
-        if part.has(mi.BSDFFlags.NonSymmetric) or not places:
-            reason = "is flagged NonSymmetric" if places else "goes straight through"
-            yield Finding("reciprocity", part.name, "skip", f"Not checked, as it {reason}.")
+        if part.has(mi.BSDFFlags.NonSymmetric) or not part.passages:
+            reason = "it is flagged NonSymmetric" if part.passages else "no light goes back"
+            yield Finding("reciprocity", part.name, "skip", f"Not checked, as {reason}.")
             continue
         outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.rounding(part), 0.0
-        for side, other in places:
-            wi, wo = on_side(hemisphere(8000, 8), side), on_side(hemisphere(8000, 9), other)
-            drawn = run.probe.sample(part, wi, random(8000, 10)).wo
-            near = (np.arange(8000) % 2 == 0) & (drawn[:, 2] * other > 0.01)
-            wo[near] = drawn[near]
-            # Of both, times the two cosines.
+        for sides in part.passages:
+            wi, wo = run.probe.pairs(part, 8000, 8, sides)
             forth = run.probe.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
             back = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
-            error = relative(forth, back, 1e-6, unknown=0).max(axis=1)
-            off = (error > tolerance).mean()
-            worst = max(worst, float(np.quantile(error, 0.999)))
-            if off > 1e-3:
-                f, g = (x / abs(wi[:, 2:] * wo[:, 2:]) for x in (forth, back))
-                outcome.wrong(error, "f", f, f"from there back, and {off:.1%} of the pairs differ", wi, wo, expected=g)
+            error = outcome.differing(
+                tolerance, F, forth, back, "from there back", wi, wo, floor=1e-6, unknown=0, but_for=1e-3
+            )
+            worst = max(worst, error)
         yield outcome.finding(f"f(wi, wo) = f(wo, wi) to {worst:.1g}, within {tolerance:.1g}.")
 
 
+F = "f, times both cosines,"
 STEP = 5e-4
 """The distance, in radians, over which ``continuity`` looks for jumps: the cosine of a smaller one is 1 in float32."""
 OCTAVES = 32, 16, 8, 4, 2, 1, 0.5
@@ -215,43 +208,38 @@ def continuity(run: Run) -> Findings:
     from 0.5° to 0.01°, eval does not change by more than a fifth power does, unless it does so before and after, too.
     """
     for part in run.probe.parts:
-        remark = ""
-        outcome, worst = Outcome("continuity", part.name), 0.0
-        step = min(STEP, run.spread(part) / 20)
-        tolerance = 10 * run.rounding(part)
+        outcome, worst, remarks = Outcome("continuity", part.name), 0.0, list[str]()
         for side in part.sides:
-            elsewhere = None
-            for where, crossing in _crossings(np.degrees(step)) if not run.probe.is_data else ():
-                crossing = [on_side(w, side) for w in crossing]
-                others = _companions(run, part, crossing[0])
-                for word, (at, *around) in _both_ways(run, part, crossing, others):
-                    mean, farther = (around[0] + around[1]) / 2, (around[2] + around[3]) / 2
-                    error = relative(mean, at, 1e-6, unknown=0)
-                    jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), error, 0)
-                    typical = float(np.quantile(jump, 0.99))
-                    if typical > tolerance and elsewhere is None:
-                        elsewhere = _jump_elsewhere(run, part, side)
-                    if tolerance < typical <= (elsewhere or 0):
-                        remark = f"At other directions it jumps, too, by {elsewhere:.1g}."
-                        continue
-                    worst = max(worst, typical)
-                    if typical > tolerance:
-                        wi, wo = (crossing[0], others)[:: 1 if word == "from" else -1]
-                        name = f"eval jumps at light {word} {where}: it"
-                        outcome.wrong(jump, name, at, "around that", wi, wo, expected=mean)
+            if not run.probe.is_data:
+                jump, remark = _check_crossings(run, outcome, part, side)
+                worst, remarks = max(worst, jump), remarks + [remark] * bool(remark)
             for phi in (0, 77):
-                # Far above the horizon only hard edges jump, the more often the farther apart two heights are.
-                angles = [70, 70 + np.degrees(STEP), *(90 - np.degrees(STEP) * times for times in OCTAVES)]
-                angles[0] -= np.degrees(STEP) * (OCTAVES[0] - 1)
-                heights = [on_side(direction(angle, phi), side) for angle in angles]
-                others = on_side(hemisphere(1000, 23), side)
-                for word, values in _both_ways(run, part, heights, others):
-                    values = np.nan_to_num(values)
-                    edges = float((_changes(values[:2])[0] > np.log(32)).sum()) / OCTAVES[0]
-                    _check_octaves(outcome, word, values[2:], heights[2:], others, edges)
-        yield outcome.finding(
-            f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}.", remark
-        )
+                _check_grazing(run, outcome, part, side, phi)
+        told = f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
+        yield outcome.finding(told, remarks[-1] if remarks else "")
+
+
+def _check_crossings(run: Run, outcome: Outcome, part: Part, side: int) -> tuple[float, str]:
+    """Check that values do not jump at normal incidence and where azimuths begin; return by how much they do, and what
+    to say of jumps that are no larger than at other directions."""
+    worst, remark, tolerance = 0.0, "", 10 * run.rounding(part)
+    elsewhere = cache(partial(_jump_elsewhere, run, part, side))
+    for where, directions in _crossings(np.degrees(min(STEP, run.spread(part) / 20))):
+        crossing = [on_side(w, side) for w in directions]
+        others = _companions(run, part, crossing[0])
+        for word, (at, *around) in _both_ways(run, part, crossing, others):
+            mean, farther = (around[0] + around[1]) / 2, (around[2] + around[3]) / 2
+            jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), relative(mean, at, 1e-6, unknown=0), 0)
+            typical = float(np.quantile(jump, 0.99))
+            if tolerance < typical <= elsewhere():
+                remark = f"At other directions it jumps, too, by {elsewhere():.1g}."
+                continue
+            worst = max(worst, typical)
+            if typical > tolerance:
+                wi, wo = (crossing[0], others)[:: 1 if word == "from" else -1]
+                name = f"eval jumps at light {word} {where}: it"
+                outcome.wrong(jump, name, at, "around that", wi, wo, expected=mean)
+    return worst, remark
 
 
 def _jump_elsewhere(run: Run, part: Part, side: int) -> float:
@@ -265,7 +253,7 @@ def _jump_elsewhere(run: Run, part: Part, side: int) -> float:
         def values(t: Array, start: Array = start, end: Array = end) -> Array:
             theta_i, phi_i, theta_o, phi_o = start + t * (end - start)
             pair = direction(theta_i, phi_i), direction(theta_o, phi_o)
-            return run.probe.eval(part, *(on_side(np.ascontiguousarray(w.T), side) for w in pair)).max(axis=1)
+            return run.probe.eval(part, *(on_side(w.T, side) for w in pair)).max(axis=1)
 
         t = np.linspace(0, np.ones(ways), 33)
         f = np.stack([values(it) for it in t])
@@ -290,25 +278,28 @@ def _changes(values: Array) -> Array:
     return np.log(np.maximum(high, 1e-38) / np.maximum(low, 1e-38))
 
 
-def _check_octaves(
-    outcome: Outcome, word: str, values: Array, heights: list[Array], others: Array, edges: float
-) -> None:
-    """Add a fault for values that change far more while the height above the horizon halves than while it halves before
-    and after: a power of the height changes alike. Of the pairs, as many may jump as there are hard ``edges`` in a STEP
-    elsewhere, and three by chance."""
-    change = _changes(values)
-    lit = np.maximum(values[:-1], values[1:]) > 1e-2 * values.max()  # a soft edge may end between two heights
-    beside = np.pad(change, ((1, 1), (0, 0)))
-    jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
-    jump[0] = False  # a highlight may end there: without what lies above, a slope is no jump
-    usual = 2 * edges * -np.diff(OCTAVES)
-    if (jump.sum(axis=1) > np.maximum(0.01 * lit.sum(axis=1), 3) + usual).any():
-        octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
-        upper, lower = np.degrees(STEP) * OCTAVES[octave], np.degrees(STEP) * OCTAVES[octave + 1]
-        factor = np.exp(change[octave, k])
-        wi, wo = (heights[octave], others[k])[:: 1 if word == "from" else -1]
-        told = f"for light {word} {upper:.3g}° to {lower:.3g}° above the horizon"
-        outcome.fault(f"eval jumps by the factor {factor:.3g} {told}", factor, wi=wi, wo=wo)
+def _check_grazing(run: Run, outcome: Outcome, part: Part, side: int, phi: float) -> None:
+    """Check that values change no more while the height above the horizon halves than while it halves before and after:
+    a power of the height changes alike. Of the pairs, as many may jump as there are hard edges in a STEP elsewhere, and
+    three by chance."""
+    step = np.degrees(STEP)
+    # Far above the horizon only hard edges jump, the more often the farther apart two heights are.
+    angles = [70 - step * (OCTAVES[0] - 1), 70 + step, *(90 - step * times for times in OCTAVES)]
+    heights = [on_side(direction(angle, phi), side) for angle in angles]
+    others = on_side(hemisphere(1000, 23), side)
+    for word, both in _both_ways(run, part, heights, others):
+        far, change = _changes(np.nan_to_num(both[:2])), _changes(values := np.nan_to_num(both[2:]))
+        usual = 2 * (far > np.log(32)).sum() / OCTAVES[0] * -np.diff(OCTAVES)
+        lit = np.maximum(values[:-1], values[1:]) > 1e-2 * values.max()  # a soft edge may end between two heights
+        beside = np.pad(change, ((1, 1), (0, 0)))
+        jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
+        jump[0] = False  # a highlight may end there: without what lies above, a slope is no jump
+        if (jump.sum(axis=1) > np.maximum(0.01 * lit.sum(axis=1), 3) + usual).any():
+            octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
+            factor, (upper, lower) = np.exp(change[octave, k]), step * np.array(OCTAVES)[octave : octave + 2]
+            wi, wo = (heights[2 + octave], others[k])[:: 1 if word == "from" else -1]
+            told = f"for light {word} {upper:.3g}° to {lower:.3g}° above the horizon"
+            outcome.fault(f"eval jumps by the factor {factor:.3g} {told}", factor, wi=wi, wo=wo)
 
 
 def _crossings(step: float) -> Iterator[tuple[str, list[Array]]]:
@@ -331,7 +322,7 @@ def _both_ways(run: Run, part: Part, directions: list[Array], others: Array) -> 
     """Yield the values for light from each of some directions towards others, and from the others towards each."""
 
     def values(wi: Array, wo: Array) -> Array:
-        pairs = (np.ascontiguousarray(w.reshape(-1, 3)) for w in np.broadcast_arrays(wi, wo))
+        pairs = (w.reshape(-1, 3) for w in np.broadcast_arrays(wi, wo))
         return run.probe.eval(part, *pairs).max(axis=1).reshape(len(directions), len(others))
 
     yield "from", values(np.stack(directions)[:, None], others)
