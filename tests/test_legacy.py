@@ -269,7 +269,7 @@ SYNTHETIC = [
     f'<emitter type="photons">{given(z=46)}</emitter>',
     f'<shape type="sphere">{given(radius=2.25, q=47)}<subsurface type="dipole"/><medium name="interior" '
     f'type="homogeneous">{given(material="milk", strategy=48)}</medium></shape>',
-    f'<shape type="instance"><shape type="shapegroup"><shape type="sphere">{given(radius=2.75)}</shape></shape></shape>',
+    f'<shape type="instance"><shape type="shapegroup"><shape type="cube">{given(x=2.75)}</shape></shape></shape>',
     f'<shape type="hair">{given(filename="bytes.png", reduction=49)}</shape>',
 ]
 CONVERTED = {"material", "sun_radius_scale", "power", "z", "reduction", "filename", "g"}
