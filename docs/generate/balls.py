@@ -19,7 +19,7 @@ from mi_brdfs.preview import studio
 
 from .made import Picture, code
 
-FRAME, BALL, RISE, SAMPLES = 58, 42, 4, 64
+FRAME, BALL, RISE, SAMPLES = 58, 42, 4, 400
 """The side of a picture and of the part around the ball, how much that lies above the middle, in pixels, and the
 samples of each."""
 
