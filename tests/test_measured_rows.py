@@ -244,6 +244,20 @@ def test_rows_of_anisotropic_materials(tmp_path):
     assert isinstance(measured(tmp_path, once, "x.csv").data, Grid)
 
 
+def test_a_row_without_a_value_takes_none_from_others(tmp_path):
+    """Neither from those that stand for the same direction at a pole, nor from one of the same angles."""
+    angles = [*itertools.product(range(0, 61, 10), range(0, 61, 10), range(0, 181, 20))]
+    values = {(i, o, d): f"{highlight(spherical(i, 0), spherical(o, d))}" for i, o, d in angles}
+
+    def data(*lacking, again=""):
+        rows = [f"{i},{o},{d},{'' if (i, o, d) in lacking else f}" for (i, o, d), f in values.items()]
+        text = "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + "\n".join(rows) + again
+        return measured(tmp_path, text, "x.csv").data.values
+
+    np.testing.assert_allclose(data((0, 20, 0), (20, 0, 60), again="\n30,30,20,"), data(), rtol=1e-12)
+    assert np.isnan(data((30, 30, 20))).sum() == 1
+
+
 def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
     rows = "\n".join(f"{i},{o},0,{highlight(spherical(i, 0), spherical(o, 0))}"
                      for i, o in itertools.product(range(-60, 61, 10), range(-60, 61, 5)))  # fmt: skip

@@ -54,7 +54,7 @@ def _check(file: TextFile, name: str, angles: np.ndarray, most: int) -> None:
 def arranged(angles: Angles, values: np.ndarray) -> Grid | Samples:
     """Return rows as a grid of :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with
     each other, and as samples if not. Rows of a single φi or φo, or in a single plane, are of an isotropic material. A
-    negative θ means the other side of the normal. Rows of the same angles are averaged, with a warning if one is more
+    negative θ means the other side of the normal. Values of the same angles are averaged, with a warning if one is more
     than twice another."""
     warn_of_contradictions(angles, values)
     theta_i, phi_i, theta_o, phi_o = angles
@@ -129,16 +129,18 @@ def gathered(angles: Angles, values: np.ndarray, anisotropic: bool) -> Grid | No
     if not anisotropic and any(np.diff(it).max(initial=np.pi * (len(it) == 1)) > COARSE for it in nodes):
         return None
     shape = tuple(len(each) for each in nodes)
-    count = np.bincount(place, minlength=size)
-    table = np.zeros((size, values.shape[1]))
-    np.add.at(table, place, values)
-    table, count = table.reshape(*shape, -1), count.reshape(*shape, 1)
+    rows, seen = np.bincount(place, minlength=size), np.isfinite(values)
+    table, count = np.zeros((size, values.shape[1])), np.zeros((size, values.shape[1]), np.int32)
+    np.add.at(table, place, np.where(seen, values, 0))
+    np.add.at(count, place, seen)
+    rows, table, count = (each.reshape(*shape, -1) for each in (rows, table, count))
     for polar in (0, 1):
         if nodes[polar][0] < SAME and not anisotropic:
             # A row at the pole stands for all azimuths.
             pole = (slice(None),) * polar + (slice(0, 1),)
-            table[pole], count[pole] = (each[pole].sum(axis=2, keepdims=True) for each in (table, count))
-    if not np.all(count):
+            for each in (rows, table, count):
+                each[pole] = each[pole].sum(axis=2, keepdims=True)
+    if not np.all(rows):
         return None
     axes = [Axis(each) for each in nodes]
     for k in range(3 if mirrored else 2, len(axes)):
@@ -147,7 +149,8 @@ def gathered(angles: Angles, values: np.ndarray, anisotropic: bool) -> Grid | No
         if sector_start(nodes[k]) is not None:
             return None
         axes[k] = Axis(nodes[k], TWO_PI)
-    return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
+    with np.errstate(invalid="ignore"):  # of what no row has a value for
+        return Grid(Spherical(mirrored, anisotropic), tuple(axes), table / count)
 
 
 def around_zero(angle: np.ndarray) -> np.ndarray:
