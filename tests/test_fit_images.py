@@ -72,6 +72,38 @@ def test_an_anisotropic_highlight(start):
     assert values(found)["alpha_v"] == pytest.approx(0.3, rel=0.05)
 
 
+@pytest.mark.parametrize("start", [0.0, 1.0])
+def test_a_share_that_starts_at_an_end(start):
+    picture = picture_of(scene_of({"type": "lambert", "reflectance": 0.5}), spp=64)
+    found = images(scene_of({"type": "lambert", "reflectance": start}), picture)
+    assert found.converged and values(found)["reflectance"] == pytest.approx(0.5, abs=5e-3)
+
+
+def test_alpha_is_no_colour():
+    """It differs between ``path``, which sees the sky, and ``prb``."""
+    lambert = {"type": "lambert", "reflectance": rgb(0.2, 0.5, 0.8)}
+    picture = picture_of(scene_of(lambert, integrator="path", pixel_format="rgba"), spp=64)
+    assert picture.shape[2] == 4 and picture[0, 0, 3] == 1
+    grey = {"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}
+    first, second = (
+        images(scene_of(grey, integrator="path", pixel_format="rgba"), given) for given in (picture, picture[..., :3])
+    )
+    assert values(first)["reflectance"] == pytest.approx([0.2, 0.5, 0.8], abs=2e-3)
+    assert first.losses == pytest.approx(second.losses, rel=1e-3)
+
+
+def test_volumetric_integrators():
+    """They have no forward derivatives, nor need any where there is no medium."""
+    lambert = {"type": "lambert", "reflectance": 0.5}
+    picture = picture_of(scene_of(lambert), spp=64)
+    for integrator in ("volpath", "prbvolpath"):
+        found = images(scene_of({"type": "lambert", "reflectance": 0.2}, integrator=integrator), picture)
+        assert values(found)["reflectance"] == pytest.approx(0.5, abs=5e-3)
+    fog = {"type": "sphere", "interior": {"type": "homogeneous"}}
+    with pytest.raises(FitError, match="Scenes with media cannot be fitted"):
+        images(scene_of(lambert, shape=fog), picture)
+
+
 @pytest.mark.slow
 def test_parameters_that_go_together():
     """Of which some are sought, and the others stay."""

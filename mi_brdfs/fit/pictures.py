@@ -28,6 +28,8 @@ SAMPLES = 1 << 18
 """Samples of a rendering of all pictures, unless there are to be more."""
 COEFFICIENT = 1e9
 """Above it, a depth stands for none."""
+WITHIN = 1e-3
+"""How far from the ends of their ranges shares start, as a part of these: at an end their scale is flat."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,11 @@ def images(
 ) -> ImageFit:
     """Fit parameters of materials to pictures of a scene whose shapes, lights and sensors are known.
 
-    The scene's own values are the start, and those found are in the scene in the end; it is as before if the fit fails
-    or is interrupted. Numbers, colours and bitmaps are sought within the ranges that the models declare, on the scales
-    that suit these: roughnesses and exponents on a logarithmic one, shares and reflectances on a logit one. A colour
-    that is given as a number stays grey, and a parameter that a model leaves out by default is fitted if it is given,
-    also as 0.
+    The scene's own values are the start, a little inwards if they are at an end of a range, and those found are in the
+    scene in the end; it is as before if the fit fails or is interrupted. Numbers, colours and bitmaps are sought within
+    the ranges that the models declare, on the scales that suit these: roughnesses and exponents on a logarithmic one,
+    shares and reflectances on a logit one. A colour that is given as a number stays grey, and a parameter that a model
+    leaves out by default is fitted if it is given, also as 0.
 
     What is minimised is the mean over pixels of ((I − P) / (P̄ + m/10))², for a rendering I and a picture P with the
     local mean P̄ over 5 x 5 pixels and the mean m of all: highlights count no more than what is around. Numbers and
@@ -97,11 +99,12 @@ def images(
     so that noise does not bias them. Bitmaps follow first as a whole, and then texel by texel with Adam.
 
     Args:
-        scene: a loaded scene, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by its integrator
-            if that is a ``prb``, and else by ``prb`` of the same depth.
-        pictures: a picture, or a list of them: files, bitmaps, or arrays of linear values and shape
-            (height, width, channels) as ``mi.render`` returns them, of the size of the film. Pixels that are NaN do not
-            count. Files of integers are taken as sRGB, and their pixels with a clipped channel do not count.
+        scene: a loaded scene without media, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by
+            its integrator if that is a ``prb``, and else by ``prb`` of the same depth.
+        pictures: a picture, or a list of them: files, bitmaps, or arrays of linear values and shape (height, width,
+            channels) as ``mi.render`` returns them, of the size of the film. Pixels that are NaN do not count, and
+            neither does alpha. Files of integers are taken as sRGB, and their pixels with a clipped channel do not
+            count.
         parameters: keys of ``mi.traverse(scene)``, or the beginnings of some up to a dot, as ``"ball.bsdf"`` for all
             parameters of a BSDF, or ``"ball.bsdf.alpha"``. By default, all of the BSDFs of this package.
         sensors: for each picture, the index of the sensor that took it; by default the first ones, in order.
@@ -127,7 +130,7 @@ def images(
     if not scene.emitters():
         raise FitError("The scene has no light.")
     slots, point = _slots(mi.traverse(scene), parameters)
-    integrator = _integrator(scene.integrator())
+    integrator = _integrator(scene)
     views = _views(scene, integrator, pictures, sensors)
     pixels = sum(view.picture.shape[0] * view.picture.shape[1] for view in views)
     rendered = Rendered(scene, integrator, views, slots, spp or max(SAMPLES // pixels, 2), seed)
@@ -243,23 +246,28 @@ def _slot(key: str, model: Any, name: str, value: Any) -> tuple[Slot, Array]:
     limits = model.ranges.get(name, (0, 1))
     is_colour, is_rotation = numbers.shape[-1] == 3, name not in model.ranges
     unknown = unknown_of(Quantity(name, limits, None, colour=is_colour, turns=is_rotation))
+    if unknown.scale == "logit":
+        numbers = np.clip(numbers, WITHIN * limits[1], (1 - WITHIN) * limits[1])
     on_scale = unknown.to_scale(numbers)
     if numbers.ndim == 3:
         return Slot(key, unknown, type(value), on_scale), np.zeros(numbers.shape[-1])
     return Slot(key, unknown, type(value), np.zeros(len(numbers))), on_scale
 
 
-def _integrator(own: mi.Integrator) -> mi.Integrator:
-    """Return a scene's own integrator if it propagates derivatives, or else one that does, of the same depth."""
-    if isinstance(own, mi.ad.integrators.common.RBIntegrator):
+def _integrator(scene: mi.Scene) -> mi.Integrator:
+    """Return a scene's own integrator if it propagates derivatives forward, or else one that does, of the same
+    depth."""
+    if any(shape.is_medium_transition() for shape in scene.shapes()):
+        raise FitError("Scenes with media cannot be fitted: Mitsuba has no forward derivatives of them.")
+    own = scene.integrator()
+    if isinstance(own, mi.ad.integrators.common.RBIntegrator) and "Vol" not in type(own).__name__:
         return own
     given = {name: int(number) for name, number in re.findall(r"(max_depth|rr_depth) = (-?\d+)", str(own))}
     if own.class_name() == "DirectIntegrator":
         given["max_depth"] = 2
     if given.get("max_depth", 0) > COEFFICIENT:
         given["max_depth"] = -1
-    kind = "prbvolpath" if "Vol" in own.class_name() else "prb"
-    return mi.load_dict({"type": kind, "hide_emitters": bool(getattr(own, "hide_emitters", False)), **given})
+    return mi.load_dict({"type": "prb", "hide_emitters": bool(getattr(own, "hide_emitters", False)), **given})
 
 
 def _views(
@@ -285,8 +293,10 @@ def _views(
         if pixels.shape[:2] != (height, width):
             shape = f"{pixels.shape[1]} x {pixels.shape[0]}"
             raise FitError(f"A picture has {shape} pixels, and the film of its sensor {width} x {height}.")
-        if pixels.shape[2] not in {channels, min(channels, 3)}:
+        colours = channels - mi.has_flag(sensor.film().flags(), mi.FilmFlags.Alpha)
+        if pixels.shape[2] not in {channels, colours}:
             raise FitError(f"A picture has {pixels.shape[2]} channels, and the film of its sensor {channels}.")
+        pixels = pixels[..., :colours]
         if not np.nan_to_num(pixels, posinf=0).any():
             raise FitError("A picture is black, or has no numbers.")
         views.append(View(sensor, pixels))
