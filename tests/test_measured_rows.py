@@ -258,6 +258,13 @@ def test_a_row_without_a_value_takes_none_from_others(tmp_path):
     assert np.isnan(data((30, 30, 20))).sum() == 1
 
 
+def test_an_anisotropic_grid_of_alta_has_azimuths_at_the_normal(tmp_path):
+    angles = itertools.product(range(0, 61, 20), range(0, 360, 90), range(0, 61, 20), range(0, 360, 90))
+    rows = [(*np.radians(row), streaks(spherical(*row[:2]), spherical(*row[2:]))[0]) for row in angles]
+    data = measured(tmp_path, alta("SPHERICAL_TL_PL_TV_PV", rows), "x.alta").data
+    assert isinstance(data, Grid) and data.values.shape == (4, 4, 4, 4, 1)
+
+
 def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
     rows = "\n".join(f"{i},{o},0,{highlight(spherical(i, 0), spherical(o, 0))}"
                      for i, o in itertools.product(range(-60, 61, 10), range(-60, 61, 5)))  # fmt: skip

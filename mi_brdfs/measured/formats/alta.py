@@ -85,8 +85,11 @@ def read(path: Path, quantity: Quantity) -> Measurement:
             "a coordinate is infinite or missing, or a direction is the zero vector",
             file.row_lines[int(np.argmax(unknown))],
         )
-    theta_i, theta_o = polar_angle(light), polar_angle(view)
-    phi_i, phi_o = (np.arctan2(w.y, w.x) for w in (light, view))
+    if name == SPHERICAL:  # whose azimuths count at the normal, too, where they fill a grid
+        theta_i, phi_i, theta_o, phi_o = table[:, :inputs].T.copy()
+    else:
+        theta_i, theta_o = polar_angle(light), polar_angle(view)
+        phi_i, phi_o = (np.arctan2(w.y, w.x) for w in (light, view))
     if not anisotropic:
         phi_i, phi_o = 0 * phi_i, phi_o - phi_i
     values = srgb_of(table[:, inputs:]) if output == "XYZ_COLOR" else table[:, inputs:].copy()
@@ -124,8 +127,9 @@ def cartesian(*v: np.ndarray) -> Pair:
     return unit(*v[3:]), unit(*v[:3])
 
 
+SPHERICAL = "SPHERICAL_TL_PL_TV_PV"
 PARAMETRISATIONS: dict[str, tuple[int, Callable[..., Pair], bool]] = {
-    "SPHERICAL_TL_PL_TV_PV": (4, lambda tl, pl, tv, pv: (spherical(tl, pl), spherical(tv, pv)), True),
+    SPHERICAL: (4, lambda tl, pl, tv, pv: (spherical(tl, pl), spherical(tv, pv)), True),
     "ISOTROPIC_TV_TL_DPHI": (3, lambda tv, tl, phi: (spherical(tl, phi), spherical(tv, 0 * phi)), False),
     "ISOTROPIC_TL_TV_PROJ_DPHI": (3, projected, False),
     "RETRO_TL_TVL_PROJ_DPHI": (3, retro, False),
