@@ -137,3 +137,22 @@ def test_samples_are_as_good_as_they_were(name):
 def test_all_models_with_smiths_term_have_it(given):
     rough = {"alpha": 0.9} if given["type"] == "walter" else {"roughness": 0.95}
     np.testing.assert_allclose(albedos({**given, **rough, "multiscatter": "walk"}, ANGLES), 1, atol=5e-3)
+
+
+@pytest.mark.parametrize("way", ["walk", "kulla-conty"])
+def test_materials_that_share_a_texture_follow_it(way):
+    """Mitsuba tells one of them that it has changed."""
+    texture = mi.load_dict({"type": "uniform", "value": 0.9})
+    walter = {"type": "walter", "multiscatter": way, "alpha": texture}
+    shapes = {name: {"type": "sphere", "bsdf": mi.load_dict(walter)} for name in ("first", "second")}
+    scene = mi.load_dict({"type": "scene", **shapes})
+    params = mi.traverse(scene)
+    (key,) = (key for key in params.keys() if "alpha" in key)
+    wi, wo = direction(30, 0)[None], direction(40, 100)[None]
+    for alpha in (0.3, 0.7):
+        params[key] = alpha
+        params.update()
+        fresh = BSDFProbe(mi.load_dict(walter | {"alpha": alpha}))
+        for shape in scene.shapes():
+            probe = BSDFProbe(shape.bsdf())
+            np.testing.assert_allclose(probe.eval(probe.whole, wi, wo), fresh.eval(fresh.whole, wi, wo), 1e-5)

@@ -68,6 +68,7 @@ class ModelBSDF:
 
     def _lobes(self, p: Values) -> tuple[Lobe, ...]:
         """Return the model's lobes, which must be of the kinds that the components were made for."""
+        self.model.uniform.compare(self.model.textures)
         name, lobes = type(self.model).__name__, self.model.lobes(p)
         if isinstance(lobes, Lobe) or not all(isinstance(lobe, Lobe) for lobe in lobes):
             raise TypeError(f"{name}.lobes returns {lobes!r}; it must return a tuple of lobes.")
@@ -239,7 +240,7 @@ class ModelBSDF:
         # Textures in Python may say something else in each call.
         if uniform.names and not is_scalar() and all(type(it) is mi.Texture for it in self.textures.values()):
             si = dr.zeros(mi.SurfaceInteraction3f, 2)
-            uniform.settle(lambda: self._lobes(self.model.evaluate(si, mi.Bool(True))))
+            uniform.settle(self.textures, lambda: self._lobes(self.model.evaluate(si, mi.Bool(True))))
 
     def to_string(self) -> str:
         return self.model.described()
