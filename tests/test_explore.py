@@ -329,6 +329,15 @@ def test_a_saved_picture_is_what_is_shown(client, monkeypatch, tmp_path):
     assert np.frombuffer(brighter["payload"], np.uint8).mean() > np.frombuffer(shown["payload"], np.uint8).mean() + 10
 
 
+def test_a_picture_that_was_denoised_stays_so_in_another_exposure(client, monkeypatch):
+    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 32)
+    client.scenes.denoise = lambda pixels: np.full_like(pixels, 0.25)
+    last = of(client.show(WARD["bsdf"], views=["picture"], size=64, refine=True), "picture")[-1]
+    (brighter,) = of(client.show(WARD["bsdf"], views=["picture"], size=64, exposure=1), "picture")
+    assert last["denoised"] and brighter["denoised"] and brighter["spp"] == last["spp"]
+    assert brighter["payload"] == rgba(np.full((64, 64, 3), 0.25, np.float32), 1)
+
+
 def test_views_hold_the_plugins_values(client):
     """A diffuse BRDF is ρ/π everywhere, its lobe ρ cosθ/π, its albedo ρ, and its sampler perfect."""
     views = ["lobe", "polar", "albedo", "slice", "hemisphere", "sampler"]

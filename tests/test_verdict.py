@@ -23,7 +23,7 @@ from mi_brdfs.probe.arrays import interaction, vectors
 from mi_brdfs.probe.sources import find_sources, shared, split
 from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
-from mi_brdfs.validation.formats import junit
+from mi_brdfs.validation.formats import block, junit
 
 BRIGHT = {"diffuse_reflectance": 0.8, "specular_reflectance": 0.8}
 PHONG = (
@@ -164,6 +164,18 @@ def test_failures_say_what_reproduces_them():
     pdf = mi.load_dict({"type": "roughplastic"}).pdf(context, interaction(wi), vectors(wo))
     assert f"pdf is {pdf[0]:.4g} for" in finding.message and pdf[0] < 0
     assert f"At wi = [{', '.join(map(str, wi))}], wo = [" in report.sentences[2]
+
+
+@pytest.mark.parametrize(
+    "failing, first",
+    [(["pdf", "chi2", "albedo"], "pdf"), (["reciprocity", "pdf", "albedo"], "pdf"),
+     (["reciprocity", "chi2"], ""), (["reciprocity", "polarization"], ""), (["weight", "weight"], "")],
+)  # fmt: skip
+def test_what_is_to_be_fixed_first_may_be_the_cause(failing, first):
+    """Of a density, others see the faults, too; of what is not reciprocal, they do not."""
+    report = Report("mine", [Finding(check, "whole", "fail", "It is wrong.") for check in failing])
+    told = [line for line, _ in block(report, 80) if "Fix" in line]
+    assert told == ([f"  Fix {first} first; failures of later checks may follow from it."] if first else [])
 
 
 # --- Comparison -----------------------------------------------------------------------------------------------------

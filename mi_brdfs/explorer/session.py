@@ -210,7 +210,6 @@ class Session:
             del self._pictures[k]  # or it would be tried for ever
             raise
         if self.scenes.denoise and any(before < count <= progress.spp for count in DENOISED_AT):
-            progress.denoised = progress.spp
             self._send_picture(k, state, serial, self.scenes.denoise)
         elif not progress.denoised:
             self._send_picture(k, state, serial)

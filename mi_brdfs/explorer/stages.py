@@ -279,7 +279,9 @@ class Progress:
     spp: int = 0
     next_pass: int = 1
     denoised: int = 0
-    """The samples per pixel when it was last denoised."""
+    """The samples per pixel when it was last denoised,"""
+    clean: np.ndarray | None = None
+    """and what it was then."""
 
     @property
     def finished(self) -> bool:
@@ -322,11 +324,14 @@ def rgba(linear: np.ndarray, exposure: float) -> bytes:
 def shown(
     progress: Progress, exposure: float, denoise: Callable[[np.ndarray], np.ndarray] | None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Return the payload of a picture's frame, denoised if there is a function for it, and its header."""
-    linear = progress.pixels()
+    """Return the payload of a picture's frame, denoised if there is a function for it, and its header. One that has
+    been denoised stays that until it is anew, as where only the exposure changes."""
+    if denoise:
+        progress.clean, progress.denoised = denoise(progress.pixels()), progress.spp
+    linear = progress.pixels() if progress.clean is None else progress.clean
     height, width = linear.shape[:2]
-    header = {"width": width, "height": height, "spp": progress.spp, "denoised": denoise is not None}
-    return rgba(denoise(linear) if denoise else linear, exposure), header
+    spp = progress.denoised or progress.spp
+    return rgba(linear, exposure), {"width": width, "height": height, "spp": spp, "denoised": bool(progress.denoised)}
 
 
 class Stages:

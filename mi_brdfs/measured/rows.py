@@ -129,11 +129,12 @@ def gathered(angles: Angles, values: np.ndarray, anisotropic: bool) -> Grid | No
     if not anisotropic and any(np.diff(it).max(initial=np.pi * (len(it) == 1)) > COARSE for it in nodes):
         return None
     shape = tuple(len(each) for each in nodes)
-    rows, seen = np.bincount(place, minlength=size), np.isfinite(values)
+    seen = np.isfinite(values)
+    rows = np.bincount(place, minlength=size).reshape(*shape, 1)
     table, count = np.zeros((size, values.shape[1])), np.zeros((size, values.shape[1]), np.int32)
     np.add.at(table, place, np.where(seen, values, 0))
     np.add.at(count, place, seen)
-    rows, table, count = (each.reshape(*shape, -1) for each in (rows, table, count))
+    table, count = table.reshape(*shape, -1), count.reshape(*shape, -1)
     for polar in (0, 1):
         if nodes[polar][0] < SAME and not anisotropic:
             # A row at the pole stands for all azimuths.

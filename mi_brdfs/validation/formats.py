@@ -18,9 +18,8 @@ def block(report: Report, width: int) -> Iterator[tuple[str, str]]:
     for verdict, checks in report.by_verdict:
         word = "FAIL" if verdict == "fail" else verdict
         yield from _folded(f"  {word}  {', '.join(checks)}", width, " " * 8, STYLES.get(verdict, "dim"))
-    if len({finding.check for finding in report.failures}) > 1:
-        first = report.failures[0].check
-        yield from _folded(f"  Fix {first} first; the other failures may follow from it.", width, " " * 4, "")
+    if first := report.first_to_fix:
+        yield from _folded(f"  Fix {first} first; failures of later checks may follow from it.", width, " " * 4, "")
     for sentence in report.sentences:
         yield from _folded(f"  {sentence}", width, " " * 4, "")
 

@@ -15,6 +15,10 @@ INSTEAD = "Check a rough BSDF in its place, as roughconductor is for conductor."
 """What to do where a BSDF has delta functions only."""
 
 
+CAUSES = "finite", "horizon", "support", "eval_pdf", "weight", "pdf", "chi2"
+"""Checks whose faults others see, too."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """The verdict of one check on one part of a BSDF."""
@@ -68,6 +72,12 @@ class Report:
     def failures(self) -> list[Finding]:
         """The findings that failed."""
         return [finding for finding in self.findings if finding.verdict == "fail"]
+
+    @property
+    def first_to_fix(self) -> str:
+        """The first check that failed for what may be the fault of those that failed after it, or none."""
+        failing = list(dict.fromkeys(finding.check for finding in self.failures))
+        return next((check for check in failing[:-1] if check in CAUSES), "")
 
     @property
     def why_not_judged(self) -> str:
