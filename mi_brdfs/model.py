@@ -30,8 +30,8 @@ EXAMPLE = "Example\n-------\n"
 FAMILIES = "diffuse", "microfacets", "cosine lobes", "production", "fits to measurements", "cartoon"
 """The families of models, in the order in which they are shown."""
 
-MEMBERS = "parameters", "textures", "ranges", "constants", "arrays", "captured", "uniform"
-"""What an instance of a plugin holds, besides its choices."""
+MEMBERS = "parameters", "textures", "ranges", "constants", "arrays", "captured", "uniform", "type", "id"
+"""What an instance of a plugin holds, besides its choices, and what its dict does."""
 
 Section = tuple[str, Sequence[tuple[str, ...]], str]
 

@@ -154,7 +154,7 @@ def test_a_lobe_without_an_albedo_is_named():
         radiance()
 
 
-@pytest.mark.parametrize("name", ["lobes", "evaluate", "parameters", "textures", "energy", "plugins"])
+@pytest.mark.parametrize("name", ["lobes", "evaluate", "parameters", "textures", "energy", "plugins", "id", "type"])
 def test_a_parameter_is_not_called_like_what_models_have(name):
     with pytest.raises(TypeError, match=f"Slip: a parameter cannot be called {name}, an attribute of every model."):
         model(**({"lobes": matte} | {name: Number(1, (0, 1), "number")}))

@@ -93,7 +93,9 @@ def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
         *scores, leverage = (np.bincount(rendered.blocks, column) for column in columns)
         left = np.maximum(1 - leverage, 0.1)  # a block with weight pulls the step to itself
         weighed = np.stack(scores) / np.sqrt(left)
-        sigma[free] = np.sqrt(np.diag(bread @ (weighed @ weighed.T) @ bread))
+        # Blocks that decide a number by themselves leave no residual to judge it by: then that of all counts.
+        alike = bread * (mean @ mean) / max(np.count_nonzero(mean) - len(free), 1)
+        sigma[free] = np.sqrt(np.maximum(np.diag(bread @ (weighed @ weighed.T) @ bread), np.diag(alike)))
     return end, sigma, look.cost
 
 

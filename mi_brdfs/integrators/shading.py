@@ -71,7 +71,7 @@ class Shading(Plugin):
     Participating media are ignored: behind a ``null`` boundary, space is empty.
 
     Differentiable in the parameters of BSDFs and lights and in ``ambient``, by ``mi.render``; not in parameters that
-    move edges.
+    move edges. Where ``clamp`` cuts off, the derivative is that of the value before, which leads an optimiser back.
 
     Example
     -------
