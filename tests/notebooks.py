@@ -9,6 +9,7 @@ from unittest.mock import patch
 
 import matplotlib
 import mitsuba as mi
+import numpy as np
 from generate.notebooks import FOLDER, NOTEBOOKS, code_cells
 from generate.notebooks import read as read_notebook
 
@@ -22,6 +23,8 @@ __all__ = ["FOLDER", "NOTEBOOKS", "code_cells", "read_notebook", "run_notebook"]
 SAMPLES = 16
 """Samples per pixel, in a test, of renderings that take theirs from the scene: these are to be looked at, and others
 are fitted and compared."""
+MOST = 1 << 22
+"""The most samples of others, unless they have as few for each pixel."""
 
 
 def run_notebook(path: Path) -> dict[str, Any]:
@@ -41,5 +44,6 @@ def run_notebook(path: Path) -> dict[str, Any]:
 
 
 def noisy(scene, *args, render=mi.render, spp=SAMPLES, **options):
-    """``mi.render`` with few samples, unless it is told their number."""
-    return render(scene, *args, spp=spp, **options)
+    """``mi.render`` with few samples, unless it is told their number, and not with very many."""
+    pixels = int(np.prod(scene.sensors()[0].film().size()))
+    return render(scene, *args, spp=min(spp, max(SAMPLES, MOST // pixels)), **options)
