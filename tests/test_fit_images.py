@@ -246,8 +246,9 @@ def test_scenes_without_an_answer():
     }.items():
         with pytest.raises(FitError, match=message):
             images(scene, GREY)
-    with mi.variant_context("scalar_rgb"), pytest.raises(FitError, match="such as llvm_ad_rgb, not scalar_rgb"):
-        images(scene_of({"type": "ward"}, integrator="path"), GREY)
+    for variant in ("scalar_rgb", "llvm_ad_spectral"):
+        with mi.variant_context(variant), pytest.raises(FitError, match=f"needs an rgb variant .*, not {variant}"):
+            images(scene_of({"type": "ward"}, integrator="path"), GREY)
 
 
 def test_an_interrupt_leaves_the_scene_as_it_was():

@@ -16,6 +16,7 @@ import mi_brdfs
 from mi_brdfs.bench.pictures import first_picture, in_new_process
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba import guests
+from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.models.eon import EON
 from mi_brdfs.parameters import Reflectance
 
@@ -201,6 +202,26 @@ def test_commands_take_in_a_file(guest):
     assert command("plot", "chalk", *option, "-o", "lobes.png").exit_code == 0
     assert command("gallery", "chalk", *option, "-o", "pictures", "--size", 32, "--spp", 4).exit_code == 0
     assert {"index.html", "overview.png", "chalk.png"} <= {file.name for file in (guest / "pictures").iterdir()}
+
+
+def test_files_keep_apart_what_has_the_name_of_another(tmp_path):
+    """Of a file elsewhere, and of a module of Python that is not loaded yet."""
+    files = [tmp_path / folder / name for folder, name in (("one", "own.py"), ("two", "own.py"), ("two", "pyclbr.py"))]
+    for k, file in enumerate(files):
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(GUEST.replace("Chalk", f"Chalk{k}"))
+        guests.import_models(str(file))
+    assert {"chalk0", "chalk1", "chalk2"} <= {*mi_brdfs.list_models()}
+    assert {str(file) for file in files} <= {*guests.sources()}
+    assert getattr(sys.modules.get("pyclbr"), "__file__", "") != str(files[2])
+
+
+def test_models_that_a_function_makes_are_told_apart_by_their_names():
+    def made(name):
+        return mi_brdfs.register(type("Made", (EON,), {"__doc__": "Made.", "plugins": (name,)}))
+
+    first, second, edited = made("one"), made("two"), made("one")
+    assert first is not edited and find_model("one") is edited and find_model("two") is second
 
 
 @pytest.mark.slow

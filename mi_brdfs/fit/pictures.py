@@ -123,8 +123,8 @@ def images(
         raise FitError(
             f"A fit needs a loaded scene, not {type(scene).__name__}: mi.load_file or mi.load_dict return it."
         )
-    if not dr.is_diff_v(mi.Float):
-        raise FitError(f"A fit needs a variant with derivatives, such as llvm_ad_rgb, not {mi.variant()}.")
+    if not dr.is_diff_v(mi.Float) or mi.is_spectral or mi.is_polarized:  # of which prb has no forward derivatives
+        raise FitError(f"A fit to pictures needs an rgb variant with derivatives, as llvm_ad_rgb, not {mi.variant()}.")
     if iterations < 1 or (spp is not None and spp < 1):
         raise FitError("A fit needs iterations >= 1 and spp >= 1.")
     if not scene.emitters():

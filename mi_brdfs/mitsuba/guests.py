@@ -8,6 +8,7 @@ import importlib.util
 import sys
 import traceback
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -106,16 +107,25 @@ def sources() -> list[str]:
 
 
 def _of_file(path: Path) -> ModuleType:
-    name = path.stem
-    known = sys.modules.get(name)
-    if known and name not in _files and not _brought_by(known):
-        name += " (imported)"  # whose name is that of a module
+    name = path.stem if _is_free(path.stem, path) else f"{path.stem} ({path.resolve()})"
     spec: Any = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # where dataclasses and pickle look it up
     exec(spec.loader.source_to_code(path.read_bytes(), str(path)), module.__dict__)  # caches miss quick edits
     _files[name] = str(path.resolve())
     return module
+
+
+def _is_free(name: str, path: Path) -> bool:
+    """Return whether no other file has the name of a module, loaded or not; one with models gives way to a file."""
+    if name in _files:
+        return _files[name] == str(path.resolve())
+    if name in sys.modules:
+        return bool(_brought_by(sys.modules[name]))
+    with suppress(ImportError, ValueError):  # as of a name with dots
+        spec = importlib.util.find_spec(name)
+        return spec is None or spec.origin == str(path.resolve())
+    return True
 
 
 def _sentence(error: BaseException, path: Path | None = None) -> str:

@@ -53,7 +53,8 @@ def register(brought: Registered, *, replace: bool = False) -> Registered:
         class Lommel(mi_brdfs.Model):
             ...
 
-    Registering an edited class again, as in a notebook, replaces the former one. BSDFs loaded before do not change.
+    Registering an edited class again, as in a notebook, replaces the former one that has one of its names. BSDFs loaded
+    before do not change.
 
     Args:
         brought: a subclass of :class:`mi_brdfs.Model`, or of :class:`mi_brdfs.microfacet.Distribution`, ``Shadowing``
@@ -90,7 +91,9 @@ def _register_model(model: type[Model], replace: bool) -> None:
                 f'{model.__name__}: the name "{name}" belongs to {owner}; '
                 'choose another one with plugins = ("…",), or register with replace=True.'
             )
-    for name in [name for name, other in MODELS.items() if full_name(other) == full_name(model)]:
+    # Classes that a function makes have one name, and are told apart by their plugins.
+    former = {it for it in MODELS.values() if full_name(it) == full_name(model) and {*it.plugins} & {*model.plugins}}
+    for name in [name for name, other in MODELS.items() if other in former]:
         del MODELS[name]
     MODELS.update(dict.fromkeys(model.plugins, model))
     for variant in _variants:
