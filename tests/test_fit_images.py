@@ -92,6 +92,15 @@ def test_alpha_is_no_colour():
     assert first.losses == pytest.approx(second.losses, rel=1e-3)
 
 
+def test_a_number_that_few_pixels_decide_is_no_surer_than_others():
+    """They leave no residuals of their own."""
+    lamp = {"lamp": {"type": "point", "position": [2, 3, 4], "intensity": 20.0}}
+    picture = picture_of(scene_of({"type": "ward", "alpha": 0.15}, size=16, lights=lamp), spp=64)
+    found = images(scene_of({"type": "ward", "alpha": 0.3}, size=16, lights=lamp), picture, ["ball.bsdf.alpha"])
+    sigma = found.sigma["ball.bsdf.alpha.value"]
+    assert abs(values(found)["alpha"] - 0.15) < 4 * sigma < 5e-3
+
+
 def test_volumetric_integrators():
     """They have no forward derivatives, nor need any where there is no medium."""
     lambert = {"type": "lambert", "reflectance": 0.5}
