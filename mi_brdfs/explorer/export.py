@@ -140,7 +140,9 @@ class _Baked:
         while progress.spp < SPP:
             with self.materials.loaded(bsdf) as loaded:
                 progress.advance(loaded)
-        pixels, header = stages.shown(progress, self.state.exposure, self.scenes.denoise)
+        if self.scenes.denoise:
+            progress.denoise(self.scenes.denoise)
+        pixels, header = stages.shown(progress, self.state.exposure)
         rgb = np.frombuffer(pixels, np.uint8).reshape(header["height"], header["width"], 4)[..., :3]
         payload = encoded(mi.Bitmap(np.ascontiguousarray(rgb)), "JPEG", 92)
         header |= {"type": "picture", "serial": 0, "subject": k, "final": True, "mime": "image/jpeg"}

@@ -210,19 +210,20 @@ class Session:
             del self._pictures[k]  # or it would be tried for ever
             raise
         if self.scenes.denoise and any(before < count <= progress.spp for count in DENOISED_AT):
-            self._send_picture(k, state, serial, self.scenes.denoise)
+            progress.denoise(self.scenes.denoise)
+            self._send_picture(k, state, serial)
         elif not progress.denoised:
             self._send_picture(k, state, serial)
         return True
 
-    def _send_picture(self, k: int, state: State, serial: int, denoise: Callable | None = None) -> None:
+    def _send_picture(self, k: int, state: State, serial: int) -> None:
         (key, setting), progress = self._pictures[k]
         content = key, replace(setting, size=0), state.exposure
         former, size, spp = self._sent.get(k, (None, 0, 0))
         if content == former and setting.size != size and progress.spp < spp and not progress.finished:
             return  # of another size, but so far no better than what is there
         self._sent[k] = content, setting.size, progress.spp
-        payload, header = stages.shown(progress, state.exposure, denoise)
+        payload, header = stages.shown(progress, state.exposure)
         self.send(packed(payload, type="picture", serial=serial, subject=k, final=progress.finished, **header))
 
     # --- Requests -----------------------------------------------------------------------------------------------------

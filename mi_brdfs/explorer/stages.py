@@ -302,6 +302,10 @@ class Progress:
         elif seconds > LONGEST and self.next_pass > 1:
             self.next_pass //= 2
 
+    def denoise(self, function: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Show the picture denoised from here on, as it is now."""
+        self.clean, self.denoised = function(self.pixels()), self.spp
+
     def bitmap(self) -> mi.Bitmap:
         """Return the picture as it is, with linear values."""
         film = self.stage.scene.sensors()[0].film()
@@ -321,13 +325,8 @@ def rgba(linear: np.ndarray, exposure: float) -> bytes:
     return np.concatenate([rgb, np.full_like(rgb[..., :1], 255)], axis=-1).tobytes()
 
 
-def shown(
-    progress: Progress, exposure: float, denoise: Callable[[np.ndarray], np.ndarray] | None
-) -> tuple[bytes, dict[str, Any]]:
-    """Return the payload of a picture's frame, denoised if there is a function for it, and its header. One that has
-    been denoised stays that until it is anew, as where only the exposure changes."""
-    if denoise:
-        progress.clean, progress.denoised = denoise(progress.pixels()), progress.spp
+def shown(progress: Progress, exposure: float) -> tuple[bytes, dict[str, Any]]:
+    """Return the payload of a picture's frame, as it was when it was last denoised if it was, and its header."""
     linear = progress.pixels() if progress.clean is None else progress.clean
     height, width = linear.shape[:2]
     spp = progress.denoised or progress.spp

@@ -28,8 +28,6 @@ SAMPLES = 1 << 18
 """Samples of a rendering of all pictures, unless there are to be more."""
 COEFFICIENT = 1e9
 """Above it, a depth stands for none."""
-WITHIN = 1e-3
-"""How far from the ends of their ranges shares start, as a part of these: at an end their scale is flat."""
 
 
 @dataclass(frozen=True)
@@ -246,9 +244,7 @@ def _slot(key: str, model: Any, name: str, value: Any) -> tuple[Slot, Array]:
     limits = model.ranges.get(name, (0, 1))
     is_colour, is_rotation = numbers.shape[-1] == 3, name not in model.ranges
     unknown = unknown_of(Quantity(name, limits, None, colour=is_colour, turns=is_rotation))
-    if unknown.scale == "logit":
-        numbers = np.clip(numbers, WITHIN * limits[1], (1 - WITHIN) * limits[1])
-    on_scale = unknown.to_scale(numbers)
+    on_scale = unknown.start(numbers)
     if numbers.ndim == 3:
         return Slot(key, unknown, type(value), on_scale), np.zeros(numbers.shape[-1])
     return Slot(key, unknown, type(value), np.zeros(len(numbers))), on_scale

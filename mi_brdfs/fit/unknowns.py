@@ -22,6 +22,8 @@ SMALLEST, LARGEST = 1e-3, 1e6
 """Where a search on a logarithmic scale begins if a range begins at 0, and ends if it has no end."""
 EDGE = 1e-5
 """How near to its ends a share is sought, as a part of its range; so near, it counts as at the end."""
+WITHIN = 1e-3
+"""How near to them one starts: at an end its scale is flat."""
 
 
 class Scale(NamedTuple):
@@ -74,6 +76,13 @@ class Unknown:
 
     def to_scale(self, x: ArrayLike) -> Array:
         return SCALES[self.scale].u(np.clip(np.asarray(x, np.float64), self.low, self.high), self.high + self.low)
+
+    def start(self, x: ArrayLike) -> Array:
+        """Return where on the scale a search begins that is to begin at a value."""
+        if self.scale == "logit":
+            whole = self.high + self.low
+            x = np.clip(x, WITHIN * whole, (1 - WITHIN) * whole)
+        return self.to_scale(x)
 
     def from_scale(self, u: Array) -> Array:
         return np.clip(SCALES[self.scale].x(u, self.high + self.low), self.low, self.high)

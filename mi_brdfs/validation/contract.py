@@ -21,7 +21,7 @@ from . import sampling
 from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding
 from .run import Run
-from .updates import traced_floats
+from .traced import traced_floats
 
 COUNT = 2000
 AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
