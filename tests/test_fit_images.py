@@ -37,9 +37,11 @@ def scene_of(bsdf, shape=None, size=SIZE, integrator="prb", origins=((0, 0, 5.2)
             "key": {"type": "point", "position": [-3, 3, 4], "intensity": 30.0},
             "rim": {"type": "point", "position": [4, 1, -1], "intensity": 20.0},
         }
+    if isinstance(integrator, str):
+        integrator = {"type": integrator} | ({} if integrator == "shading" else {"max_depth": 2})
     surface = shape or {"type": "sphere", "to_world": T().rotate([1, 0, 0], -70)}
     return mi.load_dict(
-        {"type": "scene", "integrator": {"type": integrator, "max_depth": 2}, **sensors, **lights,
+        {"type": "scene", "integrator": integrator, **sensors, **lights,
          "ball": {**surface, "bsdf": bsdf}}
     )  # fmt: skip
 
@@ -111,6 +113,21 @@ def test_volumetric_integrators():
     fog = {"type": "sphere", "interior": {"type": "homogeneous"}}
     with pytest.raises(FitError, match="Scenes with media cannot be fitted"):
         images(scene_of(lambert, shape=fog), picture)
+
+
+def test_local_illumination():
+    """``shading`` makes surfaces π times as bright as paths of light do."""
+    lamp = {"lamp": {"type": "point", "position": [2, 3, 4], "intensity": 2.0}}
+    hidden, start = (
+        {"type": "phong", "diffuse_reflectance": rho, "exponent": n} for rho, n in ((0.2, 20.0), (0.5, 40.0))
+    )
+    picture = picture_of(scene_of(hidden, integrator="shading", lights=lamp), spp=1)
+    found = images(scene_of(start, integrator="shading", lights=lamp), picture)
+    assert found.converged and values(found)["diffuse_reflectance"] == pytest.approx(0.2, abs=1e-3)
+    assert values(found)["exponent"] == pytest.approx(20, rel=1e-2)
+    scene = scene_of(hidden, integrator={"type": "shading", "environment_reflection": True})
+    with pytest.raises(FitError, match="environment_reflection cannot be fitted"):
+        images(scene, picture)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import mitsuba as mi
 import numpy as np
 import pytest
-from mutants import MUTANTS, of_others
+from mutants import MUTANTS, Lambert, Mutant, of_others, sampled
 from support import ROOT
 from test_cli import invoke
 
@@ -411,4 +411,14 @@ def test_a_wrong_constant_is_told_as_one():
     wrong = next(mutant for mutant in MUTANTS if mutant.name == "density without pi")
     (finding,) = [it for it in check(wrong.register(), only=["pdf"], angles=(50,)).failures if it.subject == "whole"]
     assert "pdf integrates to 3.14" in finding.message and "it fails for all 17 directions tried" in finding.message
-    assert finding.message.endswith("It is off by the same factor for all: a constant is wrong.")
+    assert finding.message.endswith("It is off by a factor of 3.14 everywhere: a constant is wrong.")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_wrong_constant_of_weights_is_told_as_one():
+    """What is reflected is not judged by such weights, even if it is less than is received."""
+    of_half = Mutant("half", (), Lambert, sampled(weight=lambda bs, weight, si, u: 0.5 * weight))
+    report = check(of_half.register(), only=["weight", "albedo"], angles=(50,))
+    (finding,) = (it for it in report.failures if it.subject == "whole")
+    assert finding.message.endswith("It is off by a factor of 0.5 everywhere: a constant is wrong.")
+    assert report.verdict("albedo") == "skip" and "mend weight first" in report.of("albedo")[0].message

@@ -98,7 +98,7 @@ def images(
 
     Args:
         scene: a loaded scene without media, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by
-            its integrator if that is a ``prb``, and else by ``prb`` of the same depth.
+            its integrator if that is a ``prb`` or ``shading``, and else by ``prb`` of the same depth.
         pictures: a picture, or a list of them: files, bitmaps, or arrays of linear values and shape (height, width,
             channels) as ``mi.render`` returns them, of the size of the film. Pixels that are NaN do not count, and
             neither does alpha. Files of integers are taken as sRGB, and their pixels with a clipped channel do not
@@ -251,12 +251,16 @@ def _slot(key: str, model: Any, name: str, value: Any) -> tuple[Slot, Array]:
 
 
 def _integrator(scene: mi.Scene) -> mi.Integrator:
-    """Return a scene's own integrator if it propagates derivatives forward, or else one that does, of the same
-    depth."""
+    """Return a scene's own integrator if it propagates derivatives forward, or else ``prb`` of the same depth."""
     if any(shape.is_medium_transition() for shape in scene.shapes()):
         raise FitError("Scenes with media cannot be fitted: Mitsuba has no forward derivatives of them.")
     own = scene.integrator()
-    if isinstance(own, mi.ad.integrators.common.RBIntegrator) and "Vol" not in type(own).__name__:
+    local = getattr(own, "physics", None)  # of shading, which reflects once: it has derivatives of any kind
+    if local and local.environment_reflection:
+        raise FitError(
+            "Pictures with environment_reflection cannot be fitted: Dr.Jit has no forward derivatives of them."
+        )
+    if local or (isinstance(own, mi.ad.integrators.common.RBIntegrator) and "Vol" not in type(own).__name__):
         return own
     given = {name: int(number) for name, number in re.findall(r"(max_depth|rr_depth) = (-?\d+)", str(own))}
     if own.class_name() == "DirectIntegrator":

@@ -56,7 +56,8 @@ def albedo(run: Run) -> Findings:
                 words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
         finding = _judged(part, outcome, found, limits)
-        if outcome.faults and (failing := sampling.failing(run, part, sampling.weight, sampling.pdf, sampling.chi2)):
+        causes = sampling.weight, sampling.pdf, sampling.chi2
+        if failing := sampling.failing(run, part, *causes, anew=bool(outcome.faults)):
             words = f"Not judged: mend {listed(failing, 'and')} first; only then the mean of the weights is the albedo."
             finding = Finding("albedo", part.name, "skip", words, outcome.data)
         yield finding

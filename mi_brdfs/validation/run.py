@@ -13,6 +13,7 @@ from ..probe.directions import direction, on_side, scattered
 from ..probe.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
 from .outcome import Skipped
+from .report import Finding
 from .trial import Trial, trials_of
 
 SEED = 11
@@ -34,6 +35,8 @@ class Run:
     """The dict that the BSDF was given as, if it was."""
     at_random: int = RANDOM
     """Directions at random on each side, for statistical tests, beside those that were asked for."""
+    found: list[Finding] = field(default_factory=list, init=False)
+    """What the checks made so far have found."""
     _samples: dict[tuple[str, str], Samples] = field(default_factory=dict, init=False)
     _trials: dict[str, list[Trial]] = field(default_factory=dict, init=False)
     _spreads: dict[str, float] = field(default_factory=dict, init=False)

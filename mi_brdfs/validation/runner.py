@@ -126,14 +126,14 @@ def check(
         bsdf = described(bsdf)
         probe, given = _probe(bsdf), bsdf if isinstance(bsdf, dict) else None
         run = Run(probe, angles, significance, conserves, given)
-        findings = [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
+        run.found += [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
         if not probe.bsdf.component_count():
-            findings.append(Finding("components", "whole", "fail", NO_COMPONENTS))
+            run.found.append(Finding("components", "whole", "fail", NO_COMPONENTS))
         for word in wanted:
             if probe.parts or word in OF_SAMPLES:
-                findings += _found(word, run)
+                run.found += list(_found(word, run))
             on_progress()
-        return Report(name or _name(bsdf), findings, list(run.shown_trials()))
+        return Report(name or _name(bsdf), run.found, list(run.shown_trials()))
 
 
 def compare(

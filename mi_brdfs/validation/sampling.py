@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import erfc, sqrt
 
 import numpy as np
 
+from ..probe.arrays import luminance
 from ..probe.bsdf import Part
 from ..probe.chi_square import in_words
 from .outcome import Findings, Outcome
@@ -57,8 +58,7 @@ def pdf(run: Run) -> Findings:
                 told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
                 outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
         factors = [trial.integral / max(trial.share, 1e-30) for trial in own]
-        constant = len(outcome.faults) == len(own) > 1 and max(factors) < 1.02 * min(factors)
-        remark = "It is off by the same factor for all: a constant is wrong." if constant else ""
+        remark = _constant(factors) if len(outcome.faults) == len(own) > 1 else ""
         yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.", remark, len(own))
 
 
@@ -67,6 +67,7 @@ def weight(run: Run) -> Findings:
     says is ``pdf``: to float32's rounding, for all but one sample in a thousand, and for all of them within a tenth."""
     for part in run.probe.parts:
         outcome, tolerance, worst = Outcome("weight", part.name), 3 * run.rounding(part), 0.0
+        factors: list[float] = []
         for incident in run.views(part):
             samples = run.samples(part, incident)
             lit = samples.lit
@@ -79,6 +80,7 @@ def weight(run: Run) -> Findings:
                 scale = np.maximum(np.maximum(abs(value), abs(reflected)).max(axis=1), 1e-6 * np.maximum(pdf, 1e-6))
                 off = abs(reflected - value).max(axis=1) / scale
                 wide = abs(density - pdf) / np.maximum(np.maximum(density, pdf), 1e-9)
+                factors += list(np.quantile(np.nan_to_num(luminance(reflected) / luminance(value))[lit], (0.01, 0.99)))
             for name, got, expected, why, error in (
                 ("a sample's weight", weight, quotient, "is eval/pdf", off),
                 ("the density that sample says", density, pdf, "is pdf", wide),
@@ -94,9 +96,22 @@ def weight(run: Run) -> Findings:
                     outcome.wrong(carried, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
         if outcome.faults and run.angles:
             run.trials(part)  # whose pictures show where
-        yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.")
+        remark = _constant(factors) if outcome.faults else ""
+        yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.", remark)
 
 
-def failing(run: Run, part: Part, *checks: Callable[[Run], Findings]) -> list[str]:
-    """Return those of the checks that fail for a part: what follows from a fault is not another one."""
-    return [it.check for check in checks for it in check(run) if it.subject == part.name and it.verdict == "fail"]
+def _constant(factors: Sequence[float]) -> str:
+    """Return a sentence if something is off by the same factor for all directions, and else none."""
+    factor, most = min(factors), max(factors)
+    alike = most < 1.02 * factor and not 0.99 < factor < 1.01
+    return f"It is off by a factor of {factor:.3g} everywhere: a constant is wrong." if alike else ""
+
+
+def failing(run: Run, part: Part, *checks: Callable[[Run], Findings], anew: bool = True) -> list[str]:
+    """Return those of the checks that fail for a part: what follows from a fault is not another one. Those that were
+    not made before are made ``anew``, or left out."""
+    made = {it.check for it in run.found}
+    findings = [it for check in checks if anew and check.__name__ not in made for it in check(run)]
+    failed = [it for it in [*run.found, *findings] if it.subject == part.name and it.verdict == "fail"]
+    names = [check.__name__ for check in checks]
+    return [it.check for it in failed if it.check in names]

@@ -122,11 +122,13 @@ class Trial:
     @property
     def deviation(self) -> str:
         """Where the two deviate most."""
-        worst = self.test.worst
-        return (
-            f"at {angles_of(self.partition.centres[worst])}, {self.counts[worst]} of {self.count} samples fall where "
-            f"pdf expects {self.expected[worst]:.1f}"
+        worst, expected, drawn = self.test.worst, self.expected.sum(), self.counts.sum()
+        at = angles_of(self.partition.centres[worst])
+        told = (
+            f"at {at}, {self.counts[worst]} of {self.count} samples fall where pdf expects {self.expected[worst]:.1f}"
         )
+        overall = f"; over all directions it expects {expected / max(drawn, 1):.3g} times those drawn"
+        return told + overall * bool(abs(expected - drawn) > 0.05 * drawn)
 
 
 def trials_of(probe: BSDFProbe, part: Part, asked: Sequence[Incident], at_random: Sequence[Incident]) -> list[Trial]:
