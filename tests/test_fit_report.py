@@ -239,3 +239,10 @@ def test_report_from_python(fits, tmp_path):
     (tmp_path / "data.bsdf").write_text("data")
     with pytest.raises(ValueError, match="would replace the data"):
         report([replace(fits[0], file=str(tmp_path / "data.bsdf"))], tmp_path / "data.bsdf")
+
+
+def test_differences_of_colours():
+    """CIELAB of the primaries of sRGB, as tables have it: B. Lindbloom's, of the white D65."""
+    expected = {(1, 1, 1): (100, 0, 0), (1, 0, 0): (53.24, 80.09, 67.20), (0, 1, 0): (87.73, -86.18, 83.18),
+                (0, 0, 1): (32.30, 79.19, -107.86), (0, 0, 0): (0, 0, 0)}  # fmt: skip
+    np.testing.assert_allclose(appearance.lab(np.array([*expected], float)), [*expected.values()], atol=0.05)

@@ -120,6 +120,30 @@ def test_scale_is_a_colour_and_has_a_derivative(llvm_rgb, glossy):
     np.testing.assert_allclose(np.array(dr.grad(params["scale.value"])).ravel(), value.sum(axis=0), rtol=1e-4)
 
 
+def test_values_have_a_range(llvm_rgb, glossy):
+    """What an optimiser drives below 0 counts as 0, leads back, and is projected."""
+    bsdf = mi.load_dict({"type": "tabulated", "filename": glossy, "differentiable": True})
+    assert mi_brdfs.ranges(bsdf) == {"scale.value": (0, np.inf), "values": (0, np.inf)}
+    wi, wo = (w.astype(np.float32) for w in pairs(64, 1, 0.1))
+    params = mi.traverse(bsdf)
+    params["values"] = mi.TensorXf(np.array(params["values"]) - 1e3)
+    dr.enable_grad(params["values"])
+    params.update()
+    value = bsdf.eval(context(), interaction(wi), mi.Vector3f(wo.T))
+    assert not np.array(value).any()
+    dr.backward(-dr.sum(value))
+    assert np.array(dr.grad(params["values"])).min() < 0
+    mi_brdfs.project(params)
+    assert np.array(params["values"]).min() == 0
+
+
+@pytest.mark.slow
+def test_negative_channels_of_a_file_stay_in_range(llvm_rgb):
+    file = str(shared("rgl", "chm_mint_rgb.bsdf"))
+    bsdf = mi.load_dict({"type": "tabulated", "filename": file, "differentiable": True})
+    assert mi_brdfs.ranges(bsdf)["values"] == (-np.inf, np.inf)
+
+
 def test_values_have_derivatives_on_request(llvm_rgb, glossy):
     bsdf = mi.load_dict({"type": "tabulated", "filename": glossy, "differentiable": True})
     params = mi.traverse(bsdf)

@@ -14,7 +14,7 @@ import numpy as np
 from ..model import EnergyWarning
 from ..names import tabulated
 from ..preview import preview_scene
-from ..probe.arrays import Array, luminance
+from ..probe.arrays import Array
 from ..srgb import decoded, encoded
 from .lanes import rgb_variant
 from .observations import FitError
@@ -25,6 +25,9 @@ SIZE, SAMPLES, DEPTH, SEED = 256, 36, 3, 1
 data and fits: their noise is then alike, and almost none of it is in their difference."""
 MOST = 9
 """The most fits to a material that a report shows, and does not only list."""
+
+TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+"""From linear sRGB, by IEC 61966-2-1."""
 
 
 class Appearance(NamedTuple):
@@ -85,10 +88,11 @@ def evaluator() -> Callable[..., Any]:
     return evaluate
 
 
-def lightness(picture: Array) -> Array:
-    """Return CIE L* of a picture in sRGB, from 0 to 100."""
-    y = luminance(decoded(picture))
-    return np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, 24389 / 27 * y)
+def lab(picture: Array) -> Array:
+    """Return CIELAB of a picture in sRGB: L*, from 0 to 100, a* and b*."""
+    xyz = decoded(picture) @ TO_XYZ.T / TO_XYZ.sum(axis=1)
+    x, y, z = np.moveaxis(np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), (29 / 6) ** 2 / 3 * xyz + 4 / 29), -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
 def _picture(bsdf: dict) -> Array:

@@ -14,7 +14,7 @@ from ..pages import environment
 from ..pages.figures import DIFFERENCE, data_uri, svg
 from ..rendering.output import denoiser
 from ..srgb import decoded, encoded
-from .appearance import MOST, Appearance, lightness
+from .appearance import MOST, Appearance, lab
 from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
@@ -164,11 +164,12 @@ def _draw(section: Section, shown: Appearance) -> None:
     section.planar = in_one_plane(measurement.data)
     data, *pictures = map(_smooth, (shown.data, *shown.fits[:MOST]))
     section.data = data_uri(data)
-    differences = [lightness(picture) - lightness(data) for picture in pictures]
-    section.lightness = next((end for end in SCALES if end >= np.quantile(abs(differences[0]), 0.99)), SCALES[-1])
+    differences = [lab(picture) - lab(data) for picture in pictures]
+    lightness = np.quantile(abs(differences[0][..., 0]), 0.99)
+    section.lightness = next((end for end in SCALES if end >= lightness), SCALES[-1])
     for card, picture, difference in zip(cards, pictures, differences, strict=False):
         card.picture = data_uri(picture)
-        card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference / section.lightness)[..., :3])
+        card.difference = data_uri(DIFFERENCE(0.5 + 0.5 * difference[..., 0] / section.lightness)[..., :3])
     with rgb_variant():
         probes = [probe_of(card.fit) for card in cards]
         residuals = [Residuals(pairs, card.fit, probe) for card, probe in zip(cards, probes, strict=True)]
@@ -177,10 +178,10 @@ def _draw(section: Section, shown: Appearance) -> None:
     section.limit = max(float(np.median([it.extent for it in residuals[:CURVES]])), 1e-12)
     for card, each, difference in zip(cards, residuals, differences, strict=True):
         card.residuals = svg(each.draw(section.limit))
-        most = np.quantile(abs(difference), 0.99)
+        most = np.quantile(np.linalg.norm(difference, axis=-1), 0.99)
         seen = "a visible difference" if most > NOTICED else "hardly a visible difference"
         where = f"In the rendering{section.changed and f', {section.changed}'}"
-        told = f"{each.told} {where}, L* is within {most:.2g} in 99 % of the pixels: {seen}."
+        told = f"{each.told} {where}, ΔE is within {most:.2g} in 99 % of the pixels: {seen}."
         card.told = told.replace(" %", "\u00a0%").replace("≈ ", "≈\u00a0")
 
 

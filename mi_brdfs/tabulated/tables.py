@@ -13,6 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..math import clamp
 from ..measured.arrays import DRJIT
 from ..measured.axis import Axis, Interpolation, corners
 from ..measured.coordinates import Coordinates
@@ -23,6 +24,7 @@ from ..measured.measurement import Measurement, Quantity
 from ..measured.report.albedo import albedos
 from ..measured.scattered import as_grid
 from ..observer import to_srgb
+from ..parameters import Range
 from ..probe.arrays import luminance
 from ..variants import is_scalar
 from .proposal import Proposal
@@ -43,7 +45,9 @@ class Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
         path = checked(filename)
         if not shared:
-            return cls(read(path, quantity), interpolation, extrapolate)
+            found = cls(read(path, quantity), interpolation, extrapolate)
+            found.f.limits = found.limits
+            return found
         key = mi.variant(), path.resolve(), content_hash(path), interpolation, extrapolate, quantity
         found = cls._shared.get(key)
         if found is None:
@@ -57,6 +61,7 @@ class Tables:
         self.anisotropic, self.reciprocal = grid.anisotropic, grid.coordinates.reciprocal
         converted = self.channels.converted(grid if interpolation == "nearest" else grid.closed)
         self.signed = converted.signed
+        self.limits = (-np.inf if self.signed else 0.0), np.inf
         self.f = Table(converted, self.channels.spectrum, interpolation, extrapolate)
         self.proposal = Proposal(self.channels.brightness(converted), interpolation, extrapolate)
         (albedo,) = albedos(converted, np.zeros(1), extrapolate=extrapolate)
@@ -122,6 +127,7 @@ class Table:
         self.spectrum = None if wavelengths is None else TableAxis(wavelengths)
         self.values = mi.TensorXf(np.ascontiguousarray(grid.usable, dtype=np.float32))
         self.channels = grid.values.shape[-1]
+        self.limits: Range | None = None  # of values that may change
 
     @property
     def captured(self) -> list[Any]:
@@ -145,7 +151,8 @@ class Table:
         for channels in read:
             total = 0
             for (index, weight), (k, share) in itertools.product(nodes, channels):
-                total = total + fetch(self.values.array, index * self.channels + k) * (weight * share)
+                value = fetch(self.values.array, index * self.channels + k)
+                total = total + (value if self.limits is None else clamp(value, *self.limits)) * (weight * share)
             found.append(total * scale)
         return found
 

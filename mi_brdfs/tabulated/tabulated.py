@@ -46,8 +46,8 @@ class Tabulated(Model):
     Depolarises.
 
     A file that several BSDFs name is in memory once. With ``differentiable`` a BSDF has its own copy, and
-    ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last. Directions
-    are then drawn as the file says, whatever the values become.
+    ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last, in [0, ∞) unless
+    the file's may be negative. Directions are then drawn as the file says, whatever the values become.
 
     Sampling: from a table over the half vector for 58 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
     ``MarginalContinuous2D``, and 2 % by the cosine (mi_brdfs.tabulated.proposal).
@@ -82,6 +82,7 @@ class Tabulated(Model):
         self.captured, self.signed = self.tables.captured, self.tables.signed
         if not shared:
             self.arrays = {"values": self.tables.f.values}
+            self.ranges = self.ranges | {"values": self.tables.limits}
 
     @classmethod
     def sections(cls) -> list[Section]:
