@@ -242,7 +242,7 @@ def test_report_from_python(fits, tmp_path):
 
 
 def test_differences_of_colours():
-    """CIELAB of the primaries of sRGB, as tables have it: B. Lindbloom's, of the white D65."""
+    """CIELAB of the primaries of sRGB under D65, as tables have them."""
     expected = {(1, 1, 1): (100, 0, 0), (1, 0, 0): (53.24, 80.09, 67.20), (0, 1, 0): (87.73, -86.18, 83.18),
                 (0, 0, 1): (32.30, 79.19, -107.86), (0, 0, 0): (0, 0, 0)}  # fmt: skip
     np.testing.assert_allclose(appearance.lab(np.array([*expected], float)), [*expected.values()], atol=0.05)

@@ -191,7 +191,7 @@ def plugin_names() -> set[str]:
 
 def _own_plugins() -> dict[str, type[Plugin]]:
     """Return all plugins but Mitsuba's, by name."""
-    return MODELS | DATA | INTEGRATORS
+    return DATA | INTEGRATORS | MODELS
 
 
 def all_models() -> list[type[Model]]:

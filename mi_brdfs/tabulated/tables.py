@@ -45,9 +45,9 @@ class Tables:
         """Return the tables of a file, those in memory if they are ``shared`` and the file is still the same."""
         path = checked(filename)
         if not shared:
-            found = cls(read(path, quantity), interpolation, extrapolate)
-            found.f.limits = found.limits
-            return found
+            own = cls(read(path, quantity), interpolation, extrapolate)
+            own.f.limits = own.limits
+            return own
         key = mi.variant(), path.resolve(), content_hash(path), interpolation, extrapolate, quantity
         found = cls._shared.get(key)
         if found is None:
