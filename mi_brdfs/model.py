@@ -185,6 +185,10 @@ class Model(Plugin):
     signed = False
     """Whether channels may be negative, of colours outside sRGB, as the page must then say."""
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        cls.energy = cls.__dict__.get("energy")  # a subclass has other lobes
+
     def lobes(self, p: Values) -> tuple[Lobe, ...]:
         """Return the model's lobes at a surface point, where ``p`` holds the values of the declared parameters. Their
         number and kinds depend only on the model's choices and on which parameters are given."""

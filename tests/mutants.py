@@ -219,6 +219,8 @@ class OneSidedShadowing(Shadowing):
 
 def lambert(lobe):
     class Mutant(Lambert):
+        energy = Lambert.energy  # the page that it contradicts
+
         def lobes(self, p):
             return (lobe(p.reflectance),)
 

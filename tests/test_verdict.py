@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import mitsuba as mi
 import numpy as np
 import pytest
-from mutants import MUTANTS, Lambert, Mutant, of_others, sampled
+from mutants import MUTANTS, Lambert, LambertLobe, Mutant, Ward, of_others, sampled
 from support import ROOT
 from test_cli import invoke
 
@@ -412,6 +412,20 @@ def test_a_wrong_constant_is_told_as_one():
     (finding,) = [it for it in check(wrong.register(), only=["pdf"], angles=(50,)).failures if it.subject == "whole"]
     assert "pdf integrates to 3.14" in finding.message and "it fails for all 17 directions tried" in finding.message
     assert finding.message.endswith("It is off by a factor of 3.14 everywhere: a constant is wrong.")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_a_subclass_does_not_gain_the_energy_of_its_base():
+    """The page of ``ward`` says that some of its variants gain energy."""
+
+    class Brighter(Ward):
+        def lobes(self, p):
+            return (*super().lobes(p), LambertLobe(p.diffuse_reflectance))
+
+    given = (("diffuse_reflectance", 0.9), ("variant", "ward"))
+    mutant = Mutant("brighter", (), Brighter, given=given).register()
+    assert check(mutant, only=["albedo"]).failures and Ward.energy and not Brighter.energy
+    assert not check({"type": "ward", "variant": "ward"}, only=["albedo"]).failures
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -139,7 +139,9 @@ class Columns:
         if found.keys() == set("rgb"):
             self.values = [found[kind] for kind in "rgb"]
         elif found.keys() == {"f"}:
-            stated = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", file.stated("wavelength"))
+            stated = re.match(r"(\d+(?:\.\d+)?)\s*(nm)?$", text := file.stated("wavelength"))
+            if text[:1].isdigit() and not stated:
+                raise file.error(f"the wavelength {shortened(text)} is no number of nm, such as 650 or 650 nm")
             self.values, self.wavelengths = [found["f"]], np.array([float(stated[1]) if stated else np.nan])
         elif found and not found.keys() & set("rgbf"):
             kinds = sorted(found, key=float)
