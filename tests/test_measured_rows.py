@@ -210,7 +210,7 @@ def test_csv_values(tmp_path):
     grey = measured(tmp_path, "# wavelength: 633 nm\n# material: Black Paint\n" + table(), "x.csv")
     assert (grey.wavelengths.tolist(), grey.material) == ([633], "Black Paint")
     assert np.isnan(measured(tmp_path, table(), "x.csv").wavelengths).all()
-    with pytest.raises(FileError, match="the wavelength 0.65 um is no number of nm, such as 650"):
+    with pytest.raises(FileError, match=r"the wavelength '0\.65 um' is no number of nm, such as 650"):
         measured(tmp_path, "# wavelength: 0.65 um\n" + table(), "x.csv")
 
 
