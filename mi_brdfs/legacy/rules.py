@@ -194,14 +194,28 @@ def _map(work: Work, element: Element) -> Element | None:
         if element.type == "normalmap":
             texture.name = "normalmap"
         target = work.resolved(texture)
-        if target.scale != [1.0] and element.type == "bumpmap":
-            element.set("scale", sum(target.scale) / len(target.scale))
-            target.scale = [1.0]
-            work.changed(element, "the texture scale in bumpmap is its parameter scale")
-        if target.type == "bitmap" and not target["raw"]:
-            target.set("raw", True)
+        if target.scale != [1.0]:
+            if element.type == "bumpmap":
+                element.set("scale", sum(target.scale) / len(target.scale))
+                target.scale = [1.0]
+                work.changed(element, "the texture scale in bumpmap is its parameter scale")
+        elif target.type == "bitmap" and not target["raw"]:
+            # 0.6 asks for its gamma, as a rule 1. Others may refer to it for colours.
+            linear = target.copy(texture.name)
+            linear.set("raw", True)
+            element.children[element.children.index(texture)] = linear
             work.changed(target, f"the bitmap of {element.type} is read as linear numbers")
+            continue
+        if target.type == "bitmap" and target.text("raw") != "true" and work.values(target).shape[1] > 1:
+            told = "is decoded, as in 0.6; spectral variants of Mitsuba 3 take grey or raw ones only"
+            work.changed(target, f"the bitmap of {element.type} {told}")
     return None
+
+
+@rule("bsdf", "mask")
+def _mask(work: Work, element: Element) -> None:
+    if (opacity := element["opacity"]) and not work.is_grey(opacity):
+        work.approximated(element, "the opacity of mask is the same in all channels")
 
 
 @rule("bsdf", "mixturebsdf")
@@ -240,12 +254,14 @@ def _coating(work: Work, element: Element) -> Element:
         # The coat of a diffuse base is what plastic is.
         work.approximated(element, f"{was} over {inner.type} is plastic, without absorption in the coat")
         element.type = f"{rough}plastic"
+        if not element["int_ior"]:
+            element.set("int_ior", 1.5046)
         element.set("nonlinear", True)
         if reflectance := inner["reflectance"]:
             element.put(reflectance.copy("diffuse_reflectance"))
         return _bounded(work, element)
-    index = element.number("int_ior", 1.5046) / (element.number("ext_ior", 1.000277) or 1.0)  # glass in air, as in 0.6
-    element.pop(*(it.name for it in element.of("float") if it.name in ("int_ior", "ext_ior")))
+    glass, air = (prop("", 1.5046), prop("", 1.000277))  # as in 0.6
+    index = _index(element.pop("int_ior") or glass) / _index(element.pop("ext_ior") or air)
     share = importlib.import_module("mitsuba.scalar_rgb").fresnel_diffuse_reflectance(index)
     work.approximated(element, f"{was} is a mixture with a mirror, of the coat's mean reflectance, at all angles")
     element.type = f"{rough}conductor"
@@ -261,10 +277,15 @@ def _texture(work: Work, element: Element) -> None:
     offset = {axis: written(element.number(f"{uv}offset", 0)) for axis, uv in ("xu", "yv")}
     if element.pop("uvscale", "uscale", "vscale", "uoffset", "voffset"):
         element.put(Element("transform", {}, [Element("scale", scale), Element("translate", offset)], name="to_uv"))
+    modes = [element.text(f"wrap_mode_{axis}") or element.text("wrap_mode") or "repeat" for axis in "uv"]
+    if element.pop("wrap_mode_u", "wrap_mode_v"):
+        element.set("wrap_mode", "repeat" if "repeat" in modes else modes[0])
+        say = work.changed if len({*modes}) == 1 else work.approximated
+        say(element, f"wrap_mode_u and wrap_mode_v of bitmap are wrap_mode {element.text('wrap_mode')}")
     gamma = element.number("gamma", 0)
-    element.pop("gamma", "srgb")
+    if element.pop("gamma", "srgb"):
+        element.set("raw", gamma == 1)
     if gamma == 1:
-        element.set("raw", True)
         work.changed(element, "gamma 1 of bitmap is raw")
     elif gamma > 0 and gamma != 2.2:
         work.approximated(element, f"gamma {gamma:g} of bitmap is that of its file, as a rule sRGB")

@@ -328,15 +328,24 @@ class Work:
 
     def maxima(self, texture: Element) -> np.ndarray:
         """Return the largest value in each channel, as 0.6 knows it."""
+        values, scale = self.values(texture), np.array(self.resolved(texture).scale)
+        return np.broadcast_to(np.maximum(values.max(axis=0), 0) * scale, 3)
+
+    def is_grey(self, texture: Element) -> bool:
+        """Return whether its channels are the same, but for the noise of compressed files."""
+        return bool(np.ptp(self.values(texture), axis=1).max() < 0.02)
+
+    def values(self, texture: Element) -> np.ndarray:
+        """Return what it is made of before it is scaled: constants or pixels, shape (n, 1) or (n, 3)."""
         if constants := colours(texture := self.resolved(texture)):
-            return np.max([np.broadcast_to(it.numbers(1, 3), 3) for it in constants], axis=0)
-        most: Any = 1.0
-        if texture.type == "bitmap" and (name := texture["filename"]):
-            try:
-                bitmap = mi.Bitmap(str(self.folder / name.value))
-            except RuntimeError as error:
-                raise texture.error(f"{name.value} cannot be read: {error}") from None
-            raw = texture.text("raw") == "true"
-            linear = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=bitmap.srgb_gamma() and raw)
-            most = np.maximum(np.array(linear)[..., :3].max(axis=(0, 1)), 0)
-        return np.broadcast_to(most * np.array(texture.scale), 3)
+            return np.array([np.broadcast_to(it.numbers(1, 3), 3) for it in constants])
+        if texture.type != "bitmap" or not (name := texture["filename"]):
+            return np.ones((1, 1))
+        try:
+            bitmap = mi.Bitmap(str(self.folder / name.value))
+        except RuntimeError as error:
+            raise texture.error(f"{name.value} cannot be read: {error}") from None
+        raw = texture.text("raw") == "true"
+        linear = bitmap.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=bitmap.srgb_gamma() and raw)
+        pixels = np.array(linear)
+        return pixels.reshape(-1, pixels.shape[-1] if pixels.ndim > 2 else 1)[:, :3]
