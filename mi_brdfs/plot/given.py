@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -10,12 +10,13 @@ import numpy as np
 
 from ..given import load_described
 from ..measured import read
+from ..mitsuba.registry import find_model, list_models
 from ..parameters.messages import brief
 from ..probe.bsdf import BSDFProbe
 from ..probe.curves import Curve
 from ..probe.sources import find_sources, measured_file, name_of
 from ..variants import is_measurable
-from .style import CHANNELS, plain
+from .style import CHANNELS, Place, plain
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 
@@ -25,6 +26,8 @@ class Named(NamedTuple):
 
     label: str
     probe: BSDFProbe
+    given: dict | None
+    """The dict of a plugin that was given by it or by its type."""
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
@@ -37,14 +40,14 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
         )
     if not bsdfs:
         raise ValueError('there is no BSDF to plot; give one, such as {"type": "ward"}')
-    own = _labels_of_dicts(bsdfs)
+    own = _labels(bsdfs)
     found = [pair for given in bsdfs for pair in _loaded(given, own)]
     if labels is not None:
         if len(labels) != len(found):
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
-        found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
+        found = [it._replace(label=label) for label, it in zip(labels, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
-    return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
+    return [it._replace(label=plain(it.label.lstrip("_"))) for it in found]
 
 
 def scales_of(scale: str) -> tuple[str, ...]:
@@ -88,19 +91,39 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
     who = "all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds)
     same = _common(bsdfs)
+    told = {_plugin(given) for given in bsdfs if isinstance(given, dict) and _parameters(given)}
+    bare = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind and kind not in told and len(bsdfs) > 1]
     # A colour stays on its line.
-    return [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
+    lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
+    return lines + ([f"{', '.join(bare)} with default parameters"] if bare else [])
 
 
-def is_sweep(bsdfs: Sequence[Any]) -> bool:
-    """Return whether these are dicts of one plugin, of which one number alone increases or decreases."""
-    if not all(isinstance(given, dict) for given in bsdfs):
-        return False
-    varied = {name: [given.get(name) for given in bsdfs] for name in bsdfs[0]}
+def places(found: Sequence[Named]) -> list[Place]:
+    """Return the places of curves: on a ramp, if these are dicts of one plugin, of which one number alone increases or
+    decreases; a hue for each plugin, if several have one parameter alone varied; else a hue for each."""
+    groups: dict[Any, list[int]] = {}
+    for k, it in enumerate(found):
+        groups.setdefault(it.given["type"] if it.given else k, []).append(k)
+    varied = [_varied([found[k].given or {} for k in group]) for group in groups.values() if len(group) > 1]
+    alone = len(groups) == 1
+    if not varied or not all(varied) or (alone and not _is_ordered(varied[0])):
+        return [Place(k) for k in range(len(found))]
+    numbered = enumerate(groups.values())
+    ramps = {k: Place(None if alone else hue, at, len(group)) for hue, group in numbered for at, k in enumerate(group)}
+    return [ramps[k] for k in range(len(found))]
+
+
+def _varied(bsdfs: Sequence[Mapping[str, Any]]) -> list[Any]:
+    """Return the values of the only parameter in which dicts of one plugin differ; none if there are more."""
+    varied = {name: [given.get(name) for given in bsdfs] for given in bsdfs for name in given}
     varied = {name: values for name, values in varied.items() if any(value != values[0] for value in values)}
-    (values,) = varied.values() if len(varied) == 1 else ([],)
+    return next(iter(varied.values())) if len(varied) == 1 else []
+
+
+def _is_ordered(values: list[Any]) -> bool:
+    """Return whether these are at least three numbers that increase or decrease."""
     numbers = [value for value in values if type(value) in (int, float)]
-    return len(numbers) == len(bsdfs) and numbers in (sorted(numbers), sorted(numbers, reverse=True))
+    return len(numbers) == len(values) > 2 and numbers in (sorted(numbers), sorted(numbers, reverse=True))
 
 
 def _common(bsdfs: Sequence[Any]) -> dict[str, str]:
@@ -117,13 +140,14 @@ def _told(word: str, parameters: dict[str, str]) -> str:
     return " ".join([word, *(f"{name}={value}" for name, value in parameters.items())])
 
 
-def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
+def _loaded(given: Any, labels: dict[int, str]) -> Iterator[Named]:
     if isinstance(given, str):
+        own = {"type": given} if _plugin(given) else None
         for source in find_sources(given):
-            yield source.name, _probe(source.load())
+            yield Named(labels.get(id(given), source.name), _probe(source.load()), own)
     else:
         probe = _probe(given)
-        yield labels.get(id(given)) or name_of(probe.bsdf), probe
+        yield Named(labels.get(id(given)) or name_of(probe.bsdf), probe, given if isinstance(given, dict) else None)
 
 
 def _probe(given: Any) -> BSDFProbe:
@@ -131,14 +155,30 @@ def _probe(given: Any) -> BSDFProbe:
     return BSDFProbe(load_described(given), data=read(*file).data if file else None)
 
 
-def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:
-    """Return a label for each dict, by its identity: the type, and the parameters that not all dicts share."""
+def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
+    """Return a label for each plugin, by the identity of its dict or word: the type, and the parameters that not all
+    dicts share, which have their defaults where others are given."""
     labels, common = {}, _common(bsdfs)
+    stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
     for given in bsdfs:
-        if isinstance(given, dict):
-            own = {name: value for name, value in _parameters(given).items() if name not in common}
-            labels[id(given)] = _told(str(given.get("type")), own)
+        if kind := _plugin(given):
+            own = _parameters(given) if isinstance(given, dict) else {}
+            told = {name: value for name, value in (own | _defaults(kind, own, stated)).items() if name not in common}
+            labels[id(given)] = _told(kind, told)
     return labels
+
+
+def _plugin(given: Any) -> str:
+    """Return the type of a dict, the word of a plugin, or an empty text for anything else."""
+    if isinstance(given, dict):
+        return str(given.get("type"))
+    return given if isinstance(given, str) and given.isidentifier() else ""
+
+
+def _defaults(kind: str, own: Collection[str], stated: Collection[str]) -> dict[str, str]:
+    """Return the defaults of a model that has its own parameters, of those stated elsewhere."""
+    declared = find_model(kind).declared() if kind in list_models() else []
+    return {it.name: it.rows()[0].default for it in declared if it.name in stated and not set(it.names) & set(own)}
 
 
 def _shown(value: Any) -> str:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from io import BytesIO
+from itertools import groupby, islice, zip_longest
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import to_hex
+from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ..parameters.messages import printable
 
@@ -24,6 +26,7 @@ STYLES = "-", (0, (3, 1.5)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5)), (0, (4, 1.5, 
 UNBROKEN = {"linestyle": "-"}
 """The look of what has gaps, which must not be taken for dashes."""
 CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}
+LIGHTEST = 0.75
 INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
 TEXT, SMALL = 9, 8
 LETTERS = 12
@@ -72,20 +75,28 @@ def set_title(figure: Figure, text: str) -> None:
     figure.suptitle(fill(text, int(LETTERS * figure.get_figwidth())), fontsize=TEXT + 1, color=INK)
 
 
-def add_legend(figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = ()) -> None:
-    """Add a legend below the figure, with the constants above its entries."""
+def add_legend(
+    figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = (), runs: Sequence[int] = ()
+) -> None:
+    """Add a legend below the figure, with the constants above its entries, and a column for each run of so many of
+    these, if there is room."""
     room = LETTERS * figure.get_figwidth()
     labels = [fill(label, int(room) - 10) for label in labels]
     # A formula is about two letters wide, and a handle six.
     widths = [max(map(len, re.sub(r"\$.*?\$", "xx", label).splitlines())) + 6 for label in labels]
     columns = len(labels) if sum(widths) < room else max(1, int(room / max(widths)))
+    if columns < len(labels) and 0 < len(runs) * max(widths) <= room:
+        entries, none = iter(zip(handles, labels, strict=True)), (Line2D([], [], linestyle=""), "")
+        rows_ = zip_longest(*([*islice(entries, run)] for run in runs), fillvalue=none)
+        padded = [entry for column in zip(*rows_, strict=True) for entry in column]
+        handles, labels, columns = [it for it, _ in padded], [it for _, it in padded], len(runs)
     heading = "\n".join(fill(text, int(room)) for text in constants)
     if not figure.is_sized:
         rows = -(-len(labels) // columns) + max(label.count("\n") for label in labels) + heading.count("\n")
         figure.set_figheight(figure.get_figheight() + 0.18 * (rows - 1 + bool(heading)))
     added = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=TEXT,
                           labelcolor=INK, title=heading or None, title_fontsize=TEXT)  # fmt: skip
-    added.get_title().set_color(INK)
+    added.get_title().set(color=INK, multialignment="center")
 
 
 def add_bar(colours: ScalarMappable, axes: Any, text: str, **options: Any) -> None:
@@ -96,12 +107,32 @@ def add_bar(colours: ScalarMappable, axes: Any, text: str, **options: Any) -> No
     bar.outline.set_visible(False)
 
 
-def look(k: int, channel: str = "", ramp: int = 0) -> dict[str, Any]:
-    """Return the style of the k-th curve, and its colour: a channel's, or one in the order of so many of a ramp."""
-    if ramp > 2 and not channel:
-        return {"color": to_hex(colormaps["viridis"](0.88 * k / (ramp - 1))), **UNBROKEN, "linewidth": 1.6}
-    colour = CHANNELS.get(channel, INK) if channel else COLOURS[k % len(COLOURS)]
-    return {"color": colour, "linestyle": STYLES[k % len(STYLES)], "linewidth": 1.6}
+class Place(NamedTuple):
+    """The place of a curve among others: the number of its hue, None on a ramp of hues, and its step on a ramp."""
+
+    hue: int | None
+    at: int = 0
+    of: int = 1
+
+
+def runs(places: Sequence[Place]) -> list[int]:
+    """Return how many curves follow each other in each hue, if there are ramps of several."""
+    found = [len([*run]) for _, run in groupby(places, lambda it: it.hue)]
+    return found if 1 < len(found) < len(places) else []
+
+
+def look(place: Place, channel: str = "") -> dict[str, Any]:
+    """Return the style of a curve, and its colour, a channel's or that of its place."""
+    hue, at, of = place
+    if hue is None:
+        # Up to where a line can be told from white, and in inverted figures from black.
+        return {"color": to_hex(colormaps["viridis"](LIGHTEST * at / (of - 1))), **UNBROKEN, "linewidth": 1.6}
+    colour = CHANNELS.get(channel, INK) if channel else COLOURS[hue % len(COLOURS)]
+    if of > 1:
+        own = np.array(to_rgb(colour))
+        ramp = LinearSegmentedColormap.from_list("", [0.5 * own, own, 1 - 0.5 * (1 - own)])
+        colour = to_hex(ramp(at / (of - 1)))
+    return {"color": colour, "linestyle": STYLES[hue % len(STYLES)], "linewidth": 1.6}
 
 
 def incidence(theta: float) -> str:
