@@ -328,6 +328,11 @@ def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
     figure = plot.cartesian("lambert", "phong", angles=(10, 60))
     assert len(figure.axes) == 4 and list(curves(figure, 2)) == ["lambert", "phong"]
     assert ["10°" in ax.get_title("left") for ax in figure.axes] == [True, False, False, False]
+    figure = plot.polar("lambert", "phong", angles=(10, 60))
+    texts = [[text.get_text() for text in ax.texts] for ax in figure.axes]
+    assert [own.count("30°") for own in texts] == [2, 2, 0, 0]  # around the first row
+    assert ["$10^{-1}$" in own for own in texts] == [False, False, False, True]  # one scale
+    assert "0" in texts[0] and "0" in texts[2]  # scales of their own
     figure = plot.cartesian({"type": "phong", "exponent": 7}, angles=(10, 60))
     assert len(figure.axes) == 2 and figure.get_suptitle() == "phong exponent=7"
     assert ["10°" in label for label in curves(figure)] == [True, False]

@@ -46,7 +46,17 @@ function replaceFigure(card, ...nodes) {
 /** Put the legend and the unit of curves of f cosθ into their card. */
 function describe(card, curves, axis = AXES.theta_o) {
   card.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
-  card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}`));
+  const { scale, normalise } = session.state;
+  const ratio = spread(curves);
+  const uneven = scale === "linear" && !normalise && ratio > 50;
+  const told = uneven ? `; the maxima differ by a factor of ${format(ratio, 2)}: choose log` : "";
+  card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}${told}`));
+}
+
+/** Return by what factor the maxima of curves differ, of those that are not black. */
+function spread(curves) {
+  const peaks = curves.filter(({ y }) => y.some((value) => value > 0)).map(({ y }) => largest([y]));
+  return Math.max(...peaks) / Math.min(...peaks);
 }
 
 /** Return whether curves go on below the surface. */
@@ -216,7 +226,7 @@ export function drawAlbedo() {
   // Where energy is gained without end, the scale is that of angles up to 85°.
   const scale = valueScale(
     curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)),
-    false,
+    session.state.scale === "log" && spread(curves) > 10,
     dark ? 0 : 1.02,
   );
   cards.albedo.note.textContent = "over the angle of incidence" + (gained > 1.005 ? `, up to ${format(gained)}` : "");
