@@ -307,9 +307,10 @@ def test_several_sweeps_have_a_hue_and_a_column_of_the_legend_each():
             assert saturation > 0.2
             hues.setdefault(line.get_label().split()[0], []).append(hue)
         assert all(max(own) - min(own) < 0.02 for own in hues.values()) and len(hues) == 2
+    assert legend(plot.albedo(*swept, rgb=True)) == [f"{it['type']} alpha={it['alpha']}" for it in swept]
     figure = plot.cartesian(*swept, "phong", angles=(10,))
     assert legend(figure)[3:6] == [f"walter alpha={alpha}" for alpha in (0.1, 0.2, 0.3)]
-    assert legend(figure)[6:9] == ["phong", "", ""] and figure.legends[0]._ncols == 4
+    assert legend(figure)[6:] == ["phong", "mirror direction", ""] and figure.legends[0]._ncols == 3
 
 
 def test_a_default_is_said_where_another_value_is():

@@ -95,7 +95,7 @@ def explore(
     state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body", "exposure": exposure}
     files = [it.word for it in sources if is_measured(it.word)]
     if files:
-        state["scale"] = "log"  # a measured paint is a flat line below a metal
+        state["scale"] = "log"  # as where the page adds one
     if any(in_one_plane(read(it).data) for it in files):
         state["views"] = ["picture", "polar", "cartesian", "albedo"]  # a lobe would be mostly guessed
     if mesh and mesh.suffix.lower() not in MESHES:

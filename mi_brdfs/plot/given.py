@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -26,8 +26,6 @@ class Named(NamedTuple):
 
     label: str
     probe: BSDFProbe
-    given: dict | None
-    """The dict of a plugin that was given by it or by its type."""
 
 
 def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
@@ -45,9 +43,9 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
     if labels is not None:
         if len(labels) != len(found):
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
-        found = [it._replace(label=label) for label, it in zip(labels, found, strict=True)]
+        found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
-    return [it._replace(label=plain(it.label.lstrip("_"))) for it in found]
+    return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
 
 
 def scales_of(scale: str) -> tuple[str, ...]:
@@ -98,24 +96,25 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     return lines + ([f"{', '.join(bare)} with default parameters"] if bare else [])
 
 
-def places(found: Sequence[Named]) -> list[Place]:
-    """Return the places of curves: on a ramp, if these are dicts of one plugin, of which one number alone increases or
-    decreases; a hue for each plugin, if several have one parameter alone varied; else a hue for each."""
+def places(bsdfs: Sequence[Any], count: int) -> list[Place]:
+    """Return the places of so many curves: on a ramp, if these are dicts of one plugin, of which one number alone
+    increases or decreases; a hue for each plugin, if several have one parameter alone varied; else a hue for each."""
     groups: dict[Any, list[int]] = {}
-    for k, it in enumerate(found):
-        groups.setdefault(it.given["type"] if it.given else k, []).append(k)
-    varied = [_varied([found[k].given or {} for k in group]) for group in groups.values() if len(group) > 1]
+    for k, given in enumerate(bsdfs):
+        groups.setdefault(_plugin(given) or k, []).append(k)
+    varied = [_varied([bsdfs[k] for k in group]) for group in groups.values() if len(group) > 1]
     alone = len(groups) == 1
-    if not varied or not all(varied) or (alone and not _is_ordered(varied[0])):
-        return [Place(k) for k in range(len(found))]
+    if len(bsdfs) < count or not varied or not all(varied) or (alone and not _is_ordered(varied[0])):
+        return [Place(k) for k in range(count)]
     numbered = enumerate(groups.values())
     ramps = {k: Place(None if alone else hue, at, len(group)) for hue, group in numbered for at, k in enumerate(group)}
-    return [ramps[k] for k in range(len(found))]
+    return [ramps[k] for k in range(count)]
 
 
-def _varied(bsdfs: Sequence[Mapping[str, Any]]) -> list[Any]:
+def _varied(bsdfs: Sequence[Any]) -> list[Any]:
     """Return the values of the only parameter in which dicts of one plugin differ; none if there are more."""
-    varied = {name: [given.get(name) for given in bsdfs] for given in bsdfs for name in given}
+    dicts = [given if isinstance(given, dict) else {"type": given} for given in bsdfs]
+    varied = {name: [given.get(name) for given in dicts] for given in dicts for name in given}
     varied = {name: values for name, values in varied.items() if any(value != values[0] for value in values)}
     return next(iter(varied.values())) if len(varied) == 1 else []
 
@@ -140,14 +139,13 @@ def _told(word: str, parameters: dict[str, str]) -> str:
     return " ".join([word, *(f"{name}={value}" for name, value in parameters.items())])
 
 
-def _loaded(given: Any, labels: dict[int, str]) -> Iterator[Named]:
+def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
     if isinstance(given, str):
-        own = {"type": given} if _plugin(given) else None
         for source in find_sources(given):
-            yield Named(labels.get(id(given), source.name), _probe(source.load()), own)
+            yield labels.get(id(given), source.name), _probe(source.load())
     else:
         probe = _probe(given)
-        yield Named(labels.get(id(given)) or name_of(probe.bsdf), probe, given if isinstance(given, dict) else None)
+        yield labels.get(id(given)) or name_of(probe.bsdf), probe
 
 
 def _probe(given: Any) -> BSDFProbe:
@@ -163,8 +161,10 @@ def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
     for given in bsdfs:
         if kind := _plugin(given):
             own = _parameters(given) if isinstance(given, dict) else {}
-            told = {name: value for name, value in (own | _defaults(kind, own, stated)).items() if name not in common}
-            labels[id(given)] = _told(kind, told)
+            declared = find_model(kind).declared() if kind in list_models() else []
+            left_out = [it for it in declared if it.name in stated and not own.keys() & set(it.names)]
+            own |= {it.name: it.rows()[0].default for it in left_out}
+            labels[id(given)] = _told(kind, {name: value for name, value in own.items() if name not in common})
     return labels
 
 
@@ -173,12 +173,6 @@ def _plugin(given: Any) -> str:
     if isinstance(given, dict):
         return str(given.get("type"))
     return given if isinstance(given, str) and given.isidentifier() else ""
-
-
-def _defaults(kind: str, own: Collection[str], stated: Collection[str]) -> dict[str, str]:
-    """Return the defaults of a model that has its own parameters, of those stated elsewhere."""
-    declared = find_model(kind).declared() if kind in list_models() else []
-    return {it.name: it.rows()[0].default for it in declared if it.name in stated and not set(it.names) & set(own)}
 
 
 def _shown(value: Any) -> str:

@@ -95,13 +95,14 @@ def albedo(
         style.set_title(figure, style.plain(title))
     ax = figure.subplots()
     handles = []
-    where = places(found)
+    where = places(() if rgb else bsdfs, len(found))
     for it, place in zip(found, where, strict=True):
         for name, (curve,) in by_channel([partial(lobes.albedo, it.probe, azimuth)], rgb):
             label = f"{it.label}, {name}" if name in style.CHANNELS else it.label
             handles += ax.plot(*curve, label=label, **look(place, name))
     frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
-    style.add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs), style.runs(where))
+    names = [handle.get_label() for handle in handles]
+    style.add_legend(figure, handles, names, constants(bsdfs), where)
     return figure
 
 

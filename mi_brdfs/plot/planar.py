@@ -123,7 +123,7 @@ def _planar(
     beside = side_by_side and len(found) > 1
     measured = [k for k, it in enumerate(found) if it.probe.data]
     by_bsdf = beside or not (rgb or len(found) > 1)
-    where = [Place(k) for k in range(len(found))] if by_bsdf or rgb else places(found)
+    where = places(() if by_bsdf or rgb else bsdfs, len(found))
 
     def lines(it: Named, k: int) -> list[list[LabelledCurve]]:
         rows: list[list[LabelledCurve]] = [[] for _ in angles]
@@ -186,9 +186,8 @@ def _planar(
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
     shown = {curve.label: curve for curve in everything}.values() if beside else curves
     handles = [Line2D([], [], **curve.look) for curve in shown]
-    runs = style.runs(where)
-    labels_ = [*(curve.label for curve in shown), *marks]
-    style.add_legend(figure, [*handles, *marks.values()], labels_, notes, [*runs, len(marks)] if runs else ())
+    names = [*(curve.label for curve in shown), *marks]
+    style.add_legend(figure, [*handles, *marks.values()], names, notes, where)
     return figure
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from io import BytesIO
-from itertools import groupby, islice, zip_longest
 from textwrap import fill
 from typing import Any, NamedTuple
 
@@ -76,20 +75,20 @@ def set_title(figure: Figure, text: str) -> None:
 
 
 def add_legend(
-    figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = (), runs: Sequence[int] = ()
+    figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = (), places: Sequence[Place] = ()
 ) -> None:
-    """Add a legend below the figure, with the constants above its entries, and a column for each run of so many of
-    these, if there is room."""
+    """Add a legend below the figure, with the constants above its entries, of which each hue with several has a column,
+    if there is room."""
     room = LETTERS * figure.get_figwidth()
     labels = [fill(label, int(room) - 10) for label in labels]
     # A formula is about two letters wide, and a handle six.
     widths = [max(map(len, re.sub(r"\$.*?\$", "xx", label).splitlines())) + 6 for label in labels]
     columns = len(labels) if sum(widths) < room else max(1, int(room / max(widths)))
-    if columns < len(labels) and 0 < len(runs) * max(widths) <= room:
-        entries, none = iter(zip(handles, labels, strict=True)), (Line2D([], [], linestyle=""), "")
-        rows_ = zip_longest(*([*islice(entries, run)] for run in runs), fillvalue=none)
-        padded = [entry for column in zip(*rows_, strict=True) for entry in column]
-        handles, labels, columns = [it for it, _ in padded], [it for _, it in padded], len(runs)
+    run = max((it.of for it in places if it.hue is not None), default=1)
+    wanted = -(-len(labels) // run)
+    if run > 1 and columns < len(labels) and wanted * max(widths) <= room:
+        columns, blank = wanted, wanted * run - len(labels)
+        handles, labels = [*handles, *blank * [Line2D([], [], linestyle="")]], [*labels, *blank * [""]]
     heading = "\n".join(fill(text, int(room)) for text in constants)
     if not figure.is_sized:
         rows = -(-len(labels) // columns) + max(label.count("\n") for label in labels) + heading.count("\n")
@@ -113,12 +112,6 @@ class Place(NamedTuple):
     hue: int | None
     at: int = 0
     of: int = 1
-
-
-def runs(places: Sequence[Place]) -> list[int]:
-    """Return how many curves follow each other in each hue, if there are ramps of several."""
-    found = [len([*run]) for _, run in groupby(places, lambda it: it.hue)]
-    return found if 1 < len(found) < len(places) else []
 
 
 def look(place: Place, channel: str = "") -> dict[str, Any]:

@@ -46,11 +46,7 @@ function replaceFigure(card, ...nodes) {
 /** Put the legend and the unit of curves of f cosθ into their card. */
 function describe(card, curves, axis = AXES.theta_o) {
   card.legend = curves.map(({ colour, name, dash }) => [colour, name, dash]);
-  const { scale, normalise } = session.state;
-  const ratio = spread(curves);
-  const uneven = scale === "linear" && !normalise && ratio > 50;
-  const told = uneven ? `; the maxima differ by a factor of ${format(ratio, 2)}: choose log` : "";
-  card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}${told}`));
+  card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}`));
 }
 
 /** Return by what factor the maxima of curves differ, of those that are not black. */
