@@ -583,6 +583,7 @@ def test_measured_files_of_any_name_are_loaded_copied_and_fitted(tab, address):
         tab.locator("#file").set_input_files({"name": name, "mimeType": "", "buffer": LOFT.read_bytes()})
         tab.wait_for_function(f"() => document.querySelectorAll('.pictures canvas').length === {count}")
     assert tab.locator(".chip").all_inner_texts() == ["lambert", *names]
+    assert tab.locator("#scale").input_value() == "log"
     tab.locator("#share").click()
     tab.locator("#copy-xml").click()
     tab.wait_for_function("async () => (await navigator.clipboard.readText()).includes('<bsdf type=\"tabulated\"')")
@@ -692,6 +693,15 @@ def test_nothing_is_wider_than_the_screen(tab, address):
         })  # fmt: skip
         assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
         assert not tab.evaluate(small)
+        tab.wait_for_selector("#view-polar .sample")
+        x, y = tab.evaluate("""() => {
+            const sample = document.querySelector('#view-polar .sample').getBoundingClientRect();
+            const range = document.createRange();
+            range.selectNode(document.querySelector('#view-polar .sample').nextSibling);
+            const name = range.getClientRects()[0];
+            return [name.left - sample.right, name.top - sample.bottom];
+        }""")
+        assert x >= 0 > y  # a name begins beside its dash
 
 
 @pytest.mark.slow
@@ -709,6 +719,8 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     tab.goto(exported.as_uri())
     drawn(tab)
     assert tab.locator("#view-polar svg path").count() > 1
+    assert '"scale": "log"' in text and "10⁻" in tab.locator("#view-polar .figure").inner_html()
+    assert tab.locator(".panel").bounding_box()["width"] > 0.95 * 1440
     assert tab.locator(".chip").all_inner_texts() == ["chalk", name]
     assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [exported.as_uri()]
     lobe = "document.querySelector('#view-lobe canvas').toDataURL()"

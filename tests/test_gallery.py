@@ -42,6 +42,9 @@ def test_every_model_has_a_portrait_and_sweeps():
         assert all(2 <= len(set(sweep.values)) == len(sweep.values) <= 5 for sweep in sweeps), model
         for bsdf in [portrait(model), *(bsdf for sweep in sweeps for bsdf in sweep.bsdfs(model.plugins[0]))]:
             mi.load_dict(bsdf)
+    swept = {sweep.parameter: sweep.heading() for model in own_models() for sweep in sweeps_of(model)}
+    assert swept["rotation"].startswith("rotation in turns of 360°, with alpha_u = 0.05")
+    assert swept["film_thickness"].startswith("film_thickness in nm")
 
 
 @pytest.mark.usefixtures("llvm_rgb", "as_before")
@@ -242,6 +245,10 @@ def test_the_command_writes_a_page_and_its_pictures(folder):
     for name in "eon", "lambert":
         width, height = mi.Bitmap(str(folder / f"{name}.png")).size()
         assert width > 5 * 16 and height > 2 * 16
+    assert "<nav>" in text and 'class="sheet" href="overview.png"' in text
+    invoke("gallery", "eon", "--size", 16, "--spp", 1, "-o", "one")
+    text = Path("one", "index.html").read_text(encoding="utf-8")
+    assert "<nav hidden>" in text and 'class="portrait" href="overview.png"' in text
 
 
 def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, monkeypatch):

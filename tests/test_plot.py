@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib import pyplot, rcParams
-from matplotlib.colors import to_rgb
+from matplotlib.colors import rgb_to_hsv, to_rgb
 from support import LOFT, ROOT, call, context, direction
 from test_cli import invoke
 
@@ -231,7 +231,7 @@ def test_red_green_and_blue():
     figure = plot.cartesian(COLOURED, "lambert", angles=(0, 60), scale="linear", rgb=True)
     drawn = curves(figure)
     assert list(drawn)[:3] == [f"lambert reflectance=0.2, 0.5, 0.8, {name}" for name in ("red", "green", "blue")]
-    assert list(drawn)[3:] == ["lambert"] and legend(figure)[:4] == list(drawn)
+    assert list(drawn)[3:] == ["lambert reflectance=0.5"] and legend(figure)[:4] == list(drawn)
     peaks = [value.max() for _, value in drawn.values()]
     assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5]) / np.pi, rel=1e-3)
     lines = [line for line in figure.axes[0].lines if line.get_label()[0] != "_"]
@@ -267,7 +267,8 @@ def test_a_sweep_is_named_by_what_differs():
     sweep = [{"type": "ward", "alpha": alpha, "variant": "ward-duer"} for alpha in (0.1, 0.25)]
     figure = plot.polar(*sweep, "roughconductor", angles=(45,))
     assert legend(figure)[:3] == ["ward alpha=0.1", "ward alpha=0.25", "roughconductor"]
-    assert figure.legends[0].get_title().get_text() == "ward with variant=ward-duer"
+    title = "ward with variant=ward-duer\nroughconductor with default parameters"
+    assert figure.legends[0].get_title().get_text() == title
     assert list(curves(figure)) == legend(figure)[:3]
     looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines if line.get_label()[0] != "_"}
     assert len(looks) == 3
@@ -276,7 +277,7 @@ def test_a_sweep_is_named_by_what_differs():
     several = [{"type": kind, "exponent": n, "specular_reflectance": 0.1}
                for kind, n in (("phong", 9), ("phong", 20), ("blinnphong", 9))]  # fmt: skip
     figure = plot.albedo(*several)
-    assert legend(figure) == ["phong exponent=9", "phong exponent=20", "blinnphong exponent=9"]
+    assert legend(figure) == ["phong exponent=9", "phong exponent=20", "blinnphong exponent=9", ""]
     assert figure.legends[0].get_title().get_text() == "all with specular_reflectance=0.1"
 
 
@@ -289,15 +290,50 @@ def test_a_sweep_of_a_number_has_colours_in_its_order():
     sweep = [{"type": "phong", "exponent": n} for n in (2, 4, 8, 16)]
     levels, styles = brightness(*sweep)
     assert levels == sorted(levels) and len(set(levels)) == 4 and styles == {"-"}
-    for others in ([sweep[0], sweep[2], sweep[1]], [*sweep[:3], {"type": "blinnphong", "exponent": 16}]):
-        assert len(brightness(*others)[1]) > 1
+    assert len(brightness(sweep[0], sweep[2], sweep[1])[1]) > 1
+    others = [{"type": "ward", "alpha": a} for a in (0.1, 0.2)]
+    levels, styles = brightness(*sweep, *others, "lambert")
+    assert levels[:4] == sorted(levels[:4]) and levels[4] < levels[5] and len(set(levels)) == 7 and len(styles) == 2
+
+
+def test_several_sweeps_have_a_hue_and_a_column_of_the_legend_each():
+    """Also if they are given one value after the other."""
+    swept = [{"type": kind, "alpha": alpha} for kind in ("ward", "walter") for alpha in (0.1, 0.2, 0.3)]
+    for bsdfs in swept, [swept[k] for k in (0, 3, 1, 4, 2, 5)]:
+        figure = plot.albedo(*bsdfs)
+        hues = {}
+        for line in figure.axes[0].lines[:6]:
+            hue, saturation, _ = rgb_to_hsv(to_rgb(line.get_color()))
+            assert saturation > 0.2
+            hues.setdefault(line.get_label().split()[0], []).append(hue)
+        assert all(max(own) - min(own) < 0.02 for own in hues.values()) and len(hues) == 2
+    assert legend(plot.albedo(*swept, rgb=True)) == [f"{it['type']} alpha={it['alpha']}" for it in swept]
+    figure = plot.cartesian(*swept, "phong", angles=(10,))
+    assert legend(figure)[3:6] == [f"walter alpha={alpha}" for alpha in (0.1, 0.2, 0.3)]
+    assert legend(figure)[6:] == ["phong", "mirror direction", ""] and figure.legends[0]._ncols == 3
+
+
+def test_a_default_is_said_where_another_value_is():
+    figure = plot.albedo(
+        "walter", {"type": "walter", "multiscatter": "walk"}, {"type": "ward", "alpha_u": 0.2}, "lambert"
+    )
+    assert legend(figure) == ["walter multiscatter=none", "walter multiscatter=walk", "ward alpha_u=0.2", "lambert"]
+    figure = plot.albedo("ward", {"type": "ward", "alpha": 0.2}, {"type": "ward", "alpha_v": 0.2})
+    assert legend(figure) == ["ward alpha=0.1", "ward alpha=0.2", "ward alpha_v=0.2"]
+    figure = plot.albedo("ward", "principled")
+    assert figure.legends[0].get_title().get_text() == "ward, principled with default parameters"
 
 
 @pytest.mark.slow
 def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
     figure = plot.cartesian("lambert", "phong", angles=(10, 60))
     assert len(figure.axes) == 4 and list(curves(figure, 2)) == ["lambert", "phong"]
-    assert ["10°" in ax.get_title() for ax in figure.axes] == [True, True, False, False]
+    assert ["10°" in ax.get_title("left") for ax in figure.axes] == [True, False, False, False]
+    figure = plot.polar("lambert", "phong", angles=(10, 60))
+    texts = [[text.get_text() for text in ax.texts] for ax in figure.axes]
+    assert [own.count("30°") for own in texts] == [2, 2, 0, 0]  # around the first row
+    assert ["$10^{-1}$" in own for own in texts] == [False, False, False, True]  # one scale
+    assert "0" in texts[0] and "0" in texts[2]  # scales of their own
     figure = plot.cartesian({"type": "phong", "exponent": 7}, angles=(10, 60))
     assert len(figure.axes) == 2 and figure.get_suptitle() == "phong exponent=7"
     assert ["10°" in label for label in curves(figure)] == [True, False]

@@ -93,7 +93,10 @@ def explore(
             fail(f"--labels {labels}: give a name to each of the {len(subjects)} BSDFs, not {names}", Exit.USAGE)
         subjects = [each | {"name": name} for each, name in zip(subjects, labels.split(","), strict=True)]
     state: dict[str, Any] = {"subjects": subjects, "shape": "scene" if scene else "body", "exposure": exposure}
-    if any(is_measured(it.word) and in_one_plane(read(it.word).data) for it in sources):
+    files = [it.word for it in sources if is_measured(it.word)]
+    if files:
+        state["scale"] = "log"  # as where the page adds one
+    if any(in_one_plane(read(it).data) for it in files):
         state["views"] = ["picture", "polar", "cartesian", "albedo"]  # a lobe would be mostly guessed
     if mesh and mesh.suffix.lower() not in MESHES:
         fail(f"--mesh {mesh}: give a file whose name ends in {' or '.join(MESHES)}", Exit.USAGE)

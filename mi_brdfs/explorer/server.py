@@ -212,7 +212,7 @@ class Explorer:
             shapes=scenes.shapes,
             turned=scenes.turned,
             models=[model.plugins[0] for model in all_models()],
-            metrics=list(METRICS),
+            metrics={name: it.text for name, it in METRICS.items()},
             tours=tours(),
             state=self.initial,
         )

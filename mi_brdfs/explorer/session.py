@@ -295,7 +295,7 @@ class Session:
                     best = fit(observed, model, metric=metric, starts=STARTS, progress=progress)[0]
                     error = best.held_out if math.isfinite(best.held_out) else None
                     found = {"bsdf": plain(best.bsdf), "model": best.model, "error": error}
-                    found["text"] = " ".join(best.remarks())
+                    found["text"] = "\n".join(best.remarks())
                 except Disturbed:
                     yield
                 except (RuntimeError, ValueError) as error:

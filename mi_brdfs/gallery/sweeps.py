@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..model import Model
-from .families import coloured, of_own
+from .families import MODELS, coloured, of_own
+
+UNITS = MODELS["units"]
+"""The units of parameters that have one."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class Sweep:
     def heading(self) -> str:
         """Return the heading: the parameter, and what is given."""
         given = ", ".join(f"{name} = {shown(value)}" for name, value in self.given.items())
-        return self.parameter + (f", with {given}" if given else "")
+        unit = f" in {UNITS[self.parameter]}" if self.parameter in UNITS else ""
+        return self.parameter + unit + (f", with {given}" if given else "")
 
 
 def shown(value: Any) -> str:

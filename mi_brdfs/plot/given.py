@@ -10,12 +10,13 @@ import numpy as np
 
 from ..given import load_described
 from ..measured import read
+from ..mitsuba.registry import find_model, list_models
 from ..parameters.messages import brief
 from ..probe.bsdf import BSDFProbe
 from ..probe.curves import Curve
 from ..probe.sources import find_sources, measured_file, name_of
 from ..variants import is_measurable
-from .style import CHANNELS, plain
+from .style import CHANNELS, Place, plain
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 
@@ -37,7 +38,7 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
         )
     if not bsdfs:
         raise ValueError('there is no BSDF to plot; give one, such as {"type": "ward"}')
-    own = _labels_of_dicts(bsdfs)
+    own = _labels(bsdfs)
     found = [pair for given in bsdfs for pair in _loaded(given, own)]
     if labels is not None:
         if len(labels) != len(found):
@@ -88,19 +89,40 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
     who = "all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds)
     same = _common(bsdfs)
+    told = {_plugin(given) for given in bsdfs if isinstance(given, dict) and _parameters(given)}
+    bare = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind and kind not in told and len(bsdfs) > 1]
     # A colour stays on its line.
-    return [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
+    lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
+    return lines + ([f"{', '.join(bare)} with default parameters"] if bare else [])
 
 
-def is_sweep(bsdfs: Sequence[Any]) -> bool:
-    """Return whether these are dicts of one plugin, of which one number alone increases or decreases."""
-    if not all(isinstance(given, dict) for given in bsdfs):
-        return False
-    varied = {name: [given.get(name) for given in bsdfs] for name in bsdfs[0]}
+def places(bsdfs: Sequence[Any], count: int) -> list[Place]:
+    """Return the places of so many curves: on a ramp, if these are dicts of one plugin, of which one number alone
+    increases or decreases; a hue for each plugin, if several have one parameter alone varied; else a hue for each."""
+    groups: dict[Any, list[int]] = {}
+    for k, given in enumerate(bsdfs):
+        groups.setdefault(_plugin(given) or k, []).append(k)
+    varied = [_varied([bsdfs[k] for k in group]) for group in groups.values() if len(group) > 1]
+    alone = len(groups) == 1
+    if len(bsdfs) < count or not varied or not all(varied) or (alone and not _is_ordered(varied[0])):
+        return [Place(k) for k in range(count)]
+    numbered = enumerate(groups.values())
+    ramps = {k: Place(None if alone else hue, at, len(group)) for hue, group in numbered for at, k in enumerate(group)}
+    return [ramps[k] for k in range(count)]
+
+
+def _varied(bsdfs: Sequence[Any]) -> list[Any]:
+    """Return the values of the only parameter in which dicts of one plugin differ; none if there are more."""
+    dicts = [given if isinstance(given, dict) else {"type": given} for given in bsdfs]
+    varied = {name: [given.get(name) for given in dicts] for given in dicts for name in given}
     varied = {name: values for name, values in varied.items() if any(value != values[0] for value in values)}
-    (values,) = varied.values() if len(varied) == 1 else ([],)
+    return next(iter(varied.values())) if len(varied) == 1 else []
+
+
+def _is_ordered(values: list[Any]) -> bool:
+    """Return whether these are at least three numbers that increase or decrease."""
     numbers = [value for value in values if type(value) in (int, float)]
-    return len(numbers) == len(bsdfs) and numbers in (sorted(numbers), sorted(numbers, reverse=True))
+    return len(numbers) == len(values) > 2 and numbers in (sorted(numbers), sorted(numbers, reverse=True))
 
 
 def _common(bsdfs: Sequence[Any]) -> dict[str, str]:
@@ -120,7 +142,7 @@ def _told(word: str, parameters: dict[str, str]) -> str:
 def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
     if isinstance(given, str):
         for source in find_sources(given):
-            yield source.name, _probe(source.load())
+            yield labels.get(id(given), source.name), _probe(source.load())
     else:
         probe = _probe(given)
         yield labels.get(id(given)) or name_of(probe.bsdf), probe
@@ -131,14 +153,26 @@ def _probe(given: Any) -> BSDFProbe:
     return BSDFProbe(load_described(given), data=read(*file).data if file else None)
 
 
-def _labels_of_dicts(bsdfs: Sequence[Any]) -> dict[int, str]:
-    """Return a label for each dict, by its identity: the type, and the parameters that not all dicts share."""
+def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
+    """Return a label for each plugin, by the identity of its dict or word: the type, and the parameters that not all
+    dicts share, which have their defaults where others are given."""
     labels, common = {}, _common(bsdfs)
+    stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
     for given in bsdfs:
-        if isinstance(given, dict):
-            own = {name: value for name, value in _parameters(given).items() if name not in common}
-            labels[id(given)] = _told(str(given.get("type")), own)
+        if kind := _plugin(given):
+            own = _parameters(given) if isinstance(given, dict) else {}
+            declared = find_model(kind).declared() if kind in list_models() else []
+            left_out = [it for it in declared if it.name in stated and not own.keys() & set(it.names)]
+            own |= {it.name: it.rows()[0].default for it in left_out}
+            labels[id(given)] = _told(kind, {name: value for name, value in own.items() if name not in common})
     return labels
+
+
+def _plugin(given: Any) -> str:
+    """Return the type of a dict, the word of a plugin, or an empty text for anything else."""
+    if isinstance(given, dict):
+        return str(given.get("type"))
+    return given if isinstance(given, str) and given.isidentifier() else ""
 
 
 def _shown(value: Any) -> str:

@@ -20,7 +20,7 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import largest
 from . import style
-from .given import by_channel, constants, is_sweep, named, quantity, with_smooth_part
+from .given import by_channel, constants, named, places, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
 
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
@@ -95,13 +95,14 @@ def albedo(
         style.set_title(figure, style.plain(title))
     ax = figure.subplots()
     handles = []
-    ramp = len(found) if is_sweep(bsdfs) else 0
-    for k, it in enumerate(found):
+    where = places(() if rgb else bsdfs, len(found))
+    for it, place in zip(found, where, strict=True):
         for name, (curve,) in by_channel([partial(lobes.albedo, it.probe, azimuth)], rgb):
             label = f"{it.label}, {name}" if name in style.CHANNELS else it.label
-            handles += ax.plot(*curve, label=label, **look(k, name, ramp))
+            handles += ax.plot(*curve, label=label, **look(place, name))
     frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
-    style.add_legend(figure, handles, [handle.get_label() for handle in handles], constants(bsdfs))
+    names = [handle.get_label() for handle in handles]
+    style.add_legend(figure, handles, names, constants(bsdfs), where)
     return figure
 
 

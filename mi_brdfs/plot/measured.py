@@ -29,7 +29,7 @@ from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
 from .maps import HATCHED, frame_albedo
 from .planar import MIRROR, LabelledCurve, draw_cartesian
-from .style import CHANNELS, FAINT, INK, SMALL, TEXT, UNBROKEN, add_bar, calm, incidence, look, new_figure, plain
+from .style import CHANNELS, FAINT, INK, SMALL, TEXT, UNBROKEN, Place, add_bar, calm, incidence, look, new_figure, plain
 
 ANGLES = 10, 40, 70
 """The angles of incidence of lobes, in degrees, in tables without such an axis; of others, at most LOBES nodes."""
@@ -121,7 +121,7 @@ def _norm(values: np.ndarray) -> LogNorm:
 def _draw_lobes(ax: Axes, it: LitTable) -> None:
     names = [incidence(float(f"{theta:.3g}")) for theta in it.angles]
     curves = [
-        LabelledCurve(name, theta, it.curve(theta), look(k) | UNBROKEN)
+        LabelledCurve(name, theta, it.curve(theta), look(Place(k)) | UNBROKEN)
         for k, (name, theta) in enumerate(zip(names, it.angles, strict=True))
     ]
     calm(ax)
@@ -142,7 +142,7 @@ def _draw_albedo(ax: Axes, it: LitTable) -> None:
     names = list(CHANNELS) if colour.shape[-1] == 3 else [""]
     handles = []
     for channel, name in enumerate(names):
-        handles += ax.plot(angles, colour[:, channel], label=name or "integrated", **look(channel, name))
+        handles += ax.plot(angles, colour[:, channel], label=name or "integrated", **look(Place(channel), name))
     stated = {theta: albedo[0] for theta, albedo in it.measurement.stated_albedos.items()}
     if stated:
         handles += ax.plot(np.degrees(list(stated)), list(stated.values()), label="stated", **STATED)

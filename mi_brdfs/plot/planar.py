@@ -19,8 +19,8 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import Named, by_channel, constants, is_sweep, named, quantity, scales_of, with_smooth_part
-from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, incidence, look
+from .given import Named, by_channel, constants, named, places, quantity, scales_of, with_smooth_part
+from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, Place, incidence, look
 
 MIRROR = {"marker": "v", "markersize": 5}
 THIN = {"linewidth": 0.8}
@@ -69,7 +69,7 @@ def polar(
         Exception: whatever Mitsuba raises if XML cannot be loaded.
     """
     options = azimuth, scale, labels, normalize, rgb, side_by_side, title, size
-    return _planar(_draw_polar, (0.6, 1.05), bsdfs, angles, *options)
+    return _planar(_draw_polar, (0.58, 1.05), bsdfs, angles, *options)
 
 
 def cartesian(
@@ -123,7 +123,7 @@ def _planar(
     beside = side_by_side and len(found) > 1
     measured = [k for k, it in enumerate(found) if it.probe.data]
     by_bsdf = beside or not (rgb or len(found) > 1)
-    ramp = 0 if by_bsdf or not is_sweep(bsdfs) else len(found)
+    where = places(() if by_bsdf or rgb else bsdfs, len(found))
 
     def lines(it: Named, k: int) -> list[list[LabelledCurve]]:
         rows: list[list[LabelledCurve]] = [[] for _ in angles]
@@ -132,7 +132,7 @@ def _planar(
             for j, (theta, curve) in enumerate(zip(angles, curves, strict=True)):
                 if normalize:
                     curve = curve._replace(value=curve.value / largest([curve.value]))
-                own_look = look(j if by_bsdf else k, name, ramp)
+                own_look = look(Place(j) if by_bsdf else where[k], name)
                 if k in measured or (beside and measured):
                     own_look |= UNBROKEN
                 own = incidence(theta) if by_bsdf else it.label
@@ -156,8 +156,10 @@ def _planar(
     width = max(WIDTH, NARROWEST * columns) if beside else WIDTH if len(scales) > 1 else 0.6 * WIDTH
     blocks = -(-len(panels) // columns) * len(scales) if beside else len(panels)
     height = width / columns * heights[whole] + (0.4 if beside else 0)
-    figure = style.new_figure(width, height * blocks + 0.8, size)
-    axes = figure.subplots(blocks, columns, squeeze=False)
+    # The angles around polar plots are told once, in the first row.
+    ratios = [1, *[0.89 if draw is _draw_polar else 1] * (blocks - 1)]
+    figure = style.new_figure(width, height * sum(ratios) + 0.8, size)
+    axes = figure.subplots(blocks, columns, squeeze=False, height_ratios=ratios)
     text = quantity(QUANTITY, normalize=normalize, rgb=rgb)
     everything = [curve for curves in panels for curve in curves]
     for k, (heading, curves) in enumerate(zip(headings, panels, strict=True)):
@@ -165,9 +167,10 @@ def _planar(
             ax = axes[k // columns * len(scales) + s, k % columns] if beside else axes[k, s]
             style.calm(ax)
             draw(ax, curves, name == "log", whole, text, everything if beside or name == "log" else curves)
-            if len(panels) > 1 and not (beside and s):
-                pad = -3 if draw is _draw_polar else 10  # an angle is below, or a triangle
-                ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, pad=pad)
+            if len(panels) > 1 and not s:
+                loc, pad = ("center", 10) if beside else ("left", 4)
+                pad -= 13 if draw is _draw_polar else 0  # beside the lobes there is room
+                ax.set_title(fill(heading, int(LETTERS * width / columns)), fontsize=TEXT, color=INK, loc=loc, pad=pad)
             if k % columns if beside else s:
                 ax.set_ylabel("")
                 ax.tick_params(labelleft=not beside)
@@ -183,7 +186,8 @@ def _planar(
         marks = {r"$\omega_i$": Line2D([], [], marker=">", markersize=4, **THIN, color=FAINT), **marks}
     shown = {curve.label: curve for curve in everything}.values() if beside else curves
     handles = [Line2D([], [], **curve.look) for curve in shown]
-    style.add_legend(figure, [*handles, *marks.values()], [*(curve.label for curve in shown), *marks], notes)
+    names = [*(curve.label for curve in shown), *marks]
+    style.add_legend(figure, [*handles, *marks.values()], names, notes, where)
     return figure
 
 
@@ -191,7 +195,8 @@ def _draw_polar(
     ax: Axes, lines: list[LabelledCurve], log: bool, whole: bool, text: str, alike: list[LabelledCurve]
 ) -> None:
     low, high = _range(alike) if log else (0, largest(line.curve.value for line in alike))
-    most = 12 // max(2, ax.get_gridspec().ncols)
+    spec = ax.get_subplotspec()
+    most = 12 // max(2, spec.get_gridspec().ncols)
     if log:
         end = 1.06 * (high - low)
         rings = {power - low: f"$10^{{{power}}}$" for power in range(low, int(np.floor(high)) + 1)}
@@ -202,12 +207,14 @@ def _draw_polar(
     round_ = np.linspace(-180, 180, 361) if whole else np.linspace(-90, 90, 181)
     for k, (ring, number) in enumerate(rings.items()):
         ax.plot(*_at(round_, ring), color=GRID, linewidth=0.6)
-        if k % (1 + len(rings) // most) == 0 and not 0.95 * end < ring < end and (ring > 0 or not whole):
+        is_shown = k % (1 + len(rings) // most) == 0 and not 0.95 * end < ring < end and (ring > 0 or not whole)
+        if is_shown and (spec.is_last_row() or not log):
             ax.text(ring, -0.035 * end, number, color=INK, fontsize=SMALL - 1, ha="center", va="top")
     ax.plot(*_at(round_, end), color=FAINT, linewidth=0.6)
     for turn in turns:
         ax.plot(*_at(turn, np.array([0, end])), color=GRID, linewidth=0.6)
-        ax.text(*_at(turn, 1.16 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
+        if spec.is_first_row():
+            ax.text(*_at(turn, 1.16 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
     for line in lines:
         colour = _shade(line, lines)
         arrow = {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0, "color": colour, **THIN}
@@ -220,7 +227,8 @@ def _draw_polar(
             radius = np.maximum(np.log10(line.curve.value) - low if log else line.curve.value, 0)
         ax.plot(*_at(line.curve.theta, radius), label=line.label, **line.look)
     ax.plot([-end, end], [0, 0], color=INK, linewidth=1.5)
-    ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-1.25 if whole else -0.15) * end, 1.25 * end), xticks=[], yticks=[])
+    top = 1.25 if spec.is_first_row() else 1.1
+    ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-top if whole else -0.15) * end, top * end), xticks=[], yticks=[])
     ax.set_aspect("equal", anchor="S")  # in the middle, labels below would overlap the legend
     ax.spines[:].set_visible(False)
     radius = f"log radius, cut off below $10^{{{low}}}$" if log else "linear radius"

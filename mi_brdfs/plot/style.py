@@ -6,14 +6,15 @@ import re
 from collections.abc import Sequence
 from io import BytesIO
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import to_hex
+from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ..parameters.messages import printable
 
@@ -24,6 +25,7 @@ STYLES = "-", (0, (3, 1.5)), (0, (1, 1.5)), (0, (4, 1.5, 1, 1.5)), (0, (4, 1.5, 
 UNBROKEN = {"linestyle": "-"}
 """The look of what has gaps, which must not be taken for dashes."""
 CHANNELS = {"red": "#c62f2d", "green": "#2b8a3e", "blue": "#2b5fc4"}
+LIGHTEST = 0.75
 INK, FAINT, GRID = "#222222", "#808080", "#dddddd"
 TEXT, SMALL = 9, 8
 LETTERS = 12
@@ -72,20 +74,28 @@ def set_title(figure: Figure, text: str) -> None:
     figure.suptitle(fill(text, int(LETTERS * figure.get_figwidth())), fontsize=TEXT + 1, color=INK)
 
 
-def add_legend(figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = ()) -> None:
-    """Add a legend below the figure, with the constants above its entries."""
+def add_legend(
+    figure: _Figure, handles: list, labels: list[str], constants: Sequence[str] = (), places: Sequence[Place] = ()
+) -> None:
+    """Add a legend below the figure, with the constants above its entries, of which each hue with several has a column,
+    if there is room."""
     room = LETTERS * figure.get_figwidth()
     labels = [fill(label, int(room) - 10) for label in labels]
     # A formula is about two letters wide, and a handle six.
     widths = [max(map(len, re.sub(r"\$.*?\$", "xx", label).splitlines())) + 6 for label in labels]
     columns = len(labels) if sum(widths) < room else max(1, int(room / max(widths)))
+    run = max((it.of for it in places if it.hue is not None), default=1)
+    wanted = -(-len(labels) // run)
+    if run > 1 and columns < len(labels) and wanted * max(widths) <= room:
+        columns, blank = wanted, wanted * run - len(labels)
+        handles, labels = [*handles, *blank * [Line2D([], [], linestyle="")]], [*labels, *blank * [""]]
     heading = "\n".join(fill(text, int(room)) for text in constants)
     if not figure.is_sized:
         rows = -(-len(labels) // columns) + max(label.count("\n") for label in labels) + heading.count("\n")
         figure.set_figheight(figure.get_figheight() + 0.18 * (rows - 1 + bool(heading)))
     added = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=TEXT,
                           labelcolor=INK, title=heading or None, title_fontsize=TEXT)  # fmt: skip
-    added.get_title().set_color(INK)
+    added.get_title().set(color=INK, multialignment="center")
 
 
 def add_bar(colours: ScalarMappable, axes: Any, text: str, **options: Any) -> None:
@@ -96,12 +106,26 @@ def add_bar(colours: ScalarMappable, axes: Any, text: str, **options: Any) -> No
     bar.outline.set_visible(False)
 
 
-def look(k: int, channel: str = "", ramp: int = 0) -> dict[str, Any]:
-    """Return the style of the k-th curve, and its colour: a channel's, or one in the order of so many of a ramp."""
-    if ramp > 2 and not channel:
-        return {"color": to_hex(colormaps["viridis"](0.88 * k / (ramp - 1))), **UNBROKEN, "linewidth": 1.6}
-    colour = CHANNELS.get(channel, INK) if channel else COLOURS[k % len(COLOURS)]
-    return {"color": colour, "linestyle": STYLES[k % len(STYLES)], "linewidth": 1.6}
+class Place(NamedTuple):
+    """The place of a curve among others: the number of its hue, None on a ramp of hues, and its step on a ramp."""
+
+    hue: int | None
+    at: int = 0
+    of: int = 1
+
+
+def look(place: Place, channel: str = "") -> dict[str, Any]:
+    """Return the style of a curve, and its colour, a channel's or that of its place."""
+    hue, at, of = place
+    if hue is None:
+        # Up to where a line can be told from white, and in inverted figures from black.
+        return {"color": to_hex(colormaps["viridis"](LIGHTEST * at / (of - 1))), **UNBROKEN, "linewidth": 1.6}
+    colour = CHANNELS.get(channel, INK) if channel else COLOURS[hue % len(COLOURS)]
+    if of > 1:
+        own = np.array(to_rgb(colour))
+        ramp = LinearSegmentedColormap.from_list("", [0.5 * own, own, 1 - 0.5 * (1 - own)])
+        colour = to_hex(ramp(at / (of - 1)))
+    return {"color": colour, "linestyle": STYLES[hue % len(STYLES)], "linewidth": 1.6}
 
 
 def incidence(theta: float) -> str:

@@ -1,5 +1,5 @@
 // Data out, and fits: "Share" and "Fit this".
-import { byId, element, format, save } from "./util.js";
+import { byId, element, format, save, subscripted } from "./util.js";
 import { addSubject, change, changeSubject, fragment, hasRoom, on, session, tellFull } from "./session.js";
 import { post } from "./link.js";
 import { cards } from "./card.js";
@@ -81,6 +81,11 @@ function startFit() {
     running(false);
     byId("fit-told").textContent = told;
   };
+  const explain = () => {
+    const told = `compares ${session.hello.metrics[byId("fit-metric").value]}`;
+    byId("fit-compared").replaceChildren(...subscripted(told));
+  };
+  byId("fit-metric").onchange = explain;
   byId("fit").onclick = () => {
     const { bsdf, name } = session.state.subjects[session.selected];
     if (fitted !== bsdf.file) {
@@ -89,7 +94,8 @@ function startFit() {
       fitted = bsdf.file;
       const options = (words, told = {}) => words.map((word) => element("option", { value: word }, told[word] ?? word));
       byId("fit-model").replaceChildren(...options(["all", ...session.hello.models], { all: "all, and rank them" }));
-      byId("fit-metric").replaceChildren(...options(session.hello.metrics));
+      byId("fit-metric").replaceChildren(...options(Object.keys(session.hello.metrics)));
+      explain();
     }
     byId("fit-of").textContent = name;
     dialog.showModal();
@@ -112,7 +118,8 @@ function startFit() {
   });
   on("fitted", ({ error }) => {
     running(false);
-    byId("fit-told").textContent = error ?? "The error is that on directions that were not fitted.";
+    const best = `Errors are those on directions that were not fitted, over the best, ${format(ranking[0]?.error, 2)}.`;
+    byId("fit-told").textContent = error ?? best;
   });
 }
 
@@ -124,12 +131,12 @@ function drawRanking() {
         "tr",
         { title: fit.text },
         element("td", {}, fit.model),
-        element("td", {}, format(fit.error)),
+        element("td", {}, fit.error === null ? "–" : (fit.error / ranking[0].error).toFixed(2)),
         element("td", {}, element("button", { class: "small", onclick: () => showFit(fit) }, "Show")),
       ),
     ),
   );
-  byId("fit-remarks").textContent = ranking.length && ranking[0].text ? `${ranking[0].model}: ${ranking[0].text}` : "";
+  byId("fit-remarks").textContent = ranking.length && ranking[0].text ? `${ranking[0].model}:\n${ranking[0].text}` : "";
 }
 
 /** Wipe a fit over what was measured, alone with it; it takes the place of another fit. */

@@ -49,6 +49,12 @@ function describe(card, curves, axis = AXES.theta_o) {
   card.note.replaceChildren(...subscripted(`${unitOf()}, ${axis.held()}`));
 }
 
+/** Return by what factor the maxima of curves differ, of those that are not black. */
+function spread(curves) {
+  const peaks = curves.filter(({ y }) => y.some((value) => value > 0)).map(({ y }) => largest([y]));
+  return Math.max(...peaks) / Math.min(...peaks);
+}
+
 /** Return whether curves go on below the surface. */
 const isWhole = (curves) => curves.some(({ x }) => x[0] < -91 || x.at(-1) > 91);
 
@@ -216,7 +222,7 @@ export function drawAlbedo() {
   // Where energy is gained without end, the scale is that of angles up to 85°.
   const scale = valueScale(
     curves.map(({ x, y }) => y.filter((value, k) => x[k] <= 85 || value < 1.3)),
-    false,
+    session.state.scale === "log" && spread(curves) > 10,
     dark ? 0 : 1.02,
   );
   cards.albedo.note.textContent = "over the angle of incidence" + (gained > 1.005 ? `, up to ${format(gained)}` : "");

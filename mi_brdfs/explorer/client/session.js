@@ -105,7 +105,8 @@ export function addSubject(bsdf, name) {
   const taken = subjects.map((subject) => subject.colour);
   const colour = [...PALETTE.keys()].find((k) => !taken.includes(k));
   session.selected = subjects.length;
-  arrange([...subjects, { bsdf, name, hidden: false, colour }], [...subjects.keys(), -1]);
+  const patch = bsdf.type === "tabulated" ? { scale: "log" } : {}; // a measured paint is a flat line below a metal
+  arrange([...subjects, { bsdf, name, hidden: false, colour }], [...subjects.keys(), -1], patch);
 }
 
 export function removeSubject(index) {
