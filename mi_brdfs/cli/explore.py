@@ -27,7 +27,7 @@ from .options import (
     source_of,
     write_text,
 )
-from .terminal import Exit, err, fail, failing, out, stdout_to_stderr
+from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
 @command("Look", "explore walter burley:roughness=.3", "explore paint.binary fit.json:walter --scene room.xml:wall")
@@ -202,6 +202,10 @@ def _export(
     with stdout_to_stderr(), failing(Exit.ERROR):
         scenes = Stages(user)
         state = parse(data, scenes.names, scenes.shapes)
-        text = page(state, Materials({it.word: it for it in sources}), scenes, data, varied)
+        with progress("Drawing") as bar:
+            combinations = math.prod(len(values) for name, values in varied.items() if name != "theta")
+            task = bar.add_task("", total=len(sources) * combinations)
+            materials = Materials({it.word: it for it in sources})
+            text = page(state, materials, scenes, data, varied, lambda: bar.advance(task))
     write_text(file, text)
     out.print(str(file))

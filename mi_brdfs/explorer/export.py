@@ -6,7 +6,7 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -49,14 +49,20 @@ def index() -> str:
 
 
 def page(
-    state: State, materials: Materials, scenes: stages.Stages, page_state: dict[str, Any], vary: Varied | None = None
+    state: State,
+    materials: Materials,
+    scenes: stages.Stages,
+    page_state: dict[str, Any],
+    vary: Varied | None = None,
+    on_progress: Callable[[], None] = lambda: None,
 ) -> str:
     """Return the page with all views of a state, at several angles of incidence and values of parameters;
-    ``page_state`` is what the page itself said of it. Raise a StateError if a subject cannot be shown, none has such a
-    parameter, or the page would be too large."""
+    ``page_state`` is what the page itself said of it. ``on_progress`` is called after the views of each subject at each
+    combination of the values. Raise a StateError if a subject cannot be shown, none has such a parameter, or the page
+    would be too large."""
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
-    baked = _Baked(state, materials, scenes, vary)
+    baked = _Baked(state, materials, scenes, vary, on_progress)
     frames = [(at, it.encode() if isinstance(it, str) else it, isinstance(it, str)) for at, it in baked.frames()]
     if missing := [name for name in vary if name not in baked.start]:
         raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(baked.known, 'and')}.")
@@ -88,6 +94,7 @@ class _Baked:
     materials: Materials
     scenes: stages.Stages
     vary: Varied
+    on_progress: Callable[[], None]
     subjects: list[Bsdf] = field(default_factory=list)
     """The plugin dicts with all their values."""
     known: list[str] = field(default_factory=list)
@@ -117,6 +124,7 @@ class _Baked:
                 for control, (_, value) in zip(varied, values, strict=True):
                     other = with_value(other, control, value) if control else other
                 yield from self._views(k, other, tuple(at for at, _ in values))
+                self.on_progress()
 
     def _begin(self, name: str, value: float | None) -> None:
         """Take the value that is nearest to what a subject has."""
