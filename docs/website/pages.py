@@ -117,7 +117,7 @@ def _front(folder: Path) -> str:
     of its picture of them."""
     text = re.sub(r"<!-- .*? -->\n\n?", "", (ROOT / "README.md").read_text(encoding="utf-8"))
     examples = _linked(_thumbnails(), PurePosixPath("mi_brdfs/models/README.md"), folder)
-    text = re.sub(r"^\[!\[[^\]]*\]\(docs/gallery\.jpg\)\].*$", examples, text, flags=re.MULTILINE)
+    text = re.sub(r"^\[!\[[^\]]*\]\(docs/gallery\.jpg\)\].*$", lambda _: examples, text, flags=re.MULTILINE)
     return text.replace("\n## ", f"\n{live.links()}\n\n## ", 1) + "".join(_contents())
 
 
