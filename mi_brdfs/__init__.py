@@ -3,8 +3,8 @@
 ``import mi_brdfs``, before or after ``mi.set_variant``, makes its plugins known by name in every variant, in XML and
 dict scenes. :func:`list_models` names them, :func:`info` returns a manual page, :func:`preview_scene` a scene that
 shows a material. :func:`presets` names published materials, :func:`preset` returns one. :func:`ranges` and
-:func:`project` keep optimised parameters valid. ``explore`` opens a page with sliders, lobes and pictures;
-``load_legacy`` loads a scene of Mitsuba 0.2 to 0.6.
+:func:`project` keep optimised parameters valid. ``denoise`` and ``display_image`` make a picture of what was rendered;
+``explore`` opens a page with sliders, lobes and pictures; ``load_legacy`` loads a scene of Mitsuba 0.2 to 0.6.
 """
 
 from .starting import prepare_command
@@ -44,7 +44,9 @@ install()
 
 _LAZY = ("bench", "cluster", "fit", "gallery", "legacy", "plot", "sweep", "testing", "validation")
 """Modules that are imported when they are used: some need extras, and all take time."""
-_ELSEWHERE = {"explore": "explorer", "load_legacy": "loading"}
+_ELSEWHERE = {
+    "denoise": "rendering.output", "display_image": "rendering.output", "explore": "explorer", "load_legacy": "loading",
+}  # fmt: skip
 """Functions of such modules."""
 
 

@@ -85,13 +85,15 @@ def test_every_page_has_its_source(tmp_path):
 
 @pytest.mark.slow
 def test_the_front_page_leads_to_pages_of_the_explorer(site):
-    """They are small, have scrubbers, and lead back."""
+    """They are small, have scrubbers, open where they show most, and lead back."""
     front = links(read(site / "index.html"))
     for name in live.PAGES:
         page = site / f"{name}.html"
         text = page.read_text(encoding="utf-8")
         assert '<h1><a href="index.html"' in text
         assert page.name in front and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
+        values, start = re.search(r'"theta", "values": \[(.*?)\], "start": (\d+)', text).groups()
+        assert float(values.split(", ")[int(start)]) == live.OPENED[name]
         assert ('"name": "fitted walter"' in text) == (name == "measured_paint") and '"name": "fit.json' not in text
 
 
@@ -133,6 +135,24 @@ def test_reference_pages_are_the_manual_pages(site):
 
 
 @pytest.mark.slow
+def test_the_front_page_has_the_examples_by_themselves(site):
+    """A phone would show the picture of them too small to read."""
+    text = (site / "index.html").read_text(encoding="utf-8")
+    assert "gallery.jpg" not in text and all(f'href="reference/{it.plugins[0]}.html"' in text for it in own_models())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "query, first", [("ward", "ward"), ("merl", "tabulated"), ("GGX", "walter"), ("Oren-Nayar", "orennayar")]
+)
+def test_a_search_ranks_titles_and_then_the_summaries_of_plugins(site, browser, query, first):
+    page = browser.new_page()
+    page.goto(f"{(site / 'search.html').as_uri()}?q={query}")
+    assert page.locator("#search-results li a").first.inner_text() == first
+    page.close()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_phone_shows_commands_and_tables_whole_and_plots_in_the_scheme(site, browser, scheme):
     page = browser.new_page(viewport={"width": 390, "height": 844}, color_scheme=scheme)
@@ -140,6 +160,10 @@ def test_a_phone_shows_commands_and_tables_whole_and_plots_in_the_scheme(site, b
         page.goto((site / f"{name}.html").as_uri())
         scrolled = "elements => elements.filter(it => it.scrollWidth > it.clientWidth + 1).map(it => it.textContent)"
         assert page.eval_on_selector_all("html, .highlight-sh pre, .table-wrapper", scrolled) == [], name
+    page.goto((site / "notebooks" / "is_my_sampler_right.html").as_uri())
+    for kind, wraps in ("text", "pre-wrap"), ("output", "pre"):
+        assert page.eval_on_selector(f".highlight-{kind} pre", "it => getComputedStyle(it).whiteSpace") == wraps
+    page.goto((site / "reference" / "ward.html").as_uri())
     corner = np.array(Image.open(io.BytesIO(page.locator('img[alt^="Lobes"]').screenshot())))[0, 0]
     assert (corner[:3] > 200).all() if scheme == "light" else (corner[:3] < 60).all()
     page.close()

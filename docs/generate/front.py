@@ -88,6 +88,8 @@ def _fits() -> Image.Image:
         line.set(label=it.bsdf["type"], color=COLOURS[k])  # the report's colours are those of its style sheet
     data.set(label="measured", color=INK)
     mirror.set(label="mirror direction")
+    figure.set_size_inches(4, 3)
+    figure.axes[0].set(xscale="linear", xlim=(-90, 90), xticks=range(-90, 91, 30), xlabel=r"$\theta_o$ in degrees")
     figure.axes[0].set_title(incidence(70), fontsize=TEXT, color=INK)
     figure.axes[0].legend(frameon=False, fontsize=9)
     return _image(figure)
@@ -119,6 +121,8 @@ def _checker() -> Image.Image:
         figure.axes, ((0, 0.58, 0.36, 0.36), (0, 0.06, 0.36, 0.36), (0.4, 0.17, 0.6, 0.7)), strict=True
     ):
         ax.set_position(place)
+        for ring in ax.lines[-2:]:  # around the worst direction, which a report names
+            ring.remove()
     drawn_, _, difference = figure.axes
     drawn_.set_title("drawn", loc="left", fontsize=SMALL, pad=3)
     difference.set_title("red: drawn too often\nblue: too rarely", loc="left", fontsize=SMALL, pad=3)
@@ -152,7 +156,8 @@ PARTS = {".frame >> nth=0": (6, 6, 232), ".frame >> nth=1": (6, 242, 232), ".fig
 
 
 def _explorer() -> Image.Image:
-    """Parts of the explorer's page in Chromium: pictures and lobes of two metals, and a slider."""
+    """Parts of the explorer's page in Chromium: pictures and lobes of two metals, and a slider; dark, as renderings
+    are, to suit both schemes of the site."""
     from playwright.sync_api import sync_playwright
 
     command = [sys.executable, "-m", "mi_brdfs", "explore", *SHOWN, "--no-browser", "--port", "0"]
@@ -163,11 +168,12 @@ def _explorer() -> Image.Image:
             chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
             flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
             page = running.chromium.launch(executable_path=chromium, args=flags).new_page(
-                viewport={"width": 1280, "height": 960}, device_scale_factor=2
+                viewport={"width": 1280, "height": 960}, device_scale_factor=2, color_scheme="dark"
             )
             page.goto(address)
             page.get_by_text("denoised").nth(1).wait_for(timeout=600_000)
-            shown = Image.new("RGB", SIZE, "white")
+            ground = "it => getComputedStyle(it.closest('.card')).backgroundColor"
+            shown = Image.new("RGB", SIZE, page.locator(".figure.polar").evaluate(ground))
             for place, (x, y, width) in PARTS.items():
                 part = Image.open(io.BytesIO(page.locator(place).screenshot()))
                 size = width, round(width * part.height / part.width)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 import tempfile
@@ -14,7 +15,7 @@ from sphinx.util.docutils import docutils_namespace, patch_docutils
 import mi_brdfs
 
 from . import live
-from .pages import write_pages
+from .pages import summaries, write_pages
 
 HERE = Path(__file__).parent
 LOGO = str(HERE / "static" / "logo.svg")
@@ -60,7 +61,10 @@ def build(folder: Path) -> int:
         write_pages(source)
         shutil.rmtree(folder, ignore_errors=True)
         live.write_pages(Path(scratch) / "live")
-        settings = SETTINGS | {"html_extra_path": [str(Path(scratch) / "live")]}
+        scorer = Path(scratch) / "scorer.js"
+        told = json.dumps({f"reference/{name}": text for name, text in summaries().items()})
+        scorer.write_text(f"const SUMMARIES = {told};\n{(HERE / scorer.name).read_text()}", encoding="utf-8")
+        settings = SETTINGS | {"html_extra_path": [str(Path(scratch) / "live")], "html_search_scorer": str(scorer)}
         app = Sphinx(
             source, None, folder, Path(scratch) / "doctrees", "html", settings,
             status=None, warning=sys.stderr, warningiserror=True, keep_going=True,

@@ -18,6 +18,9 @@ from mi_brdfs.cli import app
 
 MEASURED = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
 COPPER = ("-Dalpha_v=0.3", "-Ddiffuse_reflectance=0.02", "-Dspecular_reflectance=#f9cfc0")
+EXPORTED = re.compile(r'(?<=id="exported">).*?(?=</script>)', re.DOTALL)
+OPENED = {"brushed_copper": 45, "rough_plaster": 45, "measured_paint": 70}
+"""The angles of incidence at which they open, in degrees: black paint shines at grazing angles only."""
 PAGES: dict[str, tuple[str, list[str]]] = {
     "brushed_copper": (
         "brushed copper",
@@ -53,7 +56,8 @@ def write_pages(folder: Path) -> None:
             for name, (_, words) in PAGES.items():
                 file = Path(f"{name}.html")
                 _run("explore", *words, "--export", str(file))
-                file.write_text(_linked(file.read_text(encoding="utf-8")), encoding="utf-8")
+                page = _linked(file.read_text(encoding="utf-8"))
+                file.write_text(_opened(page, OPENED[name]), encoding="utf-8")
                 file.with_suffix(".jpg").write_bytes(_picture(file.read_text(encoding="utf-8")))
         for used in ("fit.json", MEASURED.name):
             Path(used).unlink()
@@ -66,9 +70,17 @@ def _linked(page: str) -> str:
     return re.sub(r"<h1>mi_brdfs", '<h1><a href="index.html" style="color: inherit">mi_brdfs</a>', page, count=1)
 
 
+def _opened(page: str, theta: float) -> str:
+    """Return an exported page that opens at an angle of incidence."""
+    content = json.loads(EXPORTED.search(page)[0])
+    (angles,) = (it for it in content["scrubbers"] if it["name"] == "theta")
+    angles["start"] = angles["values"].index(theta)
+    return EXPORTED.sub(lambda _: json.dumps(content).replace("<", "\\u003c"), page, count=1)
+
+
 def _picture(page: str) -> bytes:
     """Return the first picture of an exported page, a JPEG."""
-    content = json.loads(re.search(r'id="exported">(.*?)</script>', page, re.DOTALL)[1])
+    content = json.loads(EXPORTED.search(page)[0])
     data, at = gzip.decompress(base64.b64decode(content["data"])), 0
     for _, length, is_text in content["frames"]:
         frame, at = data[at : at + length], at + length

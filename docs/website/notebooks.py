@@ -5,12 +5,17 @@ from __future__ import annotations
 import base64
 import itertools
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
+GLANCE = "glance"
+"""The tag of the cell whose first picture stands for the notebook, and the end of that picture's name."""
+TABLE = re.compile(r"\S {2,}\S")
+"""What is in texts with columns."""
 WIDE = 900
 """The width of a picture, in pixels of the page, through which phones scroll."""
 
@@ -19,10 +24,15 @@ def markdown(path: Path, pictures: Path) -> str:
     """Return a notebook in Markdown, with solutions folded; write its pictures into a folder, a sibling of the page."""
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     drawn = (pictures / f"{path.stem}_{k}" for k in itertools.count())
+    glance = pictures / f"{path.stem}_{GLANCE}"
     parts = []
     for solution, group in itertools.groupby(cells, lambda cell: "solution" in cell["metadata"].get("tags", ())):
-        for text in _solutions(group, drawn) if solution else (_cell(cell, drawn) for cell in group):
-            parts.append(text)
+        if solution:
+            parts += _solutions(group, drawn)
+            continue
+        for cell in group:
+            stands = GLANCE in cell["metadata"].get("tags", ())
+            parts.append(_cell(cell, itertools.chain([glance], drawn) if stands else drawn))
     return "\n\n".join(parts) + "\n"
 
 
@@ -57,4 +67,5 @@ def _output(output: dict[str, Any], drawn: Iterator[Path]) -> str:
         strip = ".strip " * (width >= WIDE)
         return f"![](/notebooks/{path.parent.name}/{path.name}){{{strip}width={width}}}"
     text = "".join(output.get("text", data.get("text/plain", ""))).rstrip()
-    return f"```text\n{text}\n```" if text else ""
+    language = "output" if TABLE.search(text) else "text"  # neither has colours; the style sheet wraps only text
+    return f"```{language}\n{text}\n```" if text else ""

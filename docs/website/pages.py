@@ -86,7 +86,7 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
     for file, page in FILES.items():
         if (ROOT / file).is_file():
             pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
-    pages["index"] = ("README.md", _front())
+    pages["index"] = ("README.md", _front(folder))
     pages["folklore"] = ("docs/folklore.md", _folklore(pages["folklore"][1]))
     for page, title in TITLES.items():
         origin, text = pages[page]
@@ -112,9 +112,12 @@ def _pages(folder: Path) -> dict[str, tuple[str, str]]:
 # --- Texts ----------------------------------------------------------------------------------------------------------
 
 
-def _front() -> str:
-    """Return README.md with pages to try and the contents of the site."""
+def _front(folder: Path) -> str:
+    """Return README.md with pages to try and the contents of the site, and with examples that suit any width in place
+    of its picture of them."""
     text = re.sub(r"<!-- .*? -->\n\n?", "", (ROOT / "README.md").read_text(encoding="utf-8"))
+    examples = _linked(_thumbnails(), PurePosixPath("mi_brdfs/models/README.md"), folder)
+    text = re.sub(r"^\[!\[[^\]]*\]\(docs/gallery\.jpg\)\].*$", lambda _: examples, text, flags=re.MULTILINE)
     return text.replace("\n## ", f"\n{live.links()}\n\n## ", 1) + "".join(_contents())
 
 
@@ -135,9 +138,9 @@ def notebook_order() -> list[str]:
 
 
 def _glance(pictures: Path, link: re.Match) -> str:
-    """Return a link to a notebook, with the first picture that it renders."""
-    first = min(pictures.glob(f"{link[2]}_*.jpeg"), key=lambda path: (len(path.name), path.name))
-    return f"[![](/{PICTURES}/{first.name}){{.glance}}{link[1]}]({link[2]}.ipynb)"
+    """Return a link to a notebook, with its picture."""
+    (picture,) = pictures.glob(f"{link[2]}_{notebooks.GLANCE}.*")
+    return f"[![](/{PICTURES}/{picture.name}){{.glance}}{link[1]}]({link[2]}.ipynb)"
 
 
 def _hidden(names: list[str]) -> str:
@@ -201,8 +204,13 @@ def _thumbnails() -> str:
     return ":::{container} pictures\n" + "\n\n".join(cells) + "\n:::"
 
 
+def summaries() -> dict[str, str]:
+    """Return all names of each plugin and its summary, by the name of its page."""
+    return {it.plugins[0]: " ".join([*it.plugins, it.summary()]) for it in [*own_models(), *OTHERS]}
+
+
 def _reference() -> str:
-    names = [model.plugins[0] for model in own_models()] + [plugin.plugins[0] for plugin in OTHERS]
+    names = list(summaries())
     introduction = with_formulas(models.INTRODUCTION, ()).rstrip() + " In a terminal, $\\omega_i$ is wi."
     listed = "\n".join(f"* [`{name}`](#{name}): {_summary(name)}" for name in names)
     return "\n\n".join([introduction, _thumbnails(), listed, _hidden(names)]) + "\n"

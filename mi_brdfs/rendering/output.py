@@ -20,8 +20,9 @@ IMAGES = {
 """Mitsuba's formats by the endings of file names."""
 
 
-def denoise(colours: np.ndarray) -> np.ndarray:
-    """Return linear RGB, shape (height, width, 3), denoised by Intel's Open Image Denoise.
+def denoise(colours: np.ndarray | mi.TensorXf) -> np.ndarray:
+    """Return linear RGB, shape (height, width, 3), denoised by Intel's Open Image Denoise. Films with a box filter give
+    the best result, as pixels then share no samples.
 
     Raises:
         ImportError: without the extra that brings it.
@@ -46,8 +47,7 @@ def denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
 
 
 def denoised(picture: Picture) -> Picture:
-    """Return a picture whose colours are denoised (:func:`denoise`); alpha and AOVs are as before. Films with a box
-    filter give the best result, as pixels then share no samples.
+    """Return a picture whose colours are denoised (:func:`denoise`); alpha and AOVs are as before.
 
     Raises:
         ImportError: without the extra that brings the denoiser.
