@@ -321,7 +321,7 @@ def test_a_default_is_said_where_another_value_is():
     figure = plot.albedo("ward", {"type": "ward", "alpha": 0.2}, {"type": "ward", "alpha_v": 0.2})
     assert legend(figure) == ["ward alpha=0.1", "ward alpha=0.2", "ward alpha_v=0.2"]
     figure = plot.albedo("ward", "principled")
-    assert figure.legends[0].get_title().get_text() == "ward, principled with default parameters"
+    assert figure.legends[0].get_title().get_text() == "default parameters"
 
 
 @pytest.mark.slow

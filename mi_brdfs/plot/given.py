@@ -93,7 +93,8 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     bare = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind and kind not in told and len(bsdfs) > 1]
     # A colour stays on its line.
     lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
-    return lines + ([f"{', '.join(bare)} with default parameters"] if bare else [])
+    whose = f"{', '.join(bare)} with " if len(bare) < len({*map(_plugin, bsdfs)}) else ""
+    return lines + ([f"{whose}default parameters"] if bare else [])
 
 
 def places(bsdfs: Sequence[Any], count: int) -> list[Place]:
