@@ -103,6 +103,19 @@ def test_a_number_that_few_pixels_decide_is_no_surer_than_others():
     assert abs(values(found)["alpha"] - 0.15) < 4 * sigma < 5e-3
 
 
+@pytest.mark.slow
+def test_noise_of_derivatives_is_part_of_the_uncertainty():
+    """On a narrow highlight they decide the last step, and leave few residuals: by these alone, errors are four times
+    the standard deviations."""
+    lights = {"sky": {"type": "constant", "radiance": 0.3},
+              "lamp": {"type": "point", "position": [2, 3, 4], "intensity": 20.0}}  # fmt: skip
+    picture = picture_of(scene_of({"type": "walter", "alpha": 0.15}, size=32, lights=lights), spp=4096)
+    start = {"type": "walter", "alpha": 0.4}
+    found = [images(scene_of(start, size=32, lights=lights), picture, ["ball.bsdf.alpha"], seed=k) for k in (0, 4, 5)]
+    errors = [(values(it)["alpha"] - 0.15) / it.sigma["ball.bsdf.alpha.value"] for it in found]
+    assert np.sqrt(np.mean(np.square(errors))) < 2.5  # of five degrees of freedom, 1.3 is usual
+
+
 def test_volumetric_integrators():
     """They have no forward derivatives, nor need any where there is no medium."""
     lambert = {"type": "lambert", "reflectance": 0.5}

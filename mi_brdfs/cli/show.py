@@ -26,7 +26,10 @@ def show(
     size: Annotated[
         int, typer.Option(min=16, max=MOST_PIXELS, help="Width and height of the picture, in pixels.")
     ] = 512,
-    spp: Annotated[int | None, typer.Option(min=1, help="Samples per pixel. Default: 128, or as --time says.")] = None,
+    spp: Annotated[
+        int | None,
+        typer.Option(min=1, help="Samples per pixel. Default: 128, 32 if denoised, or as --time says."),
+    ] = None,
     seconds: Seconds = None,
     denoise: Denoise = False,
     variant: AnyVariant = None,
@@ -48,6 +51,7 @@ def show(
         film |= {"width": size, "height": size}
         if denoise:
             film["rfilter"] = {"type": "box"}
+            scene["sensor"]["sampler"]["sample_count"] = 32
         return mi.load_dict(scene), 0
 
     render_to(files, load, denoise, spp=spp, seed=seed, seconds=seconds)

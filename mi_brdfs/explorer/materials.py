@@ -168,7 +168,7 @@ def kinds() -> list[dict[str, str]]:
     found = []
     for model in sorted(all_models(), key=lambda it: (not is_own(it), it.plugins)):
         group = "mi_brdfs" if is_own(model) else "guests"
-        found.append({"name": model.plugins[0], "title": model.summary().rstrip("."), "group": group})
+        found.append({"name": model.plugins[0], "title": model.summary().replace("``", "").rstrip("."), "group": group})
     return found + [{"name": name, "title": name, "group": "Mitsuba"} for name in BUILT_IN]
 
 

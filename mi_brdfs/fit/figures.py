@@ -137,8 +137,9 @@ class Residuals:
         theta_i, theta_h, model, data = self.worst
         most = f"θi ≈ {theta_i:.0f}° and half angles near {theta_h:.0f}°"
         if (least := min(model, data)) > 0:
-            most += f", where it is {max(model, data) / least:.2g} times too {'bright' if model > data else 'dark'}"
-        return f"The fit is off by {100 * self.off:.2g} % of the reflected light, most at {most}."
+            times = _rounded(max(model, data) / least)
+            most += f", where it is {times} times too {'bright' if model > data else 'dark'}"
+        return f"The fit is off by {_rounded(100 * self.off)} % of the reflected light, most at {most}."
 
     @property
     def extent(self) -> float:
@@ -161,3 +162,8 @@ class Residuals:
         ax.set_xlabel(r"$\theta_h$", fontsize=9, color=INK)
         ax.set_ylabel(r"$\theta_d$", fontsize=9, color=INK)
         return figure
+
+
+def _rounded(value: float) -> str:
+    """Return a number with two digits, without an exponent below a million."""
+    return f"{float(f'{value:.2g}'):g}"

@@ -7,8 +7,9 @@ of each there are two, so that no product has the square of a noise in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +27,8 @@ SHORT = 0.02
 """The longest step along an unknown, on its scale, after which nothing more is to be gained from a few samples."""
 PATIENCE, GAIN = 3, 0.9
 """Nor is there after so many steps that did not lower the cost by this factor."""
-MORE = 4
-"""How many times the samples the last step takes."""
+LOOKS = 6
+"""How often the place of the last step is looked at."""
 
 TEXEL_STEPS = 10
 """Steps of Adam for each that is told of."""
@@ -37,12 +38,20 @@ MOMENTUM, MEMORY = 0.9, 0.99
 
 
 class Look(NamedTuple):
-    """What is seen at a point: a pair of independent residuals, and JᵀJ and J."""
+    """What is seen at a point: a pair of independent residuals, each a mean over some seeds, and of Jacobians."""
 
-    seeds: tuple[int, int]
+    seeds: tuple[list[int], list[int]]
     residuals: tuple[Array, Array]
-    jacobian: Array
-    matrix: Array
+    jacobians: tuple[Array, Array]
+
+    @property
+    def jacobian(self) -> Array:
+        return np.asarray(sum(self.jacobians) / 2)
+
+    @property
+    def matrix(self) -> Array:
+        """JᵀJ"""
+        return _matrix(*self.jacobians)
 
     @property
     def cost(self) -> float:
@@ -79,10 +88,13 @@ def descend(
 
 def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
-    are on the scales of the unknowns, NaN for those at an end of their range or without influence; noise may be common
-    to near pixels (MacKinnon and White 1985, HC2)."""
-    look = _look(rendered, point, MORE)
-    step, _ = _gaining(rendered, look, point, LEAST_DAMPING, MORE)
+    are on the scales of the unknowns, NaN for those at an end of their range or without influence. Of two estimates the
+    larger one counts: by the residuals, whose noise may be common to near pixels (MacKinnon and White 1985, HC2), and
+    by what the step would be without one of the looks, as noise of the derivatives leaves no residuals: the jackknife
+    (B. Efron, C. Stein, The jackknife estimate of variance, Annals of Statistics 9(3), 1981)."""
+    looks = [_look(rendered, point) for _ in range(LOOKS)]
+    look = _together(looks)
+    step, _ = _gaining(rendered, look, point, LEAST_DAMPING)
     end, (low, high) = point + step, rendered.box
     free = np.flatnonzero((end > low) & (end < high) & look.jacobian.any(axis=0))
     sigma = np.full(len(point), np.nan)
@@ -95,26 +107,43 @@ def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
         weighed = np.stack(scores) / np.sqrt(left)
         # Blocks that decide a number by themselves leave no residual to judge it by: then that of all counts.
         alike = bread * (mean @ mean) / max(np.count_nonzero(mean) - len(free), 1)
-        sigma[free] = np.sqrt(np.maximum(np.diag(bread @ (weighed @ weighed.T) @ bread), np.diag(alike)))
+        others = (_together([it for it in looks if it is not out]) for out in looks)
+        steps = np.array([it.step(point, LEAST_DAMPING, rendered.box)[free] for it in others])
+        variances = np.diag(bread @ (weighed @ weighed.T) @ bread), np.diag(alike), (LOOKS - 1) * steps.var(axis=0)
+        sigma[free] = np.sqrt(np.max(variances, axis=0))
     return end, sigma, look.cost
 
 
-def _gaining(rendered: Rendered, look: Look, point: Array, damping: float, factor: int = 1) -> tuple[Array, float]:
+def _gaining(rendered: Rendered, look: Look, point: Array, damping: float) -> tuple[Array, float]:
     """Return a step that lowers the cost, or none, and the damping of the next one."""
     for _ in range(TRIES):
         step = look.step(point, damping, rendered.box)
-        first, second = (rendered.residuals(point + step, seed, factor) for seed in look.seeds)
+        first, second = (_residuals(rendered, point + step, seeds) for seeds in look.seeds)
         if first @ second < look.cost:
             return step, max(damping * WEAKER, LEAST_DAMPING)
         damping *= STRONGER
     return np.zeros_like(point), damping
 
 
-def _look(rendered: Rendered, point: Array, factor: int = 1) -> Look:
-    seeds = rendered.fresh(), rendered.fresh()
-    first, second = (rendered.residuals(point, seed, factor) for seed in seeds)
-    one, other = (rendered.jacobian(point, rendered.fresh(), factor) for _ in range(2))
-    return Look(seeds, (first, second), (one + other) / 2, _matrix(one, other))
+def _look(rendered: Rendered, point: Array) -> Look:
+    seeds = [rendered.fresh()], [rendered.fresh()]
+    first, second = (_residuals(rendered, point, own) for own in seeds)
+    one, other = (rendered.jacobian(point, rendered.fresh()) for _ in range(2))
+    return Look(seeds, (first, second), (one, other))
+
+
+def _residuals(rendered: Rendered, point: Array, seeds: list[int]) -> Array:
+    return np.mean([rendered.residuals(point, seed) for seed in seeds], axis=0)
+
+
+def _together(looks: Sequence[Look]) -> Look:
+    """Return one look for several at a point."""
+    seeds, residuals, jacobians = zip(*looks, strict=True)
+    return Look(
+        ([*chain(*(first for first, _ in seeds))], [*chain(*(second for _, second in seeds))]),
+        (np.mean([first for first, _ in residuals], axis=0), np.mean([second for _, second in residuals], axis=0)),
+        (np.mean([one for one, _ in jacobians], axis=0), np.mean([other for _, other in jacobians], axis=0)),
+    )
 
 
 def _matrix(one: Array, other: Array) -> Array:

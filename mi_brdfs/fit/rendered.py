@@ -137,25 +137,25 @@ class Rendered:
             self.params[slot.key] = slot.typed(slot.values(point[place]))
         self.params.update()
 
-    def residuals(self, point: Array, seed: int, factor: int = 1) -> Array:
-        """Return the residuals at a point, with ``factor`` times the samples."""
+    def residuals(self, point: Array, seed: int) -> Array:
+        """Return the residuals at a point."""
         self.put(point)
         return np.concatenate([
-            (root * (view.cut(self._render(view, seed + k, factor * self.spp)) - view.picture)).ravel()
+            (root * (view.cut(self._render(view, seed + k, self.spp)) - view.picture)).ravel()
             for k, (view, root) in enumerate(zip(self.views, self._roots, strict=True))
         ])  # fmt: skip
 
     def _render(self, view: View, seed: int, spp: int) -> mi.TensorXf:
         return self.integrator.render(self.scene, view.sensor, seed=seed, spp=spp)
 
-    def jacobian(self, point: Array, seed: int, factor: int = 1) -> Array:
+    def jacobian(self, point: Array, seed: int) -> Array:
         """Return the derivatives of the residuals by the shifts, shape (residuals, shifts), by forward
         differentiation; with half the samples of residuals, as two are averaged."""
         if self._sweeps is None:
             self._sweeps = [[k] for k in range(len(point))]
             self._sweeps = self._together(self.jacobian(point, seed))
         columns = np.zeros((sum(view.picture.size for view in self.views), len(point)))
-        spp = max(factor * self.spp // 2, 1)
+        spp = max(self.spp // 2, 1)
         for sweep in self._sweeps:
             tangent = self._tangent(point, sweep, seed, spp)
             for channel, k in enumerate(sweep):  # of a sweep of one shift, all residuals are its own

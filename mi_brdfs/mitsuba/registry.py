@@ -181,7 +181,7 @@ _take_in_own()
 
 def list_models() -> list[str]:
     """Return the names of all BSDF plugins, in alphabetical order, each followed by its aliases."""
-    return [name for model in all_models() for name in model.plugins if MODELS[name] is model]
+    return [name for model in all_models() for name in model.plugins if MODELS.get(name) is model]
 
 
 def plugin_names() -> set[str]:

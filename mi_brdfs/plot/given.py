@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import mitsuba as mi
@@ -133,7 +134,8 @@ def _common(bsdfs: Sequence[Any]) -> dict[str, str]:
 
 
 def _parameters(given: dict) -> dict[str, str]:
-    return {name: _shown(value) for name, value in given.items() if name != "type"}
+    shown = given | ({"filename": Path(given["filename"]).name} if "filename" in given else {})
+    return {name: _shown(value) for name, value in shown.items() if name != "type"}
 
 
 def _told(word: str, parameters: dict[str, str]) -> str:

@@ -109,7 +109,7 @@ def albedo(
 def frame_albedo(ax: Axes, text: str) -> None:
     """Set the axes of albedo curves that are drawn, with a line at 1 unless they are far below."""
     top = largest(curve.get_ydata() for curve in ax.get_lines())
-    ax.axhline(1, color=INK, linewidth=0.6, zorder=2.5)  # above curves, and thinner: those that reach 1 hide no part
+    ax.axhline(1, color=FAINT, linewidth=0.8, zorder=1.5)
     style.calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])

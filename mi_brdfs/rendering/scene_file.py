@@ -19,6 +19,8 @@ from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
 """Names that no parameter of a scene can have: those of ``mi.parser.parse_file``."""
+GROUPS = "merge", "shapegroup", "instance"
+"""Shapes that have no BSDF of their own, but others in them."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,8 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
     """Put a BSDF in the place of the one with an id, wherever it is referred to, or of that of the shape with it; on
     both sides, in place of ``twosided``. Raise a ValueError if there is none."""
     kinds = mi.ObjectType.BSDF, mi.ObjectType.Shape
-    ids = {node.props.id(): k for k, node in enumerate(state.nodes) if node.type in kinds and node.props.id()}
+    nodes = [(k, it) for k, it in enumerate(state.nodes) if it.type in kinds and it.props.plugin_name() not in GROUPS]
+    ids = {node.props.id(): k for k, node in nodes if node.props.id()}
     if id not in ids:
         raise ValueError(f"no BSDF or shape has the id {id}; there are {', '.join(sorted(ids)) or 'none with one'}")
     is_shape = state.nodes[ids[id]].type == mi.ObjectType.Shape

@@ -83,7 +83,7 @@ class Store:
                     found = file.read(list(columns) if columns else SCHEMA.names).to_pylist()
                 for row in found:
                     json.loads(row.get("bsdf", "{}"))
-            except (OSError, ValueError) as error:  # pa.ArrowInvalid is a ValueError
+            except (OSError, TypeError, ValueError) as error:  # pa.ArrowInvalid is a ValueError
                 text = f"{path} holds no fits, and is left out: {error}"
                 warnings.warn(" ".join(text.split()), StoreWarning, stacklevel=2)
                 continue

@@ -228,12 +228,13 @@ function render(found) {
       const faded = session.info[subject]?.error ? 0.3 : 1;
       for (const at of parts.keys()) {
         const body = bodies.get(`${subject} ${at}`);
+        // What is seen through hides nothing of the others, also where they nearly touch.
         gl.depthMask(alone && !state.wire && faded === 1);
         if (!state.wire) paint(body, colour, (alone ? 0.94 : 0.38) * faded, 1);
-        gl.depthMask(true);
         if (state.wire || !alone) paint(body, colour, (state.wire ? 0.6 : 0.28) * faded, 0, "lines");
       }
     }
+    gl.depthMask(true);
     const mark = (text, point, kind) => {
       const [x, y] = project(view, point, area);
       labels.append(element("span", { class: kind, style: `left:${x}px;top:${y}px` }, ...subscripted(text)));
