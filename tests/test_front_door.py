@@ -83,6 +83,10 @@ def test_a_name_can_be_taken_explicitly():
     assert brightness("eon") == pytest.approx(0.25)
     mi_brdfs.register(EON, replace=True)
     assert brightness("eon") != pytest.approx(0.25)
+    mi_brdfs.register(matte(0.5, plugins=("eon", "matt")), replace=True)
+    mi_brdfs.register(matte(0.5, plugins=("matt",)))  # which gives the name up
+    assert "matt" in mi_brdfs.list_models()
+    mi_brdfs.register(EON, replace=True)
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,9 @@ def folder(tmp_path_factory):
     (folder / "empty.hdr").write_text("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n")
     sides = '<bsdf type="twosided">' * 17 + '<bsdf type="diffuse"/>' + "</bsdf>" * 17
     (folder / "onion.xml").write_text(f'<scene version="3.0.0">{sides}</scene>')
+    sheet = (folder / "sheet.xml").read_text()
+    grouped = sheet.replace("<shape", '<shape type="merge" id="group"><shape').replace("</shape>", "</shape></shape>")
+    (folder / "groups.xml").write_text(grouped)
     for name in "taken.png", "folder.exr", "nook", "hall":
         (folder / name).mkdir()
     (folder / "hall" / "wall_log.jpg").touch()

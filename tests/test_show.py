@@ -128,6 +128,7 @@ def test_denoising(folder):
     assert np.diff(clean, axis=1).std() < 0.5 * np.diff(few, axis=1).std()
     np.testing.assert_allclose(clean.mean(), few.mean(), rtol=0.03)
     assert run(*words, "--sensor", "away", "--denoise", "--spp", 4).exit_code == 0
+    assert run("show", "lambert", "--size", 32, "--denoise").stderr.startswith("32 samples per pixel")
 
 
 def test_denoised_edges_have_no_lines():

@@ -169,10 +169,12 @@ def test_files_that_hold_no_fits_are_told_and_made_anew(tmp_path):
     with pytest.warns(StoreWarning):
         assert fitted(sweep) == 2 and sweep.finished() == 4
     assert {path.name for path in (tmp_path / "results").iterdir()} == {first.name, second.name, "foreign.parquet"}
-    damaged = [row | {"bsdf": "[1"} for row in parquet.read_table(first).to_pylist()]
-    parquet.write_table(pa.Table.from_pylist(damaged, parquet.read_schema(first)), first)
-    with pytest.warns(StoreWarning, match="holds no fits, and is left out: Expecting"):
-        assert len(list(Store(tmp_path / "results").rows())) == 2
+    kept = parquet.read_table(first)
+    for bsdf, told in ("[1", "Expecting"), (None, "the JSON object must be"):
+        damaged = [row | {"bsdf": bsdf} for row in kept.to_pylist()]
+        parquet.write_table(pa.Table.from_pylist(damaged, kept.schema), first)
+        with pytest.warns(StoreWarning, match=f"holds no fits, and is left out: {told}"):
+            assert len(list(Store(tmp_path / "results").rows())) == 2
 
 
 @pytest.mark.usefixtures("llvm_rgb")
