@@ -52,7 +52,10 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     if any(hasattr(node, "model") and hasattr(node, "eval_pdf") and not _is_ours(node) for node in params.hierarchy):
         raise ValueError(f"These parameters are not of {mi.variant()}; activate the variant that they were loaded in.")
     source = params if optimizer is None else optimizer
-    inside = {key: _projected(source[key], limits) for key, limits in limits_of(params) if key in source}
+    inside: dict[str, Any] = {}
+    for key, limits in limits_of(params):
+        if key in source:
+            inside[key] = _projected(inside.get(key, source[key]), limits)
     if optimizer is not None:
         for key, value in inside.items():
             optimizer[key] = value
@@ -71,18 +74,24 @@ def limits_of(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
 
 def declared(params: mi.SceneParameters) -> Iterator[tuple[str, Any, str, str]]:
     """Yield ``(key, bsdf, path, name)`` of the traversed values of parameters of our BSDFs: ``path`` is that of the
-    BSDF, and empty if it was traversed by itself, and ``name`` the property's."""
+    BSDF, empty if it was traversed by itself and its id if the scene holds the texture, and ``name`` the property's. A
+    texture that several share comes once for each."""
+    owners: dict[Any, list[tuple[Any, str]]] = {}
+    for bsdf in filter(_is_ours, params.hierarchy):
+        for name, texture in bsdf.textures.items():
+            owners.setdefault(texture, []).append((bsdf, name))
     for key in params.keys():
         node = params.properties[key][2]
         *path, word = key.split(".")
         if word not in VALUES or _holds_coefficients(node, params[key]):
             continue
-        # A key is the path from the root: it has as many words below the BSDF as there are nodes.
+        # A key is the path from the root: it has as many words below a node as there are nodes.
         levels = 0
-        while node is not None and not _is_ours(node):
+        while node is not None and node not in owners:
             node, levels = params.hierarchy[node][0], levels + 1
-        if node is not None and levels:
-            yield key, node, ".".join(path[:-levels]), path[-levels]
+        for bsdf, name in owners.get(node, []):
+            within = params.hierarchy[node][0] is bsdf
+            yield key, bsdf, ".".join(path[: -levels - 1]) if within else bsdf.id(), name
 
 
 def _is_ours(node: Any) -> bool:

@@ -3,6 +3,7 @@
 import json
 import re
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -103,6 +104,28 @@ def test_a_number_that_few_pixels_decide_is_no_surer_than_others():
     assert abs(values(found)["alpha"] - 0.15) < 4 * sigma < 5e-3
 
 
+def test_a_texture_that_the_scene_holds(tmp_path):
+    """Its key is its own; an optimiser has left derivatives at another one."""
+    mi.Bitmap(np.full((2, 2, 1), 0.2, np.float32)).write(str(tmp_path / "grey.exr"))
+    grey = f"""<texture type="bitmap" id="grey"><string name="filename" value="{tmp_path / "grey.exr"}"/>
+        <boolean name="raw" value="true"/><string name="format" value="variant"/></texture>"""
+    ball = '<bsdf type="phong" id="ball"><ref name="diffuse_reflectance" id="grey"/></bsdf>'
+    light = '<emitter type="constant"/><integrator type="prb"/>'
+    sensor = """<sensor type="perspective"><transform name="to_world"><translate z="-4"/></transform>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/></film></sensor>"""
+    scene = mi.load_string(f'<scene version="3.0.0">{grey}{ball}{light}{sensor}'
+                           '<shape type="sphere"><ref id="ball"/></shape></scene>')  # fmt: skip
+    picture = picture_of(scene, spp=256)
+    params = mi.traverse(scene)
+    (key,) = (key for key in params.keys() if key.endswith(".data"))
+    params[key] = mi.TensorXf(np.full((2, 2, 1), 0.4, np.float32))
+    dr.enable_grad(params["ball.exponent.value"])
+    params.update()
+    found = images(scene, picture, key, iterations=5)
+    np.testing.assert_allclose(found.values[key], 0.2, atol=0.02)
+    assert found.bsdfs["ball"]["type"] == "phong"
+
+
 @pytest.mark.slow
 def test_noise_of_derivatives_is_part_of_the_uncertainty():
     """On a narrow highlight they decide the last step, and leave few residuals: by these alone, errors are four times
@@ -130,15 +153,18 @@ def test_volumetric_integrators():
 
 def test_local_illumination():
     """``shading`` makes surfaces π times as bright as paths of light do."""
+    shading = {"type": "shading", "clamp": False}
     lamp = {"lamp": {"type": "point", "position": [2, 3, 4], "intensity": 2.0}}
     hidden, start = (
         {"type": "phong", "diffuse_reflectance": rho, "exponent": n} for rho, n in ((0.2, 20.0), (0.5, 40.0))
     )
-    picture = picture_of(scene_of(hidden, integrator="shading", lights=lamp), spp=1)
-    found = images(scene_of(start, integrator="shading", lights=lamp), picture)
+    picture = picture_of(scene_of(hidden, integrator=shading, lights=lamp), spp=1)
+    found = images(scene_of(start, integrator=shading, lights=lamp), picture)
     assert found.converged and values(found)["diffuse_reflectance"] == pytest.approx(0.2, abs=1e-3)
     assert values(found)["exponent"] == pytest.approx(20, rel=1e-2)
-    scene = scene_of(hidden, integrator={"type": "shading", "environment_reflection": True})
+    with pytest.raises(FitError, match="give it clamp = false"):
+        images(scene_of(start, integrator="shading", lights=lamp), picture)
+    scene = scene_of(hidden, integrator={"type": "shading", "clamp": False, "environment_reflection": True})
     with pytest.raises(FitError, match="environment_reflection cannot be fitted"):
         images(scene, picture)
 

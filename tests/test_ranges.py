@@ -106,6 +106,23 @@ def test_project_puts_all_of_a_scene_into_range():
 
 
 @pytest.mark.usefixtures("llvm_rgb")
+def test_project_knows_a_texture_that_the_scene_holds(tmp_path):
+    """Its key is its own, and of two that refer to it the narrower range holds."""
+    mi.Bitmap(np.full((2, 2, 1), 0.2, np.float32)).write(str(tmp_path / "grey.exr"))
+    grey = f'<texture type="bitmap" id="grey"><string name="filename" value="{tmp_path / "grey.exr"}"/></texture>'
+    balls = "".join(
+        f'<shape type="sphere"><bsdf type="{name}"><ref name="{parameter}" id="grey"/></bsdf></shape>'
+        for name, parameter in (("lambert", "reflectance"), ("ward", "alpha"))
+    )
+    params = mi.traverse(mi.load_string(f'<scene version="3.0.0">{grey}{balls}</scene>'))
+    (key,) = (key for key in params.keys() if key.endswith(".data"))
+    params[key] = mi.TensorXf(np.float32([[-1, 0.5], [1.5, 9]])[..., None])
+    params.update()
+    mi_brdfs.project(params)
+    np.testing.assert_array_equal(params[key].numpy()[..., 0], np.float32([[1e-4, 0.5], [1, 1]]))
+
+
+@pytest.mark.usefixtures("llvm_rgb")
 def test_project_keeps_an_optimizer_going():
     """Its variables are put into range, and the next gradients are theirs; what it does not hold is left alone."""
     bsdf = mi.load_dict({"type": "ward"})

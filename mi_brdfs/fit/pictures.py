@@ -98,7 +98,8 @@ def images(
 
     Args:
         scene: a loaded scene without media, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by
-            its integrator if that is a ``prb`` or ``shading``, and else by ``prb`` of the same depth.
+            its integrator if that is a ``prb``, or ``shading`` that does not clamp, and else by ``prb`` of the same
+            depth.
         pictures: a picture, or a list of them: files, bitmaps, or arrays of linear values and shape (height, width,
             channels) as ``mi.render`` returns them, of the size of the film. Pixels that are NaN do not count, and
             neither does alpha. Files of integers are taken as sRGB, and their pixels with a clipped channel do not
@@ -127,7 +128,12 @@ def images(
         raise FitError("A fit needs iterations >= 1 and spp >= 1.")
     if not scene.emitters():
         raise FitError("The scene has no light.")
-    slots, point = _slots(mi.traverse(scene), parameters)
+    params = mi.traverse(scene)
+    for key, value in params:
+        if dr.grad_enabled(value):  # as an optimiser leaves it
+            params[key] = dr.detach(value)
+    params.update()
+    slots, point = _slots(params, parameters)
     integrator = _integrator(scene)
     views = _views(scene, integrator, pictures, sensors)
     pixels = sum(view.picture.shape[0] * view.picture.shape[1] for view in views)
@@ -259,6 +265,10 @@ def _integrator(scene: mi.Scene) -> mi.Integrator:
     if local and local.environment_reflection:
         raise FitError(
             "Pictures with environment_reflection cannot be fitted: Dr.Jit has no forward derivatives of them."
+        )
+    if local and local.clamp:
+        raise FitError(
+            "What shading clamps cannot be fitted: give it clamp = false, and a picture that is not clamped."
         )
     if local or (isinstance(own, mi.ad.integrators.common.RBIntegrator) and "Vol" not in type(own).__name__):
         return own

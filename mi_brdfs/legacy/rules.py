@@ -157,7 +157,9 @@ def _conductor(work: Work, element: Element) -> Element:
         work.changed(element, f"{element.type} without a material is copper, as in 0.6")
     alpha = element.number("alpha", 0.1)
     alphas = {element.number(name, alpha) for name in ("alpha_u", "alpha_v")}
-    if element.type == "roughconductor" and len(alphas) == 1 and element.text("distribution") in ("phong", "as"):
+    textured = any(it.name.startswith("alpha") and it.tag not in ("float", "integer") for it in element.children)
+    isotropic = len(alphas) == 1 and not textured
+    if element.type == "roughconductor" and isotropic and element.text("distribution") in ("phong", "as"):
         work.changed(element, f"distribution {element.text('distribution')} of roughconductor is blinn of microfacet")
         element.pop("alpha", "alpha_u", "alpha_v")
         element.set("distribution", "blinn")
