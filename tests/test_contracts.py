@@ -130,6 +130,7 @@ def test_a_model_without_parameters():
     [
         (lambda self, p: LambertLobe(p.reflectance), "Slip.lobes returns <mi_brdfs.lobes.diffuse.LambertLobe object"),
         (lambda self, p: (p.reflectance,), "it must return a tuple of lobes."),
+        (lambda self, p: (it for it in (LambertLobe(p.reflectance),)), "it must return a tuple of lobes."),
     ],
 )
 def test_lobes_are_a_tuple(lobes, message):

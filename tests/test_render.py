@@ -195,6 +195,8 @@ def test_tonemapping_keeps_darks_hue_and_order_of_highlights():
     grey = np.append(bright, np.full(bright.size // 500, 40.0))[:, None, None].repeat(3, axis=-1)
     assert np.all(np.diff(tonemap(grey)[: bright.size, 0, 0]) > 0)
     assert tonemap(np.full((4, 4, 3), 7.0)).max() == pytest.approx(1)
+    endless = np.float32([np.inf, 1e38, 3e38])[:, None, None] * np.ones(3, np.float32)
+    np.testing.assert_allclose(tonemap(endless), 1, 1e-6)
 
 
 def test_tonemapping_is_smooth_and_survives_bad_pixels():

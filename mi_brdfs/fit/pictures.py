@@ -286,7 +286,7 @@ def _views(
     """Return the pictures with their sensors."""
     given = [_pixels(it) for it in (pictures if isinstance(pictures, (list, tuple)) else [pictures])]
     count = len(scene.sensors())
-    indices = range(len(given)) if sensors is None else list(sensors)
+    indices = range(len(given)) if sensors is None else [*map(int, sensors)]
     if not given:
         raise FitError("There is no picture to fit to.")
     if len(indices) != len(given):

@@ -70,7 +70,7 @@ class ModelBSDF:
         """Return the model's lobes, which must be of the kinds that the components were made for."""
         self.model.uniform.compare(self.model.textures)
         name, lobes = type(self.model).__name__, self.model.lobes(p)
-        if isinstance(lobes, Lobe) or not all(isinstance(lobe, Lobe) for lobe in lobes):
+        if not isinstance(lobes, (tuple, list)) or not all(isinstance(lobe, Lobe) for lobe in lobes):
             raise TypeError(f"{name}.lobes returns {lobes!r}; it must return a tuple of lobes.")
         kinds = [(lobe.glossy, lobe.transmits, lobe.reciprocal) for lobe in lobes]
         if not self.lobe_kinds:

@@ -74,7 +74,7 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
     which continues with slope 1 and reaches 1 at ``m = p``. Brighter pixels are scaled to 1; negative values and NaNs
     become 0.
     """
-    image = np.nan_to_num(np.maximum(image, 0), nan=0.0, posinf=np.finfo(np.float32).max)
+    image = np.minimum(np.nan_to_num(np.maximum(image, 0), nan=0.0), 1e30)  # which leaves float32 room
     m = image.max(axis=-1, keepdims=True)
     p = np.percentile(m, 99.9) if peak is None else peak
     T = max((p - SHOULDER) / (1 - SHOULDER), 1.0)
