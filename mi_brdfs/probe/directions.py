@@ -48,7 +48,8 @@ def scattered(count: int, seed: int, sides: Sequence[int]) -> Array:
 def angles_of(w: Array) -> str:
     """Return a direction in words."""
     theta = np.degrees(np.arctan2(np.hypot(w[0], w[1]), w[2]))
-    return f"θ = {theta:.4g}°, φ = {np.degrees(np.arctan2(w[1], w[0])):.4g}°"
+    phi = f"{np.degrees(np.arctan2(w[1], w[0])):.4g}".replace("-", "−")
+    return f"θ = {theta:.4g}°, φ = {phi}°"
 
 
 def azimuth_axis(w: Array) -> Array:
