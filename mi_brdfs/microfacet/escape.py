@@ -32,8 +32,6 @@ ROUGHEST = 3.2
 """The largest tabulated α: that of Burley's most anisotropic facets."""
 UPRIGHT = 1e-3
 """The sin²θ below which the azimuth counts less and less: what is tabulated changes little with it there."""
-TABULATED = 8
-"""The anisotropy beyond which it counts less below a larger sin²θ, as α changes more and more with the azimuth."""
 SKEW = 0.2
 """The smaller it is, the more of y is for the smooth axis of facets of extreme anisotropy."""
 BENDS = {"ggx": ((5, 4), (3, 8)), "beckmann": ((6, 4), (6, 4)), "blinn": ((3, 8), (3, 8))}
@@ -93,8 +91,7 @@ class Walks:
             at.append(dr.sqrt(dr.sqrt(dr.minimum(u, v) / largest)))
         most, falling = BENDS[smith.facets][smith.correlated]
         bend = most * dr.rcp(1 + 0.5 * falling * (u * u + v * v))
-        upright = UPRIGHT * dr.maximum(dr.square(largest) * dr.rcp(u * v) / TABULATED, 1)
-        self.bend, self.inverse, self.upright = uniform("bend", (bend, dr.rcp(u * v), upright))
+        self.bend, self.inverse = uniform("bend", (bend, dr.rcp(u * v)))
         # Outer texels have their centres at 0 and 1.
         texels = [(x * (count - 1) + 0.5) / count for x, count in zip(at, table.shape[-2::-1], strict=True)]
         self.rows, left = {}, iter(uniform("walks", table.eval(texels)))
@@ -112,7 +109,7 @@ class Walks:
         else:
             # Towards the normal, which has no azimuth, y goes to 0. Both variables take one division.
             along, sin2 = slope2 * self.inverse, v.x * v.x + v.y * v.y
-            skewed = along + SKEW * sin2 + self.upright
+            skewed = along + SKEW * sin2 + UPRIGHT
             inverse = dr.rcp(bent * skewed)
             x, y = 2 * v.z * (skewed * inverse) - 1, (along - sin2) * (bent * inverse)
         lost = horner([horner(row, x) for row in self.rows["lost"]], y)
