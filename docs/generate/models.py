@@ -194,7 +194,10 @@ def _page(plugin: type[Plugin], picture: str, strip: str = "", lobes: str = "") 
     xml, _, dictionary = examples.partition("\n\n")
     summary, _, text = _code(text).partition("\n\n")
     with _own_words():
-        tables = [f"### {title}\n\n{_table(rows)}\n\n{note}".rstrip() for title, rows, note in plugin.sections()]
+        tables = [
+        "\n\n".join(filter(None, (f"### {title}", _table(rows) if rows else "", note)))
+        for title, rows, note in plugin.sections()
+    ]
     parts = [
         f"## {name}",
         f"Also as {', '.join(f'`{alias}`' for alias in aliases)}." if aliases else "",
