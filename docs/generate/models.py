@@ -195,9 +195,9 @@ def _page(plugin: type[Plugin], picture: str, strip: str = "", lobes: str = "") 
     summary, _, text = _code(text).partition("\n\n")
     with _own_words():
         tables = [
-        "\n\n".join(filter(None, (f"### {title}", _table(rows) if rows else "", note)))
-        for title, rows, note in plugin.sections()
-    ]
+            "\n\n".join(filter(None, (f"### {title}", _table(rows) if rows else "", note)))
+            for title, rows, note in plugin.sections()
+        ]
     parts = [
         f"## {name}",
         f"Also as {', '.join(f'`{alias}`' for alias in aliases)}." if aliases else "",
