@@ -65,9 +65,11 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
 
 def limits_of(params: mi.SceneParameters) -> Iterator[tuple[str, Range]]:
     """Yield ``(key, range)`` of the traversed parameters of our BSDFs, and of their arrays."""
-    arrays = [(key, params.properties[key][2], key.rpartition(".")[2]) for key in params.keys()]
     found = [(key, bsdf, name) for key, bsdf, _, name in declared(params)]
-    for key, bsdf, name in found + [it for it in arrays if _is_ours(it[1]) and it[2] in it[1].model.arrays]:
+    for key in params.keys():
+        if _is_ours(node := params.properties[key][2]):  # whose textures are nodes of their own
+            found.append((key, node, key.rpartition(".")[2]))
+    for key, bsdf, name in found:
         if name in bsdf.model.ranges:
             yield key, bsdf.model.ranges[name]
 

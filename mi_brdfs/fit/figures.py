@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from ..measured.measurement import Measurement
 from ..measured.report.summary import azimuths
-from ..pages.figures import DIFFERENCE, SERIES
+from ..pages.figures import DIFFERENCE, SERIES, brief
 from ..plot.measured import LitTable
 from ..plot.planar import THIN
 from ..plot.style import FAINT, GRID, INK, STYLES, calm, new_figure
@@ -137,9 +137,9 @@ class Residuals:
         theta_i, theta_h, model, data = self.worst
         most = f"θi ≈ {theta_i:.0f}° and half angles near {theta_h:.0f}°"
         if (least := min(model, data)) > 0:
-            times = _rounded(max(model, data) / least)
+            times = brief(max(model, data) / least)
             most += f", where it is {times} times too {'bright' if model > data else 'dark'}"
-        return f"The fit is off by {_rounded(100 * self.off)} % of the reflected light, most at {most}."
+        return f"The fit is off by {brief(100 * self.off)} % of the reflected light, most at {most}."
 
     @property
     def extent(self) -> float:
@@ -162,8 +162,3 @@ class Residuals:
         ax.set_xlabel(r"$\theta_h$", fontsize=9, color=INK)
         ax.set_ylabel(r"$\theta_d$", fontsize=9, color=INK)
         return figure
-
-
-def _rounded(value: float) -> str:
-    """Return a number with two digits, without an exponent below a million."""
-    return f"{float(f'{value:.2g}'):g}"

@@ -138,12 +138,14 @@ def _residuals(rendered: Rendered, point: Array, seeds: list[int]) -> Array:
 
 def _together(looks: Sequence[Look]) -> Look:
     """Return one look for several at a point."""
-    seeds, residuals, jacobians = zip(*looks, strict=True)
-    return Look(
-        ([*chain(*(first for first, _ in seeds))], [*chain(*(second for _, second in seeds))]),
-        (np.mean([first for first, _ in residuals], axis=0), np.mean([second for _, second in residuals], axis=0)),
-        (np.mean([one for one, _ in jacobians], axis=0), np.mean([other for _, other in jacobians], axis=0)),
-    )
+    firsts, seconds = zip(*(look.seeds for look in looks), strict=True)
+    residuals, jacobians = _means([look.residuals for look in looks]), _means([look.jacobians for look in looks])
+    return Look(([*chain(*firsts)], [*chain(*seconds)]), residuals, jacobians)
+
+
+def _means(pairs: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    first, second = zip(*pairs, strict=True)
+    return np.mean(first, axis=0), np.mean(second, axis=0)
 
 
 def _matrix(one: Array, other: Array) -> Array:

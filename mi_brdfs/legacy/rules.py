@@ -251,19 +251,19 @@ def _coating(work: Work, element: Element) -> Element:
         raise element.error("there is no BSDF in it")
     element.children.remove(base)
     inner, was = work.resolved(base), element.type
+    glass, air = element["int_ior"] or prop("int_ior", 1.5046), element["ext_ior"] or prop("ext_ior", 1.000277)
     rough = was.removesuffix("coating")
     if inner.type in ("diffuse", "roughdiffuse"):
         # The coat of a diffuse base is what plastic is.
         work.approximated(element, f"{was} over {inner.type} is plastic, without absorption in the coat")
         element.type = f"{rough}plastic"
-        if not element["int_ior"]:
-            element.set("int_ior", 1.5046)
+        element.put(glass)
         element.set("nonlinear", True)
         if reflectance := inner["reflectance"]:
             element.put(reflectance.copy("diffuse_reflectance"))
         return _bounded(work, element)
-    glass, air = (prop("", 1.5046), prop("", 1.000277))  # as in 0.6
-    index = _index(element.pop("int_ior") or glass) / _index(element.pop("ext_ior") or air)
+    element.pop("int_ior", "ext_ior")
+    index = _index(glass) / _index(air)
     share = importlib.import_module("mitsuba.scalar_rgb").fresnel_diffuse_reflectance(index)
     work.approximated(element, f"{was} is a mixture with a mirror, of the coat's mean reflectance, at all angles")
     element.type = f"{rough}conductor"

@@ -53,3 +53,8 @@ def svg(figure: Figure) -> Markup:
     for ink, name in VARIABLES.items():
         found = found.replace(ink, f"var({name})")
     return Markup(found)
+
+
+def brief(value: float) -> str:
+    """Return a number with two digits, without an exponent below a million."""
+    return f"{float(f'{value:.2g}'):g}"

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
-from ..pages.figures import DENSITY, DIFFERENCE, SERIES
+from ..pages.figures import DENSITY, DIFFERENCE, SERIES, brief
 from ..plot.style import FAINT, INK, SMALL, STYLES, calm, new_figure
 from ..probe.arrays import Array
 from ..probe.directions import from_plane, to_plane
@@ -165,7 +165,7 @@ def _figure(
     for ax, (title, each) in zip(figure.subplots(1, 3, gridspec_kw=places), colours.items(), strict=True):
         ax.set_title(title + ", zoomed" * (view.half < HEMISPHERE), loc="left", fontsize=SMALL, pad=3)
         _draw(ax, each, trial, view, maps.worst)
-    return f"{side} the surface: {maps.told}", figure, (_brief(low) + maps.unit, _brief(high) + maps.unit), maps.ends
+    return f"{side} the surface: {maps.told}", figure, (brief(low) + maps.unit, brief(high) + maps.unit), maps.ends
 
 
 def _draw(ax: Axes, colours: Array, trial: Trial, view: View, worst: Array | None) -> None:
@@ -195,11 +195,6 @@ def _draw(ax: Axes, colours: Array, trial: Trial, view: View, worst: Array | Non
         marked = [tick for tick in MaxNLocator(4).tick_values(low, high) if low <= tick <= high]
     ax.set_xticks(marked, [f"{tick:g}°" for tick in marked])
     ax.tick_params(labelsize=SMALL, length=0, pad=1)
-
-
-def _brief(value: float) -> str:
-    """Return a number with two digits."""
-    return f"{float(f'{value:.2g}'):g}"
 
 
 def chart(energy: dict[str, dict[str, Any]]) -> Figure:
