@@ -9,12 +9,16 @@ from catalogue import OTHER_VARIANTS
 
 from mi_brdfs.mitsuba.registry import KIT, MODELS
 
-import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
+import drjit as dr  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
+import mitsuba as mi  # isort: skip
 
 ELSE = "scalar_rgb"
 """The variant of tests that ask for none."""
 
 mi.set_variant(ELSE)
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    dr.set_thread_count(1)  # there is a worker a core, and a thread that waits for work is busy: it takes half of one
 
 
 def pytest_addoption(parser):
