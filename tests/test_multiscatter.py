@@ -123,6 +123,11 @@ def test_a_checker_finds_nothing(name, way):
     assert_bsdf(facets(way, ROUGHNESS[name], f0=0.5), only=only, angles=60)
 
 
+def test_the_finest_grooves_have_no_spot_at_the_normal():
+    """There the azimuth would change it within a fraction of a degree."""
+    assert_bsdf(facets("kulla-conty", (1e-4, 2.0), f0=0.5), only="continuity")
+
+
 @pytest.mark.parametrize("name", ROUGHNESS)
 def test_samples_are_as_good_as_they_were(name):
     """Those of anisotropic facets are worse than .95 where little is lost, too."""

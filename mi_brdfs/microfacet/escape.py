@@ -109,9 +109,9 @@ class Walks:
         else:
             # Towards the normal, which has no azimuth, y goes to 0. Both variables take one division.
             along, sin2 = slope2 * self.inverse, v.x * v.x + v.y * v.y
-            skewed = along + SKEW * sin2 + UPRIGHT
-            inverse = dr.rcp(bent * skewed)
-            x, y = 2 * v.z * (skewed * inverse) - 1, (along - sin2) * (bent * inverse)
+            divisor = (along + SKEW * sin2 + UPRIGHT) * (sin2 + UPRIGHT)
+            inverse = dr.rcp(bent * divisor)
+            x, y = 2 * v.z * (divisor * inverse) - 1, (along - sin2) * sin2 * (bent * inverse)
         lost = horner([horner(row, x) for row in self.rows["lost"]], y)
         # The others change with the angle itself, and at the normal not with the azimuth.
         versine, others = 1 - v.z, []
