@@ -2,7 +2,6 @@ import gc
 import os
 import signal
 import sys
-import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: threads that wait for work take CPU time of others
 
