@@ -13,6 +13,8 @@ import numpy as np
 from generate.notebooks import FOLDER, NOTEBOOKS, code_cells
 from generate.notebooks import read as read_notebook
 
+from mi_brdfs.fit import pictures
+
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
@@ -25,6 +27,8 @@ SAMPLES = 16
 are fitted and compared."""
 MOST = 1 << 22
 """The most samples of others, unless they have as few for each pixel."""
+FITTED = 1 << 16
+"""Samples of a rendering within a fit to pictures: its noise, and sigma, are twice as large."""
 
 
 def run_notebook(path: Path) -> dict[str, Any]:
@@ -34,7 +38,8 @@ def run_notebook(path: Path) -> dict[str, Any]:
     folder = os.getcwd()
     os.chdir(path.parent)
     try:
-        with mi.variant_context("llvm_ad_rgb"), patch("mitsuba.render", noisy):
+        few = patch.object(pictures, "SAMPLES", FITTED)
+        with mi.variant_context("llvm_ad_rgb"), patch("mitsuba.render", noisy), few:
             for cell in code_cells(read_notebook(path)):
                 exec(compile("".join(cell["source"]), f"{path.name}: {cell['id']}", "exec"), names)
     finally:

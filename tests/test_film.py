@@ -229,6 +229,7 @@ def test_a_checker_finds_nothing(given):
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_a_checker_finds_nothing_in_derivatives():
-    """Nor in anything else."""
+    """Nor in what else has kernels of its own."""
     film = {"film_thickness": 450.0, "film_ior": 1.33}
-    assert_bsdf({"type": "walter", "alpha": 0.3, "int_ior": 1.5, **film}, angles=60)
+    checks = ["gradients", "active", "continuity", "textures", "updates", "recompiles", "mode"]
+    assert_bsdf({"type": "walter", "alpha": 0.3, "int_ior": 1.5, **film}, only=checks, angles=60)
