@@ -13,6 +13,7 @@ from support import LOFT, ROOT, call, context, direction
 from test_cli import invoke
 
 from mi_brdfs import plot
+from mi_brdfs.measured import read
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.plot import command
 from mi_brdfs.probe import curves as curves_of
@@ -357,7 +358,7 @@ def test_gaps_of_measured_files_are_gaps():
     """Beyond its cone about the mirror direction, unless asked what renders there; and its curves have no dashes."""
     angles = {"angles": (60,), "scale": "log"}
     figure = plot.cartesian("ward", str(LOFT), **angles)
-    theta, value = curves(figure)[mi_brdfs.measured.read(LOFT).title]
+    theta, value = curves(figure)[read(LOFT).title]
     seen = np.isfinite(value)
     assert theta[seen].min() == pytest.approx(60 - 90, abs=0.1) and (np.diff(np.flatnonzero(seen)) == 1).all()
     assert [line.get_linestyle() for line in figure.axes[0].lines if line.get_label()[0] != "_"] == ["-", "-"]

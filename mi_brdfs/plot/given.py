@@ -148,7 +148,7 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe
     for name, loaded in found:
         file = measured_file(loaded) if isinstance(loaded, dict) else None
         measurement = read(*file) if file else None
-        probe = BSDFProbe(load_described(loaded), data=measurement and measurement.data)
+        probe = BSDFProbe(load_described(loaded), data=measurement.data if measurement else None)
         name = name.replace(measurement.path.name, measurement.title) if measurement else name
         yield labels.get(id(given)) or name or name_of(probe.bsdf), probe
 
