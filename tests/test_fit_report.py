@@ -91,6 +91,8 @@ def test_its_numbers_are_those_of_the_rows(written):
         assert cells[at + 4] == f"{row['albedo']:.3g}"
         assert f"{row['flip']:.4g}" in stdout
     assert len(rows[0]["scatter"]) == 4 and "the file states" not in page  # the table says so
+    ratios = [at["stated"] / at["values"] for at in rows[0]["scatter"]]
+    assert max(ratios) > 1.1 and f"The file states {min(ratios):.2g} to {max(ratios):.2g} times what" in page
     for k, at in enumerate(rows[0]["scatter"]):
         numbers = at["stated"], at["values"], *(row["scatter"][k]["fit"] for row in rows)
         assert cells_of("scatter", page)[k] == [f"{at['theta_i']:g}°", *(f"{number:.3g}" for number in numbers)]

@@ -178,6 +178,12 @@ def test_what_is_to_be_fixed_first_may_be_the_cause(failing, first):
     assert told == ([f"  Fix {first} first; failures of later checks may follow from it."] if first else [])
 
 
+def test_what_is_skipped_is_told_with_its_reason():
+    findings = [Finding("deltas", "whole", "skip", "There is none."), Finding("null", "whole", "skip", "It is opaque.")]
+    told = [line for line, _ in block(Report("mine", findings), 80)]
+    assert "  skip  deltas: There is none. null: It is opaque." in told
+
+
 # --- Comparison -----------------------------------------------------------------------------------------------------
 
 
@@ -411,7 +417,9 @@ def test_a_wrong_constant_is_told_as_one():
     wrong = next(mutant for mutant in MUTANTS if mutant.name == "density without pi")
     (finding,) = [it for it in check(wrong.register(), only=["pdf"], angles=(50,)).failures if it.subject == "whole"]
     assert "pdf integrates to 3.14" in finding.message and "it fails for all 17 directions tried" in finding.message
-    assert finding.message.endswith("It is off by a factor of 3.14 everywhere: a constant is wrong.")
+    assert finding.message.endswith(
+        "3.14 everywhere: a constant is wrong, perhaps the π of cosine-weighted directions."
+    )
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -434,5 +442,5 @@ def test_a_wrong_constant_of_weights_is_told_as_one():
     of_half = Mutant("half", (), Lambert, sampled(weight=lambda bs, weight, si, u: 0.5 * weight))
     report = check(of_half.register(), only=["weight", "albedo"], angles=(50,))
     (finding,) = (it for it in report.failures if it.subject == "whole")
-    assert finding.message.endswith("It is off by a factor of 0.5 everywhere: a constant is wrong.")
+    assert finding.message.endswith("0.5 everywhere: a constant is wrong, perhaps the probability of one of two lobes.")
     assert report.verdict("albedo") == "skip" and "mend weight first" in report.of("albedo")[0].message

@@ -30,7 +30,12 @@ from .options import (
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
-@command("Look", "explore walter burley:roughness=.3", "explore paint.binary fit.json:walter --scene room.xml:wall")
+@command(
+    "Look",
+    "explore walter burley:roughness=.3",
+    "explore paint.binary fit.json:walter --scene room.xml:wall",
+    "explore ward --export page.html --vary alpha=.05,.1,.2,.4",
+)
 def explore(
     targets: Annotated[list[str] | None, material_argument("Up to six.")] = None,
     parameters: Parameters = None,

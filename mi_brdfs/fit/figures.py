@@ -28,8 +28,8 @@ CURVES = len(SERIES)
 """How many fits are drawn over the data."""
 NODES = 60
 """The most nodes that are drawn of a lobe."""
-NARROW = 10
-"""The width at half of the peak, in degrees, below which the surroundings of the mirror direction are stretched."""
+NARROW = 5
+"""How near to the mirror direction all above half of the peak is where its surroundings are stretched, in degrees."""
 CELLS = 8, 28
 """The least and the most cells of a residual map, along each side."""
 PAIRS = 20
@@ -86,7 +86,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
         ax.set_ylim(max(np.quantile(seen, 0.02) / 4, seen.max() * 1e-6), seen.max() * 3)
     ax.axvline(theta_i, color=FAINT, linestyle=(0, (1, 2)), **THIN)
     ticks, zero, label = np.arange(-90, 91, 45), 0.0, r"$\theta_o$"
-    if np.ptp(curve.theta[curve.value > 0.5 * np.nanmax(curve.value)]) < NARROW:
+    if np.all(abs(curve.theta[curve.value > 0.5 * np.nanmax(curve.value)] - theta_i) < NARROW):
         # A line at the scale of the hemisphere: its surroundings are stretched.
         ticks, zero, label = np.array([-90, -40, -10, 0, 10, 40, 90]), theta_i, r"$\theta_o - \theta_i$, stretched"
         ticks = ticks[abs(zero + ticks) <= 90]

@@ -116,6 +116,15 @@ class Section:
         return " ".join(told)
 
     @property
+    def mismatch(self) -> str:
+        """How the scatter that the file states differs from that of its values, in a sentence, if it does."""
+        ratios = [stated / max(values, 1e-30) for _, stated, values in self.best.scatter]
+        if all(0.9 < ratio < 1.1 for ratio in ratios):
+            return ""
+        times = " to ".join(dict.fromkeys(f"{ratio:.2g}" for ratio in (min(ratios), max(ratios))))
+        return f"The file states {times} times what its values integrate to."
+
+    @property
     def converged(self) -> str:
         """How many optimisations of the best model found it, in a sentence."""
         agree, tried = self.best.starts.agree, self.best.starts.tried

@@ -118,7 +118,8 @@ class Fit(Data):
         close = {" and ".join(sorted(pair)) for a, row in self.correlations.items() for b, r in row.items()
                  if abs(r) > CORRELATED and len(pair := {_colour(a), _colour(b)}) > 1}  # fmt: skip
         if close:
-            found.append(f"Hard to tell apart: {', '.join(sorted(close))}.")
+            told = "other values of both fit about as well; fix one that is known"
+            found.append(f"Hard to tell apart: {', '.join(sorted(close))}: {told}.")
         for (theta, stated, values), own in () if shown else zip(self.scatter, self.scattered, strict=True):
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"

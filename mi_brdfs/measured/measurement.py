@@ -58,6 +58,12 @@ class Measurement:
         lines = {name: " ".join(text.split()) for name, text in self.notes.items()}
         object.__setattr__(self, "notes", {printable(name): printable(text) for name, text in lines.items()})
 
+    @property
+    def title(self) -> str:
+        """The name of the file, after that of the material where it is another."""
+        name = self.path.name
+        return name if self.material in ("", brief(self.path.stem)) else f"{self.material} ({name})"
+
 
 def representable(measurement: Measurement) -> Measurement:
     """Return a measurement that can be rendered, with NaN in place of values beyond ``MOST``, infinite ones among them.

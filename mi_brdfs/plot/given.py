@@ -143,17 +143,14 @@ def _told(word: str, parameters: dict[str, str]) -> str:
 
 
 def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
-    if isinstance(given, str):
-        for source in find_sources(given):
-            yield labels.get(id(given), source.name), _probe(source.load())
-    else:
-        probe = _probe(given)
-        yield labels.get(id(given)) or name_of(probe.bsdf), probe
-
-
-def _probe(given: Any) -> BSDFProbe:
-    file = measured_file(given) if isinstance(given, dict) else None
-    return BSDFProbe(load_described(given), data=read(*file).data if file else None)
+    """Yield what a user gave, loaded, with its label: for a measured file, its title."""
+    found = ((it.name, it.load()) for it in find_sources(given)) if isinstance(given, str) else [("", given)]
+    for name, loaded in found:
+        file = measured_file(loaded) if isinstance(loaded, dict) else None
+        measurement = read(*file) if file else None
+        probe = BSDFProbe(load_described(loaded), data=measurement.data if measurement else None)
+        name = name.replace(measurement.path.name, measurement.title) if measurement else name
+        yield labels.get(id(given)) or name or name_of(probe.bsdf), probe
 
 
 def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:

@@ -24,7 +24,6 @@ from ..measured.report.counts import batches, census, in_one_plane
 from ..measured.report.summary import azimuths, ends
 from ..measured.scattered import as_grid
 from ..observer import to_srgb
-from ..parameters.messages import brief
 from ..probe.arrays import luminance
 from ..probe.curves import Curve, largest, refined
 from .maps import HATCHED, frame_albedo
@@ -166,9 +165,7 @@ class LitTable:
     def __init__(self, measurement: Measurement, phi: float | None = None) -> None:
         measurement = in_colour(measurement)
         self.measurement, self.grid = measurement, as_grid(measurement.data)
-        name, material = measurement.path.name, measurement.material
-        name = name if material in ("", brief(measurement.path.stem)) else f"{material} ({name})"
-        self.name = plain(name)
+        self.name = plain(measurement.title)
         self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
         self.phi = float(azimuths(self.grid)[0]) if phi is None else phi
         self.coloured = self.grid.values.shape[-1] > 1

@@ -156,10 +156,8 @@ def _planar(
     width = max(WIDTH, NARROWEST * columns) if beside else WIDTH if len(scales) > 1 else 0.6 * WIDTH
     blocks = -(-len(panels) // columns) * len(scales) if beside else len(panels)
     height = width / columns * heights[whole] + (0.4 if beside else 0)
-    # The angles around polar plots are told once, in the first row.
-    ratios = [1, *[0.89 if draw is _draw_polar else 1] * (blocks - 1)]
-    figure = style.new_figure(width, height * sum(ratios) + 0.8, size)
-    axes = figure.subplots(blocks, columns, squeeze=False, height_ratios=ratios)
+    figure = style.new_figure(width, height * blocks + 0.8, size)
+    axes = figure.subplots(blocks, columns, squeeze=False)
     text = quantity(QUANTITY, normalize=normalize, rgb=rgb)
     everything = [curve for curves in panels for curve in curves]
     for k, (heading, curves) in enumerate(zip(headings, panels, strict=True)):
@@ -213,8 +211,7 @@ def _draw_polar(
     ax.plot(*_at(round_, end), color=FAINT, linewidth=0.6)
     for turn in turns:
         ax.plot(*_at(turn, np.array([0, end])), color=GRID, linewidth=0.6)
-        if spec.is_first_row():
-            ax.text(*_at(turn, 1.16 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
+        ax.text(*_at(turn, 1.16 * end), f"{abs(turn)}°", color=INK, fontsize=SMALL, ha="center", va="center")
     for line in lines:
         colour = _shade(line, lines)
         arrow = {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0, "color": colour, **THIN}
@@ -227,8 +224,8 @@ def _draw_polar(
             radius = np.maximum(np.log10(line.curve.value) - low if log else line.curve.value, 0)
         ax.plot(*_at(line.curve.theta, radius), label=line.label, **line.look)
     ax.plot([-end, end], [0, 0], color=INK, linewidth=1.5)
-    top = 1.25 if spec.is_first_row() else 1.1
-    ax.set(xlim=(-1.25 * end, 1.25 * end), ylim=((-top if whole else -0.15) * end, top * end), xticks=[], yticks=[])
+    top = 1.25 * end
+    ax.set(xlim=(-top, top), ylim=(-top if whole else -0.15 * end, top), xticks=[], yticks=[])
     ax.set_aspect("equal", anchor="S")  # in the middle, labels below would overlap the legend
     ax.spines[:].set_visible(False)
     radius = f"log radius, cut off below $10^{{{low}}}$" if log else "linear radius"

@@ -17,7 +17,10 @@ def block(report: Report, width: int) -> Iterator[tuple[str, str]]:
     yield from _folded(f"{report.name}: {report.outcome}", width, "", STYLES[report.outcome])
     for verdict, checks in report.by_verdict:
         word = "FAIL" if verdict == "fail" else verdict
-        yield from _folded(f"  {word}  {', '.join(checks)}", width, " " * 8, STYLES.get(verdict, "dim"))
+        told = ", ".join(checks)
+        if verdict == "skip":
+            told = " ".join(f"{check}: {report.why_skipped(check)}" for check in checks)
+        yield from _folded(f"  {word}  {told}", width, " " * 8, STYLES.get(verdict, "dim"))
     if first := report.first_to_fix:
         yield from _folded(f"  Fix {first} first; failures of later checks may follow from it.", width, " " * 4, "")
     for sentence in report.sentences:

@@ -99,9 +99,11 @@ def densities(trial: Trial, summed: Summed) -> Maps:
     counts, expected, integrals, solid_angles = map(summed, each)
     deviation = (counts - expected) / np.sqrt(np.maximum(expected, 1))
     values = np.array([counts / trial.count / solid_angles, integrals / solid_angles, deviation])
-    told, ends = "the samples drawn, their pdf, and the difference", ("−5σ, too few", "too many, +5σ")
+    reach = float(np.clip(np.quantile(abs(deviation), 0.9), 5, 500))
+    told = "the samples drawn, their pdf, and the difference"
+    ends = f"−{reach:.0f}σ, too few", f"too many, +{reach:.0f}σ"
     worst = cells.centres[trial.test.worst] if trial.test.p_value < SURE else None
-    return Maps(told, ("drawn", "pdf"), " per sr", values, 5, ends, worst)
+    return Maps(told, ("drawn", "pdf"), " per sr", values, reach, ends, worst)
 
 
 def weights(trial: Trial, summed: Summed) -> Maps:

@@ -106,6 +106,10 @@ class Report:
         every = ((verdict, [it for it in checks if self.verdict(it) == verdict]) for verdict in get_args(Verdict))
         return [(verdict, named) for verdict, named in every if named]
 
+    def why_skipped(self, check: str) -> str:
+        """Return why a check of the verdict ``skip`` was not made."""
+        return next(finding.message for finding in self.of(check) if finding.verdict == "skip")
+
     def of(self, check: str) -> list[Finding]:
         """Return the findings of one check."""
         return [finding for finding in self.findings if finding.check == check]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import erfc, sqrt
+from math import erfc, pi, sqrt
 
 import numpy as np
 
@@ -13,6 +13,15 @@ from ..probe.chi_square import in_words
 from .outcome import Findings, Outcome
 from .report import Finding
 from .run import SEED, Run
+
+CONSTANTS = {
+    2: "the probability of one of two lobes",
+    4: "the 4 in the density of wo, that of h over 4 wo·h",
+    pi: "the π of cosine-weighted directions",
+    2 * pi: "the 2π of uniform directions",
+    4 * pi: "the 4π of uniform directions on the sphere",
+}
+"""What a factor that is off, or its inverse, may be."""
 
 
 def chi2(run: Run) -> Findings:
@@ -103,8 +112,11 @@ def weight(run: Run) -> Findings:
 def _constant(factors: Sequence[float]) -> str:
     """Return a sentence if something is off by the same factor for all directions, and else none."""
     factor, most = min(factors), max(factors)
-    alike = most < 1.02 * factor and not 0.99 < factor < 1.01
-    return f"It is off by a factor of {factor:.3g} everywhere: a constant is wrong." if alike else ""
+    if not most < 1.02 * factor or 0.99 < factor < 1.01:
+        return ""
+    why = (it for size, it in CONSTANTS.items() if min(abs(factor / size - 1), abs(factor * size - 1)) < 0.02)
+    perhaps = "".join(f", perhaps {it}" for it in why)
+    return f"It is off by a factor of {factor:.3g} everywhere: a constant is wrong{perhaps}."
 
 
 def failing(run: Run, part: Part, *checks: Callable[[Run], Findings], anew: bool = True) -> list[str]:

@@ -4,11 +4,11 @@
  * of reports in front; and dashes for curves that coincide. */
 export const PALETTE = [
   ["#0072B2", "#56B4E9"],
-  ["#B97F00", "#F0A05A"],
+  ["#D55E00", "#F0A05A"],
   ["#009E73", "#3FCF9F"],
   ["#CC79A7", "#CC79A7"],
   ["#3A9BD4", "#F0E442"],
-  ["#D55E00", "#D55E00"],
+  ["#B97F00", "#D55E00"],
 ];
 export const DASHES = ["", "7 3", "2 2.5", "9 3 2 3", "12 3", "5 2 1 2 1 2"];
 export const CHANNELS = { red: "#d1495b", green: "#2f9e6d", blue: "#3f7fd6" };
