@@ -20,7 +20,11 @@ from .mitsuba import llvm  # noqa: E402
 
 llvm.point_to_extra()  # before Mitsuba is imported, which loads LLVM
 
+import drjit as dr  # noqa: E402
 import mitsuba as mi  # noqa: E402
+
+if dr.thread_count() < 2:  # on one processor, where Mitsuba would wait for ever for its first bitmap
+    dr.set_thread_count(2)
 
 __version__ = "0.1.0"
 

@@ -16,7 +16,7 @@ import mitsuba as mi
 
 from .lobes import Lobe
 from .lobes.uniform import Uniform
-from .parameters import Parameter, ParameterRow, PropertyReader
+from .parameters import Parameter, ParameterRow, PropertyReader, Rotation
 from .parameters.parameter import BoundParameters
 from .parameters.xml import to_xml
 
@@ -110,9 +110,14 @@ class Plugin:
         cls.plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
         if isinstance(cls.plugins, str):
             raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
-        for name in (name for parameter in cls.declared() for name in (parameter.name, *parameter.names)):
+        declared = [it for base in cls.__mro__ for it in vars(base).values() if isinstance(it, Parameter)]
+        for name in (name for parameter in declared for name in (parameter.name, *parameter.names)):
             if hasattr(Model, name) or name in MEMBERS:
                 raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model.")
+
+        turns = [parameter.name for parameter in cls.declared() if isinstance(parameter, Rotation)]
+        if len(turns) > 1:
+            raise TypeError(f"{cls.__name__}: {' and '.join(turns)} each turn the frame; declare one Rotation().")
 
     def __init__(self, props: mi.Properties):
         reader = PropertyReader(self.plugins[0], props)

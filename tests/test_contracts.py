@@ -11,7 +11,7 @@ from mi_brdfs.microfacet.distributions import Beckmann
 from mi_brdfs.microfacet.fresnel import Unit
 from mi_brdfs.microfacet.shadowing import VCavity
 from mi_brdfs.mitsuba.errors import one_line
-from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Spelling
+from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Rotation, Spelling
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb", "as_before")
 
@@ -24,6 +24,14 @@ def model(lobes, **declared):
 
 def matte(self, p):
     return (LambertLobe(p.reflectance),)
+
+
+class Slanted(LambertLobe):
+    """Brighter where wi leans towards the first tangent."""
+
+    def eval_pdf(self, wi, wo):
+        value, pdf = super().eval_pdf(wi, wo)
+        return value * (1 + wi.x / 2), pdf
 
 
 def radiance(**given):
@@ -155,10 +163,25 @@ def test_a_lobe_without_an_albedo_is_named():
         radiance()
 
 
-@pytest.mark.parametrize("name", ["lobes", "evaluate", "parameters", "textures", "energy", "plugins", "id", "type"])
+TAKEN = "lobes", "evaluate", "declared", "parameters", "textures", "energy", "plugins", "id", "type"
+
+
+@pytest.mark.parametrize("name", TAKEN)
 def test_a_parameter_is_not_called_like_what_models_have(name):
     with pytest.raises(TypeError, match=f"Slip: a parameter cannot be called {name}, an attribute of every model."):
         model(**({"lobes": matte} | {name: Number(1, (0, 1), "number")}))
+
+
+def test_a_rotation_turns_the_frame_under_any_name():
+    slanted = lambda self, p: (Slanted(p.reflectance),)  # noqa: E731
+    model(slanted, reflectance=Reflectance(0.5, "albedo"), turn=Rotation(), rotation=Number(1, (0, 2), "number"))
+    assert radiance(rotation=0.3) == pytest.approx(0.5 * 1.25)
+    assert radiance(turn=0.5) == pytest.approx(0.5 * 0.75)
+
+
+def test_one_rotation_turns_the_frame():
+    with pytest.raises(TypeError, match=r"Slip: turn and nap each turn the frame; declare one Rotation\(\)."):
+        model(matte, turn=Rotation(), nap=Rotation())
 
 
 def test_plugins_are_a_tuple():

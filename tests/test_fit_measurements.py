@@ -15,10 +15,12 @@ import mi_brdfs
 from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
 from mi_brdfs.fit.observations import solid_angles
 from mi_brdfs.fit.unknowns import configurations
+from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.measured import Axis, Grid, Measurement, Samples
 from mi_brdfs.measured.coordinates import HalfDifference, Spherical
 from mi_brdfs.mitsuba.registry import find_model
 from mi_brdfs.observer import to_srgb
+from mi_brdfs.parameters import Reflectance, Rotation
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -136,6 +138,27 @@ def test_anisotropic_data_have_anisotropic_parameters():
         u, v, turn = v, u, turn + 0.25
     assert (u, v) == (pytest.approx(0.1, rel=1e-3), pytest.approx(0.3, rel=1e-3))
     assert np.cos(4 * np.pi * (turn - 0.1)) == pytest.approx(1, abs=1e-5)
+
+
+@pytest.mark.usefixtures("as_before")
+def test_a_nap_is_turned_by_more_than_a_quarter():
+    """Half a turn changes a cloth with a nap."""
+
+    class Napped(LambertLobe):
+        glossy = anisotropic = True
+
+        def eval_pdf(self, wi, wo):
+            value, pdf = super().eval_pdf(wi, wo)
+            return value * (1 + wi.x / 2) * (1 + wo.x / 2), pdf
+
+    nap = {"reflectance": Reflectance(0.3, "albedo"), "rotation": Rotation()}
+    members = {"__doc__": "Cloth with a nap.", "lobes": lambda self, p: (Napped(p.reflectance),), **nap}
+    mi_brdfs.register(type("Nap", (mi_brdfs.Model,), members))
+    wi, wo = pairs(1000, 5)
+    f = 0.4 / np.pi * np.prod([1 + ref.rotate(w, 0.6)[:, :1] / 2 for w in (wi, wo)], axis=0)
+    (it,) = fit(Measurement(Path("nap"), "made", Samples(wi, wo, f, True), np.array([550.0])), "nap", starts=4)
+    assert it.bsdf["reflectance"] == pytest.approx(0.4, rel=1e-4)
+    assert it.bsdf["rotation"] == pytest.approx(-0.4, abs=1e-4)
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Registration: in any order, in every variant, beside whatever is there."""
 
+import os
 import re
 import subprocess
 import sys
@@ -39,6 +40,15 @@ def test_any_order_in_llvm(monkeypatch):
     """Where the LLVM is safe that Dr.Jit takes if it is imported first."""
     monkeypatch.setenv(llvm.VARIABLE, llvm.extra_library())
     assert run(AFTER.format("llvm_ad_rgb") + CHECK) == "Ward llvm_ad_rgb\n"
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way to leave a process one processor here")
+def test_one_processor_reads_and_writes_bitmaps(tmp_path):
+    """There, Mitsuba alone waits for ever."""
+    alone = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))}); import mi_brdfs, mitsuba as mi"
+    path = str(tmp_path / "grey.exr")
+    there = f"; mi.set_variant('scalar_rgb'); mi.Bitmap(mi.TensorXf([0.5] * 72, (4, 6, 3))).write({path!r})"
+    assert run(f"{alone}{there}; print(mi.Bitmap({path!r}).size())") == "[6, 4]\n"
 
 
 def test_variant_context():

@@ -27,17 +27,21 @@ from mi_brdfs.mitsuba.integrator import LANES
             "plate.bsdf.specular_reflectance.value", "light0.intensity.value", "light0.position",
             "light1.radiance.value", "integrator.ambient.value",
         ]),
-        (8, 0.3, ["light2.bsdf.opacity.value", "plate.bsdf.diffuse_reflectance.value", "integrator.ambient.value"]),
+        (8, 0.3, [
+            "light2.bsdf.opacity.value", "light2.bsdf.nested_bsdf.alpha.value", "plate.bsdf.diffuse_reflectance.value",
+            "integrator.ambient.value",
+        ]),
     ],
     ids=["", "in passes, through a mask"],
 )  # fmt: skip
 def test_differentiable(lanes, opacity, keys, monkeypatch):
-    """By the logarithms of parameters of BSDFs, of lights and of the ambient light, as finite differences have it."""
+    """By the logarithms of parameters of BSDFs, of lights and of the ambient light, as finite differences have it, and
+    forward by all of them."""
     monkeypatch.setattr(adapter, "LANES", lanes)
     bsdf = {"type": "phong", "normalization": "original", "exponent": 10.0}
     others = [{"type": "point", "position": [1, 0.5, 2], "intensity": 4.0}, SKY | {"radiance": 0.1}]
     if opacity:
-        mask = {"type": "mask", "opacity": opacity, "inner": {"type": "twosided", "inner": WHITE}}
+        mask = {"type": "mask", "opacity": opacity, "inner": {"type": "walter", "alpha": 0.3}}
         T = mi.ScalarTransform4f
         others.append({"type": "rectangle", "to_world": T().translate([0, 0, 1]).scale(9), "bsdf": mask})
     settings = {"ambient": 0.2, "environment_reflection": True, "tonemap": "reinhard"}
@@ -53,6 +57,11 @@ def test_differentiable(lanes, opacity, keys, monkeypatch):
     params.update()
     dr.backward(mean(seed=0))
     gradients = {key: np.sum(np.array(dr.grad(params[key])) * np.array(originals[key])) for key in keys}
+    for key, original in originals.items():
+        dr.set_grad(params[key], original)
+    params.update()
+    forward = dr.forward_to(mean(seed=0))
+    assert np.array(forward).item() == pytest.approx(sum(gradients.values()), rel=1e-3)
     for key, original in originals.items():
         ends = []
         for factor in (1.01, 0.99):

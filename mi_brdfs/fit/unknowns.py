@@ -92,9 +92,9 @@ class Unknown:
         return SCALES[self.scale].slope(x, self.high + self.low)
 
     def shown(self, x: float) -> float:
-        """Return a value as a plugin dict has it, without half turns, and at an end of the range that end itself."""
+        """Return a value as a plugin dict has it, without whole turns, and at an end of the range that end itself."""
         if self.scale == "turns":
-            return x - round(2 * x) / 2
+            return x - round(x)
         if not self.at_end(x):
             return x
         k = int(abs(x - self.high) < abs(x - self.low))

@@ -10,6 +10,7 @@ import mitsuba as mi
 from ..lobes import Lobe, Mixture
 from ..math import clamp, select
 from ..model import Model, Plugin, Values, warn_once
+from ..parameters import Rotation
 from ..parameters.colours import evaluate_colour
 from ..variants import is_scalar
 
@@ -37,6 +38,8 @@ class ModelBSDF:
         # A member, too: Dr.Jit looks for what a frozen function reads among a BSDF's members and their lists and dicts,
         # but not in other Python objects.
         self.textures, self.captured = self.model.textures, self.model.captured
+        declared = self.model.parameters.items()
+        self.rotation = next((name for name, it in declared if isinstance(it, Rotation)), None)
         self.shapes = {name: dr.shape(it) for name, it in self.model.arrays.items()}
 
         flags = mi.BSDFFlags
@@ -97,7 +100,8 @@ class ModelBSDF:
         if valid is False:
             return None
         p = self.model.evaluate(si, valid)
-        frame = LobeFrame(getattr(p, "rotation", None), select(si.wi.z < 0, valid, False) if any(transmits) else None)
+        turn = getattr(p, self.rotation) if self.rotation else None
+        frame = LobeFrame(turn, select(si.wi.z < 0, valid, False) if any(transmits) else None)
         # Replace wi in inactive lanes by a valid direction: a NaN would enter the derivatives.
         wi = frame.to_local(select(valid, si.wi, mi.Vector3f(0, 0, 1)))
         lobes = self._lobes(p)

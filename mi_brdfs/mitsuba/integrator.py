@@ -131,13 +131,14 @@ class PixelCentreIntegrator:
         if isinstance(sensor, int):
             sensor = scene.sensors()[sensor]
         film, sampler = sensor.film(), self._sampler(sensor, spp)
-        if samples_at_once(film, sampler) == sampler.sample_count():
-            return mi.SamplingIntegrator.render_forward(self, scene, params, sensor, seed, spp)
         sums, tangent = mi.Vector4f(0), mi.Vector4f(0)
         with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):
             for passed in self._passes(scene, sensor, sampler, seed):
+                # From the parameters: Dr.Jit refuses to go to the sums where other results of a call come to nothing.
                 # Later passes need the gradients of the parameters, too.
-                tangent += dr.forward_to(passed, flags=dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
+                dr.enqueue(dr.ADMode.Forward, dict(params))
+                dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
+                tangent += dr.grad(passed)
                 sums += dr.detach(passed)
                 dr.eval(sums, tangent)
         dr.enable_grad(sums)
