@@ -36,9 +36,11 @@ def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters:
     return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient, merge=True)
 
 
-def load(path: Path, parameters: Mapping[str, str], lenient: bool = False, merge: bool = False) -> Any:
-    """Load a scene file, old or new. With ``merge``, as Mitsuba does it, BSDFs that are alike become one, and meshes
-    with the same BSDF: it is faster, and ids are lost."""
+def load(
+    path: Path, parameters: Mapping[str, str], lenient: bool = False, merge: bool = False, only: str | None = None
+) -> Any:
+    """Load a scene file, old or new, or ``only`` the BSDF in it with an id. With ``merge``, as Mitsuba does it, BSDFs
+    that are alike become one, and meshes with the same BSDF: it is faster, and ids are lost."""
     with looking_in(path.parent):
         config = mi.parser.ParserConfig(mi.variant())
         state, upgraded = parsed(config, path, lenient, parameters)
@@ -47,12 +49,25 @@ def load(path: Path, parameters: Mapping[str, str], lenient: bool = False, merge
         config.merge_meshes = merge and "flip_normals" not in (upgraded or "")
         try:
             mi.parser.transform_all(config, state)
+            if only is not None:
+                state.nodes[0] = state.nodes[_bsdfs(state)[only]]
             return instantiated(config, state)
         except RuntimeError as error:  # of a file that was given a version
             place = "string" if upgraded else str(path)
             raise RuntimeError(
                 str(error).replace("loading string (line", f"loading {place} (line")
             ) from error.__cause__
+
+
+def ids_of_bsdfs(path: Path, parameters: Mapping[str, str]) -> list[str]:
+    """Return the ids of all BSDFs of a scene file, whether or not a shape has them."""
+    with looking_in(path.parent):
+        return list(_bsdfs(parsed(mi.parser.ParserConfig(mi.variant()), path, False, parameters)[0]))
+
+
+def _bsdfs(state: Any) -> dict[str, int]:
+    """Return where the BSDFs with ids are in a parsed scene."""
+    return {it.props.id(): k for k, it in enumerate(state.nodes) if it.type == mi.ObjectType.BSDF and it.props.id()}
 
 
 def load_text(text: str, parameters: Mapping[str, str]) -> Any:

@@ -17,7 +17,8 @@ import mitsuba as mi
 from .lobes import Lobe
 from .lobes.uniform import Uniform
 from .parameters import Parameter, ParameterRow, PropertyReader, Rotation
-from .parameters.parameter import BoundParameters
+from .parameters.messages import interval
+from .parameters.parameter import BoundParameters, nested
 from .parameters.xml import to_xml
 
 ENERGY_NOTE = """\
@@ -115,6 +116,11 @@ class Plugin:
             if hasattr(Model, name) or name in MEMBERS:
                 raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model.")
 
+        for it in (it for parameter in nested(cls.declared()) for way in parameter.spellings for it in way):
+            if it.default is not None and not it.limits[0] <= it.default <= it.limits[1]:
+                raise TypeError(
+                    f"{cls.__name__}: {it.name} is {it.default} by default, not within {interval(*it.limits)}."
+                )
         turns = [parameter.name for parameter in cls.declared() if isinstance(parameter, Rotation)]
         if len(turns) > 1:
             raise TypeError(f"{cls.__name__}: {' and '.join(turns)} each turn the frame; declare one Rotation().")

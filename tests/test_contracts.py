@@ -184,6 +184,11 @@ def test_one_rotation_turns_the_frame():
         model(matte, turn=Rotation(), nap=Rotation())
 
 
+def test_a_default_is_in_range():
+    with pytest.raises(TypeError, match=r"Slip: gloss is 2 by default, not within \[0, 1\]."):
+        model(matte, gloss=Number(2, (0, 1), "number"))
+
+
 def test_plugins_are_a_tuple():
     with pytest.raises(TypeError, match=r'Slip: plugins is a tuple of names; write plugins = \("slip",\).'):
         model(matte, plugins="slip")

@@ -552,11 +552,13 @@ def test_materials_that_instances_show(llvm_rgb, tmp_path):
 
 def test_each_material_of_a_scene_is_its_own(llvm_rgb, tmp_path):
     path = tmp_path / "twins.xml"
-    path.write_text(TWINS.replace("<shape", '<bsdf id="unused" type="diffuse"/><shape', 1))
+    unused = '<bsdf id="unused" type="twosided"><bsdf id="inside" type="diffuse"/></bsdf><shape'
+    path.write_text(TWINS.replace("<shape", unused, 1))
     assert [it.name for it in find_sources(str(path))] == ["twins.xml:one", "twins.xml:other"]
     grey = BSDFSource("lambert", "lambert", "lambert")
-    with pytest.raises(ValueError, match="nothing in the scene has the BSDF unused"):
-        SceneFile(str(path), replaced={"unused": grey}).load()
+    for id in ("unused", "inside"):
+        with pytest.raises(ValueError, match=f"nothing in the scene has the BSDF {id}"):
+            SceneFile(str(path), replaced={id: grey}).load()
 
 
 TWISTED = """<scene version="3.0.0"><integrator type="direct"/><emitter type="constant"/>

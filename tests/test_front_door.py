@@ -220,6 +220,13 @@ def test_files_keep_apart_what_has_the_name_of_another(tmp_path):
     assert getattr(sys.modules.get("pyclbr"), "__file__", "") != str(files[2])
 
 
+def test_a_file_imports_what_is_beside_it(tmp_path):
+    (tmp_path / "tones.py").write_text("WHITE = 1.0")
+    (tmp_path / "toned.py").write_text(f"from tones import WHITE\n{GUEST.replace('Chalk', 'Toned')}")
+    guests.import_models(str(tmp_path / "toned.py"))
+    assert "toned" in mi_brdfs.list_models()
+
+
 def test_models_that_a_function_makes_are_told_apart_by_their_names():
     def made(name):
         return mi_brdfs.register(type("Made", (EON,), {"__doc__": "Made.", "plugins": (name,)}))

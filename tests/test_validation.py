@@ -546,6 +546,7 @@ def test_delta_functions_carry_what_they_carry_alone():
         ("all reflected", "which goes to the other side"),
         ("values", "but must be 0, as it is a delta function"),
         ("no number", "but must be finite"),
+        ("no number", "its albedo is no number: light"),
     ],
 )
 def test_delta_functions_alone_are_judged_by_their_samples(fault, told):

@@ -268,9 +268,12 @@ SCENE = """<scene version="3.0.0"><default name="n" value="10"/>
 </scene>"""
 
 
+LIBRARY = """<bsdf type="twosided" id="sheet"><bsdf type="ward" id="gloss"/></bsdf></scene>"""
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 def test_materials_of_a_scene(tmp_path):
-    """Each once, by its id or else its class, without the black ones of lamps."""
+    """Each once, by its id or else its class, without the black ones of lamps; by an id any, also without a shape."""
     path = tmp_path / "s.xml"
     path.write_text(SCENE)
     names = ["TwoSidedBRDF of Ward", "Ward 1", "Ward 2", "lit", "plastic"]
@@ -282,6 +285,12 @@ def test_materials_of_a_scene(tmp_path):
     assert sorted(alphas) == pytest.approx([0.1, 0.3])
     with pytest.raises(ValueError, match="no such material; there are TwoSidedBRDF of Ward, Ward 1"):
         list(find_sources(f"{path}:gold"))
+    path.write_text(SCENE[: SCENE.index("<shape")] + LIBRARY)
+    with pytest.raises(ValueError, match=r"s.xml: no shape of the scene has a material; name one of its BSDFs, as .*:"):
+        list(find_sources(str(path)))
+    found = {id: next(find_sources(f"{path}:{id}", {"n": "7"})).load() for id in ("plastic", "sheet", "gloss")}
+    assert [str(it).partition("[")[0] for it in found.values()] == ["Phong", "TwoSided", "Ward"]
+    assert mi.traverse(found["plastic"])["exponent.value"] == 7
     (path := tmp_path / "a:b=c.xml").write_text('<!-- >< -->\n<bsdf type="ward"/>')  # no version, a trap of a name
     assert [source.name for source in find_sources(str(path))] == ["a:b=c.xml"]
 

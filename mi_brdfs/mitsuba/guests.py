@@ -111,6 +111,8 @@ def _of_file(path: Path) -> ModuleType:
     spec: Any = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # where dataclasses and pickle look it up
+    if (folder := str(path.parent.resolve())) not in sys.path:
+        sys.path.append(folder)  # what it imports may be beside it
     exec(spec.loader.source_to_code(path.read_bytes(), str(path)), module.__dict__)  # caches miss quick edits
     _files[name] = str(path.resolve())
     return module

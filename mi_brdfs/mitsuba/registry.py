@@ -119,9 +119,12 @@ def _register_term(term: type[Term], replace: bool) -> None:
         raise ValueError(
             f'{name}: the word "{word}" belongs to {owner}; take another one, or register with replace=True.'
         )
-    taken = {name for parameter in Microfacet.declared() if parameter is not choice for name in parameter.names}
-    if clash := next((name for it in term.parameters for name in (it, f"{it}_u", f"{it}_v") if name in taken), None):
-        raise ValueError(f"{name}: a parameter cannot be called {clash}, a parameter of microfacet.")
+    names = {each for it in term.parameters for each in (it, f"{it}_u", f"{it}_v")}
+    for model in all_models():
+        choosing = [it for it in model.declared() if getattr(it, "terms", None) is choice.terms]
+        others = [it for it in model.declared() if it not in choosing] if choosing else []
+        if clash := next((name for it in others for name in it.names if name in names), None):
+            raise ValueError(f"{name}: a parameter cannot be called {clash}, a parameter of {model.plugins[0]}.")
     choice.add_term(term)
 
 

@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,8 +36,8 @@ class BSDFSource(NamedTuple):
     """What a user may give for it."""
     source: str
     """The type of a plugin, XML text, or the path of a scene, of fits or of a measured file."""
-    material: int | None = None
-    """Which of the scene's materials, or of the fits."""
+    material: int | str | None = None
+    """Which of the scene's materials, or of its BSDFs by its id, or of the fits."""
     parameters: Mapping[str, str] = {}
     """Those of the plugin, or of the XML, with their values as text."""
 
@@ -53,11 +53,12 @@ class BSDFSource(NamedTuple):
             return published.preset(self.source) | values
         if is_measured(self.source):
             return tabulated(self.path) | values
-        if self.material is not None and self.source.endswith(".json"):
+        if isinstance(self.material, int) and self.source.endswith(".json"):
             return _fits(Path(self.source))[self.material]["bsdf"] | values
         if self.source.endswith(".xml"):
-            loaded = loading.load(Path(self.source), self.parameters)
-            return loaded if self.material is None else _materials(loaded)[self.material]
+            only = self.material if isinstance(self.material, str) else None
+            loaded = loading.load(Path(self.source), self.parameters, only=only)
+            return _materials(loaded)[self.material] if isinstance(self.material, int) else loaded
         if self.source.startswith("<"):
             return loading.load_text(self.source, self.parameters)
         return {"type": self.source} | values
@@ -74,7 +75,7 @@ def measured_file(given: Mapping[str, Any]) -> tuple[str, Any] | None:
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
     """Yield the BSDFs that a word stands for: the type of a plugin, the name of a published material, a ``<bsdf …>`` as
     text, the path of a measured file, which ``tabulated`` renders, the path of a scene, whose materials count once each
-    and those of lamps only if they reflect, or one of them as ``scene.xml:id``, the path of the JSON of fits, or one of
+    and those of lamps only if they reflect, or any BSDF in it as ``scene.xml:id``, the path of the JSON of fits, or one of
     them as ``fit.json:model``. Parameters are those of the plugin, or the values of the ``<default>`` elements of XML;
     those of the word itself (:func:`split`) go before.
 
@@ -109,10 +110,13 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     loaded = load(loaded) if isinstance(loaded, dict) else loaded
     if isinstance(loaded, mi.Scene) and is_file:
         names = _distinct([name_of(bsdf) for bsdf in _materials(loaded)])
-        if not names:
-            raise ValueError(f"{path}: no shape of the scene has a material")
-        for each in _chosen(source, names, wanted):
-            yield each._replace(name=each.name + _suffix(parameters))
+        others = [id for id in loading.ids_of_bsdfs(path, parameters) if id not in names]
+        if not (names or wanted):
+            hint = f"; name one of its BSDFs, as {path}:{others[0]}" if others else ""
+            raise ValueError(f"{path}: no shape of the scene has a material{hint}")
+        for each in _chosen(source, [*names, *(others if wanted else [])], wanted):
+            chosen = wanted if wanted in others else each.material
+            yield each._replace(name=each.name + _suffix(parameters), material=chosen)
     elif isinstance(loaded, mi.BSDF) and not wanted:
         yield source._replace(name=(name_of(loaded) if is_text else source.name) + _suffix(parameters))
     else:
@@ -260,7 +264,7 @@ def _suffix(parameters: Mapping[str, str]) -> str:
     return "".join(f" {name}={value}" for name, value in parameters.items())
 
 
-def _chosen(source: BSDFSource, names: list[str], wanted: str) -> Iterator[BSDFSource]:
+def _chosen(source: BSDFSource, names: Iterable[str], wanted: str) -> Iterator[BSDFSource]:
     """Yield the materials of a file, or the one that is wanted."""
     path = Path(source.source)
     if wanted and wanted not in names:

@@ -113,8 +113,7 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
         raise ValueError(f"no BSDF or shape has the id {id}; there are {', '.join(sorted(ids)) or 'none with one'}")
     is_shape = state.nodes[ids[id]].type == mi.ObjectType.Shape
     found = False
-    places = [state.nodes[ids[id]]] if is_shape else [it for it in state.nodes if it.type != mi.ObjectType.Scene]
-    for node in places:
+    for node in [state.nodes[ids[id]]] if is_shape else _used(state):
         for name in node.props.keys():
             value = node.props[name]
             if isinstance(value, mi.Properties.ResolvedReference):
@@ -128,6 +127,20 @@ def _replace(state: Any, id: str, bsdf: mi.BSDF) -> None:
         state.nodes[ids[id]].props["bsdf"] = bsdf
     elif not found:
         raise ValueError(f"nothing in the scene has the BSDF {id}; name another one, or a shape")
+
+
+def _used(state: Any) -> list[Any]:
+    """Return the nodes of a scene without itself and without BSDFs that nothing else has."""
+    used = [k for k, it in enumerate(state.nodes) if it.type not in (mi.ObjectType.Scene, mi.ObjectType.BSDF)]
+    for k in used:  # which grows
+        used += [it for it in _inner(state.nodes[k]) if it not in used]
+    return [state.nodes[k] for k in used]
+
+
+def _inner(node: Any) -> list[int]:
+    """Return which nodes a node refers to."""
+    values = [node.props[name] for name in node.props.keys()]
+    return [it.index() for it in values if isinstance(it, mi.Properties.ResolvedReference)]
 
 
 def on_both_sides(bsdf: mi.BSDF) -> mi.BSDF:
@@ -195,8 +208,6 @@ def _set_box_filters(state: Any) -> None:
         if node.type == mi.ObjectType.ReconstructionFilter:
             node.props = mi.Properties("box")
     for node in state.nodes:
-        children = [node.props[name] for name in node.props.keys()]
-        places = [it.index() for it in children if isinstance(it, mi.Properties.ResolvedReference)]
-        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in places)
+        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in _inner(node))
         if node.type == mi.ObjectType.Film and not filtered:
             node.props["rfilter"] = mi.load_dict({"type": "box"})

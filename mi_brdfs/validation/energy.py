@@ -53,7 +53,8 @@ def albedo(run: Run) -> Findings:
             words = f"light from {place} is reflected {means[k]:.4g} times{'' if alike else f' in channel {k + 1}'}"
             found.append(Reflected(place, mean, float(least[k]), words))
             if limits.largest is not None and least[k] > (limits.largest + added) * (1 + TOLERANCE):
-                words = f"it gains energy: {words} (± {noises[k]:.1g}), more than {limits.reason}"
+                fault = "its albedo is no number" if np.isnan(means[k]) else "it gains energy"
+                words = f"{fault}: {words} (± {noises[k]:.1g}), more than {limits.reason}"
                 outcome.fault(words, least[k], wi=wi)
         finding = _judged(part, outcome, found, limits)
         causes = sampling.weight, sampling.pdf, sampling.chi2
