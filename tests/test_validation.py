@@ -287,6 +287,9 @@ FALSE_ALARMS = {
     "line of ward": case(NARROW, "ward", 60, alpha_u=0.906, alpha_v=0.0003),
     "line of walter": case(NARROW, "walter", alpha_u=0.5, alpha_v=0.001),
     "line at the normal": case(NARROW, "ward", 0, variant="ward", alpha_u=0.00015),
+    "what fades above the horizon": case(
+        "continuity", "microfacet", alpha=1.326109236523212, shadowing="smith-correlated", multiscatter="kulla-conty"
+    ),
     "hard edges": case(NARROW, "toon", 80, diffuse_threshold=0.62, specular_reflectance=1.0, specular_smooth=0.0),
     "a lobe below the horizon": case("chi2 pdf", "lafortune", cx=-0.4, cy=-1.5, cz=-1.5),
     "a black band": case("chi2 pdf", "toon", diffuse_threshold=1.0, diffuse_smooth=0.0),

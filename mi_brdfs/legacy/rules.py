@@ -196,16 +196,16 @@ def _map(work: Work, element: Element) -> Element | None:
         if element.type == "normalmap":
             texture.name = "normalmap"
         target = work.resolved(texture)
+        own = target.copy(texture.name)  # others may refer to it for colours
         if target.scale != [1.0]:
             if element.type == "bumpmap":
                 element.set("scale", sum(target.scale) / len(target.scale))
-                target.scale = [1.0]
+                own.scale = [1.0]
+                element.children[element.children.index(texture)] = own
                 work.changed(element, "the texture scale in bumpmap is its parameter scale")
         elif target.type == "bitmap" and not target["raw"]:
-            # 0.6 asks for its gamma, as a rule 1. Others may refer to it for colours.
-            linear = target.copy(texture.name)
-            linear.set("raw", True)
-            element.children[element.children.index(texture)] = linear
+            own.set("raw", True)  # 0.6 asks for its gamma, as a rule 1
+            element.children[element.children.index(texture)] = own
             work.changed(target, f"the bitmap of {element.type} is read as linear numbers")
             continue
         if target.type == "bitmap" and target.text("raw") != "true" and work.values(target).shape[1] > 1:

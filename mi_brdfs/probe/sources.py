@@ -75,9 +75,9 @@ def measured_file(given: Mapping[str, Any]) -> tuple[str, Any] | None:
 def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iterator[BSDFSource]:
     """Yield the BSDFs that a word stands for: the type of a plugin, the name of a published material, a ``<bsdf …>`` as
     text, the path of a measured file, which ``tabulated`` renders, the path of a scene, whose materials count once each
-    and those of lamps only if they reflect, or any BSDF in it as ``scene.xml:id``, the path of the JSON of fits, or one of
-    them as ``fit.json:model``. Parameters are those of the plugin, or the values of the ``<default>`` elements of XML;
-    those of the word itself (:func:`split`) go before.
+    and those of lamps only if they reflect, or any BSDF in it as ``scene.xml:id``, the path of the JSON of fits, or one
+    of them as ``fit.json:model``. Parameters are those of the plugin, or the values of the ``<default>`` elements of
+    XML; those of the word itself (:func:`split`) go before.
 
     Raises:
         ValueError: if it stands for none.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache, partial
 
 import mitsuba as mi
@@ -245,31 +245,40 @@ def _check_crossings(run: Run, outcome: Outcome, part: Part, side: int) -> tuple
 def _jump_elsewhere(run: Run, part: Part, side: int) -> float:
     """Return by how much values jump, at least, on one in a hundred of the ways from a pair of directions to another:
     over no distance, whether the azimuths on the way start again at 180° or at 0."""
-    found, ways = np.inf, 1000
+    found, count = np.inf, 1000
     for begin in (-180, 0):
         low = np.array([0, begin, 0, begin])[:, None]
-        start, end = np.random.default_rng(24).uniform(low, low + np.array([80, 360] * 2)[:, None], (2, 4, ways))
+        start, end = np.random.default_rng(24).uniform(low, low + np.array([80, 360] * 2)[:, None], (2, 4, count))
 
         def values(t: Array, start: Array = start, end: Array = end) -> Array:
             theta_i, phi_i, theta_o, phi_o = start + t * (end - start)
             pair = direction(theta_i, phi_i), direction(theta_o, phi_o)
             return run.probe.eval(part, *(on_side(w.T, side) for w in pair)).max(axis=1)
 
-        t = np.linspace(0, np.ones(ways), 33)
+        t = np.linspace(0, np.ones(count), 33)
         f = np.stack([values(it) for it in t])
-        largest, lanes = abs(np.diff(f, axis=0)).argmax(axis=0), np.arange(ways)
-        (t0, t1), (f0, f1) = ((it[largest, lanes], it[largest + 1, lanes]) for it in (t, f))
-        changes = []
-        for _ in range(HALVINGS):
-            middle = (t0 + t1) / 2
-            value = values(middle)
-            first = abs(value - f0) > abs(f1 - value)
-            t0, t1 = np.where(first, t0, middle), np.where(first, middle, t1)
-            f0, f1 = np.where(first, f0, value), np.where(first, value, f1)
-            changes.append(abs(f1 - f0))
+        largest, lanes = abs(np.diff(f, axis=0)).argmax(axis=0), np.arange(count)
+        ways, ends = ((it[largest, lanes], it[largest + 1, lanes]) for it in (t, f))
+        f0, f1, changes = _narrowed(values, *ways, *ends)
         jump = np.where(changes[-1] > 0.5 * changes[-4], relative(f0, f1, 1e-6, unknown=0), 0)
         found = min(found, float(np.quantile(jump, 0.99)))
     return found
+
+
+def _narrowed(
+    values: Callable[[Array], Array], t0: Array, t1: Array, f0: Array, f1: Array
+) -> tuple[Array, Array, list[Array]]:
+    """Return the values at the ends of ways after the last of some halvings, each time to where they change more, and
+    the changes after each."""
+    changes = []
+    for _ in range(HALVINGS):
+        middle = (t0 + t1) / 2
+        value = values(middle)
+        first = abs(value - f0) > abs(f1 - value)
+        t0, t1 = np.where(first, t0, middle), np.where(first, middle, t1)
+        f0, f1 = np.where(first, f0, value), np.where(first, value, f1)
+        changes.append(abs(f1 - f0))
+    return f0, f1, changes
 
 
 def _changes(values: Array) -> Array:
@@ -279,12 +288,13 @@ def _changes(values: Array) -> Array:
 
 
 def _check_grazing(run: Run, outcome: Outcome, part: Part, side: int, phi: float) -> None:
-    """Check that values change no more while the height above the horizon halves than while it halves before and after:
-    a power of the height changes alike. Of the pairs, as many may jump as there are hard edges in a STEP elsewhere, and
-    three by chance."""
+    """Check that values change no more while the height above the horizon halves than while it halves before and after,
+    as a power of the height does, unless they fade away there. Of the pairs, as many may jump as there are hard edges
+    in a STEP elsewhere, and three by chance."""
     step = np.degrees(STEP)
     # Far above the horizon only hard edges jump, the more often the farther apart two heights are.
-    angles = [70 - step * (OCTAVES[0] - 1), 70 + step, *(90 - step * times for times in OCTAVES)]
+    grazing = 90 - step * np.array(OCTAVES)
+    angles = [70 - step * (OCTAVES[0] - 1), 70 + step, *grazing]
     heights = [on_side(direction(angle, phi), side) for angle in angles]
     others = on_side(hemisphere(1000, 23), side)
     for word, both in _both_ways(run, part, heights, others):
@@ -294,11 +304,22 @@ def _check_grazing(run: Run, outcome: Outcome, part: Part, side: int, phi: float
         beside = np.pad(change, ((1, 1), (0, 0)))
         jump = lit & (change > np.log(32)) & (change > 4.5 * np.maximum(beside[:-2], beside[2:]))
         jump[0] = False  # a highlight may end there: without what lies above, a slope is no jump
-        if (jump.sum(axis=1) > np.maximum(0.01 * lit.sum(axis=1), 3) + usual).any():
-            octave, k = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
-            factor, (upper, lower) = np.exp(change[octave, k]), step * np.array(OCTAVES)[octave : octave + 2]
-            wi, wo = (heights[2 + octave], others[k])[:: 1 if word == "from" else -1]
-            told = f"for light {word} {upper:.3g}° to {lower:.3g}° above the horizon"
+        order, usual = (1 if word == "from" else -1), usual + np.maximum(0.01 * lit.sum(axis=1), 3)
+        if (jump.sum(axis=1) > usual).any():
+            upper, k = np.nonzero(jump)
+
+            def between(theta: Array, wo: Array = others[k], order: int = order) -> Array:
+                wi = on_side(direction(theta, np.full(len(theta), phi)).T, side)
+                return run.probe.eval(part, *(wi, wo)[::order]).max(axis=1)
+
+            ends = values[upper, k], values[upper + 1, k]
+            f0, f1, _ = _narrowed(between, grazing[upper], grazing[upper + 1], *ends)
+            jump[upper, k] = abs(f1 - f0) > np.maximum(*ends) / 32
+        if (jump.sum(axis=1) > usual).any():
+            octave, pair = np.unravel_index(int(np.argmax(np.where(jump, change, 0))), jump.shape)
+            factor, (high, low) = float(np.exp(change[octave, pair])), 90 - grazing[octave : octave + 2]
+            wi, wo = (heights[2 + octave], others[pair])[::order]
+            told = f"for light {word} {high:.3g}° to {low:.3g}° above the horizon"
             outcome.fault(f"eval jumps by the factor {factor:.3g} {told}", factor, wi=wi, wo=wo)
 
 
