@@ -143,7 +143,7 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     """Return the files among the targets, and the subjects of the page."""
     from ..explorer.materials import Materials, plain
     from ..explorer.state import GIVEN, MEASURED, PRESET, SUBJECTS, checked
-    from ..mitsuba.registry import presets
+    from ..mitsuba.registry import DATA, presets
     from ..probe.sources import is_measured, shared, split, value_of
 
     if len(targets) > SUBJECTS:
@@ -156,6 +156,8 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
         with failing(Exit.USAGE):
             word, own = split(target)
             texts = options | own
+            if word in DATA:
+                word = texts.pop("filename", word)
             values = plain({name: value_of(text) for name, text in texts.items()})
             if word in known:
                 subject = {**Materials().expanded({"type": PRESET, "name": word}), **values}

@@ -70,6 +70,8 @@ class Materials:
             return bsdf
         if kind in BUILT_IN:
             return bsdf
+        if kind in DATA:
+            raise StateError(f"{kind} needs a file; give the measured file itself.")
         if kind not in MODELS:
             known = [*MODELS, *BUILT_IN, MEASURED]
             near = meant(kind, known) or closest(kind, names())

@@ -96,8 +96,9 @@ class Element:
         return ValueError(f"{self.place}: {f'{self.tag} {self.type or self.name}'.strip()}: {text}.")
 
     def copy(self, name: str) -> Element:
-        """Return a copy with another name and without an id, which stays with the original."""
-        return replace(self, name=name, id=self.id if self.tag == "ref" else "", children=[*self.children])
+        """Return a copy with another name and without ids, which stay with the original."""
+        children = [it.copy(it.name) for it in self.children]
+        return replace(self, name=name, id=self.id if self.tag == "ref" else "", children=children)
 
     def of(self, *tags: str) -> list[Element]:
         """Return the children of some tags."""
