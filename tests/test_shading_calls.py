@@ -28,7 +28,7 @@ from mi_brdfs.mitsuba.integrator import LANES
             "light1.radiance.value", "integrator.ambient.value",
         ]),
         (8, 0.3, [
-            "light2.bsdf.opacity.value", "light2.bsdf.nested_bsdf.alpha.value", "plate.bsdf.diffuse_reflectance.value",
+            "light2.bsdf.opacity.value", "light2.bsdf.nested_bsdf.alpha.data", "plate.bsdf.diffuse_reflectance.value",
             "integrator.ambient.value",
         ]),
     ],
@@ -41,7 +41,9 @@ def test_differentiable(lanes, opacity, keys, monkeypatch):
     bsdf = {"type": "phong", "normalization": "original", "exponent": 10.0}
     others = [{"type": "point", "position": [1, 0.5, 2], "intensity": 4.0}, SKY | {"radiance": 0.1}]
     if opacity:
-        mask = {"type": "mask", "opacity": opacity, "inner": {"type": "walter", "alpha": 0.3}}
+        rough = {"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2), 0.3, np.float32)), "raw": True}
+        inner = {"type": "walter", "alpha": rough | {"format": "variant"}}
+        mask = {"type": "mask", "opacity": opacity, "inner": inner}
         T = mi.ScalarTransform4f
         others.append({"type": "rectangle", "to_world": T().translate([0, 0, 1]).scale(9), "bsdf": mask})
     settings = {"ambient": 0.2, "environment_reflection": True, "tonemap": "reinhard"}

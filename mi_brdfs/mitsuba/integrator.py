@@ -132,13 +132,12 @@ class PixelCentreIntegrator:
             sensor = scene.sensors()[sensor]
         film, sampler = sensor.film(), self._sampler(sensor, spp)
         sums, tangent = mi.Vector4f(0), mi.Vector4f(0)
-        with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, False):
+        # Recorded calls whose results come to nothing, as beside masks, cannot be differentiated in this direction.
+        recorded = dr.JitFlag.SymbolicLoops, dr.JitFlag.SymbolicCalls
+        with dr.scoped_set_flag(recorded[0], False), dr.scoped_set_flag(recorded[1], False):
             for passed in self._passes(scene, sensor, sampler, seed):
-                # From the parameters: Dr.Jit refuses to go to the sums where other results of a call come to nothing.
                 # Later passes need the gradients of the parameters, too.
-                dr.enqueue(dr.ADMode.Forward, dict(params))
-                dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
-                tangent += dr.grad(passed)
+                tangent += dr.forward_to(passed, flags=dr.ADFlag.ClearEdges | dr.ADFlag.ClearInterior)
                 sums += dr.detach(passed)
                 dr.eval(sums, tangent)
         dr.enable_grad(sums)
