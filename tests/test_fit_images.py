@@ -127,6 +127,24 @@ def test_a_texture_that_the_scene_holds(tmp_path):
 
 
 @pytest.mark.slow
+def test_noise_of_a_few_pixels_is_part_of_the_uncertainty():
+    """Of a highlight of some pixels: squares of sixteen that are taken as one each are too few to judge it by."""
+    lights = {"sky": {"type": "constant", "radiance": 0.5},
+              "lamp": {"type": "point", "position": [2, 4, 3], "intensity": 20.0}}  # fmt: skip
+
+    def scene(alpha):
+        metal = {"type": "walter", "alpha": alpha, "specular_reflectance": 0.4, "diffuse_reflectance": 0.3}
+        return scene_of(metal, size=24, lights=lights, integrator={"type": "path", "max_depth": 3})
+
+    errors = []
+    for seed in (3, 5, 6, 7):
+        picture = np.array(mi.render(scene(0.2), spp=256, seed=100 + seed))
+        found = images(scene(0.4), picture, ["ball.bsdf.alpha"], seed=seed)
+        errors.append((values(found)["alpha"] - 0.2) / found.sigma["ball.bsdf.alpha.value"])
+    assert np.sqrt(np.mean(np.square(errors))) < 2  # of four, once in 3000 by chance; by the squares alone 3.8
+
+
+@pytest.mark.slow
 def test_noise_of_derivatives_is_part_of_the_uncertainty():
     """On a narrow highlight they decide the last step, and leave few residuals: by these alone, errors are four times
     the standard deviations."""

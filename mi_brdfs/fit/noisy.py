@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..probe.arrays import Array
-from .rendered import Rendered
+from .rendered import BLOCK, Rendered
 from .solver import DAMPING, STRONGER, WEAKER, damped_steps
 
 TRIES = 4
@@ -89,7 +89,7 @@ def descend(
 def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
     are on the scales of the unknowns, NaN for those at an end of their range or without influence. Of two estimates the
-    larger one counts: by the residuals, whose noise may be common to near pixels (MacKinnon and White 1985, HC2), and
+    larger one counts: by the residuals, whose noise may be common to near pixels (MacKinnon and White 1985, HC3), and
     by what the step would be without one of the looks, as noise of the derivatives leaves no residuals: the jackknife
     (B. Efron, C. Stein, The jackknife estimate of variance, Annals of Statistics 9(3), 1981)."""
     looks = [_look(rendered, point) for _ in range(LOOKS)]
@@ -101,17 +101,22 @@ def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     if len(free):
         mean, jacobian = sum(look.residuals) / 2 + look.jacobian @ step, look.jacobian[:, free]
         bread = np.linalg.pinv(look.matrix[np.ix_(free, free)])
-        columns = [*(jacobian * mean[:, None]).T, ((jacobian @ bread) * jacobian).sum(axis=1)]
-        *scores, leverage = (np.bincount(rendered.blocks, column) for column in columns)
-        left = np.maximum(1 - leverage, 0.1)  # a block with weight pulls the step to itself
-        weighed = np.stack(scores) / np.sqrt(left)
-        # Blocks that decide a number by themselves leave no residual to judge it by: then that of all counts.
+        near = [_by_residuals(jacobian, mean, bread, rendered.groups(side)) for side in (1, BLOCK)]
+        # Pixels that decide a number by themselves leave no residual to judge it by: then that of all counts.
         alike = bread * (mean @ mean) / max(np.count_nonzero(mean) - len(free), 1)
         others = (_together([it for it in looks if it is not out]) for out in looks)
         steps = np.array([it.step(point, LEAST_DAMPING, rendered.box)[free] for it in others])
-        variances = np.diag(bread @ (weighed @ weighed.T) @ bread), np.diag(alike), (LOOKS - 1) * steps.var(axis=0)
+        variances = *near, np.diag(alike), (LOOKS - 1) * steps.var(axis=0)
         sigma[free] = np.sqrt(np.max(variances, axis=0))
     return end, sigma, look.cost
+
+
+def _by_residuals(jacobian: Array, residuals: Array, bread: Array, groups: Array) -> Array:
+    """Return the variances of a step by residuals that have noise in common within groups."""
+    columns = [*(jacobian * residuals[:, None]).T, ((jacobian @ bread) * jacobian).sum(axis=1)]
+    *scores, leverage = (np.bincount(groups, column) for column in columns)
+    weighed = np.stack(scores) / np.maximum(1 - leverage, 0.1)  # one with weight pulls the step to itself
+    return np.asarray(np.diag(bread @ (weighed @ weighed.T) @ bread))
 
 
 def _gaining(rendered: Rendered, look: Look, point: Array, damping: float) -> tuple[Array, float]:

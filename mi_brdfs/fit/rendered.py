@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -22,7 +21,7 @@ FLOOR = 0.1
 """What is added to it, as a part of the mean of the picture: dark pixels are noisy."""
 
 BLOCK = 4
-"""The side of a square of pixels that may have noise in common."""
+"""The side of a square of pixels that may have noise in common; if they have not, each counts by itself."""
 
 
 @dataclass(frozen=True)
@@ -114,13 +113,12 @@ class Rendered:
                          for _ in range(slot.channels)])  # fmt: skip
         return ends[:, 0], ends[:, 1]
 
-    @cached_property
-    def blocks(self) -> Array:
-        """The number of the square of pixels in which each residual is."""
+    def groups(self, side: int) -> Array:
+        """Return the number of the square of pixels, of a side, in which each residual is."""
         found, first = [], 0
         for view in self.views:
             height, width, channels = view.picture.shape
-            row, column = np.indices((height, width)) // BLOCK
+            row, column = np.indices((height, width)) // side
             number = row * (column.max() + 1) + column + first
             found.append(np.repeat(number.ravel(), channels))
             first = number.max() + 1
