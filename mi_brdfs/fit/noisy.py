@@ -89,7 +89,7 @@ def descend(
 def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     """Return ``(point, sigma, cost)`` after one more step, with more samples than the others: the standard deviations
     are on the scales of the unknowns, NaN for those at an end of their range or without influence. Of two estimates the
-    larger one counts: by the residuals, whose noise may be common to near pixels (MacKinnon and White 1985, HC3), and
+    larger one counts: by the residuals, whose noise may be common to near pixels (MacKinnon and White 1985), and
     by what the step would be without one of the looks, as noise of the derivatives leaves no residuals: the jackknife
     (B. Efron, C. Stein, The jackknife estimate of variance, Annals of Statistics 9(3), 1981)."""
     looks = [_look(rendered, point) for _ in range(LOOKS)]
@@ -101,7 +101,8 @@ def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     if len(free):
         mean, jacobian = sum(look.residuals) / 2 + look.jacobian @ step, look.jacobian[:, free]
         bread = np.linalg.pinv(look.matrix[np.ix_(free, free)])
-        near = [_by_residuals(jacobian, mean, bread, rendered.groups(side)) for side in (1, BLOCK)]
+        groups = (rendered.groups(1), 1.0), (rendered.groups(BLOCK), 0.5)
+        near = [_by_residuals(jacobian, mean, bread, *each) for each in groups]
         # Pixels that decide a number by themselves leave no residual to judge it by: then that of all counts.
         alike = bread * (mean @ mean) / max(np.count_nonzero(mean) - len(free), 1)
         others = (_together([it for it in looks if it is not out]) for out in looks)
@@ -111,11 +112,12 @@ def finish(rendered: Rendered, point: Array) -> tuple[Array, Array, float]:
     return end, sigma, look.cost
 
 
-def _by_residuals(jacobian: Array, residuals: Array, bread: Array, groups: Array) -> Array:
-    """Return the variances of a step by residuals that have noise in common within groups."""
+def _by_residuals(jacobian: Array, residuals: Array, bread: Array, groups: Array, power: float) -> Array:
+    """Return the variances of a step by residuals that have noise in common within groups: HC3 with the power 1, and
+    with a half HC2, for groups of which few have weight."""
     columns = [*(jacobian * residuals[:, None]).T, ((jacobian @ bread) * jacobian).sum(axis=1)]
     *scores, leverage = (np.bincount(groups, column) for column in columns)
-    weighed = np.stack(scores) / np.maximum(1 - leverage, 0.1)  # one with weight pulls the step to itself
+    weighed = np.stack(scores) / np.maximum(1 - leverage, 0.1) ** power  # one with weight pulls the step to itself
     return np.asarray(np.diag(bread @ (weighed @ weighed.T) @ bread))
 
 
