@@ -391,7 +391,7 @@ def test_a_plugin_of_one_variant():
     report = check(of_others("in_rgb_alone"), only=["spectral", "polarization", "calls"])
     assert [finding.verdict for finding in report.findings] == ["skip", "skip", "pass"], report
     for finding, variant in zip(report.findings, ("spectral", "spectral_polarized"), strict=False):
-        words = f'It does not work in llvm_ad_{variant}: RuntimeError: there is no plugin "in_rgb_alone".'
+        words = f'It does not work in llvm_ad_{variant}: nobody has registered the plugin "in_rgb_alone" there.'
         assert finding.message == words
 
 

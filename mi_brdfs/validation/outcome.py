@@ -149,14 +149,15 @@ class Skipped(Exception):
 
 
 def told(error: Exception) -> str:
-    """Return an exception in a few words: its kind, and the first line of what it says, or that a plugin is unknown.
+    """Return an exception in a few words: its kind, and the first line of what it says, or that a plugin is unknown in
+    the variant.
     Mitsuba and Dr.Jit hide the cause of an error in a plugin's Python code behind one of their own."""
     cause: BaseException = error
     while cause.__cause__ is not None:
         cause = cause.__cause__
     line = next((line.strip() for line in str(cause).splitlines() if line.strip()), "")
     if unknown := re.search(r'Plugin "(.+)" not found', line):
-        line = f'there is no plugin "{unknown[1]}"'
+        return f'nobody has registered the plugin "{brief(unknown[1])}" there'
     return type(cause).__name__ + (f": {brief(line.rstrip('.'))}" if line else "")
 
 

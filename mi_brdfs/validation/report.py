@@ -70,13 +70,16 @@ class Report:
 
     @property
     def failures(self) -> list[Finding]:
-        """The findings that failed."""
+        """The findings that failed, what to fix first in front."""
+        return sorted(self._failed(), key=lambda it: it.check != self.first_to_fix)
+
+    def _failed(self) -> list[Finding]:
         return [finding for finding in self.findings if finding.verdict == "fail"]
 
     @property
     def first_to_fix(self) -> str:
         """The first check that failed for what may be the fault of those that failed after it, or none."""
-        failing = list(dict.fromkeys(finding.check for finding in self.failures))
+        failing = list(dict.fromkeys(finding.check for finding in self._failed()))
         return next((check for check in failing[:-1] if check in CAUSES), "")
 
     @property
