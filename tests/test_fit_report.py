@@ -158,7 +158,10 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     section = Section("f", [Card(first), Card(second)])
     assert section.verdict == f"first comes nearest to the data. {told}"
     assert section.converged == "first was optimised from one start only."
-    assert replace(section, off=0.4).verdict == f"first comes nearest to the data, but fits poorly. {told}"
+    assert (
+        replace(section, off=0.4).verdict
+        == f"first comes nearest to the data, but fits poorly: try other models, or render the file itself. {told}"
+    )
 
 
 def test_how_far_a_fit_is_from_the_data_is_told(fits):

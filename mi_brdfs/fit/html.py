@@ -93,7 +93,7 @@ class Section:
     def verdict(self) -> str:
         """Which model fits best, and by how much, in sentences."""
         fits = [card.fit for card in self.cards]
-        best, poorly = fits[0], ", but fits poorly" if self.off > POOR else ""
+        best, poorly = fits[0], ", but fits poorly: try other models, or render the file itself" * (self.off > POOR)
         if len(fits) == 1:
             return f"Only {best.model} was fitted{poorly}."
         told = [f"{best.model} comes nearest to the data{poorly}."]
