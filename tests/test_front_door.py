@@ -93,6 +93,7 @@ def test_a_name_can_be_taken_explicitly():
     "model, error, message",
     [
         (int, TypeError, "register takes a subclass of mi_brdfs.Model, or of a term"),
+        (matte(1, plugins=()), ValueError, "Matte has no name: leave out plugins, or give it one"),
         (matte(1, __doc__=None), ValueError, "Matte has no docstring: write its manual page there"),
         (matte(1, plugins=("my matte",)), ValueError, "Matte: 'my matte' cannot be a plugin name; use letters"),
     ],

@@ -145,11 +145,12 @@ class Grey(Lambert):
 
 def test_a_guest_is_known_by_its_source(tmp_path, as_before):
     found = []
-    for text in (GUEST, GUEST + "# edited", GUEST):
-        (tmp_path / "grey_guest.py").write_text(text, encoding="utf-8")
+    for text, shade in ((GUEST, 1), (GUEST + "# edited", 1), (GUEST, 1), (GUEST, 0.5)):
+        (tmp_path / "grey_guest.py").write_text(f"import grey_shades\n{text}", encoding="utf-8")
+        (tmp_path / "grey_shades.py").write_text(f"SHADE = {shade}  # beside it", encoding="utf-8")
         guests.import_models(str(tmp_path / "grey_guest.py"))
         found.append(plan.versions(find_model("grey")))
-    assert found[0] == found[2] != found[1]
+    assert found[0] == found[2] and len({*found}) == 3
     assert plan.versions(find_model("ward")) == f"mi_brdfs {plan.__version__}, Mitsuba {mi.__version__}"
 
 

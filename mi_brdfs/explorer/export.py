@@ -60,12 +60,14 @@ def page(
     ``page_state`` is what the page itself said of it. ``on_progress`` is called after the views of each subject at each
     combination of the values. Raise a StateError if a subject cannot be shown, none has such a parameter, or the page
     would be too large."""
+    controls = (it for given in state.subjects for it in materials.controls(materials.expanded(given)))
+    known = dict.fromkeys(it["name"] for it in controls if it["kind"] == "number")
+    if missing := [name for name in vary or {} if name not in ("theta", *known)]:
+        raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(known, 'and')}.")
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
     baked = _Baked(state, materials, scenes, vary, on_progress)
     frames = [(at, it.encode() if isinstance(it, str) else it, isinstance(it, str)) for at, it in baked.frames()]
-    if missing := [name for name in vary if name not in baked.start]:
-        raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(baked.known, 'and')}.")
     told = page_state.get("subjects") or [{} for _ in state.subjects]
     if len(told) != len(state.subjects):
         raise StateError("The state of a page is of other materials than those shown.")
@@ -97,8 +99,6 @@ class _Baked:
     on_progress: Callable[[], None]
     subjects: list[Bsdf] = field(default_factory=list)
     """The plugin dicts with all their values."""
-    known: list[str] = field(default_factory=list)
-    """The numbers that may be varied."""
     start: dict[str, int] = field(default_factory=dict)
     """Where each scrubber of something stands at first: where it is nearest to the state."""
 
@@ -114,7 +114,6 @@ class _Baked:
             told = {"controls": controls, **self.materials.written(bsdf), **self.materials.described(bsdf)}
             yield nowhere, text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told)
             numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
-            self.known += [name for name in numbers if name not in self.known]
             varied = [numbers.get(name) if name != "theta" else None for name in self.vary]
             for each in filter(None, varied):
                 self._begin(each["name"], each["value"])

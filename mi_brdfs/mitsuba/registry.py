@@ -82,6 +82,8 @@ def register(brought: Registered, *, replace: bool = False) -> Registered:
 def _register_model(model: type[Model], replace: bool) -> None:
     if not (model.__doc__ or "").strip():
         raise ValueError(f"{model.__name__} has no docstring: write its manual page there, first a summary.")
+    if not model.plugins:
+        raise ValueError(f"{model.__name__} has no name: leave out plugins, or give it one.")
     for name in model.plugins:
         if not re.fullmatch(r"[A-Za-z]\w*", name):
             raise ValueError(f"{model.__name__}: {name!r} cannot be a plugin name; use letters, digits and _.")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import site
+import sys
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -36,8 +38,9 @@ class Sweep:
     """All fits of some models to some files, and a folder for them.
 
     A fit is known by the content of its file, the model, the metric, the seed and the settings, the variant, and the
-    versions of mi_brdfs and Mitsuba, for a third-party model by the source of its module: if any of them changes, it
-    is made anew. Its result depends on nothing else, neither on the other fits nor on the workers.
+    versions of mi_brdfs and Mitsuba, for a third-party model by the sources of its module and of those beside it: if
+    any of them changes, it is made anew. Its result depends on nothing else, neither on the other fits nor on the
+    workers.
 
     Args:
         files: measured BRDFs; of two with the same content, the first counts.
@@ -176,12 +179,25 @@ def digest(data: Any) -> str:
 
 
 def versions(model: type[Model] | None = None) -> str:
-    """Return all versions that a result depends on, with a third-party model's, which is the source of its module."""
+    """Return all versions that a result depends on, with a third-party model's: the sources of its module, and of those
+    that are loaded of its package or beside its file."""
     found = f"mi_brdfs {__version__}, Mitsuba {mi.__version__}"
     if model is None or is_own(model):
         return found
     try:
-        source = inspect.getsource(inspect.getmodule(model) or model)
+        sources = [inspect.getsource(it) for it in _beside(inspect.getmodule(model) or model)]
     except (OSError, TypeError):  # defined in a notebook
-        source = inspect.getsource(model)
-    return f"{found}, {model.__module__} {digest(source)}"
+        sources = [inspect.getsource(model)]
+    return f"{found}, {model.__module__} {digest(sources)}"
+
+
+def _beside(module: Any) -> list[Any]:
+    """Return a module and the loaded ones of its package, or, unless it is installed, beside its file."""
+    package, folder = module.__name__.partition(".")[0], Path(inspect.getfile(module)).parent
+    installed = str(folder) in site.getsitepackages()
+    files = {it: Path(getattr(it, "__file__", None) or "") for it in list(sys.modules.values()) if inspect.ismodule(it)}
+    found = {
+        it for it, file in files.items() if file.suffix == ".py"
+        and (it.__name__.partition(".")[0] == package or (file.parent == folder and not installed))
+    }  # fmt: skip
+    return sorted({module, *found}, key=lambda it: it.__name__)
