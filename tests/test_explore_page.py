@@ -710,7 +710,7 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     exported, name, requests = tmp_path / "page.html", "<!--<script> '1' (1) \udcff.bsdf", []
     shutil.copy(LOFT, tmp_path / name)
     options = "--exposure", "1.5", "--labels", f"chalk,{name}", "--vary", "theta=0,45,85", "--export", "page.html"
-    command = alone("lambert", name, *options, first=FEW)
+    command = alone("ward", name, *options, first=FEW)
     subprocess.run(command, check=True, timeout=200, cwd=tmp_path)
     text = exported.read_text(encoding="utf-8")
     assert len(text) < 3e6 and '"exposure": 1.5' in text and '"name": "chalk"' in text
@@ -722,6 +722,16 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     assert '"scale": "log"' in text and "10⁻" in tab.locator("#view-polar .figure").inner_html()
     assert tab.locator(".panel").bounding_box()["width"] > 0.95 * 1440
     assert tab.locator(".chip").all_inner_texts() == ["chalk", name]
+    words, tops = tab.evaluate("""() => [
+        [...document.querySelectorAll('.fixed code')].flatMap(it => [...it.childNodes]).filter(it => it.data).map(it => {
+            const range = document.createRange();
+            range.selectNode(it);
+            return [it.data, range.getClientRects().length];
+        }),
+        [...document.querySelectorAll('#controls summary, .fixed')].map(it => it.getBoundingClientRect().top),
+    ]""")
+    assert ["specular_", 1] in words and all(lines == 1 for _, lines in words)  # they end after underscores only
+    assert tops.count(min(tops)) == 3  # the caption is beside the values, whose columns start together
     assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [exported.as_uri()]
     lobe = "document.querySelector('#view-lobe canvas').toDataURL()"
     before = tab.evaluate(lobe)
