@@ -737,6 +737,10 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     before = tab.evaluate(lobe)
     tab.locator("#view-lobe canvas").press("ArrowLeft")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    tab.locator("[data-view=hemisphere]").click()
+    tab.wait_for_selector("#view-hemisphere .ramp")
+    maps, ramp = (tab.locator(f"#view-hemisphere {it}").bounding_box() for it in (".maps", ".ramp"))
+    assert ramp["width"] == maps["width"] and ramp["y"] - maps["y"] - maps["height"] == pytest.approx(16)
     theta = tab.locator("#scrubbers input")
     assert theta.get_attribute("aria-valuetext") == "45"
     before = tab.evaluate(lobe)
