@@ -483,6 +483,8 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     opened(tab, address)
     assert tab.locator("#chips").inner_text().split() == ["ward", "walter"]
     tab.locator("#view-polar .curve").first.wait_for(state="attached")
+    head, shaft = (tab.locator(f"#view-polar {it}").bounding_box() for it in ("path.source", "line.incident"))
+    assert head["y"] == pytest.approx(shaft["y"], abs=1)  # wi is away from the surface
     assert tab.locator(".pictures canvas").count() == 2
     assert tab.locator("#subject-type").inner_text() == ""  # it has that name
     shown = "document.querySelector('#view-polar .curve').getAttribute('stroke').toLowerCase()"
