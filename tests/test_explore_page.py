@@ -749,3 +749,7 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     theta.press("End")
     tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    tab.add_init_script("Response.prototype.arrayBuffer = () => new Promise(() => {})")  # as long as it unpacks
+    tab.reload()
+    tab.wait_for_function("() => document.querySelector('h1').innerText.endsWith('Loading …')")
+    assert "Loading" in tab.evaluate("() => getComputedStyle(document.querySelector('.frame'), '::after').content")

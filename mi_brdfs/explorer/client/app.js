@@ -183,7 +183,8 @@ function drawBars() {
   byId("theme").textContent = isDark() ? "Light" : "Dark";
   const told = state.subjects.map(({ name }) => name).join(", ");
   document.title = `${told || "Explorer"} · mi_brdfs`;
-  if (session.exported) byId("version").textContent = `${told}: move a slider, turn the lobe, point at a curve`;
+  if (session.exported)
+    byId("version").textContent = info.length ? `${told}: move a slider, turn the lobe, point at a curve` : "Loading …";
 }
 
 // --- Messages -------------------------------------------------------------------------------------------------------
