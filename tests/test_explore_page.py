@@ -747,6 +747,7 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     assert theta.get_attribute("aria-valuetext") == "45"
     before = tab.evaluate(lobe)
     theta.press("End")
+    assert tab.locator("h1").inner_text().endswith("move θi, turn the lobe, point at a curve")
     tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
     tab.add_init_script("Response.prototype.arrayBuffer = () => new Promise(() => {})")  # as long as it unpacks
