@@ -695,6 +695,14 @@ def test_nothing_is_wider_than_the_screen(tab, address):
         })  # fmt: skip
         assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
         assert not tab.evaluate(small)
+        name, status = tab.evaluate("""() => {
+            const status = document.querySelector('#status');
+            Object.assign(status, { textContent: 'Compiling walter …', hidden: false });
+            const range = document.createRange();
+            range.selectNode(document.querySelector('h1').firstChild);
+            return [range.getBoundingClientRect(), status.getBoundingClientRect()];
+        }""")
+        assert status["left"] > name["right"] or status["top"] > name["bottom"]
         tab.wait_for_selector("#view-polar .sample")
         x, y = tab.evaluate("""() => {
             const sample = document.querySelector('#view-polar .sample').getBoundingClientRect();
@@ -739,6 +747,7 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     before = tab.evaluate(lobe)
     tab.locator("#view-lobe canvas").press("ArrowLeft")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    assert tab.locator("h1").inner_text().endswith("move θi, turn the lobe, point at a curve")
     tab.locator("[data-view=hemisphere]").click()
     tab.wait_for_selector("#view-hemisphere .ramp")
     maps, ramp = (tab.locator(f"#view-hemisphere {it}").bounding_box() for it in (".maps", ".ramp"))
@@ -747,7 +756,6 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     assert theta.get_attribute("aria-valuetext") == "45"
     before = tab.evaluate(lobe)
     theta.press("End")
-    assert tab.locator("h1").inner_text().endswith("move θi, turn the lobe, point at a curve")
     tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
     tab.add_init_script("Response.prototype.arrayBuffer = () => new Promise(() => {})")  # as long as it unpacks
