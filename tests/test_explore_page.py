@@ -752,6 +752,9 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     tab.wait_for_selector("#view-hemisphere .ramp")
     maps, ramp = (tab.locator(f"#view-hemisphere {it}").bounding_box() for it in (".maps", ".ramp"))
     assert ramp["width"] == maps["width"] and ramp["y"] - maps["y"] - maps["height"] == pytest.approx(16)
+    tab.locator("[data-view=slice]").click()
+    scale = tab.locator("#view-slice .bar").inner_text()
+    assert "10³" not in scale and "and above" in scale  # a sliver is brighter than all else
     theta = tab.locator("#scrubbers input")
     assert theta.get_attribute("aria-valuetext") == "45"
     before = tab.evaluate(lobe)
