@@ -501,6 +501,22 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     tab.wait_for_selector(".pictures canvas")
 
 
+def test_each_of_two_lobes_keeps_its_hue(tab, address):
+    """Also one within the other."""
+    greys = [{"bsdf": {"type": "lambert", "reflectance": it}, "name": f"{it}"} for it in (0.4, 0.8)]
+    opened(tab, address, {"subjects": greys, "views": ["picture", "lobe"], "dark": False})
+    hues = """() => {
+        const lobe = document.querySelector('#view-lobe canvas');
+        const copy = new OffscreenCanvas(lobe.width, lobe.height).getContext('2d');
+        copy.drawImage(lobe, 0, 0);
+        const { data } = copy.getImageData(0, 0, lobe.width, lobe.height);
+        const pixels = Array.from({ length: data.length / 4 }, (_, k) => [data[4 * k], data[4 * k + 2]]);
+        return [pixels.filter(([red, blue]) => blue > 2 * red), pixels.filter(([red, blue]) => red > 2 * blue)]
+            .map(it => it.length);
+    }"""
+    settled(tab, lambda: min(tab.evaluate(hues)) > 300)
+
+
 @pytest.mark.slow
 def test_models_and_published_materials_open_one_after_the_other(tab, address):
     """With all kinds of controls, and found by their pictures."""

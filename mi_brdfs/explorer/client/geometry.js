@@ -49,9 +49,9 @@ export function makeBody({ theta, phi, values }, below, radius) {
     }
   }
   const every = (count, wanted) => Math.max(1, Math.round(count / wanted));
-  for (let i = 0; i < rows; i += every(rows, 22))
+  for (let i = 0; i < rows; i += every(rows, 12))
     for (let j = 0; j < across - 1; j++) lines.push(i * across + j, i * across + j + 1);
-  for (let j = 0; j < across; j += every(across, 40))
+  for (let j = 0; j < across; j += every(across, 16))
     for (let i = 0; i < rows - 1; i++) lines.push(i * across + j, (i + 1) * across + j);
   return { position, normal, faces, lines };
 }
