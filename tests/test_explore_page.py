@@ -749,11 +749,13 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     assert tab.locator(".panel").bounding_box()["width"] > 0.95 * 1440
     assert tab.locator(".chip").all_inner_texts() == ["chalk", name]
     words, tops = tab.evaluate("""() => [
-        [...document.querySelectorAll('.fixed code')].flatMap(it => [...it.childNodes]).filter(it => it.data).map(it => {
-            const range = document.createRange();
-            range.selectNode(it);
-            return [it.data, range.getClientRects().length];
-        }),
+        [...document.querySelectorAll('.fixed code')].flatMap(({ childNodes }) => [...childNodes])
+            .filter(({ data }) => data)
+            .map(it => {
+                const range = document.createRange();
+                range.selectNode(it);
+                return [it.data, range.getClientRects().length];
+            }),
         [...document.querySelectorAll('#controls summary, .fixed')].map(it => it.getBoundingClientRect().top),
     ]""")
     assert ["specular_", 1] in words and all(lines == 1 for _, lines in words)  # they end after underscores only

@@ -135,9 +135,8 @@ export function drawPolar() {
     );
   svg.append(line(...middle, ...place(-theta, 1), "incident"));
   const [head, half] = [1 - 12 / radius, degrees(4 / radius)];
-  svg.append(
-    shape("path", { d: path([place(half - theta, head), place(-theta, 1), place(-half - theta, head)]), class: "source" }),
-  );
+  const outline = path([place(half - theta, head), place(-theta, 1), place(-half - theta, head)]);
+  svg.append(shape("path", { d: outline, class: "source" }));
   const aside = degrees(20 / radius);
   const [besideX, besideY] = place(-theta + (theta < 30 ? -aside : aside), 1 - 14 / radius);
   svg.append(label(besideX, besideY + 4, "ωi", "middle", "direction"));
