@@ -483,6 +483,8 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     opened(tab, address)
     assert tab.locator("#chips").inner_text().split() == ["ward", "walter"]
     tab.locator("#view-polar .curve").first.wait_for(state="attached")
+    head, shaft = (tab.locator(f"#view-polar {it}").bounding_box() for it in ("path.source", "line.incident"))
+    assert head["y"] == pytest.approx(shaft["y"], abs=1)  # wi is away from the surface
     assert tab.locator(".pictures canvas").count() == 2
     assert tab.locator("#subject-type").inner_text() == ""  # it has that name
     shown = "document.querySelector('#view-polar .curve').getAttribute('stroke').toLowerCase()"
@@ -497,6 +499,22 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     tab.locator(".divider[aria-valuetext='ward up to 0\u00a0%']").wait_for()
     tab.locator("#compare").select_option("difference")
     tab.wait_for_selector(".pictures canvas")
+
+
+def test_each_of_two_lobes_keeps_its_hue(tab, address):
+    """Also one within the other."""
+    greys = [{"bsdf": {"type": "lambert", "reflectance": it}, "name": f"{it}"} for it in (0.4, 0.8)]
+    opened(tab, address, {"subjects": greys, "views": ["picture", "lobe"], "dark": False})
+    hues = """() => {
+        const lobe = document.querySelector('#view-lobe canvas');
+        const copy = new OffscreenCanvas(lobe.width, lobe.height).getContext('2d');
+        copy.drawImage(lobe, 0, 0);
+        const { data } = copy.getImageData(0, 0, lobe.width, lobe.height);
+        const pixels = Array.from({ length: data.length / 4 }, (_, k) => [data[4 * k], data[4 * k + 2]]);
+        return [pixels.filter(([red, blue]) => blue > 2 * red), pixels.filter(([red, blue]) => red > 2 * blue)]
+            .map(it => it.length);
+    }"""
+    settled(tab, lambda: min(tab.evaluate(hues)) > 300)
 
 
 @pytest.mark.slow
@@ -693,6 +711,14 @@ def test_nothing_is_wider_than_the_screen(tab, address):
         })  # fmt: skip
         assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
         assert not tab.evaluate(small)
+        name, status = tab.evaluate("""() => {
+            const status = document.querySelector('#status');
+            Object.assign(status, { textContent: 'Compiling walter …', hidden: false });
+            const range = document.createRange();
+            range.selectNode(document.querySelector('h1').firstChild);
+            return [range.getBoundingClientRect(), status.getBoundingClientRect()];
+        }""")
+        assert status["left"] > name["right"] or status["top"] > name["bottom"]
         tab.wait_for_selector("#view-polar .sample")
         x, y = tab.evaluate("""() => {
             const sample = document.querySelector('#view-polar .sample').getBoundingClientRect();
@@ -710,7 +736,7 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     exported, name, requests = tmp_path / "page.html", "<!--<script> '1' (1) \udcff.bsdf", []
     shutil.copy(LOFT, tmp_path / name)
     options = "--exposure", "1.5", "--labels", f"chalk,{name}", "--vary", "theta=0,45,85", "--export", "page.html"
-    command = alone("lambert", name, *options, first=FEW)
+    command = alone("ward", name, *options, first=FEW)
     subprocess.run(command, check=True, timeout=200, cwd=tmp_path)
     text = exported.read_text(encoding="utf-8")
     assert len(text) < 3e6 and '"exposure": 1.5' in text and '"name": "chalk"' in text
@@ -722,14 +748,38 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     assert '"scale": "log"' in text and "10⁻" in tab.locator("#view-polar .figure").inner_html()
     assert tab.locator(".panel").bounding_box()["width"] > 0.95 * 1440
     assert tab.locator(".chip").all_inner_texts() == ["chalk", name]
+    words, tops = tab.evaluate("""() => [
+        [...document.querySelectorAll('.fixed code')].flatMap(({ childNodes }) => [...childNodes])
+            .filter(({ data }) => data)
+            .map(it => {
+                const range = document.createRange();
+                range.selectNode(it);
+                return [it.data, range.getClientRects().length];
+            }),
+        [...document.querySelectorAll('#controls summary, .fixed')].map(it => it.getBoundingClientRect().top),
+    ]""")
+    assert ["specular_", 1] in words and all(lines == 1 for _, lines in words)  # they end after underscores only
+    assert tops.count(min(tops)) == 3  # the caption is beside the values, whose columns start together
     assert [it for it in requests if not it.startswith(("data:", "blob:"))] == [exported.as_uri()]
     lobe = "document.querySelector('#view-lobe canvas').toDataURL()"
     before = tab.evaluate(lobe)
     tab.locator("#view-lobe canvas").press("ArrowLeft")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    assert tab.locator("h1").inner_text().endswith("move θi, turn the lobe, point at a curve")
+    tab.locator("[data-view=hemisphere]").click()
+    tab.wait_for_selector("#view-hemisphere .ramp")
+    maps, ramp = (tab.locator(f"#view-hemisphere {it}").bounding_box() for it in (".maps", ".ramp"))
+    assert ramp["width"] == maps["width"] and ramp["y"] - maps["y"] - maps["height"] == pytest.approx(16)
+    tab.locator("[data-view=slice]").click()
+    scale = tab.locator("#view-slice .bar").inner_text()
+    assert "10³" not in scale and "and above" in scale  # a sliver is brighter than all else
     theta = tab.locator("#scrubbers input")
     assert theta.get_attribute("aria-valuetext") == "45"
     before = tab.evaluate(lobe)
     theta.press("End")
     tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    tab.add_init_script("Response.prototype.arrayBuffer = () => new Promise(() => {})")  # as long as it unpacks
+    tab.reload()
+    tab.wait_for_function("() => document.querySelector('h1').innerText.endsWith('Loading …')")
+    assert "Loading" in tab.evaluate("() => getComputedStyle(document.querySelector('.frame'), '::after').content")

@@ -1,5 +1,5 @@
 // The page: its cards, its bars, and what is drawn when.
-import { byId, element, phone } from "./util.js";
+import { byId, element, phone, subscripted } from "./util.js";
 import { LIMITS, VIEWS, WORDS, change, clean, emit, fragment, goTo, on, readFragment, session, visible } from "./session.js";
 import { connect, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
@@ -183,7 +183,9 @@ function drawBars() {
   byId("theme").textContent = isDark() ? "Light" : "Dark";
   const told = state.subjects.map(({ name }) => name).join(", ");
   document.title = `${told || "Explorer"} · mi_brdfs`;
-  if (session.exported) byId("version").textContent = `${told}: move a slider, turn the lobe, point at a curve`;
+  const moved = session.scrubbers.length > 1 ? "a slider" : "θi";
+  const text = info.length ? `${told}: move ${moved}, turn the lobe, point at a curve` : "Loading …";
+  if (session.exported) byId("version").replaceChildren(...subscripted(text));
 }
 
 // --- Messages -------------------------------------------------------------------------------------------------------

@@ -42,6 +42,10 @@ export function drawControls() {
   byId("notes").textContent = (info?.notes ?? []).join(" · ");
 }
 
+/** Return the name of a parameter, whose lines end after underscores only. */
+const nameOf = (name) =>
+  element("code", {}, ...name.split(/(?<=_)/).flatMap((part, k) => (k ? [element("wbr"), part] : [part])));
+
 /** In an exported page nothing can be changed: list the parameters, folded where there is little room. */
 function drawList(host, bsdf) {
   const told = (value) => (typeof value === "number" ? format(value, 4) : String(value));
@@ -54,11 +58,12 @@ function drawList(host, bsdf) {
       element(
         "div",
         { class: "fixed" },
-        element("code", {}, name),
+        nameOf(name),
         element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
       ),
     );
-  host.replaceChildren(element("details", { open }, element("summary", {}, "Parameters"), ...rows));
+  const list = element("div", { class: "list" }, ...rows);
+  host.replaceChildren(element("details", { open }, element("summary", {}, "Parameters"), list));
 }
 
 /** Make the scrubbers of an exported page, each with its values listed. */
@@ -87,7 +92,7 @@ function makeScrubber({ name, values }, k) {
       element(
         "label",
         { for: id },
-        ...(name === "theta" ? subscripted(`θi in degrees${phi}`) : [element("code", {}, name)]),
+        ...(name === "theta" ? subscripted(`θi in degrees${phi}`) : [nameOf(name)]),
       ),
     ),
     element(
@@ -143,7 +148,7 @@ function makeRow(control, k) {
         onclick: () => set(control.default ?? usual[control.kind](control)),
       },
       "+ ",
-      element("code", {}, control.name),
+      nameOf(control.name),
     );
     return { control, node, absent, error, show: () => {} };
   }
@@ -155,7 +160,7 @@ function makeRow(control, k) {
   const head = element(
     "div",
     { class: "name" },
-    element("label", { for: id, title: control.text ?? "" }, element("code", {}, control.name)),
+    element("label", { for: id, title: control.text ?? "" }, nameOf(control.name)),
     element(
       "button",
       { class: "quiet small reset", "aria-label": `${act} ${control.name}`, onclick: () => set(null) },

@@ -49,9 +49,9 @@ export function makeBody({ theta, phi, values }, below, radius) {
     }
   }
   const every = (count, wanted) => Math.max(1, Math.round(count / wanted));
-  for (let i = 0; i < rows; i += every(rows, 22))
+  for (let i = 0; i < rows; i += every(rows, 12))
     for (let j = 0; j < across - 1; j++) lines.push(i * across + j, i * across + j + 1);
-  for (let j = 0; j < across; j += every(across, 40))
+  for (let j = 0; j < across; j += every(across, 16))
     for (let i = 0; i < rows - 1; i++) lines.push(i * across + j, (i + 1) * across + j);
   return { position, normal, faces, lines };
 }
@@ -81,9 +81,8 @@ function tube(way, from, to, wide, end, position, faces) {
 export function furniture(wi) {
   const position = [];
   const faces = [];
-  tube(wi, 0.12, ARROW, 0.009, 0.009, position, faces);
-  tube(wi, 0.12, 0.02, 0.034, 0, position, faces);
-  tube(wi, ARROW - 0.03, ARROW + 0.03, 0.034, 0.034, position, faces);
+  tube(wi, 0, ARROW - 0.1, 0.009, 0.009, position, faces);
+  tube(wi, ARROW - 0.1, ARROW + 0.03, 0.04, 0, position, faces);
   const mirror = [-wi[0], -wi[1], wi[2]];
   for (let k = 0; k < 12; k++) tube(mirror, 0.1 * k, 0.1 * k + 0.05, 0.006, 0.006, position, faces);
   tube([0, 0, 1], 0, 1.08, 0.003, 0.003, position, faces);

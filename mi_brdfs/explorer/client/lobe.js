@@ -222,16 +222,17 @@ function render(found) {
     paint(things, ink, 0.75, 0);
     paint(things, ink, 0.4, 0, "lines");
     const shown = side ? [found[at]] : found;
-    const alone = shown.length === 1;
-    for (const { subject, parts } of shown) {
+    for (const [place, { subject, parts }] of shown.entries()) {
       const colour = rgbOf(colourOf(subject));
       const faded = session.info[subject]?.error ? 0.3 : 1;
+      // One is a body and the others are wires in front of it: seen through each other, two would mix their colours.
+      const solid = place === 0 && !state.wire;
+      gl.depthMask(solid && faded === 1);
+      if (!solid) gl.disable(gl.DEPTH_TEST);
       for (const at of parts.keys()) {
         const body = bodies.get(`${subject} ${at}`);
-        // What is seen through hides nothing of the others, also where they nearly touch.
-        gl.depthMask(alone && !state.wire && faded === 1);
-        if (!state.wire) paint(body, colour, (alone ? 0.94 : 0.38) * faded, 1);
-        if (state.wire || !alone) paint(body, colour, (state.wire ? 0.6 : 0.28) * faded, 0, "lines");
+        if (solid) paint(body, colour, 0.94 * faded, 1);
+        else paint(body, colour, 0.6 * faded, 0, "lines");
       }
     }
     gl.depthMask(true);

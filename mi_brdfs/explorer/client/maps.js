@@ -1,5 +1,5 @@
 // Maps in false colours: the θh × θd slice and the hemisphere.
-import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, onArrows, onPointer, power, shape, subscripted, wrapped } from "./util.js";
+import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, onArrows, onPointer, power, quantile, shape, subscripted, wrapped } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { quantity } from "./plots.js";
@@ -11,7 +11,9 @@ export function drawMaps(view) {
     (session.shown[view][subject]?.parts ?? []).map((part, at) => ({ ...part, subject, below: at > 0 })),
   );
   const arrays = found.map(({ values }) => values);
-  const peak = largest(arrays);
+  // At grazing incidence a sliver of the slice may be brighter than all else by decades.
+  const bright = view === "slice" ? arrays.map((values) => quantile(values, 0.99) ?? 0) : [];
+  const peak = Math.max(...bright, 0) || largest(arrays);
   const [low, high] = decades(arrays, peak);
   card.maps ??= card.figure.appendChild(element("div", { class: "maps" }));
   card.node.classList.toggle("wide", found.length > 1);
@@ -24,6 +26,7 @@ export function drawMaps(view) {
   const notes = [
     `${view === "slice" ? "f" : quantity()}, 1/sr, always logarithmic`,
     ...(hatched.length ? [`hatched: ${hatched.join(" or ")}`] : []),
+    ...(largest(arrays) > peak ? [`yellow: ${format(peak, 2)} and above`] : []),
     ...(view === "slice" ? [] : ["○ ωi, + mirror, rim 90°"]),
   ];
   bar(card, low, high, notes.join("; "));

@@ -133,15 +133,11 @@ export function drawPolar() {
         curve.x.map((angle, k) => place(angle, scale.of(curve.y[k]))),
       ),
     );
-  const tip = place(-theta, 1);
-  svg.append(line(...tip, ...place(-theta, 0.06), "incident"));
-  svg.append(
-    shape("path", {
-      d: path([place(-theta + 2.5, 0.13), place(-theta, 0.03), place(-theta - 2.5, 0.13)]),
-      class: "incident",
-    }),
-  );
-  const aside = degrees(16 / radius);
+  svg.append(line(...middle, ...place(-theta, 1), "incident"));
+  const [head, half] = [1 - 12 / radius, degrees(4 / radius)];
+  const outline = path([place(half - theta, head), place(-theta, 1), place(-half - theta, head)]);
+  svg.append(shape("path", { d: outline, class: "source" }));
+  const aside = degrees(20 / radius);
   const [besideX, besideY] = place(-theta + (theta < 30 ? -aside : aside), 1 - 14 / radius);
   svg.append(label(besideX, besideY + 4, "ωi", "middle", "direction"));
   const overlay = shape("g");

@@ -93,17 +93,19 @@ export function largest(arrays) {
   return found || 1;
 }
 
+/** Return a quantile of the positive values of an array, or undefined if none is above 0. */
+export function quantile(values, share) {
+  const positive = Float64Array.from(values)
+    .filter((value) => value > 0 && value < Infinity)
+    .sort();
+  return positive[Math.floor(share * positive.length)];
+}
+
 /** Return the exponents at which a logarithmic scale begins and ends: it shows nine tenths of the positive values of
  * each array, but at least two decades and at most five. */
 export function decades(arrays, peak) {
   const high = Math.log10(peak);
-  let dim = peak;
-  for (const values of arrays) {
-    const positive = Float64Array.from(values)
-      .filter((value) => value > 0)
-      .sort();
-    if (positive.length) dim = Math.min(dim, positive[Math.floor(0.1 * positive.length)]);
-  }
+  const dim = Math.min(peak, ...arrays.map((values) => quantile(values, 0.1) ?? peak));
   return [Math.floor(clamp(Math.log10(dim), high - 5, high - 2)), high];
 }
 
