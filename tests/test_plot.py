@@ -261,6 +261,18 @@ def test_marks_are_beside_the_lobes():
         assert [line.get_ydata()[0] for line in ax.lines] == [0, 0]
 
 
+def test_labels_of_ticks_stay_apart():
+    """Also from those of the other axis and of the panels beside."""
+    for figure in plot.cartesian("ward"), plot.cartesian(SHEET), plot.measured(AEROGLAZE):
+        figure.draw_without_rendering()
+        axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+        seen = [label for axis in axes for at, label in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
+                if axis.get_view_interval()[0] <= at <= axis.get_view_interval()[1] and label.get_text()]  # fmt: skip
+        # Bounds are higher than digits.
+        boxes = [label.get_window_extent().padded(2, -3) for label in seen]
+        assert len(boxes) > 10 and all(first.count_overlaps(boxes) == 1 for first in boxes)
+
+
 # --- Several BSDFs --------------------------------------------------------------------------------------------------
 
 
