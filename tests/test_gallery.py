@@ -114,6 +114,10 @@ def test_labels_cover_no_picture_and_are_not_cut():
     ink = (image > 128).all(axis=-1)
     assert ink.sum() > 200
     assert not any(edge.any() for edge in (ink[:4], ink[-4:], ink[:, :4], ink[:, -4:]))
+    bare = np.array(sheet([Row({}, [red, red], ["specular-maroon-phenolic", "specular-orange-phenolic"])]))
+    blank = np.flatnonzero(~(bare[30:] > 128).any(axis=(0, 2)))
+    widest = max(map(len, np.split(blank, np.flatnonzero(np.diff(blank) > 1) + 1)[1:-1]))
+    assert widest >= 12  # several times the space between letters
 
 
 def test_profiles_are_below_their_pictures_on_one_scale():
@@ -220,6 +224,7 @@ def test_a_wall_of_presets(tmp_path, monkeypatch):
     assert [caption for row in rows for caption in row.captions] == [name.rpartition("/")[2] for name in names[:-1]]
     width, height = mi.Bitmap(str(tmp_path / "lambert_presets.jpg")).size()
     assert width > 8 * 32 and height > 3 * 32
+    assert mi.Bitmap(str(tmp_path / "lambert.png")).size()[0] == width
 
 
 @pytest.fixture

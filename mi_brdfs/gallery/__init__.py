@@ -180,10 +180,12 @@ class Entry:
         return rows
 
     def write(self, folder: Path) -> None:
-        """Write the contact sheet and the wall of presets unless they are empty."""
-        for rows, name in ((self.rows(), f"{self.type}.png"), (self.wall(), f"{self.type}_presets.jpg")):
+        """Write the contact sheet and the wall of presets unless they are empty, both as wide as the wider one."""
+        sheets = {f"{self.type}.png": self.rows(), f"{self.type}_presets.jpg": self.wall()}
+        width = max((sheet(rows).width for rows in sheets.values() if rows), default=0)
+        for name, rows in sheets.items():
             if rows:
-                _save(sheet(rows), folder / name)
+                _save(sheet(rows, width), folder / name)
 
     def described(self) -> str:
         """Return what the contact sheet shows, in words."""
