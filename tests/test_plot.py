@@ -231,8 +231,8 @@ def test_red_green_and_blue():
     """In a row for each angle, a style for each BSDF, and without the word luminance; one curve for what is grey."""
     figure = plot.cartesian(COLOURED, "lambert", angles=(0, 60), scale="linear", rgb=True)
     drawn = curves(figure)
-    assert list(drawn)[:3] == [f"lambert reflectance=0.2, 0.5, 0.8, {name}" for name in ("red", "green", "blue")]
-    assert list(drawn)[3:] == ["lambert reflectance=0.5"] and legend(figure)[:4] == list(drawn)
+    assert list(drawn)[:3] == [f"reflectance=0.2, 0.5, 0.8, {name}" for name in ("red", "green", "blue")]
+    assert list(drawn)[3:] == ["reflectance=0.5"] and legend(figure)[:4] == list(drawn)
     peaks = [value.max() for _, value in drawn.values()]
     assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5]) / np.pi, rel=1e-3)
     lines = [line for line in figure.axes[0].lines if line.get_label()[0] != "_"]
@@ -332,7 +332,9 @@ def test_a_default_is_said_where_another_value_is():
     )
     assert legend(figure) == ["walter multiscatter=none", "walter multiscatter=walk", "ward alpha_u=0.2", "lambert"]
     figure = plot.albedo("ward", {"type": "ward", "alpha": 0.2}, {"type": "ward", "alpha_v": 0.2})
-    assert legend(figure) == ["ward alpha=0.1", "ward alpha=0.2", "ward alpha_v=0.2"]
+    assert legend(figure) == ["alpha=0.1", "alpha=0.2", "alpha_v=0.2"]
+    assert figure.legends[0].get_title().get_text() == "ward"
+    assert legend(plot.albedo("ward", "ward")) == ["ward", "ward"]
     figure = plot.albedo("ward", "principled")
     assert figure.legends[0].get_title().get_text() == "default parameters"
 
@@ -356,7 +358,8 @@ def test_side_by_side_each_bsdf_has_a_panel_on_one_scale():
     """With a colour for each angle, and a row for each scale; the last of five panels leaves no empty axes."""
     narrow, wide = ({"type": "phong", "exponent": n, "diffuse_reflectance": 0} for n in (2000, 20))
     figure = plot.cartesian(wide, narrow, angles=(10, 40), side_by_side=True)
-    assert [ax.get_title() for ax in figure.axes] == ["phong exponent=20", "phong exponent=2000", "", ""]
+    assert [ax.get_title() for ax in figure.axes] == ["exponent=20", "exponent=2000", "", ""]
+    assert figure.legends[0].get_title().get_text().startswith("phong with diffuse_reflectance=0\n")
     linear, other, log, _ = figure.axes
     assert linear.get_ylim() == other.get_ylim() and [linear.get_yscale(), log.get_yscale()] == ["linear", "log"]
     tops = [max(value.max() for _, value in curves(figure, panel).values()) for panel in (0, 1)]
