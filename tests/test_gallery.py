@@ -44,6 +44,7 @@ def test_every_model_has_a_portrait_and_sweeps():
             mi.load_dict(bsdf)
     swept = {sweep.parameter: sweep.heading() for model in own_models() for sweep in sweeps_of(model)}
     assert swept["rotation"].startswith("rotation in turns of 360°, with alpha_u = 0.05")
+    assert Sweep("rotation", (0.0, 0.0625), {}).captions() == ["0 (0°)", "0.0625 (22.5°)"]
     assert swept["film_thickness"].startswith("film_thickness in nm")
 
 

@@ -38,7 +38,7 @@ from ..rendering.passes import ctrl_c
 from ..writing import write_text
 from .families import by_family, portrait, stage_of, year
 from .sheet import Row, sheet
-from .sweeps import Sweep, shown, sweeps_of
+from .sweeps import Sweep, sweeps_of
 
 __all__ = ["gallery"]
 
@@ -147,7 +147,7 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
 
 def sweep_row(sweep: Sweep, stage: str, shots: list[Shot]) -> Row:
     """Return the pictures of a sweep, as far as they go; under a point light, with their profiles."""
-    captions = [shown(value) for value in sweep.values[: len(shots)]]
+    captions = sweep.captions()[: len(shots)]
     profiles = [each.profile for each in shots] if stage == "point" else []
     return Row({0: sweep.heading()}, [each.picture for each in shots], captions, profiles)
 

@@ -32,6 +32,11 @@ class Sweep:
         unit = f" in {UNITS[self.parameter]}" if self.parameter in UNITS else ""
         return self.parameter + unit + (f", with {given}" if given else "")
 
+    def captions(self) -> list[str]:
+        """Return a label for each value; of a rotation, also in degrees."""
+        degrees = self.parameter == "rotation"
+        return [shown(value) + (f" ({360 * value:g}°)" if degrees else "") for value in self.values]
+
 
 def listed(values: Mapping[str, Any]) -> str:
     """Return parameters and their values as a label."""
