@@ -195,7 +195,7 @@ def test_what_is_finished_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("mi_brdfs.gallery.gallery", pressed)
     done = invoke("gallery", "lambert", "eon", "wrap", "--size", 16, "-o", "made/here", cwd=tmp_path)
     assert (done.exit_code, done.stdout) == (130, f"{Path('made', 'here', 'index.html')}\n"), done.output
-    assert done.stderr == "Interrupted; it has 8 of 23 pictures.\n"
+    assert done.stderr == "lambert is finished; 6 of 23 pictures.\nInterrupted; it has 8 of 23 pictures.\n"
     assert reported == [*(("lambert", k, 23) for k in range(1, 7)), ("wrap", 7, 23), ("wrap", 8, 23)]
     files = {path.name: path for path in (tmp_path / "made" / "here").iterdir()}
     assert set(files) == {"index.html", "overview.png", "lambert.png", "wrap.png"}
@@ -239,7 +239,8 @@ def folder(tmp_path, monkeypatch):
 def test_the_command_writes_a_page_and_its_pictures(folder):
     done = invoke("gallery", "eon", "lambert", "--size", 16, "--spp", 1, "-o", "pictures")
     assert (done.exit_code, done.stdout) == (0, f"{Path('pictures', 'index.html')}\n"), done.stderr
-    assert re.fullmatch(r"12 pictures in \d+ s, \w+_rgb\.\n", done.stderr)
+    told = r"lambert is finished; 6 of 12 pictures\.\n12 pictures in \d+ s, \w+_rgb\.\n"
+    assert re.fullmatch(told, done.stderr)
     folder = folder / "pictures"
     assert sorted(path.name for path in folder.iterdir()) == ["eon.png", "index.html", "lambert.png", "overview.png"]
 
