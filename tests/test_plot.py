@@ -339,6 +339,21 @@ def test_a_default_is_said_where_another_value_is():
     assert figure.legends[0].get_title().get_text() == "default parameters"
 
 
+def test_defaults_in_which_models_differ_are_said():
+    """Unless they are given."""
+
+    def told(*bsdfs):
+        return plot.albedo(*bsdfs).legends[0].get_title().get_text().split("\n")
+
+    ward, walter = "ward by default: diffuse_reflectance=0.5", "walter by default: diffuse_reflectance=none"
+    both = [f"{ward} specular_reflectance=0.2", f"{walter} specular_reflectance=1"]
+    assert told("ward", "walter") == ["default parameters", *both]
+    given = [{"type": kind, "specular_reflectance": 0.4} for kind in ("ward", "walter")]
+    assert told(*given) == ["all with specular_reflectance=0.4", ward, walter]
+    assert told("ward", "phong") == ["default parameters"]
+    assert told({"type": "ward", "preset": "ngan/ward/chrome"}, "walter") == ["walter with default parameters"]
+
+
 @pytest.mark.slow
 def test_each_angle_is_a_row_of_several_and_a_curve_of_one():
     figure = plot.cartesian("lambert", "phong", angles=(10, 60))

@@ -86,7 +86,8 @@ def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool =
 
 
 def constants(bsdfs: Sequence[Any]) -> list[str]:
-    """Return a line with what all dicts have in common, if anything: their labels tell the rest."""
+    """Return lines with what all dicts have in common, if anything, and what models have otherwise by default: their
+    labels tell the rest."""
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
     only = _only_plugin(bsdfs)
     who = only or ("all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds))
@@ -96,7 +97,8 @@ def constants(bsdfs: Sequence[Any]) -> list[str]:
     # A colour stays on its line.
     lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else [only] if only else []
     whose = f"{', '.join(bare)} with " if len(bare) < len({*map(_plugin, bsdfs)}) else ""
-    return lines + ([f"{whose}default parameters"] if bare else [])
+    lines += [f"{whose}default parameters"] if bare else []
+    return lines + [_told(f"{kind} by default:", own) for kind, own in _differing_defaults(bsdfs).items() if own]
 
 
 def places(bsdfs: Sequence[Any], count: int) -> list[Place]:
@@ -160,6 +162,25 @@ def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
     own, only = _distinguishing(bsdfs), _only_plugin(bsdfs)
     kinds = {id(given): kind for given in bsdfs if (kind := _plugin(given))}
     return {key: _told("" if only else kind, own[key]) for key, kind in kinds.items()}
+
+
+def _differing_defaults(bsdfs: Sequence[Any]) -> dict[str, dict[str, str]]:
+    """Return the defaults of each of several models that another has otherwise, of parameters that none is given."""
+    stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
+    if "preset" in stated:  # it gives others
+        return {}
+    found = {
+        kind: {it.name: it.rows()[0].default for it in find_model(kind).declared() if not stated & set(it.names)}
+        for kind in dict.fromkeys(map(_plugin, bsdfs))
+        if kind in list_models()
+    }
+    differing = {
+        name
+        for own in found.values()
+        for name in own
+        if any(it.get(name, own[name]) != own[name] for it in found.values())
+    }
+    return {kind: {name: it for name, it in own.items() if name in differing} for kind, own in found.items()}
 
 
 def _only_plugin(bsdfs: Sequence[Any]) -> str:
