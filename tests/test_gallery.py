@@ -44,6 +44,7 @@ def test_every_model_has_a_portrait_and_sweeps():
             mi.load_dict(bsdf)
     swept = {sweep.parameter: sweep.heading() for model in own_models() for sweep in sweeps_of(model)}
     assert swept["rotation"].startswith("rotation in turns of 360°, with alpha_u = 0.05")
+    assert Sweep("rotation", (0.0, 0.0625), {}).captions() == ["0 (0°)", "0.0625 (22.5°)"]
     assert swept["film_thickness"].startswith("film_thickness in nm")
 
 
@@ -114,6 +115,10 @@ def test_labels_cover_no_picture_and_are_not_cut():
     ink = (image > 128).all(axis=-1)
     assert ink.sum() > 200
     assert not any(edge.any() for edge in (ink[:4], ink[-4:], ink[:, :4], ink[:, -4:]))
+    bare = np.array(sheet([Row({}, [red, red], ["specular-maroon-phenolic", "specular-orange-phenolic"])]))
+    blank = np.flatnonzero(~(bare[30:] > 128).any(axis=(0, 2)))
+    widest = max(map(len, np.split(blank, np.flatnonzero(np.diff(blank) > 1) + 1)[1:-1]))
+    assert widest >= 12  # several times the space between letters
 
 
 def test_profiles_are_below_their_pictures_on_one_scale():
@@ -190,7 +195,7 @@ def test_what_is_finished_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr("mi_brdfs.gallery.gallery", pressed)
     done = invoke("gallery", "lambert", "eon", "wrap", "--size", 16, "-o", "made/here", cwd=tmp_path)
     assert (done.exit_code, done.stdout) == (130, f"{Path('made', 'here', 'index.html')}\n"), done.output
-    assert done.stderr == "Interrupted; it has 8 of 23 pictures.\n"
+    assert done.stderr == "lambert is finished; 6 of 23 pictures.\nInterrupted; it has 8 of 23 pictures.\n"
     assert reported == [*(("lambert", k, 23) for k in range(1, 7)), ("wrap", 7, 23), ("wrap", 8, 23)]
     files = {path.name: path for path in (tmp_path / "made" / "here").iterdir()}
     assert set(files) == {"index.html", "overview.png", "lambert.png", "wrap.png"}
@@ -220,6 +225,7 @@ def test_a_wall_of_presets(tmp_path, monkeypatch):
     assert [caption for row in rows for caption in row.captions] == [name.rpartition("/")[2] for name in names[:-1]]
     width, height = mi.Bitmap(str(tmp_path / "lambert_presets.jpg")).size()
     assert width > 8 * 32 and height > 3 * 32
+    assert mi.Bitmap(str(tmp_path / "lambert.png")).size()[0] == width
 
 
 @pytest.fixture
@@ -233,7 +239,8 @@ def folder(tmp_path, monkeypatch):
 def test_the_command_writes_a_page_and_its_pictures(folder):
     done = invoke("gallery", "eon", "lambert", "--size", 16, "--spp", 1, "-o", "pictures")
     assert (done.exit_code, done.stdout) == (0, f"{Path('pictures', 'index.html')}\n"), done.stderr
-    assert re.fullmatch(r"12 pictures in \d+ s, \w+_rgb\.\n", done.stderr)
+    told = r"lambert is finished; 6 of 12 pictures\.\n12 pictures in \d+ s, \w+_rgb\.\n"
+    assert re.fullmatch(told, done.stderr)
     folder = folder / "pictures"
     assert sorted(path.name for path in folder.iterdir()) == ["eon.png", "index.html", "lambert.png", "overview.png"]
 

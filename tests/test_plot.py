@@ -231,8 +231,8 @@ def test_red_green_and_blue():
     """In a row for each angle, a style for each BSDF, and without the word luminance; one curve for what is grey."""
     figure = plot.cartesian(COLOURED, "lambert", angles=(0, 60), scale="linear", rgb=True)
     drawn = curves(figure)
-    assert list(drawn)[:3] == [f"lambert reflectance=0.2, 0.5, 0.8, {name}" for name in ("red", "green", "blue")]
-    assert list(drawn)[3:] == ["lambert reflectance=0.5"] and legend(figure)[:4] == list(drawn)
+    assert list(drawn)[:3] == [f"reflectance=0.2, 0.5, 0.8, {name}" for name in ("red", "green", "blue")]
+    assert list(drawn)[3:] == ["reflectance=0.5"] and legend(figure)[:4] == list(drawn)
     peaks = [value.max() for _, value in drawn.values()]
     assert peaks == pytest.approx(np.array([0.2, 0.5, 0.8, 0.5]) / np.pi, rel=1e-3)
     lines = [line for line in figure.axes[0].lines if line.get_label()[0] != "_"]
@@ -259,6 +259,18 @@ def test_marks_are_beside_the_lobes():
     for theta, ax in zip((10, 40, 70), plot.hemisphere(MIRROR, resolution=8).axes, strict=False):
         assert [line.get_xdata()[0] * 90 for line in ax.lines] == pytest.approx([-theta, theta])
         assert [line.get_ydata()[0] for line in ax.lines] == [0, 0]
+
+
+def test_labels_of_ticks_stay_apart():
+    """Also from those of the other axis and of the panels beside."""
+    for figure in plot.cartesian("ward"), plot.cartesian(SHEET), plot.measured(AEROGLAZE):
+        figure.draw_without_rendering()
+        axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+        seen = [label for axis in axes for at, label in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
+                if axis.get_view_interval()[0] <= at <= axis.get_view_interval()[1] and label.get_text()]  # fmt: skip
+        # Bounds are higher than digits.
+        boxes = [label.get_window_extent().padded(2, -3) for label in seen]
+        assert len(boxes) > 10 and all(first.count_overlaps(boxes) == 1 for first in boxes)
 
 
 # --- Several BSDFs --------------------------------------------------------------------------------------------------
@@ -320,9 +332,26 @@ def test_a_default_is_said_where_another_value_is():
     )
     assert legend(figure) == ["walter multiscatter=none", "walter multiscatter=walk", "ward alpha_u=0.2", "lambert"]
     figure = plot.albedo("ward", {"type": "ward", "alpha": 0.2}, {"type": "ward", "alpha_v": 0.2})
-    assert legend(figure) == ["ward alpha=0.1", "ward alpha=0.2", "ward alpha_v=0.2"]
+    assert legend(figure) == ["alpha=0.1", "alpha=0.2", "alpha_v=0.2"]
+    assert figure.legends[0].get_title().get_text() == "ward"
+    assert legend(plot.albedo("ward", "ward")) == ["ward", "ward"]
     figure = plot.albedo("ward", "principled")
     assert figure.legends[0].get_title().get_text() == "default parameters"
+
+
+def test_defaults_in_which_models_differ_are_said():
+    """Unless they are given."""
+
+    def told(*bsdfs):
+        return plot.albedo(*bsdfs).legends[0].get_title().get_text().split("\n")
+
+    ward, walter = "ward by default: diffuse_reflectance=0.5", "walter by default: diffuse_reflectance=none"
+    both = [f"{ward} specular_reflectance=0.2", f"{walter} specular_reflectance=1"]
+    assert told("ward", "walter") == ["default parameters", *both]
+    given = [{"type": kind, "specular_reflectance": 0.4} for kind in ("ward", "walter")]
+    assert told(*given) == ["all with specular_reflectance=0.4", ward, walter]
+    assert told("ward", "phong") == ["default parameters"]
+    assert told({"type": "ward", "preset": "ngan/ward/chrome"}, "walter") == ["walter with default parameters"]
 
 
 @pytest.mark.slow
@@ -344,7 +373,8 @@ def test_side_by_side_each_bsdf_has_a_panel_on_one_scale():
     """With a colour for each angle, and a row for each scale; the last of five panels leaves no empty axes."""
     narrow, wide = ({"type": "phong", "exponent": n, "diffuse_reflectance": 0} for n in (2000, 20))
     figure = plot.cartesian(wide, narrow, angles=(10, 40), side_by_side=True)
-    assert [ax.get_title() for ax in figure.axes] == ["phong exponent=20", "phong exponent=2000", "", ""]
+    assert [ax.get_title() for ax in figure.axes] == ["exponent=20", "exponent=2000", "", ""]
+    assert figure.legends[0].get_title().get_text().startswith("phong with diffuse_reflectance=0\n")
     linear, other, log, _ = figure.axes
     assert linear.get_ylim() == other.get_ylim() and [linear.get_yscale(), log.get_yscale()] == ["linear", "log"]
     tops = [max(value.max() for _, value in curves(figure, panel).values()) for panel in (0, 1)]

@@ -143,9 +143,19 @@ def test_the_front_page_has_the_examples_by_themselves(site):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "query, first", [("ward", "ward"), ("merl", "tabulated"), ("GGX", "walter"), ("Oren-Nayar", "orennayar")]
+    "query, first",
+    [
+        ("ward", "ward"),
+        ("merl", "tabulated"),
+        ("GGX", "walter"),
+        ("Oren-Nayar", "orennayar"),
+        ("rough metal dark", "mi_brdfs"),
+        ("dark grazing", "Questions"),
+    ],
 )
-def test_a_search_ranks_titles_and_then_the_summaries_of_plugins(site, browser, query, first):
+def test_a_search_ranks_titles_and_then_the_summaries_of_plugins_and_of_several_words_questions(
+    site, browser, query, first
+):
     page = browser.new_page()
     page.goto(f"{(site / 'search.html').as_uri()}?q={query}")
     assert page.locator("#search-results li a").first.inner_text() == first

@@ -13,7 +13,7 @@ from PIL import Image
 from mi_brdfs import plot, preview
 from mi_brdfs.gallery import overview, sheet, shot, sweep_row
 from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
-from mi_brdfs.gallery.sweeps import Sweep, shown, sweeps_of
+from mi_brdfs.gallery.sweeps import Sweep, listed, sweeps_of
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
 from mi_brdfs.model import EXAMPLE, Model, Plugin
@@ -154,7 +154,7 @@ def strip_picture(model: type[Model]) -> str:
     """Return the link to the picture of a model's main sweep."""
     name, main = model.plugins[0], main_sweep(model)
     file = f"../../docs/sweeps/{name}.jpg"
-    return f"[![{name}: {main.heading()}: {', '.join(map(shown, main.values))}]({file})]({file})"
+    return f"[![{name}: {main.heading()}: {', '.join(main.captions())}]({file})]({file})"
 
 
 def lobes_picture(model: type[Model]) -> str:
@@ -172,7 +172,9 @@ def _overview(models: list[type[Model]]) -> str:
 
 def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
-    strip = f"*The picture at the top has the colour of the model's family.*\n\n{strip_picture(model)}"
+    given = {name: value for name, value in portrait(model).items() if name != "type"}
+    about = f"*The picture at the top, in the colour of the model's family, has* `{listed(given)}`."
+    strip = f"{about}\n\n{strip_picture(model)}"
     return _page(model, _picture(model), strip, f"### Lobes\n\n{lobes_picture(model)}")
 
 

@@ -15,7 +15,7 @@ from sphinx.util.docutils import docutils_namespace, patch_docutils
 import mi_brdfs
 
 from . import live
-from .pages import summaries, write_pages
+from .pages import questions, summaries, write_pages
 
 HERE = Path(__file__).parent
 LOGO = str(HERE / "static" / "logo.svg")
@@ -63,7 +63,8 @@ def build(folder: Path) -> int:
         live.write_pages(Path(scratch) / "live")
         scorer = Path(scratch) / "scorer.js"
         told = json.dumps({f"reference/{name}": text for name, text in summaries().items()})
-        scorer.write_text(f"const SUMMARIES = {told};\n{(HERE / scorer.name).read_text()}", encoding="utf-8")
+        data = f"const SUMMARIES = {told};\nconst QUESTIONS = {json.dumps(questions())};\n"
+        scorer.write_text(data + (HERE / scorer.name).read_text(), encoding="utf-8")
         settings = SETTINGS | {"html_extra_path": [str(Path(scratch) / "live")], "html_search_scorer": str(scorer)}
         app = Sphinx(
             source, None, folder, Path(scratch) / "doctrees", "html", settings,

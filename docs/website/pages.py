@@ -209,6 +209,13 @@ def summaries() -> dict[str, str]:
     return {it.plugins[0]: " ".join([*it.plugins, it.summary()]) for it in [*own_models(), *OTHERS]}
 
 
+def questions() -> dict[str, list[str]]:
+    """Return the questions that pages answer, by the name of the page."""
+    texts = {page: (ROOT / file).read_text(encoding="utf-8") for file, page in FILES.items() if file.endswith(".md")}
+    found = {page: re.findall(r"^\*\*([^*]+\?)\*\*", text, re.MULTILINE) for page, text in texts.items()}
+    return {page: asked for page, asked in found.items() if asked}
+
+
 def _reference() -> str:
     names = list(summaries())
     introduction = with_formulas(models.INTRODUCTION, ()).rstrip() + " In a terminal, $\\omega_i$ is wi."

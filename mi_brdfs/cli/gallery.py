@@ -47,6 +47,9 @@ def gallery(
 
         def advance(type: str, done: int, of: int) -> None:
             nonlocal finished, total
+            before = bar.tasks[task].description
+            if before not in ("", type) and not err.is_terminal:  # there is no bar
+                err.print(f"{before} is finished; {finished} of {of} pictures.")
             finished, total = done, of
             bar.update(task, description=type, completed=done, total=of)
 

@@ -38,7 +38,7 @@ from ..rendering.passes import ctrl_c
 from ..writing import write_text
 from .families import by_family, portrait, stage_of, year
 from .sheet import Row, sheet
-from .sweeps import Sweep, shown, sweeps_of
+from .sweeps import Sweep, sweeps_of
 
 __all__ = ["gallery"]
 
@@ -147,7 +147,7 @@ def overview(portraits: list[tuple[type[Model], Image.Image]]) -> Image.Image:
 
 def sweep_row(sweep: Sweep, stage: str, shots: list[Shot]) -> Row:
     """Return the pictures of a sweep, as far as they go; under a point light, with their profiles."""
-    captions = [shown(value) for value in sweep.values[: len(shots)]]
+    captions = sweep.captions()[: len(shots)]
     profiles = [each.profile for each in shots] if stage == "point" else []
     return Row({0: sweep.heading()}, [each.picture for each in shots], captions, profiles)
 
@@ -180,10 +180,12 @@ class Entry:
         return rows
 
     def write(self, folder: Path) -> None:
-        """Write the contact sheet and the wall of presets unless they are empty."""
-        for rows, name in ((self.rows(), f"{self.type}.png"), (self.wall(), f"{self.type}_presets.jpg")):
+        """Write the contact sheet and the wall of presets unless they are empty, both as wide as the wider one."""
+        sheets = {f"{self.type}.png": self.rows(), f"{self.type}_presets.jpg": self.wall()}
+        width = max((sheet(rows).width for rows in sheets.values() if rows), default=0)
+        for name, rows in sheets.items():
             if rows:
-                _save(sheet(rows), folder / name)
+                _save(sheet(rows, width), folder / name)
 
     def described(self) -> str:
         """Return what the contact sheet shows, in words."""

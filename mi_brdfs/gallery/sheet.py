@@ -27,13 +27,15 @@ class Row(NamedTuple):
     """If any, the brightness across each picture, drawn below it beside the first one, which is orange."""
 
 
-def sheet(rows: list[Row]) -> Image.Image:
-    """Return the rows as one image. Columns are as wide as the pictures, or as the captions need."""
+def sheet(rows: list[Row], width: int = 0) -> Image.Image:
+    """Return the rows as one image, at least so wide. Columns are as wide as the pictures, or as the captions need."""
     size = rows[0].pictures[0].width
     font = ImageFont.load_default(max(11, size // 11))
     line = sum(font.getmetrics())
     captions = [caption for row in rows for caption in row.captions]
-    column = max(size, *(_width(font, caption) for caption in captions)) + GAP
+    most = max(len(row.pictures) for row in rows)
+    column = max(size, *(_width(font, caption) + GAP for caption in captions)) + GAP
+    column = max(column, (width - GAP) // most)
     lines = max(caption.count("\n") for caption in captions) + 1
     heights = [
         size + lines * line + 2 * GAP + bool(row.headings) * (line + GAP // 2) + bool(row.profiles) * (line + size // 3)
@@ -41,9 +43,9 @@ def sheet(rows: list[Row]) -> Image.Image:
     ]
     reach = [column * at + _width(font, text) + GAP for row in rows for at, text in row.headings.items()]
     reach += [_width(font, PROFILES) + GAP for row in rows if row.profiles]
-    width = max([column * len(row.pictures) for row in rows] + reach)
+    width = max(width, *(GAP + it for it in [column * most, *reach]))
 
-    image = Image.new("RGB", (width + GAP, sum(heights) + GAP), PAPER)
+    image = Image.new("RGB", (width, sum(heights) + GAP), PAPER)
     draw = ImageDraw.Draw(image)
     top = GAP
     for row, height in zip(rows, heights, strict=True):

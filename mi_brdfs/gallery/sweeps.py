@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,9 +28,19 @@ class Sweep:
 
     def heading(self) -> str:
         """Return the heading: the parameter, and what is given."""
-        given = ", ".join(f"{name} = {shown(value)}" for name, value in self.given.items())
+        given = listed(self.given)
         unit = f" in {UNITS[self.parameter]}" if self.parameter in UNITS else ""
         return self.parameter + unit + (f", with {given}" if given else "")
+
+    def captions(self) -> list[str]:
+        """Return a label for each value; of a rotation, also in degrees."""
+        degrees = self.parameter == "rotation"
+        return [shown(value) + (f" ({360 * value:g}°)" if degrees else "") for value in self.values]
+
+
+def listed(values: Mapping[str, Any]) -> str:
+    """Return parameters and their values as a label."""
+    return ", ".join(f"{name} = {shown(value)}" for name, value in values.items())
 
 
 def shown(value: Any) -> str:

@@ -86,16 +86,19 @@ def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool =
 
 
 def constants(bsdfs: Sequence[Any]) -> list[str]:
-    """Return a line with what all dicts have in common, if anything: their labels tell the rest."""
+    """Return lines with what all dicts have in common, if anything, and what models have otherwise by default: their
+    labels tell the rest."""
     kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
-    who = "all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds)
+    only = _only_plugin(bsdfs)
+    who = only or ("all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds))
     same = _common(bsdfs)
     told = {_plugin(given) for given in bsdfs if isinstance(given, dict) and _parameters(given)}
     bare = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind and kind not in told and len(bsdfs) > 1]
     # A colour stays on its line.
-    lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else []
+    lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else [only] if only else []
     whose = f"{', '.join(bare)} with " if len(bare) < len({*map(_plugin, bsdfs)}) else ""
-    return lines + ([f"{whose}default parameters"] if bare else [])
+    lines += [f"{whose}default parameters"] if bare else []
+    return lines + [_told(f"{kind} by default:", own) for kind, own in _differing_defaults(bsdfs).items() if own]
 
 
 def places(bsdfs: Sequence[Any], count: int) -> list[Place]:
@@ -139,7 +142,7 @@ def _parameters(given: dict) -> dict[str, str]:
 
 
 def _told(word: str, parameters: dict[str, str]) -> str:
-    return " ".join([word, *(f"{name}={value}" for name, value in parameters.items())])
+    return " ".join(filter(None, [word, *(f"{name}={value}" for name, value in parameters.items())]))
 
 
 def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
@@ -154,9 +157,43 @@ def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe
 
 
 def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
-    """Return a label for each plugin, by the identity of its dict or word: the type, and the parameters that not all
-    dicts share, which have their defaults where others are given."""
-    labels, common = {}, _common(bsdfs)
+    """Return a label for each plugin, by the identity of its dict or word: the type, unless it is that of all, and the
+    parameters that distinguish it."""
+    own, only = _distinguishing(bsdfs), _only_plugin(bsdfs)
+    kinds = {id(given): kind for given in bsdfs if (kind := _plugin(given))}
+    return {key: _told("" if only else kind, own[key]) for key, kind in kinds.items()}
+
+
+def _differing_defaults(bsdfs: Sequence[Any]) -> dict[str, dict[str, str]]:
+    """Return the defaults of each of several models that another has otherwise, of parameters that none is given."""
+    stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
+    if "preset" in stated:  # it gives others
+        return {}
+    found = {
+        kind: {it.name: it.rows()[0].default for it in find_model(kind).declared() if not stated & set(it.names)}
+        for kind in dict.fromkeys(map(_plugin, bsdfs))
+        if kind in list_models()
+    }
+    differing = {
+        name
+        for own in found.values()
+        for name in own
+        if any(it.get(name, own[name]) != own[name] for it in found.values())
+    }
+    return {kind: {name: it for name, it in own.items() if name in differing} for kind, own in found.items()}
+
+
+def _only_plugin(bsdfs: Sequence[Any]) -> str:
+    """Return the plugin that several are, all told apart by their parameters, or an empty text."""
+    kinds = {_plugin(given) for given in bsdfs}
+    is_told = len(bsdfs) > 1 and len(kinds) == 1 and all(_distinguishing(bsdfs).values())
+    return kinds.pop() if is_told else ""
+
+
+def _distinguishing(bsdfs: Sequence[Any]) -> dict[int, dict[str, str]]:
+    """Return the parameters of each plugin that not all dicts share, by the identity of its dict or word; they have
+    their defaults where others are given."""
+    found, common = {}, _common(bsdfs)
     stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
     for given in bsdfs:
         if kind := _plugin(given):
@@ -164,8 +201,8 @@ def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
             declared = find_model(kind).declared() if kind in list_models() else []
             left_out = [it for it in declared if it.name in stated and not own.keys() & set(it.names)]
             own |= {it.name: it.rows()[0].default for it in left_out}
-            labels[id(given)] = _told(kind, {name: value for name, value in own.items() if name not in common})
-    return labels
+            found[id(given)] = {name: value for name, value in own.items() if name not in common}
+    return found
 
 
 def _plugin(given: Any) -> str:

@@ -254,7 +254,8 @@ def draw_cartesian(
         ax.plot(*line.curve, label=line.label, **line.look)
     ax.set_xlim(-end, end)
     turns = range(-end, end + 1, end // 3)
-    ax.set_xticks(turns, [f"{turn}°".replace("-", "−") for turn in turns])
+    # Labels of the ends would touch those of the other axis and of the next panel.
+    ax.set_xticks(turns, ["" if turn % (2 * end // 3) else f"{turn}°".replace("-", "−") for turn in turns])
     ax.set_xlabel(r"$\theta_o$", fontsize=TEXT, color=INK)
     ax.set_ylabel(text, fontsize=TEXT, color=INK)
 
