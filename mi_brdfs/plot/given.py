@@ -165,14 +165,14 @@ def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
 
 
 def _differing_defaults(bsdfs: Sequence[Any]) -> dict[str, dict[str, str]]:
-    """Return the defaults of each of several models that another has otherwise, of parameters that none is given."""
+    """Return the defaults of each of a few models that another has otherwise, of parameters that none is given."""
     stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
-    if "preset" in stated:  # it gives others
+    kinds = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind in list_models()]
+    if "preset" in stated or len(kinds) > 4:  # it gives others; and of many, lines would be more than curves
         return {}
     found = {
         kind: {it.name: it.rows()[0].default for it in find_model(kind).declared() if not stated & set(it.names)}
-        for kind in dict.fromkeys(map(_plugin, bsdfs))
-        if kind in list_models()
+        for kind in kinds
     }
     differing = {
         name
