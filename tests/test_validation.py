@@ -287,6 +287,7 @@ FALSE_ALARMS = {
     "line of ward": case(NARROW, "ward", 60, alpha_u=0.906, alpha_v=0.0003),
     "line of walter": case(NARROW, "walter", alpha_u=0.5, alpha_v=0.001),
     "line at the normal": case(NARROW, "ward", 0, variant="ward", alpha_u=0.00015),
+    "all light reflected, whatever is outside": case("gradients", "walter", int_ior=0.01),
     "what fades above the horizon": case(
         "continuity", "microfacet", alpha=1.326109236523212, shadowing="smith-correlated", multiscatter="kulla-conty"
     ),

@@ -99,8 +99,8 @@ class Interface(Fresnel):
 
 
 class Dielectric(Interface):
-    """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
-    Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
+    """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = ``interior`` / ``exterior``, as Cook
+    and Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
     word = "dielectric"
     parameters = {
@@ -108,17 +108,18 @@ class Dielectric(Interface):
         "ext_ior": Index("air", "index of refraction of what is outside it", sought=False),
     }
     LEAST, INSIDE = 0.01, 0.9
-    """The least index, which reflects all light, and one that has a derivative."""
+    """The least index, which reflects all light, and a relative one that has a derivative."""
 
-    def __init__(self, eta: mi.Float, exterior: mi.Float = 1) -> None:
-        self.eta, self.exterior = eta, exterior
+    def __init__(self, interior: mi.Float, exterior: mi.Float = 1) -> None:
+        self.interior, self.exterior, self.eta = interior, exterior, interior / exterior
 
     @classmethod
     def of_values(cls, values: Mapping[str, Any]) -> Dielectric:
-        return cls(values["int_ior"] / values["ext_ior"], values["ext_ior"])
+        return cls(values["int_ior"], values["ext_ior"])
 
     def __call__(self, cos: mi.Float) -> mi.Float:
-        return leaving(self.LEAST, self.INSIDE, lambda eta: self._reflectance(eta, cos), self.eta)
+        inside = self.INSIDE * dr.detach(self.exterior)
+        return leaving(self.LEAST, inside, lambda index: self._reflectance(index / self.exterior, cos), self.interior)
 
     def refracted(self, cos: mi.Float) -> tuple[mi.Float, mi.Float]:
         g2 = self.eta * self.eta - 1 + cos * cos
