@@ -99,8 +99,8 @@ class Interface(Fresnel):
 
 
 class Dielectric(Interface):
-    """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = ``interior`` / ``exterior``, as Cook
-    and Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
+    """The exact unpolarized reflectance of a dielectric of relative index ``eta`` = interior / exterior, as Cook and
+    Torrance write it (1982, doi:10.1145/357290.357293). Beyond the critical angle (eta < 1) it is 1."""
 
     word = "dielectric"
     parameters = {
