@@ -31,7 +31,8 @@ def ranges(bsdf: mi.BSDF) -> dict[str, Range]:
 
 
 def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | None = None) -> None:
-    """Clamp the parameters of all BSDFs of this package in a scene to their ranges; a NaN stays one, to be seen.
+    """Clamp the parameters of all BSDFs of this package in a scene to their ranges; a NaN stays one, to be seen, and
+    attributes of meshes are theirs.
 
     In an optimisation, call it after each step with the optimizer, whose variables are clamped, too::
 

@@ -301,7 +301,7 @@ WRONG = {
     "sensors": ({"sensors": [0, 0]}, "Each picture has its sensor: there are 1 pictures and 2 sensors."),
     "number": ({"pictures": [GREY, GREY]}, "The scene has no sensor 1 for a picture"),
     "misspelt": ({"parameters": "ball.bsdf.alhpa"}, "no parameter ball.bsdf.alhpa; did you mean ball.bsdf.alpha"),
-    "another": ({"parameters": ["key.intensity.value"]}, "key.intensity.value is no parameter of a BSDF of mi_brdfs"),
+    "another": ({"parameters": ["key.intensity.value"]}, "key.intensity.value is no number, colour or bitmap"),
     "none": ({"parameters": []}, "There are no parameters to fit: the list is empty."),
     "iterations": ({"iterations": 0}, "A fit needs iterations >= 1 and spp >= 1."),
 }  # fmt: skip

@@ -87,8 +87,8 @@ def images(
     The scene's own values are the start, a little inwards if they are at an end of a range, and those found are in the
     scene in the end; it is as before if the fit fails or is interrupted. Numbers, colours and bitmaps are sought within
     the ranges that the models declare, on the scales that suit these: roughnesses and exponents on a logarithmic one,
-    shares and reflectances on a logit one. A colour that is given as a number stays grey, and a parameter that a model
-    leaves out by default is fitted if it is given, also as 0.
+    shares and reflectances on a logit one; mesh attributes stay as they are. A colour that is given as a number stays
+    grey, and a parameter that a model leaves out by default is fitted if it is given, also as 0.
 
     What is minimised is the mean over pixels of ((I − P) / (P̄ + m/10))², for a rendering I and a picture P with the
     local mean P̄ over 5 x 5 pixels and the mean m of all: highlights count no more than what is around. Numbers and
@@ -226,7 +226,9 @@ def _slots(params: mi.SceneParameters, wanted: str | Sequence[str] | None) -> tu
         matching = [key for key in ours if key == word or key.startswith(f"{word}.")]
         if not matching:
             if any(key == word or key.startswith(f"{word}.") for key in params.keys()):
-                raise FitError(f"{word} is no parameter of a BSDF of mi_brdfs; there are {listed(ours, 'and')}.")
+                raise FitError(
+                    f"{word} is no number, colour or bitmap of a BSDF of mi_brdfs; there are {listed(ours, 'and')}."
+                )
             near = meant(word, ours)
             hint = f"did you mean {near}?" if near else f"there are {listed(ours, 'and')}."
             raise FitError(f"The scene has no parameter {word}; {hint}")
