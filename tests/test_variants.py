@@ -395,11 +395,11 @@ def test_a_changed_deepcopy_leaves_the_model_alone():
     declared = copy.deepcopy(model.declared())
     assert described(declared) == before and bound(model, declared, {"alpha": 0.1})
     distribution = next(parameter for parameter in declared if parameter.name == "distribution")
-    distribution.words["beckmann"]["alpha"].limits = (0.2, 0.5)
+    distribution.words["beckmann"]["alpha"].limits = (0.05, 0.5)
     assert described(model.declared()) == before != described(declared)
-    assert bound(model, model.declared(), {"alpha": 0.1})
-    with pytest.raises(ValueError, match=r"alpha = 0.1 is not allowed; it must be a number in \[0.2, 0.5\]"):
-        bound(model, declared, {"alpha": 0.1})
+    assert bound(model, model.declared(), {"alpha": 0.04})
+    with pytest.raises(ValueError, match=r"alpha = 0.04 is not allowed; it must be a number in \[0.05, 0.5\]"):
+        bound(model, declared, {"alpha": 0.04})
 
 
 @pytest.mark.parametrize("variant", ["scalar_rgb"], indirect=True)
