@@ -109,7 +109,7 @@ def instantiated(config: Any, state: Any) -> Any:
             kind, values = props.plugin_name(), {key: props[key] for key in props.keys()}
             check_plugin(kind, values)
             if node.type == mi.ObjectType.BSDF:
-                bsdfs[k] = [it.index() for it in values.values() if isinstance(it, mi.Properties.ResolvedReference)]
+                bsdfs[k] = referred(props)
             if kind in MESHES:
                 given = {key: values[key] for key in ("filename", "shape_index") if key in values}
                 checked_mesh({"type": kind, **given})
@@ -119,6 +119,12 @@ def instantiated(config: Any, state: Any) -> Any:
     if inner:
         raise ValueError(f"More than {DEEPEST} BSDFs are in one another; nest fewer.")
     return mi.parser.instantiate(config, state)
+
+
+def referred(props: mi.Properties) -> list[int]:
+    """Return the nodes of a parsed scene to which the properties of one refer."""
+    values = [props[key] for key in props.keys()]
+    return [it.index() for it in values if isinstance(it, mi.Properties.ResolvedReference)]
 
 
 def check_plugin(kind: str, given: Iterable[str]) -> None:

@@ -111,17 +111,18 @@ class Plugin:
         cls.plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
         if isinstance(cls.plugins, str):
             raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
-        declared = [it for base in cls.__mro__ for it in vars(base).values() if isinstance(it, Parameter)]
-        for name in (name for parameter in declared for name in (parameter.name, *parameter.names)):
+        every = [it for base in cls.__mro__ for it in vars(base).values() if isinstance(it, Parameter)]
+        for name in (name for parameter in every for name in (parameter.name, *parameter.names)):
             if hasattr(Model, name) or name in MEMBERS:
                 raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model.")
 
-        for it in (it for parameter in nested(cls.declared()) for way in parameter.spellings for it in way):
+        declared = cls.declared()
+        for it in (it for parameter in nested(declared) for way in parameter.spellings for it in way):
             if it.default is not None and not it.limits[0] <= it.default <= it.limits[1]:
                 raise TypeError(
                     f"{cls.__name__}: {it.name} is {it.default} by default, not within {interval(*it.limits)}."
                 )
-        turns = [parameter.name for parameter in cls.declared() if isinstance(parameter, Rotation)]
+        turns = [parameter.name for parameter in declared if isinstance(parameter, Rotation)]
         if len(turns) > 1:
             raise TypeError(f"{cls.__name__}: {' and '.join(turns)} each turn the frame; declare one Rotation().")
 

@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -110,11 +110,12 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     loaded = load(loaded) if isinstance(loaded, dict) else loaded
     if isinstance(loaded, mi.Scene) and is_file:
         names = _distinct([name_of(bsdf) for bsdf in _materials(loaded)])
-        others = [id for id in loading.ids_of_bsdfs(path, parameters) if id not in names]
+        is_hidden = not names or wanted not in ("", *names)
+        others = [id for id in loading.ids_of_bsdfs(path, parameters) if id not in names] if is_hidden else []
         if not (names or wanted):
             hint = f"; name one of its BSDFs, as {path}:{others[0]}" if others else ""
             raise ValueError(f"{path}: no shape of the scene has a material{hint}")
-        for each in _chosen(source, [*names, *(others if wanted else [])], wanted):
+        for each in _chosen(source, [*names, *others], wanted):
             chosen = wanted if wanted in others else each.material
             yield each._replace(name=each.name + _suffix(parameters), material=chosen)
     elif isinstance(loaded, mi.BSDF) and not wanted:
@@ -264,7 +265,7 @@ def _suffix(parameters: Mapping[str, str]) -> str:
     return "".join(f" {name}={value}" for name, value in parameters.items())
 
 
-def _chosen(source: BSDFSource, names: Iterable[str], wanted: str) -> Iterator[BSDFSource]:
+def _chosen(source: BSDFSource, names: list[str], wanted: str) -> Iterator[BSDFSource]:
     """Yield the materials of a file, or the one that is wanted."""
     path = Path(source.source)
     if wanted and wanted not in names:

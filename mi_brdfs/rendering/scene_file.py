@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 import mitsuba as mi
 
 from ..legacy import upgrade
-from ..loading import file_names, instantiated, load_text, looking_in, parsed
+from ..loading import file_names, instantiated, load_text, looking_in, parsed, referred
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
@@ -133,14 +133,8 @@ def _used(state: Any) -> list[Any]:
     """Return the nodes of a scene without itself and without BSDFs that nothing else has."""
     used = [k for k, it in enumerate(state.nodes) if it.type not in (mi.ObjectType.Scene, mi.ObjectType.BSDF)]
     for k in used:  # which grows
-        used += [it for it in _inner(state.nodes[k]) if it not in used]
+        used += [it for it in referred(state.nodes[k].props) if it not in used]
     return [state.nodes[k] for k in used]
-
-
-def _inner(node: Any) -> list[int]:
-    """Return which nodes a node refers to."""
-    values = [node.props[name] for name in node.props.keys()]
-    return [it.index() for it in values if isinstance(it, mi.Properties.ResolvedReference)]
 
 
 def on_both_sides(bsdf: mi.BSDF) -> mi.BSDF:
@@ -208,6 +202,6 @@ def _set_box_filters(state: Any) -> None:
         if node.type == mi.ObjectType.ReconstructionFilter:
             node.props = mi.Properties("box")
     for node in state.nodes:
-        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in _inner(node))
+        filtered = any(state.nodes[place].type == mi.ObjectType.ReconstructionFilter for place in referred(node.props))
         if node.type == mi.ObjectType.Film and not filtered:
             node.props["rfilter"] = mi.load_dict({"type": "box"})

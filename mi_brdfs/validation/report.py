@@ -71,7 +71,8 @@ class Report:
     @property
     def failures(self) -> list[Finding]:
         """The findings that failed, what to fix first in front."""
-        return sorted(self._failed(), key=lambda it: it.check != self.first_to_fix)
+        first = self.first_to_fix
+        return sorted(self._failed(), key=lambda it: it.check != first)
 
     def _failed(self) -> list[Finding]:
         return [finding for finding in self.findings if finding.verdict == "fail"]
