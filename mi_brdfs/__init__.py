@@ -41,7 +41,6 @@ from .mitsuba.guests import register_installed  # noqa: E402
 from .mitsuba.registry import info, install, list_models, presets, register  # noqa: E402
 from .model import Energy, EnergyWarning, Model  # noqa: E402
 from .parameters.published import preset  # noqa: E402
-from .preview import preview_scene  # noqa: E402
 from .ranges import project, ranges  # noqa: E402
 
 install()
@@ -50,6 +49,7 @@ _LAZY = ("bench", "cluster", "fit", "gallery", "legacy", "plot", "sweep", "testi
 """Modules that are imported when they are used: some need extras, and all take time."""
 _ELSEWHERE = {
     "denoise": "rendering.output", "display_image": "rendering.output", "explore": "explorer", "load_legacy": "loading",
+    "preview_scene": "preview",
 }  # fmt: skip
 """Functions of such modules."""
 

@@ -43,19 +43,20 @@ def test_mitsuba_versions(monkeypatch):
 
 @pytest.mark.slow
 def test_import_is_fast(tmp_path):
-    """At most 0.2 s over Mitsuba's own, of the processor's time, with modules that are compiled, as those of an
-    installed package are. Other processes only add to it, so the least of several counts."""
+    """At most half as long again as Mitsuba's and NumPy's (0.2 s over Mitsuba's on a machine that imports both in
+    0.23 s), of the processor's time, with modules that are compiled, as those of an installed package are. Other
+    processes only add to it, so the least of several counts."""
     compiled = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}
 
-    def seconds(name):
-        code = f"import time; t = time.process_time(); import {name}; print(time.process_time() - t)"
+    def seconds(names):
+        code = f"import time; t = time.process_time(); import {names}; print(time.process_time() - t)"
         return float(python(code, **compiled).stdout)
 
     seconds("mi_brdfs")  # compiles
-    ours, mitsuba = [], []
-    while len(ours) < 2 or (min(ours) - min(mitsuba) >= 0.2 and len(ours) < 7):
-        ours, mitsuba = [*ours, seconds("mi_brdfs")], [*mitsuba, seconds("mitsuba")]
-    assert min(ours) - min(mitsuba) < 0.2, (mitsuba, ours)
+    ours, theirs = [], []
+    while len(ours) < 2 or (min(ours) >= 1.5 * min(theirs) and len(ours) < 7):
+        ours, theirs = [*ours, seconds("mi_brdfs")], [*theirs, seconds("mitsuba, numpy")]
+    assert min(ours) < 1.5 * min(theirs), (theirs, ours)
 
 
 @pytest.mark.parametrize(

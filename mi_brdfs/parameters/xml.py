@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 
 def to_xml(bsdf: Mapping[str, Any], id: str = "") -> str:
     """Return a plugin dict of numbers, words and rgb colours as XML, to paste into a scene; with an id, to be a file of
     its own, which a scene may ``<include>``."""
     lines = [f"    {_element(name, value)}" for name, value in bsdf.items() if name != "type"]
-    alone = f' version="3.0.0" id={quoteattr(id)}' if id else ""
-    return "\n".join([f"<bsdf{alone} type={quoteattr(bsdf['type'])}>", *lines, "</bsdf>"])
+    alone = f' version="3.0.0" id={_quoted(id)}' if id else ""
+    return "\n".join([f"<bsdf{alone} type={_quoted(bsdf['type'])}>", *lines, "</bsdf>"])
 
 
 def _element(name: str, value: Any) -> str:
@@ -24,4 +23,10 @@ def _element(name: str, value: Any) -> str:
         kind, text = "string", value.replace("$", "\\$")  # what follows a bare one is the name of a parameter
     else:
         kind, text = "float", f"{value:.7g}"
-    return f"<{kind} name={quoteattr(name)} value={quoteattr(text)}/>"
+    return f"<{kind} name={_quoted(name)} value={_quoted(text)}/>"
+
+
+def _quoted(text: str) -> str:
+    from xml.sax.saxutils import quoteattr  # 20 ms: only when needed
+
+    return quoteattr(text)
