@@ -276,6 +276,16 @@ def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
     np.testing.assert_allclose(as_grid(data).evaluate(wi, wo), highlight(wi, wo), rtol=0.05)
 
 
+def test_light_on_both_sides_is_in_one_plane(tmp_path):
+    """Where f depends on the azimuth between light and view, the material is isotropic."""
+    angles = itertools.product(range(-60, 61, 10), range(0, 61, 10), range(0, 180, 20))
+    rows = "\n".join(f"{i},{o},{d},{highlight(spherical(i, 0), spherical(o, d))}" for i, o, d in angles)
+    data = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows, "x.csv").data
+    assert isinstance(data, Grid) and not data.anisotropic
+    wi, wo = spherical(40, 70), spherical(40, 250)
+    np.testing.assert_allclose(data.evaluate(wi, wo), highlight(wi, wo), rtol=1e-3)
+
+
 def test_half_a_turn_tells_the_other_half(tmp_path):
     """Of the light's azimuths, by reciprocity; there is no jump where they end."""
     angles = itertools.product(range(0, 61, 20), range(0, 181, 20), range(0, 61, 20), range(0, 360, 20))
@@ -305,9 +315,10 @@ def highlight(wi, wo):
 
 @pytest.mark.parametrize(
     "azimuths",
-    [lambda i, d: (180, 180 + d), lambda i, d: (180 if i else 0, 180 + d), lambda i, d: (-d, 0)],
-    ids=["light at 180°", "light at 180°, but 0 at the normal", "light goes round"],
-)
+    [lambda i, d: (180, 180 + d), lambda i, d: (180 if i else 0, 180 + d), lambda i, d: (-d, 0),
+     lambda i, d: (d // 180 * 180, d // 180 * 180 + d)],
+    ids=["light at 180°", "light at 180°, but 0 at the normal", "light goes round", "light on both sides"],
+)  # fmt: skip
 def test_isotropic_materials_are_recognized(tmp_path, azimuths):
     """Whichever azimuth a file keeps; at the normal one means nothing."""
     rows = []

@@ -53,16 +53,15 @@ def _check(file: TextFile, name: str, angles: np.ndarray, most: int) -> None:
 
 def arranged(angles: Angles, values: np.ndarray) -> Grid | Samples:
     """Return rows as a grid of :class:`~mi_brdfs.measured.coordinates.Spherical` angles if each of them is there with
-    each other, and as samples if not. Rows of a single φi or φo, or in a single plane, are of an isotropic material. A
-    negative θ means the other side of the normal. Values of the same angles are averaged, with a warning if one is more
-    than twice another."""
+    each other, and as samples if not. Rows of a single φi or φo, or of two that are opposite, are of an isotropic
+    material. A negative θ means the other side of the normal. Values of the same angles are averaged, with a warning if
+    one is more than twice another."""
     warn_of_contradictions(angles, values)
     theta_i, phi_i, theta_o, phi_o = angles
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
     turned_i, turned_o = phi_i[theta_i > SAME], phi_o[theta_o > SAME]
-    in_plane = is_single(2 * turned_i) and is_single(2 * turned_o)
-    anisotropic = not (in_plane or is_single(turned_i) or (len(turned_o) and is_single(turned_o)))
+    anisotropic = not (is_single(2 * turned_i) or (len(turned_o) and is_single(2 * turned_o)))
     if not anisotropic:
         # At the normal the azimuth means nothing, and files have any there.
         phi_o = phi_o - np.where(theta_i > SAME, phi_i, turned_i[:1].sum())
