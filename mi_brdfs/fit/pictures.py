@@ -38,8 +38,9 @@ class ImageFit:
     """By their keys in ``mi.traverse(scene)``: a number, a list of a colour's channels, or the array of a bitmap, of
     shape (height, width, channels)."""
     sigma: dict[str, Any]
-    """The standard deviations of numbers and channels, as far as noise of the pictures and of the last renderings goes;
-    None at the end of a range, where the pictures tell nothing, and for bitmaps."""
+    """The standard deviations of numbers and channels, as far as noise of the pictures and of the last renderings goes,
+    and for bitmaps that are right up to a common shift of their texels: where texels can make up for a number, it is
+    known less well. None at the end of a range, where the pictures tell nothing, and for bitmaps."""
     bsdfs: dict[str, dict[str, Any]]
     """Their materials, by path, as plugin dicts for ``mi.load_dict`` with the scene's own textures."""
     bounds: list[str]
@@ -48,7 +49,7 @@ class ImageFit:
     """The mean squared relative difference before each step, and at last after them: without the noise of the
     renderings, but with that of the pictures."""
     converged: bool
-    """Whether the steps got short, or gained no more, before they were used up."""
+    """Whether the steps of numbers, colours and whole bitmaps got short, or gained no more, before they were used up."""
 
     def update(self, scene: mi.Scene) -> None:
         """Give the values to another scene that has parameters with these keys."""
