@@ -49,7 +49,7 @@ class ImageFit:
     """The mean squared relative difference before each step, and at last after them: without the noise of the
     renderings, but with that of the pictures."""
     converged: bool
-    """Whether the steps of numbers, colours and whole bitmaps got short, or gained no more, before they were used up."""
+    """Whether the steps of numbers and colours, and of bitmaps as a whole, got short or gained no more."""
 
     def update(self, scene: mi.Scene) -> None:
         """Give the values to another scene that has parameters with these keys."""
