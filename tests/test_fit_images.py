@@ -297,7 +297,12 @@ WRONG = {
     "black": ({"pictures": 0 * GREY}, "A picture is black, or has no numbers."),
     "gaps": ({"pictures": np.nan * GREY}, "A picture is black, or has no numbers."),
     "file": ({"pictures": "missing.exr"}, "There is no file missing.exr."),
-    "sensor": ({"sensors": [1]}, "The scene has no sensor 1 for a picture: it has 1, counted from 0."),
+    "no picture": ({"pictures": __file__}, f"Mitsuba cannot read {__file__}: [Bitmap] Bitmap: Unknown file format!"),
+    "layers": (
+        {"pictures": mi.Bitmap(np.ones((16, 16, 6), np.float32))},
+        "A picture has 6 channels: give the colours among what mi.Bitmap.split returns.",
+    ),
+    "sensor": ({"sensors": 1}, "The scene has no sensor 1 for a picture: it has 1, counted from 0."),
     "sensors": ({"sensors": [0, 0]}, "Each picture has its sensor: there are 1 pictures and 2 sensors."),
     "number": ({"pictures": [GREY, GREY]}, "The scene has no sensor 1 for a picture"),
     "misspelt": ({"parameters": "ball.bsdf.alhpa"}, "no parameter ball.bsdf.alhpa; did you mean ball.bsdf.alpha"),

@@ -113,6 +113,16 @@ def test_alta_values(tmp_path):
     np.testing.assert_array_equal(measured(tmp_path, with_deltas, "z.dat").data.values.ravel(), [1])
 
 
+def test_alta_grids_of_half_vectors_reach_below_the_horizon(tmp_path):
+    angles = [*itertools.product(*(np.radians(range(0, most, 15)) for most in (91, 91, 181)))]
+    below = sum(np.cos(h) * np.cos(d) - np.sin(h) * np.sin(d) * abs(np.cos(phi)) < -1e-6 for h, d, phi in angles)
+    with pytest.warns(UserWarning, match=f"rows of directions below the horizon are left out: {below}"):
+        samples = measured(tmp_path, alta("RUSIN_TH_TD_PD", [(*row, 0.5) for row in angles]), "x.dat").data
+    assert min(samples.wi[:, 2].min(), samples.wo[:, 2].min()) > -1e-5
+    with pytest.raises(FileError, match="no row has both directions above the horizon"), pytest.warns(UserWarning):
+        measured(tmp_path, alta("RUSIN_TH_TD_PD", [(1.5, 1.5, 0, 0.5)]), "x.dat")
+
+
 def test_alta_vectors_have_any_length_but_none(tmp_path):
     rows = [(*(3 * V), *(1e-200 * L), 0.5), (*L, *V, 0.1)]
     samples = measured(tmp_path, alta("CARTESIAN", rows), "x.dat").data

@@ -13,6 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..mitsuba.errors import one_line
 from ..parameters import PerLobe, Quantity, Rotation
 from ..parameters.messages import listed, meant
 from ..probe.arrays import Array
@@ -77,7 +78,7 @@ def images(
     pictures: Picture | Sequence[Picture],
     parameters: str | Sequence[str] | None = None,
     *,
-    sensors: Sequence[int] | None = None,
+    sensors: int | Sequence[int] | None = None,
     iterations: int = 20,
     spp: int | None = None,
     seed: int = 0,
@@ -284,12 +285,15 @@ def _integrator(scene: mi.Scene) -> mi.Integrator:
 
 
 def _views(
-    scene: mi.Scene, integrator: mi.Integrator, pictures: Picture | Sequence[Picture], sensors: Sequence[int] | None
+    scene: mi.Scene,
+    integrator: mi.Integrator,
+    pictures: Picture | Sequence[Picture],
+    sensors: int | Sequence[int] | None,
 ) -> list[View]:
     """Return the pictures with their sensors."""
     given = [_pixels(it) for it in (pictures if isinstance(pictures, (list, tuple)) else [pictures])]
     count = len(scene.sensors())
-    indices = range(len(given)) if sensors is None else [*map(int, sensors)]
+    indices = range(len(given)) if sensors is None else [*map(int, np.atleast_1d(sensors))]
     if not given:
         raise FitError("There is no picture to fit to.")
     if len(indices) != len(given):
@@ -321,10 +325,15 @@ def _pixels(picture: Picture) -> Array:
     if isinstance(picture, (str, os.PathLike)):
         if not Path(picture).is_file():
             raise FitError(f"There is no file {picture}.")
-        picture = mi.Bitmap(str(picture))
+        try:
+            picture = mi.Bitmap(str(picture))
+        except RuntimeError as error:
+            raise FitError(f"Mitsuba cannot read {picture}: {one_line(error)}") from None
     clips = False
     if isinstance(picture, mi.Bitmap):
         formats = mi.Bitmap.PixelFormat
+        if (count := picture.channel_count()) > 4:
+            raise FitError(f"A picture has {count} channels: give the colours among what mi.Bitmap.split returns.")
         colour = formats.Y if picture.pixel_format() in (formats.Y, formats.YA) else formats.RGB
         clips = np.array(picture).dtype.kind == "u"
         picture = picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from ..arrays import vector
 from ..coordinates import HalfDifference, SpecularPolar, polar_angle, spherical
 from ..files import FileError
 from ..measurement import Measurement, Quantity
-from ..rows import measured
+from ..rows import SAME, measured
 from ..text import TextFile, opening, shortened, whole
 from .tabular import srgb_of
 
@@ -37,8 +38,9 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     """Read rows of input and output columns (L. Belcour, P. Barla, R. Pacanowski, ALTA: a BRDF analysis library,
     Eurographics Workshop on Material Appearance Modeling 2014, doi:10.2312/mam.20141298). The light L is wi, and the
     view V is wo; both point away from the surface, and Δφ = 0 is where they coincide. Columns of uncertainty (#VS) are
-    left out. ``INV_STERADIAN_COSINE_FACTOR`` is divided by cosθo. Files without #PARAM_OUT are, for ALTA, of an unknown
-    output: ``quantity`` says what they hold. Colours are taken as f if it does not.
+    left out, and so are rows below the horizon, which grids of half and difference angles have.
+    ``INV_STERADIAN_COSINE_FACTOR`` is divided by cosθo. Files without #PARAM_OUT are, for ALTA, of an unknown output:
+    ``quantity`` says what they hold. Colours are taken as f if it does not.
 
     Raises:
         FileError: if the file is no text, not complete, of a fitted function, or in a parametrisation in which no BRDF
@@ -85,6 +87,14 @@ def read(path: Path, quantity: Quantity) -> Measurement:
             "a coordinate is infinite or missing, or a direction is the zero vector",
             file.row_lines[int(np.argmax(unknown))],
         )
+    if name in HALF:
+        above = np.minimum(light.z, view.z) > -SAME
+        if below := int(np.sum(~above)):
+            warnings.warn(f"{path}: rows of directions below the horizon are left out: {below:,}.", stacklevel=2)
+            if not np.any(above):
+                raise FileError(f"{path}: no row has both directions above the horizon.")
+            table = table[above]
+            light, view = directions(*table[:, :inputs].T)
     if name == SPHERICAL:  # whose azimuths count at the normal, too, where they fill a grid
         theta_i, phi_i, theta_o, phi_o = table[:, :inputs].T.copy()
     else:
@@ -138,3 +148,5 @@ PARAMETRISATIONS: dict[str, tuple[int, Callable[..., Pair], bool]] = {
     "CARTESIAN": (6, cartesian, True),
 }
 """ALTA's names: how many columns they have, ``(L, V)`` of these, and whether f depends on the azimuth of both."""
+HALF = "RUSIN_TH_TD_PD", "RUSIN_TH_PH_TD_PD"
+"""Those whose grids reach below the horizon."""
