@@ -49,33 +49,9 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     file = TextFile(path)
     rows = file.rows()
     first = next(rows, [])
-    settings: dict[str, list[str]] = {}
-    notes: dict[str, str] = {}
-    for name, *words in (comment.split() for comment in file.comments):
-        if name.upper() in KEYWORDS:
-            settings[name.upper()] = words
-        elif words and name.isupper() and name != "ALTA":
-            notes[name.lower()] = " ".join(words).strip('"')
-    if settings.get("TYPE", ["data"])[0].lower() == "function" or settings.get("FORMAT", ["text"])[0].lower() != "text":
-        raise FileError(f"{path} holds a fitted function or binary data of ALTA; only its text data can be read.")
-    name, output = ((settings.get(key) or ["UNKNOWN"])[0].upper() for key in ("PARAM_IN", "PARAM_OUT"))
-    if name not in PARAMETRISATIONS:
-        known = ", ".join(PARAMETRISATIONS)
-        raise FileError(f"{path}: {shortened(name)} is not known; known are {known}.")
-    if output not in OUTPUTS:
-        raise FileError(f"{path}: its output {shortened(output)} is no BRDF (#PARAM_OUT INV_STERADIAN or RGB_COLOR).")
-    if output.startswith("UNKNOWN") and quantity == "stated":
-        raise FileError(
-            f'{path} does not say what it holds: give the quantity, "f" or "f cos", or add a line #PARAM_OUT with '
-            "INV_STERADIAN or INV_STERADIAN_COSINE_FACTOR."
-        )
-    needed, directions, anisotropic = PARAMETRISATIONS[name]
-    inputs, outputs = (whole(word) for word in (*settings.get("DIM", []), "", "")[:2])
-    if inputs != needed or outputs not in ((3,) if "COLOR" in output else (1, 3)):
-        raise FileError(
-            f"{path}: its line #DIM has {inputs} and {outputs} columns; of {name} {needed} can be read, and of values "
-            "3 in rgb or XYZ, or a single one, as their wavelengths are not known."
-        )
+    settings, notes = _header(file)
+    name, output, outputs = _stated(path, settings, quantity)
+    inputs, directions, anisotropic = PARAMETRISATIONS[name]
     uncertain = any(word not in ("0", "0.0") for word in settings.get("VS", []))
     what = f"{inputs} of #PARAM_IN and {outputs} of #PARAM_OUT"
     table = file.table(itertools.chain([first], rows), inputs + outputs, what, more=uncertain)
@@ -88,13 +64,8 @@ def read(path: Path, quantity: Quantity) -> Measurement:
             file.row_lines[int(np.argmax(unknown))],
         )
     if name in HALF:
-        above = np.minimum(light.z, view.z) > -SAME
-        if below := int(np.sum(~above)):
-            warnings.warn(f"{path}: rows of directions below the horizon are left out: {below:,}.", stacklevel=2)
-            if not np.any(above):
-                raise FileError(f"{path}: no row has both directions above the horizon.")
-            table = table[above]
-            light, view = directions(*table[:, :inputs].T)
+        table = _above_horizon(path, table, np.minimum(light.z, view.z))
+        light, view = directions(*table[:, :inputs].T)
     if name == SPHERICAL:  # whose azimuths count at the normal, too, where they fill a grid
         theta_i, phi_i, theta_o, phi_o = table[:, :inputs].T.copy()
     else:
@@ -111,6 +82,54 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     }
     wavelengths = np.array([np.nan]) if outputs == 1 else None
     return measured(file, NAME, (theta_i, phi_i, theta_o, phi_o), values, wavelengths, **said)
+
+
+def _header(file: TextFile) -> tuple[dict[str, list[str]], dict[str, str]]:
+    """Return the words of ALTA's own comments, and what others note."""
+    settings: dict[str, list[str]] = {}
+    notes: dict[str, str] = {}
+    for name, *words in (comment.split() for comment in file.comments):
+        if name.upper() in KEYWORDS:
+            settings[name.upper()] = words
+        elif words and name.isupper() and name != "ALTA":
+            notes[name.lower()] = " ".join(words).strip('"')
+    return settings, notes
+
+
+def _stated(path: Path, settings: dict[str, list[str]], quantity: Quantity) -> tuple[str, str, int]:
+    """Return the parametrisation, what the values are, and how many columns they have. Raise a FileError where they
+    cannot be read as a BRDF."""
+    if settings.get("TYPE", ["data"])[0].lower() == "function" or settings.get("FORMAT", ["text"])[0].lower() != "text":
+        raise FileError(f"{path} holds a fitted function or binary data of ALTA; only its text data can be read.")
+    name, output = ((settings.get(key) or ["UNKNOWN"])[0].upper() for key in ("PARAM_IN", "PARAM_OUT"))
+    if name not in PARAMETRISATIONS:
+        known = ", ".join(PARAMETRISATIONS)
+        raise FileError(f"{path}: {shortened(name)} is not known; known are {known}.")
+    if output not in OUTPUTS:
+        raise FileError(f"{path}: its output {shortened(output)} is no BRDF (#PARAM_OUT INV_STERADIAN or RGB_COLOR).")
+    if output.startswith("UNKNOWN") and quantity == "stated":
+        raise FileError(
+            f'{path} does not say what it holds: give the quantity, "f" or "f cos", or add a line #PARAM_OUT with '
+            "INV_STERADIAN or INV_STERADIAN_COSINE_FACTOR."
+        )
+    needed = PARAMETRISATIONS[name][0]
+    inputs, outputs = (whole(word) for word in (*settings.get("DIM", []), "", "")[:2])
+    if inputs != needed or outputs not in ((3,) if "COLOR" in output else (1, 3)):
+        raise FileError(
+            f"{path}: its line #DIM has {inputs} and {outputs} columns; of {name} {needed} can be read, and of values "
+            "3 in rgb or XYZ, or a single one, as their wavelengths are not known."
+        )
+    return name, output, outputs
+
+
+def _above_horizon(path: Path, table: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """Return the rows whose lower direction, of that cosine, is above the horizon, with a warning if others are not."""
+    above = cosine > -SAME
+    if not np.any(above):
+        raise FileError(f"{path}: no row has both directions above the horizon.")
+    if below := int(np.sum(~above)):
+        warnings.warn(f"{path}: rows of directions below the horizon are left out: {below:,}.", stacklevel=2)
+    return table[above]
 
 
 def projected(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Pair:
