@@ -491,6 +491,7 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
     [
         ('<float name="exponent" value="nan"/>', "float exponent: 'nan' is not a finite number"),
         ('<float name="exponent" value="1e999"/>', "float exponent: '1e999' is not a finite number"),
+        ('<boolean name="nonlinear" value="yes"/>', "boolean nonlinear: 'yes' is neither true nor false"),
         ('<point name="center" x="nan"/>', "point center: 'nan' is not a finite number"),
         (
             '<transform name="toWorld"><matrix value="1 0 0 0"/></transform>',
@@ -499,8 +500,17 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
         ('<transform name="toWorld"><lookat up="0,1"/></transform>', "lookat: '0,1' is not 3 finite numbers"),
     ],
 )
-def test_what_is_no_number_is_refused(folder, inside, sentence):
+def test_malformed_values_are_refused(folder, inside, sentence):
     text = f'<scene version="0.6.0"><bsdf type="phong">{inside}</bsdf></scene>'
     (folder / "scene.xml").write_text(text)
     with pytest.raises(ValueError, match=sentence):
         upgrade(folder / "scene.xml")
+
+
+def test_booleans_have_any_case(folder):
+    def upgraded(value):
+        inside = f'<bsdf type="roughplastic"><boolean name="nonlinear" value="{value}"/></bsdf>'
+        (folder / "scene.xml").write_text(f'<scene version="0.6.0">{inside}</scene>')
+        return upgrade(folder / "scene.xml").xml
+
+    assert upgraded(" True ") == upgraded("true") != upgraded("False")

@@ -188,6 +188,10 @@ class Work:
                     if kind in COUNTS and (text or COUNTS[kind]):
                         it.numbers(*COUNTS[kind], text=text)
             element.value = element.value.strip(", \t\n")
+            if element.tag == "boolean":
+                element.value = element.value.lower()
+                if element.value not in ("true", "false"):
+                    raise element.error(f"{element.value!r} is neither true nor false")
             return element
         if element.tag not in PLUGINS:
             shown = " ".join([element.tag, *element.attributes.values()])
