@@ -35,6 +35,7 @@ from test_cli import invoke
 
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.models.lambert import Lambert
+from mi_brdfs.probe.arrays import context
 from mi_brdfs.validation import CHECKS, check
 from mi_brdfs.validation import run as run_of_checks
 from mi_brdfs.validation.incidents import random_incidents
@@ -548,6 +549,10 @@ def test_delta_functions_carry_what_they_carry_alone():
         ("bright", "it gains energy"),
         ("darker at grazing", "the light of a sample back to wi"),
         ("all reflected", "which goes to the other side"),
+        ("diffuse", "sampled_type is 2 for light"),
+        ("any type", "a type mask that leaves it out, where all must be black"),
+        ("from the camera alone", "in the mode Importance a sample's weight"),
+        ("inactive", "where active is False, but must be 0"),
         ("values", "but must be 0, as it is a delta function"),
         ("no number", "but must be finite"),
         ("no number", "its albedo is no number: light"),
@@ -559,6 +564,9 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
 
     def sample(self, ctx, si, u, v, active=True):
         bs = dr.zeros(mi.BSDFSample3f)
+        if fault == "any type":
+            ctx = context(ctx.component)
+        active |= fault == "inactive"
         reflects, passes = (
             ctx.is_enabled(kind, k) for k, kind in enumerate((kinds[0], mi.BSDFFlags.DeltaTransmission))
         )
@@ -570,8 +578,10 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
         bs.pdf = dr.select(mirrored, share, 1 - share) & (reflects or passes) & active
         bs.sampled_component = dr.select(mirrored, mi.UInt32(0), 1)
         through = kinds[0] if fault == "all reflected" else mi.BSDFFlags.DeltaTransmission
-        bs.sampled_type = dr.select(mirrored, mi.UInt32(int(kinds[0])), mi.UInt32(int(through)))
-        light = dr.select(mirrored, r, (1 - r) * inverse**2) / bs.pdf
+        back = mi.BSDFFlags.DiffuseReflection if fault == "diffuse" else kinds[0]
+        bs.sampled_type = dr.select(mirrored, mi.UInt32(int(back)), mi.UInt32(int(through)))
+        seen = ctx.mode == mi.TransportMode.Radiance or fault == "from the camera alone"
+        light = dr.select(mirrored, r, (1 - r) * (inverse**2 if seen else 1)) / bs.pdf
         light *= {"bright": 1.05, "no number": dr.nan}.get(fault, 1)
         if fault == "darker at grazing":
             light *= abs(si.wi.z)
@@ -581,8 +591,56 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
         return mi.Color3f(0.1 if fault == "values" else 0), mi.Float(0)
 
     glass = stranger("glass", *(kind | BOTH_SIDES for kind in kinds), sample=sample, eval_pdf=eval_pdf)
-    report = check(glass, only=["albedo", "deltas", "active", "calls"])
+    report = check(glass, only=["albedo", "deltas", "active", "mode", "calls"])
     assert report.passed == (not fault) and told in str([it.data for it in report.failures]) + str(report), report
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("fault", ["", "textures", "updates", "colours"])
+def test_parameters_of_delta_functions_are_judged(fault):
+    """Of a mirror that looks up its reflectance elsewhere, keeps the first one, or exchanges red and green."""
+
+    class Mirror(mi.BSDF):
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            self.reflectance = props.get_texture("reflectance", 0.8)
+            self.m_components = [int(mi.BSDFFlags.DeltaReflection | FRONT)]
+            self.m_flags = self.m_components[0]
+
+        def traverse(self, callback):
+            callback.put("reflectance", self.reflectance, mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys=()):
+            if fault == "updates":
+                self.reflectance = mi.load_dict({"type": "rgb", "value": (0.2, 0.3, 0.4)})
+
+        def sample(self, ctx, si, u, v, active=True):
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
+            lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
+            bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
+            at = mi.SurfaceInteraction3f(si)
+            if fault == "textures":
+                at.uv = mi.Point2f(si.uv.y, si.uv.x)
+            value = self.reflectance.eval(at)
+            value = mi.Color3f(value.y, value.x, value.z) if fault == "colours" else value
+            return bs, dr.select(lit, value, 0)
+
+        def eval(self, *given):
+            return mi.Color3f(0)
+
+        def pdf(self, *given):
+            return mi.Float(0)
+
+        def eval_pdf(self, *given):
+            return mi.Color3f(0), mi.Float(0)
+
+    name = f"judged_mirror_{fault}"
+    mi.register_bsdf(name, Mirror)
+    report = check({"type": name}, only=["deltas", "textures", "updates", "colours"])
+    assert {it.check for it in report.failures} == ({fault} if fault else set()), report
+    verdicts = {it.check: it.verdict for it in report.findings if it.check != "components"}
+    assert set(verdicts.values()) <= {"pass", "fail"}, report
 
 
 @pytest.mark.slow

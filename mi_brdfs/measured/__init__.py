@@ -7,7 +7,7 @@ from .formats import read
 from .grid import Grid
 from .measurement import Measurement
 from .report.summary import Summary, summarize
-from .scattered import Samples
+from .scattered import Samples, as_grid
 from .source import Source
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Samples",
     "Source",
     "Summary",
+    "as_grid",
     "bake",
     "convert",
     "read",

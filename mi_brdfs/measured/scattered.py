@@ -72,7 +72,7 @@ class Samples:
 
 
 def as_grid(data: Grid | Samples, extrapolate: Extrapolation = "hold") -> Grid:
-    """Return measured values on a grid: their own, or for samples that of :func:`gridded`."""
+    """Return measured values on a grid, which has ``evaluate``: their own, or for samples that of :func:`gridded`."""
     return data if isinstance(data, Grid) else gridded(data, extrapolate)
 
 

@@ -92,6 +92,14 @@ class Samples(NamedTuple):
         return self.lit | (black & (abs(self.density - self.pdf) < 0.01 * self.pdf))
 
 
+class Value(NamedTuple):
+    """What becomes of light, by a name of it, and where it goes: a row for each direction."""
+
+    name: str
+    wo: Array
+    value: Array
+
+
 @dataclass
 class BSDFProbe:
     """A BSDF of the active variant, which must be vectorized and unpolarized, with its parts.
@@ -120,10 +128,13 @@ class BSDFProbe:
         return parts
 
     @cached_property
-    def deltas(self) -> list[int]:
-        """The components that are delta functions."""
+    def deltas(self) -> list[Part]:
+        """The components that are delta functions, seen from wherever a component is."""
         smooth = [part.component for part in self.components]
-        return [k for k in range(self.bsdf.component_count()) if k not in smooth]
+        others = [k for k in range(self.bsdf.component_count()) if k not in smooth]
+        return [
+            Part(self.name_of(k), context(component=k), k, int(self.bsdf.flags(k)), self.whole.sides) for k in others
+        ]
 
     def name_of(self, component: int) -> str:
         """Return the name of a component, with what its flags say it is."""
@@ -179,6 +190,18 @@ class BSDFProbe:
         """Return f |cosθ_o|."""
         value = numbers(self.bsdf.eval(part.context, self._at(wi, uv, len(wo)), vectors(wo), True), len(wo))
         return np.where(self.data.seen(wi, wo)[:, None], value, np.nan) if self.data is not None else value
+
+    def values(self, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> list[Value]:
+        """Return f |cosθ_o| of the whole, and what samples of each delta function alone weigh."""
+        return self.values_at(self._at(wi, uv, len(wo)), wo)
+
+    def values_at(self, si: mi.SurfaceInteraction3f, wo: Array) -> list[Value]:
+        """Return these at surface points, for which :attr:`data` does not count."""
+        count, found = len(wo), [Value("eval", wo, self.bsdf.eval(self.whole.context, si, vectors(wo), True))]
+        for part in self.deltas:
+            bs, weight = self.bsdf.sample(part.context, si, *sample_arguments(random(count, 83)), True)
+            found.append(Value(f"a sample's weight of {part.name}", numbers(bs.wo, count), weight))
+        return [each._replace(value=numbers(each.value, count)) for each in found]
 
     def pdf(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return the density of ``wo``."""

@@ -32,7 +32,7 @@ def components(run: Run) -> Findings:
         yield outcome.finding("Sums, sampled components and types are as asked for.")
     for part in probe.components:
         outcome = Outcome("components", f"{part.name} masked out")
-        _check_masks(run, outcome, part)
+        check_masks(run, outcome, part)
         yield outcome.finding("Black where the context excludes it.")
 
 
@@ -126,7 +126,7 @@ def _check_sum(run: Run, outcome: Outcome) -> None:
         outcome.differing(tolerance, "pdf", density, mixed, why, wi, wo, unknown=0)
 
 
-def _check_masks(run: Run, outcome: Outcome, part: Part) -> None:
+def check_masks(run: Run, outcome: Outcome, part: Part) -> None:
     """Check that what a context excludes is black, and that the rest is there."""
     probe, wi = run.probe, on_side(direction(30, 20), part.sides[0])
     wo = np.concatenate([hemisphere(COUNT, 1), on_side(hemisphere(COUNT, 2), -1)])

@@ -14,11 +14,12 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, Part
 from ..probe.directions import hemisphere, on_side, scattered
 from ..probe.variates import random
 from . import sampling
-from .outcome import Findings, Outcome, Skipped, told
+from .deltas import deltas
+from .outcome import KNOWN, Findings, Outcome, Skipped, told
 from .report import Finding
 from .run import Run
 from .traced import traced_floats
@@ -57,7 +58,12 @@ def active(run: Run) -> Findings:
 
 
 def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.Bool) -> dict[str, Array]:
-    """Return what all methods return where a mask is active, by name, without the weights of delta functions."""
+    """Return what all methods return where a mask is active, by name, without the weights of type Null, which Mitsuba's
+    own plugins do not mask."""
+
+    def stops(bs: mi.BSDFSample3f) -> mi.Bool:
+        return (bs.sampled_type & int(mi.BSDFFlags.Null)) == 0
+
     bsdf, ctx, si, towards = probe.bsdf, mi.BSDFContext(), interaction(wi), vectors(wo)
     value, density = bsdf.eval_pdf(ctx, si, towards, mask)
     bs, weight = bsdf.sample(ctx, si, *sample_arguments(u), mask)
@@ -67,11 +73,11 @@ def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.B
         "pdf": bsdf.pdf(ctx, si, towards, mask),
         "eval_pdf's value": value,
         "eval_pdf's density": density,
-        "the weight of sample": dr.select(probe.is_smooth(bs), weight, 0),
+        "the weight of sample": dr.select(stops(bs), weight, 0),
         "the density of sample": bs.pdf,
         "eval_pdf_sample's value": also[0],
         "eval_pdf_sample's density": also[1],
-        "the weight of eval_pdf_sample": dr.select(probe.is_smooth(also[2]), also[3], 0),
+        "the weight of eval_pdf_sample": dr.select(stops(also[2]), also[3], 0),
         "the density of eval_pdf_sample": also[2].pdf,
     }
     dr.eval(found)
@@ -114,7 +120,8 @@ def mode(run: Run) -> Findings:
     transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
     cosine of ``wo``: Mitsuba's ``eval`` and ``sample`` are those of the adjoint then, without which ``ptracer`` and
     ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
-    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too."""
+    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too. Delta functions draw the same, and weigh
+    it without the factor 1/η² of refracted radiance."""
     for part in run.probe.parts:
         if not part.passages:
             yield Finding("mode", part.name, "skip", "Not checked, as it transmits from one side only.")
@@ -143,6 +150,23 @@ def mode(run: Run) -> Findings:
                     tolerance, name, *pair, "is eval", wi, samples.wo, unknown=0, where=lit, but_for=0.01, seed=67
                 )
         yield outcome.finding("Light may be traced from either end.")
+    for part in run.probe.deltas:
+        outcome = Outcome("mode", part.name)
+        if not sampling.failing(run, part, deltas):  # what is wrong with it in any mode is said once
+            _check_traced_samples(run, outcome, part)
+        yield outcome.finding("Light may be traced from either end.")
+
+
+def _check_traced_samples(run: Run, outcome: Outcome, part: Part) -> None:
+    """Check that a delta function draws the same in the mode Importance, and how it weighs it."""
+    traced = part._replace(context=context(part.component))
+    traced.context.mode = mi.TransportMode.Importance
+    wi, u = scattered(COUNT, 66, part.sides), random(COUNT, 67)
+    got, usual = (run.probe.sample(each, wi, u) for each in (traced, part))
+    name, why = "in the mode Importance a sample's weight", "is needed: that of radiance times η²"
+    pair = got.weight, usual.weight * usual.eta[:, None] ** 2
+    outcome.differing(KNOWN, name, *pair, why, wi, got.wo, floor=1e-3, seed=67)
+    outcome.astray("in the mode Importance", got.wo, usual.wo, "in the other", wi, 67)
 
 
 def _methods(bsdf: mi.BSDF, ctx: mi.BSDFContext) -> dict[str, Callable[..., Any]]:
@@ -192,7 +216,7 @@ def calls(run: Run) -> Findings:
         if method == "sample":
             it = probe.sample(part, i, variates, at)
             wanted = {"a sample's weight": it.weight, "a sample's density": it.density[:, None]}
-            lit = it.lit[order, None]
+            lit = (it.weight != 0).any(axis=1, keepdims=True)[order]
             return {name: value[order] * lit for name, value in wanted.items()}, it.wo[order] * lit
         return {method: getattr(probe, method)(part, i, o, at).reshape(COUNT, -1)[order]}, wo
 

@@ -5,35 +5,33 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from ..probe.arrays import Array, context
-from ..probe.bsdf import BSDFProbe, Part, Samples
+from ..probe.arrays import Array
+from ..probe.bsdf import Part, Samples
 from ..probe.directions import scattered
 from ..probe.variates import random
-from .components import check_eta, turned
+from .components import check_eta, check_masks, turned
 from .incidents import SCATTERED, Incident
 from .outcome import KNOWN, Findings, Outcome
 from .report import Finding
 from .run import SEED, Run
 
+DELTAS = int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null)
+"""The types of delta functions."""
+
 
 def deltas(run: Run) -> Findings:
     """Check delta functions by their samples: their density is how often they are drawn, they carry as much light among
-    others as alone, to the side that their type says, and ``eval`` and ``pdf`` do not know of them. Light is bent as
-    ``eta`` says, after Snell, unless flags say that the surface turns it, and goes back where it came from, as much of
-    it."""
-    probe = run.probe
-    if not probe.deltas:
+    others as alone, to the side that their type says, which is that of their flags, none where a context excludes them,
+    and ``eval`` and ``pdf`` do not know of them. Light is bent as ``eta`` says, after Snell, unless flags say that the
+    surface turns it, and goes back where it came from, as much of it."""
+    if not run.probe.deltas:
         yield Finding("deltas", "whole", "skip", "There is no delta function.")
-    for part in (delta(probe, k) for k in probe.deltas):
+    for part in run.probe.deltas:
         outcome = Outcome("deltas", part.name)
         _check_drawn(run, outcome, part)
         _check_paths(run, outcome, part)
+        check_masks(run, outcome, part)
         yield outcome.finding("Its samples fit together.")
-
-
-def delta(probe: BSDFProbe, k: int) -> Part:
-    """Return the component of a delta function."""
-    return Part(probe.name_of(k), context(component=k), k, int(probe.bsdf.flags(k)), probe.whole.sides)
 
 
 def _check_drawn(run: Run, outcome: Outcome, part: Part) -> None:
@@ -76,6 +74,9 @@ def _check_paths(run: Run, outcome: Outcome, part: Part) -> None:
     said = [(kind & int(it)) != 0 for it in (kinds.Reflection, kinds.Transmission)]
     wrong = lit & steep & (np.where(stays, *said) == 0)
     outcome.wrong(wrong, "sampled_type", kind, "which goes to the other side", wi, wo, digits=9)
+    others = (kind & ~(part.flags & DELTAS) != 0) | (kind == 0)
+    why = f"but must be a delta function's among those of its flags, {part.flags & DELTAS}"
+    outcome.wrong(lit & others, "sampled_type", kind, why, wi, wo, digits=9)
     check_eta(outcome, Incident("all directions", wi), there, lit)
     if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
         _check_turned(run, outcome, part, wi, there)

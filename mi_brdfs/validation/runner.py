@@ -78,7 +78,10 @@ SIGNIFICANCE = 0.01
 AGAINST_SEED = 91
 FAINT = 1e-6
 """Values below this part of the largest one for an angle of incidence differ as much as this part does."""
-OF_SAMPLES = "albedo", "deltas", "active", "recorded", "calls", "null", "polarization"
+OF_SAMPLES = (
+    "albedo", "deltas", "textures", "updates", "recompiles", "active", "mode", "recorded", "calls", "null", "colours",
+    "spectral", "polarization",
+)  # fmt: skip
 """The checks that do without values, which delta functions have none of."""
 NO_COMPONENTS = "component_count() is 0: put the flags of each component into m_components."
 DELTA = "A delta function, which has no values: deltas judges its samples."
@@ -126,7 +129,7 @@ def check(
         bsdf = described(bsdf)
         probe, given = _probe(bsdf), bsdf if isinstance(bsdf, dict) else None
         run = Run(probe, angles, significance, conserves, given)
-        run.found += [Finding("components", probe.name_of(k), "skip", DELTA) for k in probe.deltas]
+        run.found += [Finding("components", part.name, "skip", DELTA) for part in probe.deltas]
         if not probe.bsdf.component_count():
             run.found.append(Finding("components", "whole", "fail", NO_COMPONENTS))
         for word in wanted:

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
-from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, vectors
-from ..probe.bsdf import BSDFProbe, load
+from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned
+from ..probe.bsdf import BSDFProbe, Value, load
 from ..probe.directions import hemisphere, on_side
 from . import sampling, values
 from .outcome import Findings, Outcome, Skipped, relative, told
@@ -31,9 +31,9 @@ HUE = 1, 0.7, 0.45
 
 def colours(run: Run) -> Findings:
     """Check that no channels of colour are exchanged: with colours for parameters that are grey or coloured, each
-    channel of ``eval`` is what it is where all parameters are grey of their value in this channel, or at least nearer
-    to that than to what another channel makes: a tint may depend on the luminance. For this the BSDF must be given as a
-    dict."""
+    channel of ``eval``, and of the weights of delta functions, is what it is where all parameters are grey of their
+    value in this channel, or at least nearer to that than to what another channel makes: a tint may depend on the
+    luminance. For this the BSDF must be given as a dict."""
     greys = _greys(run.probe, run.described("To give it other colours"))
     if not greys:
         raise Skipped("It has no colours.")
@@ -55,27 +55,28 @@ def spectral(run: Run) -> Findings:
     rgb, other = (f"{mi.variant().rpartition('_')[0]}_{kind}" for kind in ("rgb", "spectral"))
     if mi.variant() not in (rgb, other) or not {rgb, other} <= set(mi.variants()):
         raise Skipped(f"It takes the variants {rgb} and {other}.")
-    expected: dict[str, Array] = {}
+    expected: dict[str, list[Value]] = {}
     try:
         with unwrapped_ctrl_c(), mi.variant_context(rgb):
             probe = _load(described)
             greys = _greys(probe, described)
             tried = _tried(probe, described, greys)
             wi, wo = _load(tried[""]).pairs(part, COUNT, 81)
-            expected = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
+            expected = {words: _load(given).values(wi, wo) for words, given in tried.items()}
     except Exception as failure:  # it was checked in the other
         without = f"It does not work in {rgb}: {told(failure)}. "
         greys, tried = _greys(run.probe, described), {}
     else:
         without = ""
         # Of every lane alone: next to a narrow highlight all else is small.
-        if relative(expected[""].min(axis=1), expected[""].max(axis=1), 1e-12).max() > 1e-4:
+        spread = [relative(it.value.min(axis=1), it.value.max(axis=1), 1e-12).max() for it in expected[""]]
+        if max(spread) > 1e-4:
             tried = {}  # it has colours that cannot be replaced, of which spectral variants make other ones
     outcome, worst = Outcome("spectral", part.name), 0.0
     with mi.variant_context(other):
         try:
             with unwrapped_ctrl_c():
-                got = {words: _load(given).eval(part, wi, wo) for words, given in tried.items()}
+                got = {words: _load(given).values(wi, wo) for words, given in tried.items()}
                 coloured = _load(described | _coloured(greys))
                 every = replace(run, probe=coloured, angles=(), given=None)
                 # Few tests, but judged as strictly as those of this run: they are as many more.
@@ -94,28 +95,42 @@ def spectral(run: Run) -> Findings:
         if findings and all(finding.verdict != "fail" for finding in check(run)):
             outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
     for words in tried:
-        wanted = np.broadcast_to(expected[words].mean(axis=1, keepdims=True), got[words].shape)
-        places = Places(wi, wo, hero_wavelengths(COUNT))
-        worst = max(
-            worst, _compare(outcome, f"in {other}, in grey{words}, eval", got[words], wanted, f"in {rgb}", places)
-        )
+        for it, in_rgb in zip(got[words], expected[words], strict=True):
+            wanted = np.broadcast_to(in_rgb.value.mean(axis=1, keepdims=True), it.value.shape)
+            places, name = Places(wi, it.wo, hero_wavelengths(COUNT)), f"in {other}, in grey{words}, {it.name}"
+            worst = max(worst, _compare(outcome, name, it.value, wanted, f"in {rgb}", places))
     grey = f"Grey is the same in {rgb} and {other}, to {worst:.1g}. " if tried else ""
     yield outcome.finding(f"{without}{grey}Wavelengths follow their own.")
 
 
 def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None:
-    """Check that channels, or wavelengths, follow their own values of the colours."""
-    part, given = run.probe.whole, run.given or {}
-    wavelengths = hero_wavelengths(COUNT)
+    """Check that channels, or wavelengths, follow their own values of the colours: of ``eval``, and of the weights of
+    delta functions."""
+    given = run.given or {}
     textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
     coloured = load(given | textures)
-    wi, wo = BSDFProbe(coloured).pairs(part, COUNT, 84)
-    si, places = interaction(wi, wavelengths=wavelengths), Places(wi, wo, wavelengths)
+    wi, wo = BSDFProbe(coloured).pairs(run.probe.whole, COUNT, 84)
+    for kind in range(1 + len(run.probe.deltas)):
+        _check_followed(outcome, given, coloured, textures, (wi, wo), kind)
+
+
+def _check_followed(
+    outcome: Outcome,
+    given: dict[str, Any],
+    coloured: mi.BSDF,
+    textures: dict[str, mi.Texture],
+    directions: tuple[Array, Array],
+    kind: int,
+) -> None:
+    """Check one of the values, of the ``kind`` of that place in :meth:`BSDFProbe.values`."""
+    (wi, wo), wavelengths = directions, hero_wavelengths(COUNT)
+    si = interaction(wi, wavelengths=wavelengths)
+    name, wo, got = BSDFProbe(coloured).values_at(si, wo)[kind]
+    places = Places(wi, wo, wavelengths)
 
     def evaluated(bsdf: mi.BSDF, wavelengths: Array) -> Array:
-        return numbers(bsdf.eval(part.context, interaction(wi, wavelengths=wavelengths), vectors(wo), True), COUNT)
+        return BSDFProbe(bsdf).values_at(interaction(wi, wavelengths=wavelengths), directions[1])[kind].value
 
-    got = evaluated(coloured, wavelengths)
     count = got.shape[1]
     alike = [np.repeat(wavelengths[:, [k]], 4, axis=1) for k in range(4)]
     grey = [
@@ -125,22 +140,22 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     errors = np.array([[_error(got[:, k], grey[other][:, k]) for other in range(count)] for k in range(count)])
     if mi.is_spectral:
         rolled = np.roll(evaluated(coloured, np.roll(wavelengths, 1, axis=1)), -1, axis=1)
-        name, why = "in another order of the wavelengths eval", "in the first: it takes another's value"
-        _compare(outcome, name, rolled, got, why, places)
+        why = "in the first: it takes another's value"
+        _compare(outcome, f"in another order of the wavelengths {name}", rolled, got, why, places)
         # Asked at any wavelengths, these textures have the values of the light's, also to make a tint of.
         bound = evaluated(load(given | {name: pinned(texture, si) for name, texture in textures.items()}), wavelengths)
         why = "if all colours have their values of the light's wavelengths: they are looked up at others"
-        _compare(outcome, "eval", got, bound, why, places)
+        _compare(outcome, name, got, bound, why, places)
     for k in range(count):
         channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
         difference, why = abs(got[:, k] - grey[k][:, k]), "where all colours are grey of their value there"
         if errors[k, k] > TOLERANCE and errors[k].min() < 0.5 * errors[k, k]:
-            name, of_other = f"eval in {channel}", f"{why}: it follows another channel"
-            outcome.wrong(difference, name, got[:, k], of_other, wi, wo, expected=grey[k][:, k])
+            of_other = f"{why}: it follows another channel"
+            outcome.wrong(difference, f"{name} in {channel}", got[:, k], of_other, wi, wo, expected=grey[k][:, k])
         if mi.is_spectral:
             # Of four equal wavelengths no tint can depend on the others.
             alone, place = evaluated(coloured, alike[k])[:, k], Places(wi, wo, wavelengths[:, k])
-            _compare(outcome, "eval", alone, grey[k][:, k], why, place)
+            _compare(outcome, name, alone, grey[k][:, k], why, place)
 
 
 class Places(NamedTuple):
@@ -192,7 +207,7 @@ def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
         with unwrapped_ctrl_c():
             asking = load(given | {name: Asking(name, grey) for name, grey in greys.items()})
             wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
-            asking.eval(mi.BSDFContext(), interaction(wi), vectors(wi), True)
+            BSDFProbe(asking).values(wi, wi)
     except (RuntimeError, TypeError):
         return {}
     return {name: grey for name, grey in greys.items() if name in asked and grey > 0}

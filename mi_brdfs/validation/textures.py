@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import Array, interaction, numbers, pinned
-from ..probe.bsdf import BSDFProbe, Samples, load
+from ..probe.bsdf import BSDFProbe, Samples, Value, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .outcome import Findings, Outcome, Skipped, relative
@@ -25,9 +25,9 @@ SHAPE = 5, 7
 def textures(run: Run) -> Findings:
     """Check that a parameter given as a texture acts as its value at the surface point does, wherever that is, also
     outside the unit square. Constant parameters become bitmaps of random texels, and given textures stay. All over them
-    ``eval`` and ``eval_diffuse_reflectance`` are what they are where each texture has the value of the point
-    everywhere, and no other than if fewer points are evaluated; and weights are eval/pdf, to float32's rounding. For
-    this the BSDF must be given as a dict."""
+    ``eval``, ``eval_diffuse_reflectance`` and the weights of delta functions are what they are where each texture has
+    the value of the point everywhere, and no other than if fewer points are evaluated; and weights are eval/pdf, to
+    float32's rounding. For this the BSDF must be given as a dict."""
     varied, refused = _textured(run.probe, run.described("To replace its parameters by textures"))
     for name in refused:
         yield Finding("textures", name, "skip", "It does not take a bitmap of its kind beside the others.")
@@ -58,19 +58,20 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     # The one has its values wherever it is asked: let it be asked elsewhere.
     other = BSDFProbe(load(given | constant))
     why = "where its textures have the values of this point everywhere"
-    value, few = real.eval(part, wi, wo, uv), slice(COUNT // 8)
-    rows = [
-        ("eval", value, other.eval(part, wi, wo), why),
-        ("eval_diffuse_reflectance", real.diffuse_reflectance(wi, uv), other.diffuse_reflectance(wi), why),
-    ]
+    reflectance = Value("eval_diffuse_reflectance", wo, real.diffuse_reflectance(wi, uv))
+    found, few = [*real.values(wi, wo, uv), reflectance], slice(COUNT // 8)
+    pinned_down = [it.value for it in other.values(wi, wo)] + [other.diffuse_reflectance(wi)]
+    rows = [(it, expected, why) for it, expected in zip(found, pinned_down, strict=True)]
     if len(free) == len(varied):  # those that are pinned have as many lanes
-        alone = real.eval(part, wi[few], wo[few], uv[few])
-        rows.append(("eval", value[few], alone, "if fewer points are evaluated at once"))
+        alone = [it.value for it in real.values(wi[few], wo[few], uv[few])]
+        rows += [(it._replace(value=it.value[few]), value, "if fewer points are evaluated at once")
+                 for it, value in zip(found, alone, strict=False)]  # fmt: skip
     error = relative(*_reflected(run.probe.sample(part, wi, u, uv)))
     if np.quantile(error, 0.999) <= tolerance:  # else it is no matter of textures
-        rows.append(("the weight times pdf", *_reflected(samples), "is eval"))
-    for row in rows:
-        outcome.differing(tolerance, *row, wi, wo, uv=uv)
+        reflected, value = _reflected(samples)
+        rows.append((Value("the weight times pdf", wo, reflected), value, "is eval"))
+    for it, expected, why in rows:
+        outcome.differing(tolerance, it.name, it.value, expected, why, wi, it.wo, uv=uv)
 
 
 def _reflected(samples: Samples) -> tuple[Array, Array]:

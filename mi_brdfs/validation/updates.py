@@ -10,7 +10,7 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, launched_kernels, numbers
-from ..probe.bsdf import BSDFProbe, load
+from ..probe.bsdf import BSDFProbe, Value, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
@@ -33,9 +33,10 @@ class Drawn(NamedTuple):
 
 def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
-    value: ``eval`` and ``pdf`` are the same to float32's rounding, and so are directions drawn, but for few. And what
-    is set of one changes no other BSDF of the plugin; and ``parameters_changed`` without names takes up any change, and
-    of texels and tables no more than with their names. For this the BSDF must be given as a dict."""
+    value: ``eval``, ``pdf`` and the weights of delta functions are the same to float32's rounding, and so are
+    directions drawn, but for few. And what is set of one changes no other BSDF of the plugin; and
+    ``parameters_changed`` without names takes up any change, and of texels and tables no more than with their names.
+    For this the BSDF must be given as a dict."""
     described = run.described("To load it with another value")
     parameters, _ = traced_floats(run, "updates")
     wi, u = on_side(hemisphere(COUNT, 91), run.probe.whole.sides[0]), random(COUNT, SEED)
@@ -57,35 +58,38 @@ def _updated(run: Run, parameter: Parameter, described: dict[str, Any], drawn: D
         if len(number) > 1 and not mi.is_rgb:  # spectral variants keep the coefficients of a spectrum
             return None
         given = float(number[0]) if len(number) == 1 else {"type": "rgb", "value": number.tolist()}
-        before = run.probe.eval(run.probe.whole, drawn.wi, drawn.wo)
+        before = run.probe.values(drawn.wi, drawn.wo)
         if (other := loaded_or_none(described | {name: given})) is None:  # it is given otherwise
             return None
         told = ", ".join(f"{each:.4g}" for each in number)
         why = "before: they share something"
-        fresh, after = BSDFProbe(other), run.probe.eval(run.probe.whole, drawn.wi, drawn.wo)
-        _compare(run, outcome, drawn, f"once another is loaded with {told}, eval", after, before, why)
-        first = fresh.eval(run.probe.whole, drawn.wi, drawn.wo)
+        fresh, after = BSDFProbe(other), run.probe.values(drawn.wi, drawn.wo)
+        _compare(run, outcome, drawn, f"once another is loaded with {told},", after, before, why)
+        first = fresh.values(drawn.wi, drawn.wo)
         parameter.set(value)
-        last = fresh.eval(run.probe.whole, drawn.wi, drawn.wo)
-        _compare(run, outcome, drawn, f"once it is set to {told}, eval of another with that", last, first, why)
+        last = fresh.values(drawn.wi, drawn.wo)
+        _compare(run, outcome, drawn, f"once it is set to {told}, of another with that", last, first, why)
         _check_as_loaded(run, outcome, fresh, drawn, f"once it is set to {told},")
         parameter.params[parameter.key] = original
         run.probe.bsdf.parameters_changed()
-        back = run.probe.eval(run.probe.whole, drawn.wi, drawn.wo)
-        _compare(run, outcome, drawn, "once it is set back, eval", back, before, f"before: {UNNOTICED}")
+        back = run.probe.values(drawn.wi, drawn.wo)
+        _compare(run, outcome, drawn, "once it is set back,", back, before, f"before: {UNNOTICED}")
     return outcome.finding("Set and updated, it acts as loaded.")
 
 
-def _compare(run: Run, outcome: Outcome, drawn: Drawn, name: str, got: Array, expected: Array, why: str) -> None:
-    outcome.differing(10 * run.rounding(run.probe.whole), name, got, expected, why, drawn.wi, drawn.wo, seed=SEED)
+def _compare(
+    run: Run, outcome: Outcome, drawn: Drawn, once: str, got: list[Value], expected: list[Value], why: str
+) -> None:
+    for one, other in zip(got, expected, strict=True):
+        name, tolerance = f"{once} {one.name}", 10 * run.rounding(run.probe.whole)
+        outcome.differing(tolerance, name, one.value, other.value, why, drawn.wi, one.wo, seed=SEED)
 
 
 def _check_as_loaded(run: Run, outcome: Outcome, fresh: BSDFProbe, drawn: Drawn, once: str) -> None:
     """Check that the BSDF acts as a fresh one, which was loaded with its parameters."""
     part, (wi, wo, u), as_loaded = run.probe.whole, drawn, "if it is loaded with that"
-    for name in ("eval", "pdf"):
-        got, expected = (getattr(each, name)(part, wi, wo) for each in (run.probe, fresh))
-        _compare(run, outcome, drawn, f"{once} {name}", got, expected, as_loaded)
+    one, other = ([*each.values(wi, wo), Value("pdf", wo, each.pdf(part, wi, wo))] for each in (run.probe, fresh))
+    _compare(run, outcome, drawn, once, one, other, as_loaded)
     ours, loaded = (each.sample(part, wi, u) for each in (run.probe, fresh))
     # What sample keeps of former values shows beside pdf, which has the new ones.
     if np.quantile(relative(loaded.pdf, loaded.density, unknown=0) * loaded.lit, 0.99) <= 10 * run.rounding(part):
@@ -104,20 +108,16 @@ def _check_taken_up(run: Run, outcome: Outcome, parameter: Parameter, drawn: Dra
     probe, value = run.probe, np.array(parameter.value)
     parameter.set(value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
 
-    def found() -> list[tuple[str, Array, Array]]:
+    def found() -> list[Value]:
         samples = probe.sample(probe.whole, drawn.wi, drawn.u)
-        values, densities = (call(probe.whole, drawn.wi, drawn.wo) for call in (probe.eval, probe.pdf))
-        return [
-            ("eval", drawn.wo, values),
-            ("pdf", drawn.wo, densities),
-            ("a sample's density", samples.wo, samples.density),
-        ]
+        density = Value("pdf", drawn.wo, probe.pdf(probe.whole, drawn.wi, drawn.wo))
+        drawn_density = Value("a sample's density", samples.wo, samples.density)
+        return [*probe.values(drawn.wi, drawn.wo), density, drawn_density]
 
     named = found()
     probe.bsdf.parameters_changed()
     why = "after parameters_changed without names: what is kept of it is out of date"
-    for (name, wo, got), (_, _, expected) in zip(named, found(), strict=True):
-        _compare(run, outcome, drawn._replace(wo=wo), f"once it is changed, {name}", got, expected, why)
+    _compare(run, outcome, drawn, "once it is changed,", named, found(), why)
 
 
 def recompiles(run: Run) -> Findings:
