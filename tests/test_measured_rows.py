@@ -11,6 +11,8 @@ import pytest
 from support import shared, spherical, written
 
 from mi_brdfs.measured import FileError, Grid, Samples, read
+from mi_brdfs.measured.arrays import NUMPY, components
+from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import csv, zemax
 from mi_brdfs.measured.report.summary import summarize
 from mi_brdfs.measured.scattered import as_grid
@@ -111,6 +113,22 @@ def test_alta_values(tmp_path):
     assert rgb.wavelengths is None
     with_deltas = alta("ISOTROPIC_TV_TL_DPHI", [(0.1, 0.2, 0.3, 1, 0.1)]).replace("#DIM 4 1", "#DIM 3 1\n#VS 1")
     np.testing.assert_array_equal(measured(tmp_path, with_deltas, "z.dat").data.values.ravel(), [1])
+
+
+@pytest.mark.parametrize(
+    "coordinates",
+    [HalfDifference(reciprocal=False, anisotropic=True), Spherical(False, True), SpecularPolar(False, True)],
+    ids=lambda it: type(it).__name__,
+)
+@pytest.mark.parametrize("tiny", [0, 1e-9, 1e-6])
+def test_azimuths_count_where_a_pole_has_none(coordinates, tiny):
+    """Of the other direction, where one is at the normal, and of both, where the half vector is."""
+    normal, view = np.array([0, tiny, 1]), spherical(40, 70)
+    mirrored = view * [-1, -1, 1] + [0, tiny, 0]
+    for wi, wo in ((normal, view), (view, normal), (view, mirrored / np.linalg.norm(mirrored))):
+        there = coordinates.locate(components(wi), components(wo), NUMPY)
+        found = [np.array([w.x, w.y, w.z]) for w in coordinates.directions(*map(np.float64, there))]
+        np.testing.assert_allclose(found, [wi, wo], atol=2e-7)
 
 
 def test_alta_grids_of_half_vectors_reach_below_the_horizon(tmp_path):

@@ -596,6 +596,15 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
 
 
 @pytest.mark.usefixtures("llvm_rgb")
+def test_a_plugin_may_change_its_mask_in_place():
+    def sample(own, ctx, si, u, v, active):
+        active &= u < 0.5
+        return own(ctx, si, u, v, active)
+
+    assert check(wrapped("changed_mask", {"type": "diffuse"}, sample=sample), only="active").passed
+
+
+@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("fault", ["", "textures", "updates", "colours"])
 def test_parameters_of_delta_functions_are_judged(fault):
     """Of a mirror that looks up its reflectance elsewhere, keeps the first one, or exchanges red and green."""

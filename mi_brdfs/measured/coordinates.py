@@ -76,12 +76,13 @@ class HalfDifference(Coordinates):
         length = xp.sqrt(across * across + sz * sz)
         theta_h = xp.atan2(across, sz)
         theta_d = xp.atan2(xp.sqrt(dx * dx + dy * dy + dz * dz), length)
-        # d on the unit vectors towards growing θh and φh, both times |s|² sinθh.
-        polar = (dx * sx + dy * sy) * sz - dz * across * across
-        azimuthal = (dy * sx - dx * sy) * length
+        # d on the unit vectors towards growing θh and φh, both times |s|.
+        cos_phi, sin_phi = azimuth_of(vector(sx, sy, sz), xp)
+        polar = (dx * cos_phi + dy * sin_phi) * sz - dz * across
+        azimuthal = (dy * cos_phi - dx * sin_phi) * length
         phi_d = wrapped(xp.atan2(azimuthal, polar), np.pi if self.reciprocal else TWO_PI, xp)
         place = xp.sqrt(theta_h * (2 / np.pi)), theta_d, phi_d
-        return (*place, wrapped(xp.atan2(sy, sx), TWO_PI, xp)) if self.anisotropic else place
+        return (*place, wrapped(xp.atan2(sin_phi, cos_phi), TWO_PI, xp)) if self.anisotropic else place
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         root, theta_d, phi_d, *phi_h = places
@@ -104,10 +105,11 @@ class Spherical(Coordinates):
         self.names = ("theta_i", "theta_o", "delta_phi", *(("phi_i",) if anisotropic else ()))
 
     def locate(self, wi: Any, wo: Any, xp: SimpleNamespace) -> tuple[Any, ...]:
-        delta = xp.atan2(wo.y * wi.x - wo.x * wi.y, wo.x * wi.x + wo.y * wi.y)
+        cos_phi, sin_phi = azimuth_of(wi, xp)
+        delta = xp.atan2(wo.y * cos_phi - wo.x * sin_phi, wo.x * cos_phi + wo.y * sin_phi)
         delta = abs(delta) if self.mirrored else wrapped(delta, TWO_PI, xp)
         place = polar_angle(wi, xp), polar_angle(wo, xp), delta
-        return (*place, wrapped(xp.atan2(wi.y, wi.x), TWO_PI, xp)) if self.anisotropic else place
+        return (*place, wrapped(xp.atan2(sin_phi, cos_phi), TWO_PI, xp)) if self.anisotropic else place
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         theta_i, theta_o, delta, *phi_i = places
@@ -139,7 +141,7 @@ class SpecularPolar(Coordinates):
         azimuth = abs(azimuth) if self.mirrored else wrapped(azimuth, TWO_PI, xp)
         radial = xp.atan2(xp.sqrt(towards * towards + y * y), along)
         place = polar_angle(wi, xp), azimuth, radial
-        return (*place, wrapped(xp.atan2(wi.y, wi.x), TWO_PI, xp)) if self.anisotropic else place
+        return (*place, wrapped(xp.atan2(sin_phi, cos_phi), TWO_PI, xp)) if self.anisotropic else place
 
     def directions(self, *places: np.ndarray) -> tuple[SimpleNamespace, SimpleNamespace]:
         theta_i, azimuth, radial, *phi_i = places

@@ -64,13 +64,16 @@ def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.B
     def stops(bs: mi.BSDFSample3f) -> mi.Bool:
         return (bs.sampled_type & int(mi.BSDFFlags.Null)) == 0
 
+    def given() -> bool | mi.Bool:
+        return mask if isinstance(mask, bool) else mi.Bool(mask)  # plugins in Python may change theirs in place
+
     bsdf, ctx, si, towards = probe.bsdf, mi.BSDFContext(), interaction(wi), vectors(wo)
-    value, density = bsdf.eval_pdf(ctx, si, towards, mask)
-    bs, weight = bsdf.sample(ctx, si, *sample_arguments(u), mask)
-    also = bsdf.eval_pdf_sample(ctx, si, towards, *sample_arguments(u), mask)
+    value, density = bsdf.eval_pdf(ctx, si, towards, given())
+    bs, weight = bsdf.sample(ctx, si, *sample_arguments(u), given())
+    also = bsdf.eval_pdf_sample(ctx, si, towards, *sample_arguments(u), given())
     found = {
-        "eval": bsdf.eval(ctx, si, towards, mask),
-        "pdf": bsdf.pdf(ctx, si, towards, mask),
+        "eval": bsdf.eval(ctx, si, towards, given()),
+        "pdf": bsdf.pdf(ctx, si, towards, given()),
         "eval_pdf's value": value,
         "eval_pdf's density": density,
         "the weight of sample": dr.select(stops(bs), weight, 0),
@@ -81,7 +84,7 @@ def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.B
         "the density of eval_pdf_sample": also[2].pdf,
     }
     dr.eval(found)
-    reflectance = {"eval_diffuse_reflectance": probe.diffuse_reflectance(wi, active=mask)}
+    reflectance = {"eval_diffuse_reflectance": probe.diffuse_reflectance(wi, active=given())}
     return {name: numbers(value, len(wo)) for name, value in found.items()} | reflectance
 
 
