@@ -27,7 +27,7 @@ PAGES: dict[str, tuple[str, list[str]]] = {
         ["ward", "--labels", "brushed copper", *COPPER, "--vary", "alpha_u=0.03,0.1,0.3"],
     ),
     "rough_plaster": (
-        "smooth and rough plaster",
+        "plaster, of Lambert and of Oren and Nayar",
         ["lambert", "orennayar", "-Dreflectance=#d8c8b0", "--vary", "sigma=0.1,0.3,0.5"],
     ),
     "measured_paint": (

@@ -33,7 +33,7 @@ class Tabulated(Model):
     where the file is anisotropic. ``nearest`` takes the nearest node's value: MERL's own look-up. Negative values and
     missing ones count as 0, except for the channels of RGL's colours outside sRGB. What lies outside the measured range
     has the value at its border with ``hold``, and is 0 with ``zero``. What a file calls the incident direction is wi,
-    as in Mitsuba's ``measured``. Files of f cosθo are divided by the cosine; ``quantity`` is for those that do not
+    as in Mitsuba's ``measured``. Files of f cosθ_o are divided by the cosine; ``quantity`` is for those that do not
     state what they hold: ALTA's without #PARAM_OUT must be told, others are ``f`` by default.
 
     Linear sRGB values are rgb. In spectral variants they weigh three spectra that sum to 1, so that white stays white.
@@ -49,7 +49,7 @@ class Tabulated(Model):
     ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last, in [0, ∞) unless
     the file's may be negative. Directions are then drawn as the file says, whatever the values become.
 
-    Sampling: from a table over the half vector for 58 angles θi, in proportion to f cosθo at its nodes, by Mitsuba's
+    Sampling: from a table over the half vector for 58 angles θi, in proportion to f cosθ_o at its nodes, by Mitsuba's
     ``MarginalContinuous2D``, and 2 % by the cosine (mi_brdfs.tabulated.proposal).
 
     W. Matusik, H. Pfister, M. Brand and L. McMillan, A data-driven reflectance model, ACM Transactions on Graphics
@@ -67,7 +67,7 @@ class Tabulated(Model):
     scale = Colour(1, (0, np.inf), "factor on all values")
     interpolation = Choice(("trilinear", "nearest"), "between the nodes of the file's grid")
     extrapolate = Choice(("hold", "zero"), "beyond the measured range: the value at its border, or nothing")
-    quantity = Choice(("stated", "f", "f cos"), "what a file holds that does not state it: f, or f cosθo")
+    quantity = Choice(("stated", "f", "f cos"), "what a file holds that does not state it: f, or f cosθ_o")
     differentiable = Flag(False, "give this BSDF a table of its own, with derivatives, as the parameter values")
     rotation = Rotation()
 
