@@ -124,7 +124,7 @@ def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
         self.table = mi.Float([0.1, 0.4, 0.2, 0.3])
         self.parameters_changed()
 
-    def parameters_changed(self, keys=()):
+    def parameters_changed(self, keys):
         if not keys or key in keys:
             self.mean = dr.mean(self.table)
 
@@ -619,7 +619,7 @@ def test_parameters_of_delta_functions_are_judged(fault):
         def traverse(self, callback):
             callback.put("reflectance", self.reflectance, mi.ParamFlags.Differentiable)
 
-        def parameters_changed(self, keys=()):
+        def parameters_changed(self, keys):
             if fault == "updates":
                 self.reflectance = mi.load_dict({"type": "rgb", "value": (0.2, 0.3, 0.4)})
 

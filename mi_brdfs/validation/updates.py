@@ -71,7 +71,7 @@ def _updated(run: Run, parameter: Parameter, described: dict[str, Any], drawn: D
         _compare(run, outcome, drawn, f"once it is set to {told}, of another with that", last, first, why)
         _check_as_loaded(run, outcome, fresh, drawn, f"once it is set to {told},")
         parameter.params[parameter.key] = original
-        run.probe.bsdf.parameters_changed()
+        run.probe.bsdf.parameters_changed([])
         back = run.probe.values(drawn.wi, drawn.wo)
         _compare(run, outcome, drawn, "once it is set back,", back, before, f"before: {UNNOTICED}")
     return outcome.finding("Set and updated, it acts as loaded.")
@@ -115,7 +115,7 @@ def _check_taken_up(run: Run, outcome: Outcome, parameter: Parameter, drawn: Dra
         return [*probe.values(drawn.wi, drawn.wo), density, drawn_density]
 
     named = found()
-    probe.bsdf.parameters_changed()
+    probe.bsdf.parameters_changed([])
     why = "after parameters_changed without names: what is kept of it is out of date"
     _compare(run, outcome, drawn, "once it is changed,", named, found(), why)
 
