@@ -156,7 +156,7 @@ def test_charts_show_albedo_and_efficiency():
             curves[found.groups()] = points
     assert "↑ 1e+30 at 90°" in parsed.text
     albedo["90° behind"] = {"albedo": 3.9, "noise": 0}
-    assert not chart({"albedo": albedo}).axes[0].texts
+    assert not chart({"albedo": albedo}).axes[0].get_title("right")
     # Albedos are up to 4; what is above is cut off by the chart, and not drawn at its edge.
     (left, half), (right, quarter) = curves["1", "1.6"]
     ((_, one),) = {curves["2", "1.6"][0]}

@@ -223,7 +223,7 @@ def chart(energy: dict[str, dict[str, Any]]) -> Figure:
     ax.set(xlim=(0, 90), ylim=(0, min(largest, HIGHEST) * 1.02))
     if largest > HIGHEST:
         side = "right" if at > 45 else "left"
-        ax.text(at, HIGHEST, f"↑ {largest:.3g} at {at:g}°", ha=side, va="top", fontsize=SMALL, color=INK)
+        ax.set_title(f"↑ {largest:.3g} at {at:g}°", loc=side, fontsize=SMALL, color=INK, pad=3)
     ax.set_xticks([0, 30, 60, 90], ["0°", "30°", "60°", "90°"])
     ax.set_xlabel("θi", fontsize=SMALL, color=INK)
     ax.set_ylabel("albedo, η" if "efficiency" in energy else "albedo", fontsize=SMALL, color=INK)
