@@ -169,7 +169,7 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     )
     rest = [Card(replace(second, bsdf={"type": model.plugins[0]})) for model in all_models()]
     all_tried, but_one = (replace(poor, cards=[*poor.cards, *own]).verdict for own in (rest, rest[1:]))
-    assert all_tried == poor.verdict.replace(": try other models, or", ", as all models do:")
+    assert all_tried == poor.verdict.replace(": try other models, or", ", and all models were tried:")
     assert but_one == poor.verdict
 
 

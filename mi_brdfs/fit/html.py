@@ -93,7 +93,7 @@ class Section:
         """Which model fits best, and by how much, in sentences."""
         fits = [card.fit for card in self.cards]
         all_tried = {model.plugins[0] for model in all_models()} <= {it.bsdf["type"] for it in fits}
-        advice = ", as all models do: " if all_tried else ": try other models, or "
+        advice = ", and all models were tried: " if all_tried else ": try other models, or "
         best, poorly = fits[0], f", but fits poorly{advice}render the file itself" * (self.off > POOR)
         if len(fits) == 1:
             return f"Only {best.model} was fitted{poorly}."
