@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import shlex
 import sys
 from dataclasses import replace
 from io import BytesIO
@@ -15,11 +16,13 @@ from support import LOFT, ROOT, Page
 from test_cli import invoke
 
 from mi_brdfs.fit import FitError, appearance, fit, observe, report
-from mi_brdfs.fit.figures import Residuals
+from mi_brdfs.fit.figures import Residuals, lobes
 from mi_brdfs.fit.html import Card, Section, page_of, section_of
-from mi_brdfs.fit.result import values, whole
+from mi_brdfs.fit.result import notes, values, whole
 from mi_brdfs.measured import read
+from mi_brdfs.mitsuba.registry import all_models
 from mi_brdfs.probe.bsdf import BSDFProbe
+from mi_brdfs.probe.sources import value_of
 
 MEASURED = ROOT / "scenes" / "measured"
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -59,6 +62,7 @@ def test_the_page_needs_nothing_else(written):
     assert page.text.count(f"Fits to {HOSTILE}") == 2
     assert {link[1:] for link in links if link.startswith("#")} <= set(identifiers)
     assert len(written[2]) < 700_000
+    assert not re.search(r"<th[^>]*></th>", written[2])  # each column has a heading
 
 
 def test_its_pictures_show_something(written):
@@ -158,10 +162,44 @@ def test_the_verdict_heeds_the_evidence(fits, error, bic, told):
     section = Section("f", [Card(first), Card(second)])
     assert section.verdict == f"first comes nearest to the data. {told}"
     assert section.converged == "first was optimised from one start only."
+    poor = replace(section, off=0.4)
     assert (
-        replace(section, off=0.4).verdict
+        poor.verdict
         == f"first comes nearest to the data, but fits poorly: try other models, or render the file itself. {told}"
     )
+    rest = [Card(replace(second, bsdf={"type": model.plugins[0]})) for model in all_models()]
+    all_tried, but_one = (replace(poor, cards=[*poor.cards, *own]).verdict for own in (rest, rest[1:]))
+    assert all_tried == poor.verdict.replace(": try other models, or", ", and all models were tried:")
+    assert but_one == poor.verdict
+
+
+def test_ties_are_told(fits):
+    """Beside each model that is about as good, by the error that ranks; not beside the best."""
+    best, *others = (
+        replace(fits[0], bounds=[], in_highlight=9, errors={"log": {"held_out": it}}) for it in (1, 1.04, 1.06)
+    )
+    assert [notes(it, best) for it in (best, *others)] == ["", "about as good", ""]
+    best, *others = (replace(it, flip=flip) for it, flip in zip((best, *others), (1, 1.06, 1.04), strict=True))
+    assert [notes(it, best) for it in (best, *others)] == ["", "", "about as good"]
+
+
+@pytest.mark.parametrize(("f0", "option"), [
+    (0.04, "f0=0.04"), ({"type": "rgb", "value": [0.5, 0.25, 1.0]}, "'f0=0.5;0.25;1'"),
+])  # fmt: skip
+def test_what_is_hard_to_tell_apart_can_be_fixed(fits, f0, option):
+    """By an option that reads back as the value that the fit has."""
+    bsdf, names = {"type": "walter", "f0": f0, "alpha": 0.3}, ("alpha", "f0.r")
+    fit = replace(fits[0], bsdf=bsdf, correlations={a: dict.fromkeys(names, 0.99) for a in names})
+    (told,) = (it for it in fit.remarks(shown=True) if it.startswith("Hard to tell apart: alpha and f0: "))
+    assert told.endswith(f"fix one that is known, as in -D {option}.")
+    assert value_of(shlex.split(option)[0].removeprefix("f0=")) == f0
+
+
+@pytest.mark.parametrize(("channels", "label"), [(1, "$f$ [1/sr]"), (3, "$f$ [1/sr], luminance")])
+def test_axes_tell_what_of_colours_is_drawn(channels, label):
+    data = read(LOFT)
+    coloured = replace(data, data=replace(data.data, values=np.repeat(data.data.values, channels, axis=-1)))
+    assert {figure.axes[0].get_ylabel() for _, figure in lobes(coloured, [], 80)} == {label}
 
 
 def test_how_far_a_fit_is_from_the_data_is_told(fits):

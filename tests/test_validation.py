@@ -550,7 +550,7 @@ def test_delta_functions_carry_what_they_carry_alone():
         ("darker at grazing", "the light of a sample back to wi"),
         ("all reflected", "which goes to the other side"),
         ("diffuse", "sampled_type is 2 for light"),
-        ("any type", "a type mask that leaves it out, where all must be black"),
+        ("any type", "leaves it out, where all must be black: active &= ctx.is_enabled(type, 0)"),
         ("from the camera alone", "in the mode Importance a sample's weight"),
         ("inactive", "where active is False, but must be 0"),
         ("values", "but must be 0, as it is a delta function"),

@@ -17,7 +17,7 @@ from mi_brdfs.probe.partition import partitions
 from mi_brdfs.validation import Finding, Report, check
 from mi_brdfs.validation.html import page
 from mi_brdfs.validation.incidents import Incident
-from mi_brdfs.validation.pictures import HEMISPHERE, View, rasters, views, weights
+from mi_brdfs.validation.pictures import HEMISPHERE, View, chart, rasters, views, weights
 from mi_brdfs.validation.trial import COUNT, Trial
 
 HOSTILE = """</h2><script>alert("1")</script> 'x' & <b"""
@@ -141,19 +141,22 @@ def test_pictures_are_sound(reports, text):
 
 
 def test_charts_show_albedo_and_efficiency():
-    """What cannot be drawn is left out, and what exceeds the chart leaves it."""
+    """What cannot be drawn is left out, and what exceeds the chart leaves it, with its value."""
     albedos = {"0°": 0.5, "45°": math.nan, "90°": 0.25, "0° behind": 1.0, "90° behind": 1e30}
     albedo = {name: {"albedo": value, "noise": 0} for name, value in albedos.items()} | {"faults": ["a", "b"]}
     findings = [Finding("albedo", "whole", "fail", "a.", albedo), Finding("efficiency", "whole", "info", "", {"0°": 1})]
     parsed = Page(page([Report("x", findings)]))
-    (chart,) = parsed.pictures()
-    assert chart == "x, whole: albedo and efficiency over the angle of incidence"
+    (drawn,) = parsed.pictures()
+    assert drawn == "x, whole: albedo and efficiency over the angle of incidence"
     curves: dict = {}
     for tag, given in parsed.elements:
         found = re.search(r"var\(--series-(\d)\); stroke-width: ([\d.]+)", given.get("style", ""))
         if tag == "path" and found:
             points = [tuple(map(float, point)) for point in re.findall(r"[ML] (\S+) (\S+)", given["d"])]
             curves[found.groups()] = points
+    assert "↑ 1e+30 at 90°" in parsed.text
+    albedo["90° behind"] = {"albedo": 3.9, "noise": 0}
+    assert not chart({"albedo": albedo}).axes[0].get_title("right")
     # Albedos are up to 4; what is above is cut off by the chart, and not drawn at its edge.
     (left, half), (right, quarter) = curves["1", "1.6"]
     ((_, one),) = {curves["2", "1.6"][0]}

@@ -282,7 +282,7 @@ def print_ranking(fits: list[Fit]) -> None:
         table.add_row(
             it.model, *[number(it.flip)] * seen, f"{it.held_out:.4g}",
             f"{it.errors[it.metric]['fitted']:.4g}",
-            f"{it.bic - lowest:.0f}", f"{it.albedo:.3f}", f"{it.starts.agree}/{it.starts.tried}", notes(it),
+            f"{it.bic - lowest:.0f}", f"{it.albedo:.3f}", f"{it.starts.agree}/{it.starts.tried}", notes(it, best),
         )  # fmt: skip
     print_table(table)
     out.print(f"Error of {METRICS[best.metric].text}, up to {best.cut:g}°; {best.pairs} pairs of directions fitted.")

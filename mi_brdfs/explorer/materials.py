@@ -24,7 +24,7 @@ from ..parameters.messages import brief, listed, meant, printable
 from ..parameters.published import closest, names, preset
 from ..parameters.xml import to_xml
 from ..probe.bsdf import BSDFProbe
-from ..probe.sources import BSDFSource, measured_file
+from ..probe.sources import BSDFSource, measured_file, text_of
 from . import controls
 from .controls import Control
 from .state import GIVEN, MEASURED, PRESET, Bsdf, StateError
@@ -156,7 +156,7 @@ class Materials:
         if kind == MEASURED:
             word = self._source(bsdf).path
             named = {"type": kind, "filename": word, **values}
-        options = [text for name, value in values.items() for text in ("-D", f"{name}={_option(value)}")]
+        options = [text for name, value in values.items() for text in ("-D", f"{name}={text_of(value)}")]
         try:
             check_name(word)
             told = {"xml": to_xml(named), "dict": repr(named)}
@@ -207,15 +207,6 @@ def _quoted(word: str) -> str:
         return shlex.quote(word)
     escaped = {it: "".join(f"\\x{byte:02x}" for byte in os.fsencode(it)) for it in word}
     return "$'" + "".join(it if it.isprintable() and it not in "'\\" else escaped[it] for it in word) + "'"
-
-
-def _option(value: Any) -> str:
-    """Return a value as -D takes it."""
-    if isinstance(value, dict):
-        return ";".join(f"{number:.7g}" for number in value["value"])
-    if isinstance(value, bool):
-        return str(value).lower()
-    return value if isinstance(value, str) else f"{value:.7g}"
 
 
 def _built_in(kind: str, values: Bsdf) -> mi.BSDF:

@@ -96,7 +96,7 @@ def _lobe(table: LitTable, theta_i: float, caption: str, nodes: Curve, fits: Seq
     ax.set_xlim(-90, 90)
     ax.set_title(caption, fontsize=9, color=INK)
     ax.set_xlabel(label, fontsize=9, color=INK)
-    ax.set_ylabel("f [1/sr]", fontsize=9, color=INK)
+    ax.set_ylabel(table.quantity, fontsize=9, color=INK)
     return figure
 
 

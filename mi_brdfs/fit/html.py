@@ -10,6 +10,7 @@ import numpy as np
 
 from ..measured import Measurement, read
 from ..measured.report.counts import in_one_plane
+from ..mitsuba.registry import all_models
 from ..pages import environment
 from ..pages.figures import DIFFERENCE, data_uri, svg
 from ..rendering.output import denoiser
@@ -19,12 +20,10 @@ from .figures import CURVES, Residuals, lobes, probe_of
 from .lanes import rgb_variant
 from .metrics import METRICS
 from .observations import observe
-from .result import ANGLES, Fit, medians, notes, number, values
+from .result import ALIKE, ANGLES, Fit, medians, notes, number, values
 
 PAIRS = 16384
 """The most pairs of directions of a residual map."""
-ALIKE = 1.05
-"""The ratio of errors up to which two models fit alike, unless BIC decides between them."""
 DECISIVE = 10
 """The difference in BIC from which the evidence is called very strong.
 
@@ -93,11 +92,13 @@ class Section:
     def verdict(self) -> str:
         """Which model fits best, and by how much, in sentences."""
         fits = [card.fit for card in self.cards]
-        best, poorly = fits[0], ", but fits poorly: try other models, or render the file itself" * (self.off > POOR)
+        all_tried = {model.plugins[0] for model in all_models()} <= {it.bsdf["type"] for it in fits}
+        advice = ", and all models were tried: " if all_tried else ": try other models, or "
+        best, poorly = fits[0], f", but fits poorly{advice}render the file itself" * (self.off > POOR)
         if len(fits) == 1:
             return f"Only {best.model} was fitted{poorly}."
         told = [f"{best.model} comes nearest to the data{poorly}."]
-        ratio, name, against = _error(fits[1]) / max(_error(best), 1e-30), fits[1].model, fits[1].bic - best.bic
+        ratio, name, against = fits[1].error / max(best.error, 1e-30), fits[1].model, fits[1].bic - best.bic
         kind = "held-out error" if best.flip is None else "FLIP error"
         larger = f"its {kind} is only {100 * (ratio - 1):.1f} % larger"
         if ratio > ALIKE:
@@ -156,6 +157,7 @@ def page_of(sections: Sequence[Section], unfinished: str = "") -> str:
         metrics=METRICS,
         flip=any(it.flip is not None for own in everything for it in own),
         unfinished=unfinished,
+        alike=round(100 * (ALIKE - 1)),
         curves=CURVES,
         most=MOST,
         steepest=ANGLES[-1],
@@ -200,11 +202,6 @@ def _smooth(picture: np.ndarray) -> np.ndarray:
     return encoded(denoise(decoded(picture))) if denoise else picture
 
 
-def _error(fit: Fit) -> float:
-    """Return the error by which fits are ranked."""
-    return fit.held_out if fit.flip is None else fit.flip
-
-
 def _told(measurement: Measurement) -> str:
     channels = measurement.data.values.shape[-1]
     kind = "anisotropic" if measurement.data.anisotropic else "isotropic"
@@ -212,4 +209,4 @@ def _told(measurement: Measurement) -> str:
     return ", ".join(word for word in words if word)
 
 
-environment.filters |= {"number": number, "error": _error, "name": lambda file: Path(file).name}
+environment.filters |= {"number": number, "name": lambda file: Path(file).name}

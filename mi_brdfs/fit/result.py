@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -16,10 +17,13 @@ from ..model import EnergyWarning
 from ..parameters.xml import to_xml
 from ..probe.bsdf import BSDFProbe
 from ..probe.directions import direction
+from ..probe.sources import text_of
 from ..probe.variates import sobol
 from .lanes import rgb_variant
 from .observations import Data
 
+ALIKE = 1.05
+"""The ratio of errors up to which two models fit about as well."""
 ANGLES = 0, 20, 40, 60, 70, 80
 """The angles at which the albedo is looked at, in degrees."""
 LOG2_COUNT = 10
@@ -75,8 +79,13 @@ class Fit(Data):
 
     @property
     def held_out(self) -> float:
-        """The error on what was held out, in the fitted metric, by which fits are ranked."""
+        """The error on what was held out, in the fitted metric."""
         return self.errors[self.metric]["held_out"]
+
+    @property
+    def error(self) -> float:
+        """By which fits are ranked: the FLIP error where it was looked at, and else the held-out one."""
+        return self.held_out if self.flip is None else self.flip
 
     @property
     def resolved(self) -> bool:
@@ -115,11 +124,14 @@ class Fit(Data):
             found.append(f"Not determined by the data: {whole(self.undetermined)}.")
         if self.bounds and not shown:
             found.append(f"At the end of the range: {whole(self.bounds)}.")
-        close = {" and ".join(sorted(pair)) for a, row in self.correlations.items() for b, r in row.items()
+        close = {tuple(sorted(pair)) for a, row in self.correlations.items() for b, r in row.items()
                  if abs(r) > CORRELATED and len(pair := {_colour(a), _colour(b)}) > 1}  # fmt: skip
         if close:
-            told = "other values of both fit about as well; fix one that is known"
-            found.append(f"Hard to tell apart: {', '.join(sorted(close))}: {told}.")
+            pairs = sorted(close)
+            name = pairs[0][1]
+            fixed = shlex.quote(f"{name}={text_of(self.bsdf[name])}")
+            told = f"other values of both fit about as well; fix one that is known, as in -D {fixed}"
+            found.append(f"Hard to tell apart: {', '.join(map(' and '.join, pairs))}: {told}.")
         for (theta, stated, values), own in () if shown else zip(self.scatter, self.scattered, strict=True):
             if abs(own - stated) > 0.1 * stated:
                 told = f"the file states {stated:.3g}, its values integrate to {values:.3g}"
@@ -172,9 +184,10 @@ def whole(numbers: Sequence[str]) -> str:
     return ", ".join(it if len(own) in (0, 3) else f"{it} ({', '.join(own)})" for it, own in channels.items())
 
 
-def notes(fit: Fit) -> str:
-    """Return what of a fit calls for caution, in words."""
-    words = ["albedo above 1"] * (fit.albedo > 1) + ["unresolved"] * (not fit.resolved)
+def notes(fit: Fit, best: Fit) -> str:
+    """Return whether a fit is about as good as the best, and what of it calls for caution, in words."""
+    words = ["about as good"] * (fit is not best and fit.error <= ALIKE * best.error)
+    words += ["albedo above 1"] * (fit.albedo > 1) + ["unresolved"] * (not fit.resolved)
     return ", ".join(words + ([f"at its limit: {whole(fit.bounds)}"] if fit.bounds else []))
 
 

@@ -211,6 +211,15 @@ def value_of(text: str) -> Any:
     return _rgb(colour) if len(colour) == 3 else text
 
 
+def text_of(value: Any) -> str:
+    """Return a number, a boolean, a colour or a word as text that :func:`value_of` takes."""
+    if isinstance(value, dict):
+        return ";".join(f"{number:.7g}" for number in value["value"])
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else f"{value:.7g}"
+
+
 def degrees_of(text: str) -> list[float]:
     """Return angles in degrees that are given as 10,40,70, or raise a ValueError."""
     try:

@@ -139,7 +139,7 @@ def check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         nothing = part._replace(context=excluding)
         value, density = probe.eval_pdf(nothing, wi, wo)
         samples = probe.sample(nothing, wi, random(COUNT, 3))
-        why = f"with {words}, where all must be black, as BSDFContext.is_enabled says"
+        why = f"with {words}, where all must be black: active &= ctx.is_enabled(type, {part.component})"
         outcome.wrong(value != 0, "eval", value, why, wi, wo)
         outcome.wrong(density != 0, "pdf", density, why, wi, wo)
         outcome.wrong(samples.weight != 0, "a sample's weight", samples.weight, why, wi, samples.wo, seed=3)

@@ -28,6 +28,8 @@ LEVELS = 64
 """How many colours a picture has: with more, its file would be larger and show no more."""
 IMPOSSIBLE = 230 / 255, 0, 60 / 255, 1
 """The red of what no density may be."""
+HIGHEST = 4
+"""Where the chart of energy ends at the latest, so that what is right can still be seen."""
 HEMISPHERE = 92.0
 """Half the size of a window, in degrees, that shows a side of the surface from horizon to horizon."""
 
@@ -205,7 +207,7 @@ def chart(energy: dict[str, dict[str, Any]]) -> Figure:
     ax = figure.subplots()
     calm(ax)
     ax.grid(axis="x", visible=False)
-    largest = 1.0
+    largest, at = 1.0, 0.0
     looks = dict(zip(("albedo", "efficiency"), zip(SERIES, STYLES, strict=False), strict=False))
     for kind, data in energy.items():
         colour, style = looks[kind]
@@ -217,8 +219,11 @@ def chart(energy: dict[str, dict[str, Any]]) -> Figure:
                 if name.endswith("behind") == behind and np.isfinite(value)
             ]
             ax.plot(*zip(*points, strict=True), color=colour, linestyle=style, linewidth=0.8 if behind else 1.6)
-            largest = max([largest, *(value for _, value in points)])
-    ax.set(xlim=(0, 90), ylim=(0, min(largest, 4) * 1.02))
+            largest, at = max([(largest, at), *((value, theta) for theta, value in points)])
+    ax.set(xlim=(0, 90), ylim=(0, min(largest, HIGHEST) * 1.02))
+    if largest > HIGHEST:
+        side = "right" if at > 45 else "left"
+        ax.set_title(f"↑ {largest:.3g} at {at:g}°", loc=side, fontsize=SMALL, color=INK, pad=3)
     ax.set_xticks([0, 30, 60, 90], ["0°", "30°", "60°", "90°"])
     ax.set_xlabel("θi", fontsize=SMALL, color=INK)
     ax.set_ylabel("albedo, η" if "efficiency" in energy else "albedo", fontsize=SMALL, color=INK)
