@@ -269,6 +269,13 @@ def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, 
     assert done.stderr == "mi-brdfs: cannot write to the folder made: Read-only file system\n"
 
 
+@pytest.mark.parametrize("name", ["g.png", "g.HTML"])
+def test_a_folder_is_not_called_like_a_file(folder, name):
+    done = invoke("gallery", "ward", "-o", name)
+    assert done.exit_code == 2 and not Path(name).exists()
+    assert done.stderr == f"mi-brdfs: -o {name}: name a folder, in which there will be a page and its pictures\n"
+
+
 def test_a_missing_package(monkeypatch):
     for package in ("PIL", "mitsuba_oidn", "jinja2"):
         with monkeypatch.context() as patch:
