@@ -262,10 +262,13 @@ def test_marks_are_beside_the_lobes():
 
 
 def test_labels_of_ticks_stay_apart():
-    """Also from those of the other axis and of the panels beside."""
-    for figure in plot.cartesian("ward"), plot.cartesian(SHEET), plot.measured(AEROGLAZE):
+    """Also from those of the other axis and of the panels beside; each line of the grid has one."""
+    narrow = plot.cartesian(SHEET, "lambert", "wrap", "eon", side_by_side=True, scale="log")
+    for figure in plot.cartesian("ward"), plot.cartesian(SHEET), narrow, plot.measured(AEROGLAZE):
         figure.draw_without_rendering()
-        axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+        angles = [label.get_text() for label in figure.axes[1].get_xticklabels()]
+        assert len(angles) == 7 and all(angles[1:-1])
+        axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_ticklabels()]
         seen = [label for axis in axes for at, label in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
                 if axis.get_view_interval()[0] <= at <= axis.get_view_interval()[1] and label.get_text()]  # fmt: skip
         # Bounds are higher than digits.

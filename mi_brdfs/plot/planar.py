@@ -255,7 +255,7 @@ def draw_cartesian(
     ax.set_xlim(-end, end)
     turns = range(-end, end + 1, end // 3)
     # Labels of the ends would touch those of the other axis and of the next panel.
-    ax.set_xticks(turns, ["" if turn % (2 * end // 3) else f"{turn}°".replace("-", "−") for turn in turns])
+    ax.set_xticks(turns, ["" if abs(turn) == end else f"{turn}°".replace("-", "−") for turn in turns])
     ax.set_xlabel(r"$\theta_o$", fontsize=TEXT, color=INK)
     ax.set_ylabel(text, fontsize=TEXT, color=INK)
 
