@@ -88,7 +88,8 @@ def albedo(
 ) -> Figure:
     """Draw the directional albedo over the angle of incidence: the luminance, or with ``rgb`` each channel, of all
     reflected and transmitted light, delta functions included. It is the mean weight of 8192 samples of the BSDF's own
-    sampler, with the same variates at each angle. Everything else is as in :func:`polar`."""
+    sampler, with the same variates at each angle. A curve that grows without bound beyond 85° leaves the axes; how far
+    it goes is above them. Everything else is as in :func:`polar`."""
     found = named(bsdfs, labels)
     figure = style.new_figure(6, 3.8, size)
     if title:
