@@ -13,6 +13,7 @@ from generate import models as docs
 from PIL import Image
 from support import is_scalar
 from test_cli import invoke
+from test_explore_page import browser as browser
 
 import mi_brdfs
 from mi_brdfs.gallery import Entry, Row, Shot, gallery, sheet, shot
@@ -258,6 +259,24 @@ def test_the_command_writes_a_page_and_its_pictures(folder):
     assert "<nav" not in text and "overview.png" not in text
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("llvm_rgb", "grey")
+def test_on_a_phone_labels_are_legible_and_sheets_scroll(folder, browser, monkeypatch):
+    monkeypatch.setattr("mi_brdfs.gallery.presets", lambda type: mi_brdfs.presets("ward")[:10])
+    gallery(["lambert"], with_presets=True)
+    tab = browser.new_page(viewport={"width": 390, "height": 3000})  # all is seen, so that it is loaded
+    tab.goto((folder / "gallery" / "index.html").as_uri())
+    tab.wait_for_function("[...document.images].every(it => it.naturalWidth)")
+    scales = tab.eval_on_selector_all(
+        ".sheet img", "all => all.map(it => (it.clientWidth - parseFloat(getComputedStyle(it).paddingRight))"
+        " / it.naturalWidth)"
+    )  # fmt: skip
+    assert np.all(np.array(scales) * (256 // 11, 128 // 11) > (11, 8.5))  # pixels, of the letters
+    assert tab.evaluate("document.documentElement.scrollWidth") == 390
+    assert all(tab.eval_on_selector_all(".sheet", "all => all.map(it => it.scrollWidth > it.clientWidth)"))
+    tab.close()
+
+
 def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, monkeypatch):
     def refused(dir):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
@@ -267,6 +286,13 @@ def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, 
     done = invoke("gallery", "ward", "-o", "made")
     assert done.exit_code == 1
     assert done.stderr == "mi-brdfs: cannot write to the folder made: Read-only file system\n"
+
+
+@pytest.mark.parametrize("name", ["g.png", "g.HTML"])
+def test_a_folder_is_not_called_like_a_file(folder, name):
+    done = invoke("gallery", "ward", "-o", name)
+    assert done.exit_code == 2 and not Path(name).exists()
+    assert done.stderr == f"mi-brdfs: -o {name}: name a folder, in which there will be a page and its pictures\n"
 
 
 def test_a_missing_package(monkeypatch):

@@ -156,6 +156,16 @@ def test_albedo():
         np.testing.assert_allclose(value, expected[name], rtol=1e-3)
 
 
+def test_albedos_without_bound_leave_the_others_their_scale():
+    """And how far they go is said."""
+    gaining, lossy = ({"type": "ward", "alpha": 0.3, "variant": variant} for variant in ("ward-duer", "ward"))
+    figure = plot.albedo(gaining, lossy)
+    most = max(value.max() for _, value in curves(figure).values())
+    assert most > 5 and 1 < figure.axes[0].get_ylim()[1] < 1.5
+    assert figure.axes[0].get_title("right") == f"up to {most:.2g}"
+    assert plot.albedo(lossy).axes[0].get_title("right") == ""
+
+
 def test_luminance_is_drawn_and_said():
     """Of spectra, the mean."""
     figure = plot.cartesian(COLOURED, angles=(0,), scale="linear")
@@ -239,8 +249,19 @@ def test_red_green_and_blue():
     assert len({line.get_color() for line in lines}) == 4 and len({line.get_linestyle() for line in lines}) == 2
     assert len(figure.axes) == 2 and "luminance" not in figure.axes[0].get_ylabel()
     assert [value[0] for _, value in curves(plot.albedo(COLOURED, rgb=True)).values()] == pytest.approx([0.2, 0.5, 0.8])
+    assert "Black: red, green and blue are equal." in figure.legends[0].get_title().get_text()
     with mi.variant_context("llvm_ad_spectral"), pytest.raises(ValueError, match="rgb curves need an rgb variant"):
         plot.polar("lambert", rgb=True)
+
+
+def test_what_is_grey_is_drawn_as_luminance_and_that_is_said():
+    def looks(figure):
+        return [(line.get_label(), line.get_color(), line.get_marker()) for ax in figure.axes for line in ax.lines]
+
+    for draw, *bsdfs in (plot.cartesian, "lambert"), (plot.polar, "lambert", "ward"), (plot.albedo, "lambert", "ward"):
+        figure = draw(*bsdfs, rgb=True)
+        assert looks(figure) == looks(draw(*bsdfs))
+        assert "Red, green and blue are equal." in figure.legends[0].get_title().get_text()
 
 
 @pytest.mark.slow
@@ -262,10 +283,13 @@ def test_marks_are_beside_the_lobes():
 
 
 def test_labels_of_ticks_stay_apart():
-    """Also from those of the other axis and of the panels beside."""
-    for figure in plot.cartesian("ward"), plot.cartesian(SHEET), plot.measured(AEROGLAZE):
+    """Also from those of the other axis and of the panels beside; each line of the grid has one."""
+    narrow = plot.cartesian(SHEET, "lambert", "wrap", "eon", side_by_side=True, scale="log")
+    for figure in plot.cartesian("ward"), plot.cartesian(SHEET), narrow, plot.measured(AEROGLAZE):
         figure.draw_without_rendering()
-        axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+        angles = [label.get_text() for label in figure.axes[1].get_xticklabels()]
+        assert len(angles) == 7 and all(angles[1:-1])
+        axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis) if axis.get_ticklabels()]
         seen = [label for axis in axes for at, label in zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
                 if axis.get_view_interval()[0] <= at <= axis.get_view_interval()[1] and label.get_text()]  # fmt: skip
         # Bounds are higher than digits.

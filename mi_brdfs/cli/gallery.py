@@ -11,7 +11,7 @@ import typer
 from ..rendering import MOST_PIXELS
 from .app import command
 from .files import check_output
-from .options import AnyVariant, Types, set_variant
+from .options import FIGURES, PAGES, AnyVariant, Types, set_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 
@@ -32,10 +32,12 @@ def gallery(
     ] = False,
     variant: AnyVariant = None,
 ) -> None:
-    """Render models with sweeps of their parameters: contact sheets, and a page that shows them. Ctrl-C keeps the
-    finished pictures."""
+    """Render models with sweeps of their parameters: contact sheets, and a page that shows them, in about half a minute
+    a model. Ctrl-C keeps the finished pictures."""
     from ..gallery import gallery as render_gallery
 
+    if output.suffix.lower() in (*FIGURES, *PAGES):
+        fail(f"-o {output}: name a folder, in which there will be a page and its pictures", Exit.USAGE)
     if (page := output / "index.html").exists():
         check_output("-o", page, mark="<title>What BRDFs look like</title>")
     elif any(it.suffix in (".png", ".jpg") for it in output.glob("*")):

@@ -64,13 +64,23 @@ def with_smooth_part(found: list[Named]) -> list[Named]:
     return [it._replace(label=f"{it.label} without its delta lobe") if it.probe.deltas else it for it in found]
 
 
-def by_channel(draw: Sequence[Callable[[int | None], Curve]], rgb: bool) -> list[tuple[str, list[Curve]]]:
-    """Return the name and the curves of each channel to draw: "" for the luminance, or "grey" if red, green and blue
-    are one. Raise a ValueError if the active variant has none."""
-    if not rgb:
-        return [("", [each(None) for each in draw])]
-    if not mi.is_rgb:
+def by_channel(
+    draw: Sequence[Sequence[Callable[[int | None], Curve]]], rgb: bool
+) -> tuple[list[list[tuple[str, list[Curve]]]], bool, list[str]]:
+    """Return the names and curves of the channels to draw of each BSDF, whether they have colours, and lines that say
+    where red, green and blue are equal. The name is "" for the luminance, drawn if no colour is asked for or there is
+    none, and "grey" for a grey among colours. Raise a ValueError if the active variant has no colours."""
+    if rgb and not mi.is_rgb:
         raise ValueError(f"{mi.variant()} has no red, green and blue: rgb curves need an rgb variant")
+    found = [_channels(own) for own in draw] if rgb else []
+    grey = [len(own) == 1 for own in found]
+    if all(grey):
+        luminances = [[("", [each(None) for each in own])] for own in draw]
+        return luminances, False, ["Red, green and blue are equal."] if rgb else []
+    return found, True, ["Black: red, green and blue are equal."] if any(grey) else []
+
+
+def _channels(draw: Sequence[Callable[[int | None], Curve]]) -> list[tuple[str, list[Curve]]]:
     found = [(name, [each(k) for each in draw]) for k, name in enumerate(CHANNELS)]
     pairs = [pair for _, curves in found[1:] for pair in zip(found[0][1], curves, strict=True)]
     alike = all(len(a.value) == len(b.value) and np.allclose(a.value, b.value, 1e-3, equal_nan=True) for a, b in pairs)

@@ -18,10 +18,10 @@ from matplotlib.patheffects import withStroke
 
 from ..given import angles_of_incidence
 from ..probe import curves as lobes
-from ..probe.curves import largest
+from ..probe.curves import Curve, largest
 from . import style
 from .given import by_channel, constants, named, places, quantity, with_smooth_part
-from .style import FAINT, GRID, INK, LETTERS, QUANTITY, TEXT, WIDTH, incidence, look
+from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, WIDTH, incidence, look
 
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
 MIRROR = {"marker": "+", "markersize": 8, "markeredgewidth": 1.1}
@@ -88,32 +88,38 @@ def albedo(
 ) -> Figure:
     """Draw the directional albedo over the angle of incidence: the luminance, or with ``rgb`` each channel, of all
     reflected and transmitted light, delta functions included. It is the mean weight of 8192 samples of the BSDF's own
-    sampler, with the same variates at each angle. Everything else is as in :func:`polar`."""
+    sampler, with the same variates at each angle. A curve that grows without bound beyond 85° leaves the axes; how far
+    it goes is above them. Everything else is as in :func:`polar`."""
     found = named(bsdfs, labels)
     figure = style.new_figure(6, 3.8, size)
     if title:
         style.set_title(figure, style.plain(title))
     ax = figure.subplots()
     handles = []
+    channels, rgb, equal = by_channel([[partial(lobes.albedo, it.probe, azimuth)] for it in found], rgb)
     where = places(() if rgb else bsdfs, len(found))
-    for it, place in zip(found, where, strict=True):
-        for name, (curve,) in by_channel([partial(lobes.albedo, it.probe, azimuth)], rgb):
+    for it, place, own in zip(found, where, channels, strict=True):
+        for name, (curve,) in own:
             label = f"{it.label}, {name}" if name in style.CHANNELS else it.label
             handles += ax.plot(*curve, label=label, **look(place, name))
     frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
     names = [handle.get_label() for handle in handles]
-    style.add_legend(figure, handles, names, constants(bsdfs), where)
+    style.add_legend(figure, handles, names, [*constants(bsdfs), *equal], where)
     return figure
 
 
 def frame_albedo(ax: Axes, text: str) -> None:
     """Set the axes of albedo curves that are drawn, with a line at 1 unless they are far below."""
-    top = largest(curve.get_ydata() for curve in ax.get_lines())
+    curves = [Curve(*line.get_data()) for line in ax.get_lines()]
+    # Where energy is gained without end, the scale is that of angles up to 85°.
+    top = largest(curve.value[(curve.theta <= 85) | (curve.value < 1.3)] for curve in curves)
     ax.axhline(1, color=FAINT, linewidth=0.8, zorder=1.5)
     style.calm(ax)
     ax.set_xlim(0, 90)
     ax.set_xticks(range(0, 91, 15), [f"{angle}°" for angle in range(0, 91, 15)])
     ax.set_ylim(0, 1.05 * (top if top < DARK else max(1, top)))
+    if (gained := largest(curve.value for curve in curves)) > ax.get_ylim()[1]:
+        ax.set_title(f"up to {gained:.2g}", loc="right", fontsize=SMALL, color=INK)
     ax.set_xlabel(r"$\theta_i$", fontsize=TEXT)
     ax.set_ylabel(text, fontsize=TEXT)
 

@@ -125,6 +125,7 @@ def _draw_lobes(ax: Axes, it: LitTable) -> None:
     ]
     calm(ax)
     draw_cartesian(ax, curves, True, False, it.quantity, curves)
+    ax.tick_params(axis="x", labelsize=SMALL - 1.5)  # larger ones would touch in so narrow a panel
     for line, nodes in zip(curves, it.nodes(it.angles), strict=True):
         ax.plot(*nodes, color=line.look["color"], **NODE, markevery=max(1, len(nodes.theta) // NODES))
         ax.set_ylim(top=max(ax.get_ylim()[1], 1.3 * largest([nodes.value])))

@@ -55,7 +55,8 @@ def polar(
         labels: the names in the legend. By default the type of a dict with the parameters that distinguish it, and the
             id or class of a loaded BSDF; what the others have in common is above the legend.
         normalize: divide each curve by its maximum, to compare shapes.
-        rgb: draw red, green and blue in place of the luminance, in a row for each angle; one curve of what is grey.
+        rgb: draw red, green and blue in place of the luminance, in a row for each angle; one black curve of what is
+            grey, and the luminance where all is.
         side_by_side: draw each BSDF in a panel of its own, on the same scale, with a colour for each angle.
         title: above the figure; by default the name of the only BSDF, or the only angle.
         size: width and height in inches; by default what the panels need.
@@ -122,13 +123,16 @@ def _planar(
     whole = any(lobes.transmits(it.probe) for it in found)
     beside = side_by_side and len(found) > 1
     measured = [k for k, it in enumerate(found) if it.probe.data]
+    plane = lobes.in_plane_of_incidence
+    channels, rgb, equal = by_channel(
+        [[partial(plane, it.probe, theta, azimuth) for theta in angles] for it in found], rgb
+    )
     by_bsdf = beside or not (rgb or len(found) > 1)
     where = places(() if by_bsdf or rgb else bsdfs, len(found))
 
     def lines(it: Named, k: int) -> list[list[LabelledCurve]]:
         rows: list[list[LabelledCurve]] = [[] for _ in angles]
-        plane = [partial(lobes.in_plane_of_incidence, it.probe, theta, azimuth) for theta in angles]
-        for name, curves in by_channel(plane, rgb):
+        for name, curves in channels[k]:
             for j, (theta, curve) in enumerate(zip(angles, curves, strict=True)):
                 if normalize:
                     curve = curve._replace(value=curve.value / largest([curve.value]))
@@ -143,7 +147,7 @@ def _planar(
 
     each = [lines(it, k) for k, it in enumerate(found)]
     peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
-    notes = constants(bsdfs)
+    notes = [*constants(bsdfs), *equal]
     if any((line.curve.value < 0).any() for rows in each for part in rows for line in part):
         notes.append("Negative values are left out.")
     if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 50:  # the lowest curve cannot be seen
@@ -255,15 +259,16 @@ def draw_cartesian(
     ax.set_xlim(-end, end)
     turns = range(-end, end + 1, end // 3)
     # Labels of the ends would touch those of the other axis and of the next panel.
-    ax.set_xticks(turns, ["" if turn % (2 * end // 3) else f"{turn}°".replace("-", "−") for turn in turns])
+    ax.set_xticks(turns, ["" if abs(turn) == end else f"{turn}°".replace("-", "−") for turn in turns])
     ax.set_xlabel(r"$\theta_o$", fontsize=TEXT, color=INK)
     ax.set_ylabel(text, fontsize=TEXT, color=INK)
 
 
 def _shade(line: LabelledCurve, lines: list[LabelledCurve]) -> str:
-    """Return the colour of the marks of an angle of incidence: the curve's, unless the angle has curves of several."""
+    """Return the colour of the marks of an angle of incidence: the curve's, unless the angle has curves of several or
+    what is grey has black ones for all angles."""
     colours = {other.look["color"] for other in lines if other.theta_i == line.theta_i}
-    return FAINT if len(colours) > 1 else line.look["color"]
+    return FAINT if len(colours) > 1 or INK in colours else line.look["color"]
 
 
 def _range(lines: list[LabelledCurve]) -> tuple[int, float]:
