@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -25,7 +25,7 @@ from .grid import Grid, usable
 from .measurement import Measurement
 from .report.counts import census, in_one_plane
 from .report.summary import ends, percent
-from .scattered import as_grid
+from .scattered import Samples, as_grid
 from .source import Source, batches, pairs
 
 PAIRS = 1 << 15
@@ -34,6 +34,8 @@ BAKED_TO = 80
 NEAR_NORMAL = 10
 """The angle up to which a measurement may leave out the normal, in degrees, without a word."""
 GREY = "What was measured at one wavelength became grey."
+MOSTLY = 0.99
+"""The share of directions that counts as all: others lie between the last node and the horizon."""
 ALIKE = 1e-3
 """By what part of its peak f may change where it counts as the same."""
 
@@ -168,6 +170,19 @@ def _not_measured(measurement: Measurement) -> Iterator[str]:
     told = [f"{name} {low:.4g} to {high:.4g}°" for name, low, high in ranges if low > NEAR_NORMAL or high < BAKED_TO]
     if told:
         yield f"It was measured for {' and '.join(told)}; what lies beyond has the values at the border."
+    share = _share(data, ranges)
+    if share < MOSTLY and not in_one_plane(data):
+        directions = "the directions in between" if told else "all directions"
+        yield f"Of {directions} {percent(share)} were measured; the others have the values at the border."
+
+
+def _share(data: Grid | Samples, ranges: Sequence[tuple[str, float, float]]) -> float:
+    """Return the share of pairs of directions within ranges of θi and θo that was measured."""
+    both = [w[1::2] for w in pairs(PAIRS)]  # the others are around the mirror direction
+    thetas = [np.degrees(np.arccos(w[:, 2])) for w in both]
+    inside = [(low <= theta) & (theta <= high) for theta, (_, low, high) in zip(thetas, ranges, strict=True)]
+    within = inside[0] & inside[1]
+    return float(data.measured(*(w[within] for w in both)).mean()) if within.any() else 1.0
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:
