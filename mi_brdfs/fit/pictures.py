@@ -42,7 +42,8 @@ class ImageFit:
     """The standard deviations of numbers and channels, as far as noise of the pictures and of the last renderings goes,
     and for bitmaps that are right up to a common shift of their texels: where texels can make up for a number, it is
     known less well. On films of few pixels they are too small where the film's filter shares noise among pixels, as the
-    Gaussian one does and a box does not. None at the end of a range, where the pictures tell nothing, and for bitmaps."""
+    Gaussian one does and a box does not. None at the end of a range, where the pictures tell nothing, and for
+    bitmaps."""
     bsdfs: dict[str, dict[str, Any]]
     """Their materials, by path, as plugin dicts for ``mi.load_dict`` with the scene's own textures."""
     bounds: list[str]
