@@ -55,12 +55,11 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     real = BSDFProbe(load(given | constant | {name: varied[name] for name in free}))
     samples = real.sample(part, wi, u := random(COUNT, 31), uv)
     wo[::2] = samples.wo[::2]
-    # The one has its values wherever it is asked: let it be asked elsewhere.
     other = BSDFProbe(load(given | constant))
     why = "where its textures have the values of this point everywhere"
     reflectance = Value("eval_diffuse_reflectance", wo, real.diffuse_reflectance(wi, uv))
     found, few = [*real.values(wi, wo, uv), reflectance], slice(COUNT // 8)
-    pinned_down = [it.value for it in other.values(wi, wo)] + [other.diffuse_reflectance(wi)]
+    pinned_down = [it.value for it in other.values(wi, wo, uv)] + [other.diffuse_reflectance(wi, uv)]
     rows = [(it, expected, why) for it, expected in zip(found, pinned_down, strict=True)]
     if len(free) == len(varied):  # those that are pinned have as many lanes
         alone = [it.value for it in real.values(wi[few], wo[few], uv[few])]
