@@ -26,6 +26,14 @@ from mi_brdfs.mitsuba.registry import own_models
 
 FEW = "from mi_brdfs.explorer import export, stages; stages.MOST = export.SPP = 4"
 """Pictures with few samples, as the machine has other things to do."""
+SHADES = """() => {
+    const lobe = document.querySelector('#view-lobe canvas');
+    const { width, height } = lobe;
+    const context = Object.assign(document.createElement('canvas'), { width, height }).getContext('2d');
+    context.drawImage(lobe, 0, 0);
+    return new Set(context.getImageData(0, 0, width, height).data.filter((_, k) => k % 4 === 3)).size;
+}"""
+"""How many opacities the lobe's picture has: more if its edges are smooth."""
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
@@ -779,6 +787,14 @@ def test_the_exported_page_works_from_the_disk(tab, tmp_path):
     theta.press("End")
     tab.wait_for_function("() => document.querySelector('#view-polar .note').innerText.includes('85°')")
     tab.wait_for_function(f"before => {lobe} !== before", arg=before)
+    smooth, shades = tab.evaluate(SHADES), f"shades => ({SHADES})()"
+    box = tab.locator("#view-lobe canvas").bounding_box()
+    tab.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 0.8 * box["height"])
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 0.8 * box["height"])
+    tab.wait_for_function(f"{shades} < 0.7 * shades", arg=smooth)  # software draws coarse edges faster
+    tab.mouse.up()
+    tab.wait_for_function(f"{shades} > 0.9 * shades", arg=smooth)
     tab.add_init_script("Response.prototype.arrayBuffer = () => new Promise(() => {})")  # as long as it unpacks
     tab.reload()
     tab.wait_for_function("() => document.querySelector('h1').innerText.endsWith('Loading …')")

@@ -24,7 +24,7 @@ const bodies = new Map();
 export function startLobe() {
   const card = cards.lobe;
   canvas = element("canvas", { tabindex: 0, role: "img" });
-  gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  gl = canvas.getContext("webgl2", { antialias: false, premultipliedAlpha: true, preserveDrawingBuffer: true });
   if (!gl) {
     card.figure.append(
       element("p", {}, "This browser has no WebGL 2, which the lobe needs; the polar plot shows its cut."),
@@ -201,6 +201,7 @@ function render(found) {
     .color.match(/[\d.]+/g)
     .slice(0, 3)
     .map((value) => value / 255);
+  const show = smooth();
   gl.viewport(0, 0, canvas.width, canvas.height);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   labels.replaceChildren();
@@ -246,6 +247,32 @@ function render(found) {
     if (side) mark(state.subjects[found[at].subject].name, places.whole ? [0, 0, -1.3] : [0, 0, -0.4], "name");
   });
   discard(things);
+  show();
+}
+
+/** Draw with smooth edges from here on, and return what shows it; without them under a hand that drags, where there is
+ * no graphics processor: they take most of the time then. */
+function smooth() {
+  const name = gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
+  if (session.dragged && /swiftshader|llvmpipe|softpipe|basic render/i.test(name)) return () => {};
+  const { width, height } = canvas;
+  const [frame, ...buffers] = [gl.createFramebuffer(), gl.createRenderbuffer(), gl.createRenderbuffer()];
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  for (const [k, [format, place]] of [
+    [gl.RGBA8, gl.COLOR_ATTACHMENT0],
+    [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
+  ].entries()) {
+    gl.bindRenderbuffer(gl.RENDERBUFFER, buffers[k]);
+    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffers[k]);
+  }
+  return () => {
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.deleteFramebuffer(frame);
+    buffers.forEach((buffer) => gl.deleteRenderbuffer(buffer));
+  };
 }
 
 const again = () => requestAnimationFrame(drawLobe);
@@ -294,6 +321,7 @@ function listen() {
     canvas.addEventListener(end, (event) => {
       fingers.delete(event.pointerId);
       dragged = null;
+      again();
     });
   }
   canvas.addEventListener(
