@@ -122,7 +122,7 @@ def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
 
     def begin(self):
         self.table = mi.Float([0.1, 0.4, 0.2, 0.3])
-        self.parameters_changed()
+        self.parameters_changed([])
 
     def parameters_changed(self, keys):
         if not keys or key in keys:
