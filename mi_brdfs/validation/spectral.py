@@ -25,6 +25,7 @@ BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
 AGAIN = values.finite, sampling.weight, values.eval_pdf
 """The checks to run again in a spectral variant, of what they pass in rgb."""
+OWN = "where all colours are grey of their value there"
 HUE = 1, 0.7, 0.45
 """The channels of a colour, as parts of the grey in its place."""
 
@@ -106,56 +107,49 @@ def spectral(run: Run) -> Findings:
 def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None:
     """Check that channels, or wavelengths, follow their own values of the colours: of ``eval``, and of the weights of
     delta functions."""
-    given = run.given or {}
+    given, wavelengths = run.given or {}, hero_wavelengths(COUNT)
     textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
     coloured = load(given | textures)
-    wi, wo = BSDFProbe(coloured).pairs(run.probe.whole, COUNT, 84)
-    for kind in range(1 + len(run.probe.deltas)):
-        _check_followed(outcome, given, coloured, textures, (wi, wo), kind)
-
-
-def _check_followed(
-    outcome: Outcome,
-    given: dict[str, Any],
-    coloured: mi.BSDF,
-    textures: dict[str, mi.Texture],
-    directions: tuple[Array, Array],
-    kind: int,
-) -> None:
-    """Check one of the values, of the ``kind`` of that place in :meth:`BSDFProbe.values`."""
-    (wi, wo), wavelengths = directions, hero_wavelengths(COUNT)
+    wi, towards = BSDFProbe(coloured).pairs(run.probe.whole, COUNT, 84)
     si = interaction(wi, wavelengths=wavelengths)
-    name, wo, got = BSDFProbe(coloured).values_at(si, wo)[kind]
-    places = Places(wi, wo, wavelengths)
 
-    def evaluated(bsdf: mi.BSDF, wavelengths: Array) -> Array:
-        return BSDFProbe(bsdf).values_at(interaction(wi, wavelengths=wavelengths), directions[1])[kind].value
+    def evaluated(bsdf: mi.BSDF, wavelengths: Array) -> list[Value]:
+        return BSDFProbe(bsdf).values_at(interaction(wi, wavelengths=wavelengths), towards)
 
-    count = got.shape[1]
+    def held(*channel: int) -> mi.BSDF:
+        return load(given | {name: pinned(texture, si, *channel) for name, texture in textures.items()})
+
+    got = evaluated(coloured, wavelengths)
+    channels = range(got[0].value.shape[1])
     alike = [np.repeat(wavelengths[:, [k]], 4, axis=1) for k in range(4)]
-    grey = [
-        evaluated(load(given | {name: pinned(texture, si, k) for name, texture in textures.items()}), alike[k])
-        for k in range(count)
-    ]
-    errors = np.array([[_error(got[:, k], grey[other][:, k]) for other in range(count)] for k in range(count)])
-    if mi.is_spectral:
-        rolled = np.roll(evaluated(coloured, np.roll(wavelengths, 1, axis=1)), -1, axis=1)
+    grey = [evaluated(held(k), alike[k]) for k in channels]
+    for at, it in enumerate(got):
+        _check_followed(outcome, it, [each[at].value for each in grey], wi)
+    if not mi.is_spectral:
+        return
+    rolled, bound = evaluated(coloured, np.roll(wavelengths, 1, axis=1)), evaluated(held(), wavelengths)
+    alone = [evaluated(coloured, alike[k]) for k in channels]
+    for at, (name, wo, value) in enumerate(got):
+        places, usual = Places(wi, wo, wavelengths), np.roll(rolled[at].value, -1, axis=1)
         why = "in the first: it takes another's value"
-        _compare(outcome, f"in another order of the wavelengths {name}", rolled, got, why, places)
+        _compare(outcome, f"in another order of the wavelengths {name}", usual, value, why, places)
         # Asked at any wavelengths, these textures have the values of the light's, also to make a tint of.
-        bound = evaluated(load(given | {name: pinned(texture, si) for name, texture in textures.items()}), wavelengths)
         why = "if all colours have their values of the light's wavelengths: they are looked up at others"
-        _compare(outcome, name, got, bound, why, places)
-    for k in range(count):
+        _compare(outcome, name, value, bound[at].value, why, places)
+        for k in channels:  # of four equal wavelengths no tint can depend on the others
+            one, own = (each[k][at].value[:, k] for each in (alone, grey))
+            _compare(outcome, name, one, own, OWN, Places(wi, wo, wavelengths[:, k]))
+
+
+def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -> None:
+    """Check that a value's channels are nearest to what they are where all colours are grey of their own values."""
+    for k, own in enumerate(grey):
+        got, expected = it.value[:, k], own[:, k]
         channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
-        difference, why = abs(got[:, k] - grey[k][:, k]), "where all colours are grey of their value there"
-        if errors[k, k] > TOLERANCE and errors[k].min() < 0.5 * errors[k, k]:
-            of_other = f"{why}: it follows another channel"
-            outcome.wrong(difference, f"{name} in {channel}", got[:, k], of_other, wi, wo, expected=grey[k][:, k])
-        if mi.is_spectral:
-            # Of four equal wavelengths no tint can depend on the others.
-            alone, place = evaluated(coloured, alike[k])[:, k], Places(wi, wo, wavelengths[:, k])
-            _compare(outcome, name, alone, grey[k][:, k], why, place)
+        errors = [_error(got, other[:, k]) for other in grey]
+        if errors[k] > TOLERANCE and min(errors) < 0.5 * errors[k]:
+            name, why = f"{it.name} in {channel}", f"{OWN}: it follows another channel"
+            outcome.wrong(abs(got - expected), name, got, why, wi, it.wo, expected=expected)
 
 
 class Places(NamedTuple):
