@@ -17,7 +17,7 @@ void main() {
   seen = vec4(colour.rgb * light * colour.a, colour.a);
 }`;
 const camera = { yaw: 1.87, pitch: 0.42, distance: 3.8 };
-let gl, program, canvas, labels, places;
+let gl, program, canvas, labels, places, edges;
 const bodies = new Map();
 
 /** Put the canvas into its card. */
@@ -64,6 +64,9 @@ function setUp() {
   gl.useProgram(program);
   gl.clearColor(0, 0, 0, 0);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  const named = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
+  const slow = /swiftshader|llvmpipe|softpipe|basic render/i.test(gl.getParameter(named));
+  edges = { frame: gl.createFramebuffer(), buffers: [gl.createRenderbuffer(), gl.createRenderbuffer()], slow };
 }
 
 function upload({ position, normal, faces, lines }) {
@@ -253,25 +256,24 @@ function render(found) {
 /** Draw with smooth edges from here on, and return what shows it; without them under a hand that drags, where there is
  * no graphics processor: they take most of the time then. */
 function smooth() {
-  const name = gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
-  if (session.dragged && /swiftshader|llvmpipe|softpipe|basic render/i.test(name)) return () => {};
+  if (session.dragged && edges.slow) return () => {};
   const { width, height } = canvas;
-  const [frame, ...buffers] = [gl.createFramebuffer(), gl.createRenderbuffer(), gl.createRenderbuffer()];
-  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
-  for (const [k, [format, place]] of [
-    [gl.RGBA8, gl.COLOR_ATTACHMENT0],
-    [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
-  ].entries()) {
-    gl.bindRenderbuffer(gl.RENDERBUFFER, buffers[k]);
-    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
-    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffers[k]);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, edges.frame);
+  if (edges.width !== width || edges.height !== height) {
+    Object.assign(edges, { width, height });
+    for (const [k, [format, place]] of [
+      [gl.RGBA8, gl.COLOR_ATTACHMENT0],
+      [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
+    ].entries()) {
+      gl.bindRenderbuffer(gl.RENDERBUFFER, edges.buffers[k]);
+      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, edges.buffers[k]);
+    }
   }
   return () => {
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
     gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.deleteFramebuffer(frame);
-    buffers.forEach((buffer) => gl.deleteRenderbuffer(buffer));
   };
 }
 
