@@ -164,14 +164,13 @@ def _not_measured(measurement: Measurement) -> Iterator[str]:
             f"{percent(found.above.missing / found.above.values)} of its values were missing; they are filled in from "
             "those around them, with 0 where there are none."
         )
-    if in_one_plane(data):
+    if planar := in_one_plane(data):
         yield "It was measured in the plane of incidence only; what lies beside it is interpolated."
     ranges = [("θi", *ends(data, "theta_i", found.theta_i)), ("θo", *ends(data, "theta_o", found.theta_o))]
     told = [f"{name} {low:.4g} to {high:.4g}°" for name, low, high in ranges if low > NEAR_NORMAL or high < BAKED_TO]
     if told:
         yield f"It was measured for {' and '.join(told)}; what lies beyond has the values at the border."
-    share = _share(data, ranges)
-    if share < MOSTLY and not in_one_plane(data):
+    if not planar and (share := _share(data, ranges)) < MOSTLY:
         directions = "the directions in between" if told else "all directions"
         yield f"Of {directions} {percent(share)} were measured; the others have the values at the border."
 
