@@ -150,6 +150,7 @@ def test_memory(tmp_path, text, ending):
         ("# light " + "1" * 50_000 + "\n" + ZEMAX, "bsdf", ""),
         ("# A" + " " * 50_000 + "b\n" + ZEMAX, "bsdf", ""),
         ("theta_i_deg,theta_o_deg,phi_o_deg,450" + " " * 50_000 + "x\n0,0,0,1\n", "csv", "is no angle such as"),
+        ("theta_i_deg,theta_o_deg,phi_o_deg,f,\n0,0,0,1,\n", "csv", "column 5 of the header has no name"),
         ("NVIDIA ARC MBSDF V1\n" + "\n" * 1_000_000, "mbsdf", "below it a block of data"),
     ],
     ids=["digits", "spaces", "spaces in a name", "lines"],

@@ -116,6 +116,8 @@ class Columns:
         cosines = set()
         for k, name in enumerate(names):
             word = name.strip().lower() if len(name) < LONGEST_NAME else ""
+            if word == "nan":
+                raise file.error(f"column {k + 1} of the header has no name")
             if match := ANGLE.fullmatch(word):
                 self._add_angle(k, name, *match.groups())
             elif match := VALUE.fullmatch(word):
