@@ -153,7 +153,7 @@ def test_memory(tmp_path, text, ending):
         ("theta_i_deg,theta_o_deg,phi_o_deg,f,\n0,0,0,1,\n", "csv", "column 5 of the header has no name"),
         ("NVIDIA ARC MBSDF V1\n" + "\n" * 1_000_000, "mbsdf", "below it a block of data"),
     ],
-    ids=["digits", "spaces", "spaces in a name", "lines"],
+    ids=["digits", "spaces", "spaces in a name", "no name", "lines"],
 )
 def test_time(tmp_path, text, ending, sentence):
     """Long words take no time that grows with their square: half a minute and more, or for ever."""
