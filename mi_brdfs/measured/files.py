@@ -69,7 +69,7 @@ class BinaryFile:
     @property
     def left(self) -> int:
         """The bytes behind the offset."""
-        return self.size - self.offset
+        return max(self.size - self.offset, 0)
 
     def error(self, problem: str, offset: int | None = None) -> FileError:
         return FileError(f"{self.path}: at byte {self.offset if offset is None else offset}, {problem}.")
@@ -85,7 +85,5 @@ class BinaryFile:
                 "it is truncated, or of another format"
             )
         values = np.fromfile(self.path, dtype=dtype, count=int(count), offset=self.offset)
-        if len(values) < count:
-            raise self.error(f"{what} are missing; the file became shorter while it was read")
         self.offset += needed
         return values

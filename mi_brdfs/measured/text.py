@@ -14,8 +14,6 @@ from .files import FileError
 
 LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""
-NOTED = 1000
-"""The characters of a comment that are looked at."""
 
 
 def _foreign(error: UnicodeError) -> tuple[str, int]:
@@ -52,7 +50,7 @@ class TextFile:
         for text in self.lines():
             text, _, comment = text.partition("#")
             if comment := comment.strip("# \t"):
-                self.comments.append(comment[:NOTED])
+                self.comments.append(comment)
             if words := text.replace(",", " ").split():
                 yield words
 

@@ -31,8 +31,6 @@ NAME = "UTIA"
 DESCRIPTION = "a .bin of three planes of 288 × 288 float64"
 RATIO = 8
 """How many times as many azimuths as polar angles a file has: 360°/90° times the ratio of the steps."""
-LARGEST = 1e12
-"""The largest f that is believed: the float64 of half a file, read as float32, are up to 1e38."""
 
 
 def recognizes(path: Path, head: bytes) -> bool:
@@ -53,10 +51,6 @@ def read(path: Path, quantity: Quantity) -> Measurement:
 
 def _read(file: BinaryFile, dtype: np.dtype, theta: int, phi: int, quantity: Quantity) -> Measurement:
     planes = file.take(dtype, 3 * (theta * phi) ** 2, "values").reshape(3, theta, phi, theta, phi)
-    if np.max(np.abs(planes), where=np.isfinite(planes), initial=0) > LARGEST:
-        raise file.error(
-            f"there are numbers beyond {LARGEST:g}, which no BRDF has; it is truncated, or of another format", 0
-        )
     values = np.empty((theta, theta, phi, phi, 3), dtype=np.float32)
     k = np.arange(phi)
     for delta in range(phi):
