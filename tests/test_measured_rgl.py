@@ -202,7 +202,7 @@ PATCHED = {
     "long name": (18, b"\xff\xff", "at byte 20, 65,535 bytes of a field's name"),
     "65535 dimensions": (FIRST, b"\xff\xff", "524,280 bytes of the shape of 'description' should follow"),
     "type": (FIRST + 2, b"\x0c", "at byte 18, field 'description' is of the unknown type 12"),
-    "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "bytes of 'description' should follow, but the file ends after 0"),
+    "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "should follow, but the file ends after 0"),
     "10 GB": (FIRST + 11, struct.pack("<Q", 10**10), "10,000,000,000 bytes of 'description' should follow"),
 }
 SPOILED = {

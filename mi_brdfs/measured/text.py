@@ -60,7 +60,7 @@ class TextFile:
     def numbers(self, words: Sequence[str], what: str = "a number") -> list[float]:
         """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
         try:
-            return floats(words)
+            return list(map(float, words))
         except ValueError:
             bad = next(word for word in words if not is_number(word))
             raise self.error(f"{shortened(bad)} should be {what}") from None
@@ -113,16 +113,9 @@ def decoded(data: bytes) -> str:
     return data.decode(encoding(data[:4]), errors=FOREIGN)
 
 
-def floats(words: Sequence[str]) -> list[float]:
-    """Return words as Python reads them, but without the underscores that it lets digits have."""
-    if "_" in "".join(words):
-        raise ValueError
-    return list(map(float, words))
-
-
 def is_number(word: str) -> bool:
     try:
-        floats([word])
+        float(word)
     except ValueError:
         return False
     return True
