@@ -8,7 +8,7 @@ import merl_tables
 import numpy as np
 import pytest
 from merl_tables import SCALE
-from support import pairs, refused, spherical, traced, turned, written
+from support import pairs, refused, spherical, traced, written
 
 from mi_brdfs.measured import FileError, read
 from mi_brdfs.measured.formats import merl
@@ -59,19 +59,6 @@ def test_nearest_is_merls_own_look_up(tmp_path, dimensions):
     expected, safe = looked_up(planes, wi, wo)
     assert safe.mean() > 0.99
     np.testing.assert_allclose(grid.evaluate(wi, wo, "nearest")[safe], expected[safe], rtol=1e-6)
-
-
-def test_merl_nodes_lie_at_centres_and_tables_are_reciprocal_and_isotropic(tmp_path):
-    grid = read(written(tmp_path, "x.binary", merl_bytes())).data
-    wi, wo, f = grid.pairs()
-    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
-    np.testing.assert_allclose(grid.evaluate(wi, wo)[above], f[above], rtol=1e-6)
-    for found, expected in zip(merl_tables.angles(wi, wo), merl_tables.centres((6, 5, 10)), strict=True):
-        np.testing.assert_allclose(found, expected.ravel(), atol=1e-7)
-    wi, wo = pairs(1000, 8)
-    f = grid.evaluate(wi, wo)
-    np.testing.assert_allclose(grid.evaluate(wo, wi), f, rtol=1e-9)
-    np.testing.assert_allclose(grid.evaluate(turned(wi, 1.0), turned(wo, 1.0)), f, rtol=1e-6)
 
 
 def test_minus_one_is_missing_and_other_negatives_stay(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from mitsuba import tensor_io
 from support import context, interaction, numbers, pairs, refused, shared, traced
 
-from mi_brdfs.measured import FileError, convert, read
+from mi_brdfs.measured import convert, read
 from mi_brdfs.measured.arrays import DRJIT, NUMPY, components
 from mi_brdfs.measured.formats import rgl
 from mi_brdfs.measured.source import Source
@@ -237,15 +237,6 @@ def test_malformed_files_are_refused_in_a_sentence(tmp_path, case):
     assert offset or case == "no magic"
     if case == "negative ndf":  # offsets are those of the values
         assert struct.unpack_from("<f", data, int(offset[1])) == (-1,)
-
-
-def test_no_name_of_a_field_controls_a_terminal(tmp_path):
-    fields, hostile = material(), "\x1b[31m\x7f"
-    description = np.frombuffer(f"paint {hostile}".encode(), np.uint8)
-    assert read(written(tmp_path, fields | {"description": description})).material == "paint �[31m�"
-    with pytest.raises(FileError) as caught:
-        read(written(tmp_path, {hostile: fields.pop("phi_i"), **fields}))
-    assert str(caught.value).isprintable() and "it has �[31m�, description" in str(caught.value)
 
 
 def test_missing_values_are_kept(tmp_path):

@@ -163,10 +163,3 @@ def test_time(tmp_path, text, ending, sentence):
         read(path)
     assert time.process_time() - start < 2
 
-
-def test_a_colour_that_is_not_read_says_what_to_export(tmp_path):
-    (tmp_path / "paint.bsdf").write_text(LIGHTTOOLS.replace("Monochrome", "RGB"))
-    with pytest.raises(
-        FileError, match="SpectralContent is 'RGB', which cannot be read; export it as Monochrome or XYZ"
-    ):
-        read(tmp_path / "paint.bsdf")
