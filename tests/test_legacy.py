@@ -503,4 +503,3 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
 def test_malformed_values_are_refused(upgraded, inside, sentence):
     with pytest.raises(ValueError, match=sentence):
         upgraded(f'<bsdf type="phong">{inside}</bsdf>')
-

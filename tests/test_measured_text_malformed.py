@@ -162,4 +162,3 @@ def test_time(tmp_path, text, ending, sentence):
     with pytest.raises(FileError, match=sentence) if sentence else contextlib.nullcontext():
         read(path)
     assert time.process_time() - start < 2
-
