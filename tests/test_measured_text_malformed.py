@@ -39,12 +39,6 @@ def any_table(text, counted=True):
     yield with_last("a line without end", "1" * (1 << 20))
 
 
-def wide(count):
-    """A CSV of one direction and many wavelengths."""
-    names = ",".join(map(str, range(1, count + 1)))
-    return f"theta_i_deg,theta_o_deg,phi_o_deg,{names}\n10,20,30{count * ',1'}\n"
-
-
 def damage():
     for format, text in TEXTS.items():
         for name, damaged, at_a_line in any_table(text, format in ("zemax", "lighttools")):
@@ -56,8 +50,6 @@ def damage():
             assert old in text
             text = text.partition(old)[0] if cut else text.replace(old, new[1:].replace("9…9", "9" * 5000), 1)
         yield pytest.param(text, ENDINGS[format], place == "line", id=f"{format}: {name}")
-    yield pytest.param(wide(4097), "csv", False, id="more wavelengths than can be read")
-    yield pytest.param(wide(4097).replace("4096,", "f,", 1), "csv", True, id="f among many wavelengths")
 
 
 @pytest.mark.parametrize("text, ending, at_a_line", list(damage()))

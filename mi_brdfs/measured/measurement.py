@@ -20,7 +20,6 @@ Quantity = Literal["stated", "f", "f cos"]
 """What a file holds: what it states, or f or f cosθo where it states nothing."""
 MOST = 1e36
 """The largest value: float32 holds it times a solid angle."""
-MOST_CHANNELS = 4096
 LEAST_NM = 12.0
 """In nm, between the 10.6 µm of carbon dioxide lasers and the 13.5 nm of extreme ultraviolet light."""
 MOST_UNSEEN = 0.2
@@ -67,16 +66,9 @@ class Measurement:
 
 def representable(measurement: Measurement) -> Measurement:
     """Return a measurement that can be rendered, with NaN in place of values beyond ``MOST``, infinite ones among them.
-    Raise a FileError if no value is left that is positive, or wavelengths are too many, no numbers, the same or in
-    micrometres. Warn of spectra that leave out much of what the eye sees."""
+    Raise a FileError if no value is left that is positive, or wavelengths are in micrometres. Warn of spectra that
+    leave out much of what the eye sees."""
     values, nm = measurement.data.values, measurement.wavelengths
-    if values.shape[-1] > MOST_CHANNELS:
-        raise FileError(
-            f"{measurement.path} has {values.shape[-1]:,} wavelengths, of which at most {MOST_CHANNELS:,} can be read; "
-            "keep every second one, or fewer."
-        )
-    if nm is not None and len(nm) > 1 and not np.all((np.diff(nm) > 0) & np.isfinite(nm[1:])):
-        raise FileError(f"{measurement.path}: its wavelengths must be numbers that differ.")
     if nm is not None and nm[-1] < LEAST_NM:
         numbers = f"{nm[0]:g} to {nm[-1]:g}" if len(nm) > 1 else f"{nm[0]:g}"
         raise FileError(f"{measurement.path}: wavelengths of {numbers} look like micrometres; write nm.")
