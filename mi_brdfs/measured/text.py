@@ -45,14 +45,18 @@ class TextFile:
                     raise self.error(f"there are more than {LONGEST:,} characters: this is no table")
                 yield text.strip()
 
-    def rows(self) -> Iterator[list[str]]:
-        """Yield the words of lines that have some, between white space and commas, and collect the comments."""
+    def content(self) -> Iterator[str]:
+        """Yield what lines have beside comments, where they have anything, and collect the comments."""
         for text in self.lines():
             text, _, comment = text.partition("#")
             if comment := comment.strip("# \t"):
                 self.comments.append(comment)
-            if words := text.replace(",", " ").split():
-                yield words
+            if text := text.strip():
+                yield text
+
+    def rows(self) -> Iterator[list[str]]:
+        """Yield the words of lines, between white space and commas."""
+        return filter(None, (text.replace(",", " ").split() for text in self.content()))
 
     def error(self, problem: str, line: int | None = None) -> FileError:
         return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")

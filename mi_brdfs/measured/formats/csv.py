@@ -172,15 +172,12 @@ class Columns:
 
 
 def fields(file: TextFile) -> Iterator[list[str]]:
-    """Yield the fields of rows, with ``nan`` for empty ones, and collect comments."""
+    """Yield the fields of rows, with ``nan`` for empty ones."""
     mark: str | None = ""
-    for text in file.lines():
-        if text.startswith("#"):
-            file.comments.append(text.strip("# \t"))
-        elif text:
-            mark = separator(text) if mark == "" else mark
-            row = split(text, mark)
-            yield [field.replace(",", ".") for field in row] if mark in (";", "\t") else row
+    for text in file.content():
+        mark = separator(text) if mark == "" else mark
+        row = split(text, mark)
+        yield [field.replace(",", ".") for field in row] if mark in (";", "\t") else row
 
 
 def separator(text: str) -> str | None:
