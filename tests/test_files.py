@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from support import LOFT, ROOT
+from support import LOFT
 from test_cli import SCENE, command, invoke
 
 import mi_brdfs
@@ -28,6 +28,10 @@ from mi_brdfs.rendering.output import write
 from mi_brdfs.sweep import Sweep, plan, store
 
 FITTED = "--model", "lambert", "--starts", "1"
+
+
+def ended(*words, **options):
+    return subprocess.run(command(*words), stderr=subprocess.PIPE, text=True, **options)
 
 
 # --- Ends ------------------------------------------------------------------------------------------------------------
@@ -99,48 +103,33 @@ LONG = "long" * 75
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
-def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
+def test_a_full_disk_behind_the_standard_output_gets_a_sentence_and_files_are_written(tmp_path):
     with open("/dev/full", "w") as full:
-        done = subprocess.run(command("--version"), stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 1
-    assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
+        done = ended("fit", LOFT, *FITTED, "-o", tmp_path / "x.xml", stdout=full)
+    sentence = "mi-brdfs: cannot write to the standard output: No space left on device\n"
+    assert (done.returncode, done.stderr) == (1, sentence) and (tmp_path / "x.xml").is_file()
     assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
-
-
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
-def test_files_are_written_also_if_the_standard_output_is_full(tmp_path):
-    source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.xml"
-    arguments = command("fit", source, "--model", "lambert", "--starts", "1", "-o", target)
-    with open("/dev/full", "w") as full:
-        done = subprocess.run(arguments, stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 1 and target.is_file()
-    assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
 
 
 def test_files_are_written_also_if_nobody_reads_on(tmp_path):
     """As behind ``head``, which ends after some lines."""
-    source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.json"
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(
-        command("measured", source, "--json", target), stdout=writing, stderr=subprocess.PIPE, text=True
-    )
+    done = ended("measured", LOFT, "--json", tmp_path / "x.json", stdout=writing)
     os.close(writing)
-    assert (done.returncode, done.stderr) == (0, "") and target.is_file()
+    assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "x.json").is_file()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")
 def test_a_working_folder_that_is_gone_gets_a_sentence(tmp_path):
-    done = subprocess.run(
-        command("--version"), cwd=tmp_path, preexec_fn=tmp_path.rmdir, stderr=subprocess.PIPE, text=True
-    )
-    assert done.returncode == 1
-    assert done.stderr == "mi-brdfs: the working folder is gone; change to one that is there\n"
+    done = ended("--version", cwd=tmp_path, preexec_fn=tmp_path.rmdir)
+    sentence = "mi-brdfs: the working folder is gone; change to one that is there\n"
+    assert (done.returncode, done.stderr) == (1, sentence)
 
 
 def test_letters_that_the_output_cannot_have_are_replaced():
-    done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
-    assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
+    done = ended("info", "ward", stdout=subprocess.PIPE, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, "") and "?" in done.stdout
 
 
 def swept(folder):

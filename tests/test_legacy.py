@@ -384,7 +384,6 @@ HOSTILE = {
     "two roots": '<scene version="0.6.0"/><scene version="0.6.0"/>',
     "another root": '<bsdf version="0.6.0"/>',
     "version": '<scene version="0.7.0"/>',
-    "no number": '<scene version="0.x"/>',
     "includes itself": '<scene version="0.6.0"><include filename="scene.xml"/></scene>',
     "cycle": '<scene version="0.6.0"><include filename="cycle.xml"/></scene>',
     "includes a folder": '<scene version="0.6.0"><include filename="."/></scene>',
@@ -394,8 +393,6 @@ HOSTILE = {
         "<texture", '<texture name="diffuseReflectance"'
     ),
     "external": '<!DOCTYPE scene [<!ENTITY a SYSTEM "SECRET">]><scene version="0.6.0">&a;</scene>',
-    "parameter entity": '<!DOCTYPE scene [<!ENTITY % a SYSTEM "SECRET"> %a;]><scene version="0.6.0"/>',
-    "external type": '<!DOCTYPE scene SYSTEM "SECRET"><scene version="0.6.0"/>',
     "XInclude": '<scene version="0.6.0" xmlns:i="http://www.w3.org/2001/XInclude"><i:include href="SECRET"/></scene>',
     "undefined entity": '<scene version="0.6.0">&nothing;</scene>',
     "parameters that multiply": '<scene version="0.6.0"><default name="a0" value="hahahahaha"/>'
@@ -500,17 +497,6 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
         ('<transform name="toWorld"><lookat up="0,1"/></transform>', "lookat: '0,1' is not 3 finite numbers"),
     ],
 )
-def test_malformed_values_are_refused(folder, inside, sentence):
-    text = f'<scene version="0.6.0"><bsdf type="phong">{inside}</bsdf></scene>'
-    (folder / "scene.xml").write_text(text)
+def test_malformed_values_are_refused(upgraded, inside, sentence):
     with pytest.raises(ValueError, match=sentence):
-        upgrade(folder / "scene.xml")
-
-
-def test_booleans_have_any_case(folder):
-    def upgraded(value):
-        inside = f'<bsdf type="roughplastic"><boolean name="nonlinear" value="{value}"/></bsdf>'
-        (folder / "scene.xml").write_text(f'<scene version="0.6.0">{inside}</scene>')
-        return upgrade(folder / "scene.xml").xml
-
-    assert upgraded(" True ") == upgraded("true") != upgraded("False")
+        upgraded(f'<bsdf type="phong">{inside}</bsdf>')

@@ -8,7 +8,7 @@ import merl_tables
 import numpy as np
 import pytest
 from merl_tables import SCALE
-from support import pairs, refused, spherical, traced, turned, written
+from support import pairs, refused, spherical, traced, written
 
 from mi_brdfs.measured import FileError, read
 from mi_brdfs.measured.formats import merl
@@ -59,19 +59,6 @@ def test_nearest_is_merls_own_look_up(tmp_path, dimensions):
     expected, safe = looked_up(planes, wi, wo)
     assert safe.mean() > 0.99
     np.testing.assert_allclose(grid.evaluate(wi, wo, "nearest")[safe], expected[safe], rtol=1e-6)
-
-
-def test_merl_nodes_lie_at_centres_and_tables_are_reciprocal_and_isotropic(tmp_path):
-    grid = read(written(tmp_path, "x.binary", merl_bytes())).data
-    wi, wo, f = grid.pairs()
-    above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
-    np.testing.assert_allclose(grid.evaluate(wi, wo)[above], f[above], rtol=1e-6)
-    for found, expected in zip(merl_tables.angles(wi, wo), merl_tables.centres((6, 5, 10)), strict=True):
-        np.testing.assert_allclose(found, expected.ravel(), atol=1e-7)
-    wi, wo = pairs(1000, 8)
-    f = grid.evaluate(wi, wo)
-    np.testing.assert_allclose(grid.evaluate(wo, wi), f, rtol=1e-9)
-    np.testing.assert_allclose(grid.evaluate(turned(wi, 1.0), turned(wo, 1.0)), f, rtol=1e-6)
 
 
 def test_minus_one_is_missing_and_other_negatives_stay(tmp_path):
@@ -188,21 +175,21 @@ def replaced(data, offset, part):
 
 
 M, U, B = merl_bytes(), utia_bytes(), mbsdf_bytes()
+FILES = {"x.binary": M, "x.bin": U, "x.mbsdf": B}
 HEAD = len(B) - 4 * 4 * 4 * 6 * 3 - 12
 NOISE = np.random.default_rng(7).bytes(5000)
 NUMBER = {"x.binary": ("<f8", 12), "x.bin": ("<f8", 0), "x.mbsdf": ("<f4", HEAD + 12)}
 """The type of the values, and where they begin."""
 
 
-def filled(data, name, value):
-    """Return a file whose last values, half of them, are replaced."""
-    dtype, start = NUMBER[name]
-    size = np.dtype(dtype).itemsize
-    count = (len(data) - start) // size // 2
-    return data[: -count * size] + np.full(count, value, dtype).tobytes()
+def filled(name, value, part):
+    """Return a file whose last values, one of ``part``, are replaced."""
+    (dtype, start), data = NUMBER[name], FILES[name]
+    rest = np.full((len(data) - start) // np.dtype(dtype).itemsize // part, value, dtype).tobytes()
+    return data[: -len(rest)] + rest
 
 
-def damaged(data, name):
+def damaged(data):
     """What any format must refuse, or read as it is."""
     return {
         **{f"the first {n} bytes": data[:n] for n in (1, 12, 40)},
@@ -216,15 +203,13 @@ def damaged(data, name):
 
 
 REFUSED = {
-    **{("x.binary", k): v for k, v in damaged(M, "x.binary").items()},
+    **{(name, k): v for name, data in FILES.items() for k, v in damaged(data).items()},
     ("x.binary", "-6 cells"): replaced(M, 0, struct.pack("<i", -6)),
     ("x.binary", "big-endian"): replaced(M, 0, struct.pack(">3i", 6, 5, 10)),
     ("x.binary", "float32"): M[:12] + np.frombuffer(M[12:], "<f8").astype("<f4").tobytes(),
-    **{("x.bin", k): v for k, v in damaged(U, "x.bin").items()},
     ("x.bin", "four planes"): U + U[: len(U) // 3],
     ("x.bin", "a header"): b"UTIA" + U,
     ("x.bin", "7 × 48"): bytes(3 * 8 * (7 * 48) ** 2),
-    **{("x.mbsdf", k): v for k, v in damaged(B, "x.mbsdf").items()},
     ("x.mbsdf", "version 2"): B.replace(b"V1", b"V2"),
     ("x.mbsdf", "type 2"): replaced(B, HEAD, struct.pack("<I", 2)),
     ("x.mbsdf", "no θ"): replaced(B, HEAD + 4, struct.pack("<I", 0)),
@@ -250,14 +235,11 @@ def test_a_damaged_file_is_refused_in_a_sentence(tmp_path, case):
 @pytest.mark.parametrize("name, value", ODD)
 def test_odd_values_count_as_none(tmp_path, name, value):
     """Also those that float32 does not hold. Where there are no others, there is nothing to read."""
-    data = filled({"x.binary": M, "x.bin": U, "x.mbsdf": B}[name], name, value)
-    path = written(tmp_path, name, data)
+    path = written(tmp_path, name, filled(name, value, 2))
     grid = read(path).data
     f = grid.evaluate(*pairs(100, 10))
     assert np.isfinite(f).all() and (f >= 0).all() and (f < 1e9).all()
     assert ((grid.values < 0) if value == -2 else np.isnan(grid.values)).mean() >= 0.5
-    dtype, start = NUMBER[name]
-    rest = np.frombuffer(data[start:], dtype)
-    path.write_bytes(data[:start] + np.full_like(rest, value).tobytes())
+    path.write_bytes(filled(name, value, 1))
     with pytest.raises(FileError, match="no value is positive"):
         read(path)

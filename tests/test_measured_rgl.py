@@ -12,7 +12,7 @@ import pytest
 from mitsuba import tensor_io
 from support import context, interaction, numbers, pairs, refused, shared, traced
 
-from mi_brdfs.measured import FileError, convert, read
+from mi_brdfs.measured import convert, read
 from mi_brdfs.measured.arrays import DRJIT, NUMPY, components
 from mi_brdfs.measured.formats import rgl
 from mi_brdfs.measured.source import Source
@@ -200,11 +200,10 @@ PATCHED = {
     "no magic": (0, b"tenser", "no known format"),
     "version": (12, b"\2", "at byte 12, the version is 2.0"),
     "long name": (18, b"\xff\xff", "at byte 20, 65,535 bytes of a field's name"),
-    "65535 dimensions": (FIRST, b"\xff\xff", "field 'description' has 65535 dimensions; there are at most 8"),
+    "65535 dimensions": (FIRST, b"\xff\xff", "524,280 bytes of the shape of 'description' should follow"),
     "type": (FIRST + 2, b"\x0c", "at byte 18, field 'description' is of the unknown type 12"),
-    "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "at byte 18, field 'description' should have"),
-    "overlap": (FIRST + 3, struct.pack("<Q", 100), "'description' starts, but the table of contents reaches to byte"),
-    "10 GB": (FIRST + 11, struct.pack("<Q", 10**10), "but the file ends at"),
+    "offset": (FIRST + 3, struct.pack("<Q", 1 << 40), "should follow, but the file ends after 0"),
+    "10 GB": (FIRST + 11, struct.pack("<Q", 10**10), "10,000,000,000 bytes of 'description' should follow"),
 }
 SPOILED = {
     "no vndf": ("vndf", lambda field: None, "without 'vndf'"),
@@ -222,7 +221,7 @@ SPOILED = {
 }
 
 
-@pytest.mark.parametrize("case", [*PATCHED, *SPOILED, "cut off", "cut off in the contents", "a name twice"])
+@pytest.mark.parametrize("case", [*PATCHED, *SPOILED, "cut off", "cut off in the contents"])
 def test_malformed_files_are_refused_in_a_sentence(tmp_path, case):
     path = written(tmp_path, spoiled(*SPOILED[case][:2]) if case in SPOILED else material())
     data, words = path.read_bytes(), (PATCHED | SPOILED).get(case, [""])[-1]
@@ -230,7 +229,7 @@ def test_malformed_files_are_refused_in_a_sentence(tmp_path, case):
         offset, patch, _ = PATCHED[case]
         data = data[:offset] + patch + data[offset + len(patch) :]
     elif case not in SPOILED:
-        data = {"cut off": data[:-1], "cut off in the contents": data[:100]}.get(case, data.replace(b"sigma", b"phi_i"))
+        data = data[: -1 if case == "cut off" else 100]
     path.write_bytes(data)
     text = refused(path)
     assert words in text, text
@@ -238,15 +237,6 @@ def test_malformed_files_are_refused_in_a_sentence(tmp_path, case):
     assert offset or case == "no magic"
     if case == "negative ndf":  # offsets are those of the values
         assert struct.unpack_from("<f", data, int(offset[1])) == (-1,)
-
-
-def test_no_name_of_a_field_controls_a_terminal(tmp_path):
-    fields, hostile = material(), "\x1b[31m\x7f"
-    description = np.frombuffer(f"paint {hostile}".encode(), np.uint8)
-    assert read(written(tmp_path, fields | {"description": description})).material == "paint �[31m�"
-    with pytest.raises(FileError) as caught:
-        read(written(tmp_path, {hostile: fields.pop("phi_i"), **fields}))
-    assert str(caught.value).isprintable() and "it has �[31m�, description" in str(caught.value)
 
 
 def test_missing_values_are_kept(tmp_path):

@@ -19,8 +19,24 @@ from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.measured.source import Source
 
 
-def measured(folder, text, name):
+def measured(folder, text, name="x.csv"):
     return read(written(folder, name, text))
+
+
+def highlight(wi, wo):
+    """A reciprocal and isotropic highlight."""
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
+    return 0.1 + np.exp(-20 * (1 - half[..., 2] ** 2))
+
+
+def tabulated(folder, *angles, f=highlight):
+    """A CSV of f where all angles cross: θi, θo and Δφ, or θi, φi, θo and φo."""
+    names = "theta_i,theta_o,delta_phi" if len(angles) == 3 else "theta_i,phi_i,theta_o,phi_o"
+    rows = np.array([*itertools.product(*angles)], dtype=float)
+    i, p, o, q = rows.T if len(angles) == 4 else (rows[:, 0], 0, *rows.T[1:])
+    table = np.column_stack([rows, f(spherical(i, p), spherical(o, q))])
+    text = "\n".join(",".join(map(str, row)) for row in table.tolist())
+    return measured(folder, f"# angles: degrees\n{names},f\n{text}")
 
 
 def value_at(measurement, wi, wo):
@@ -219,7 +235,7 @@ def table(header="theta_i_deg,theta_o_deg,phi_o_deg,f", scale=1.0, mark=",", fac
     ids=range(10),
 )
 def test_csv_spellings(tmp_path, text):
-    measurement = measured(tmp_path, text, "x.csv")
+    measurement = measured(tmp_path, text)
     assert isinstance(measurement.data, Grid)
     for i, o, d in ROWS:
         np.testing.assert_allclose(value_at(measurement, spherical(i, 0), spherical(o, d)), f_of(i, o, d), rtol=1e-9)
@@ -229,22 +245,22 @@ def test_csv_values(tmp_path):
     row = "\n30,10,40,100,0.1,0.2,0.3\n"
     angles = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg"
     wi, wo = spherical(30, 0), spherical(40, 90)  # turned: a single φi is that of an isotropic material
-    rgb = measured(tmp_path, angles + ",b,g,r" + row, "x.csv")
+    rgb = measured(tmp_path, angles + ",b,g,r" + row)
     assert rgb.wavelengths is None
     np.testing.assert_allclose(value_at(rgb, wi, wo), [0.3, 0.2, 0.1])
-    spectral = measured(tmp_path, angles + ",650nm,450 nm,f_550" + row, "x.csv")
+    spectral = measured(tmp_path, angles + ",650nm,450 nm,f_550" + row)
     np.testing.assert_array_equal(spectral.wavelengths, [450, 550, 650])
     np.testing.assert_allclose(value_at(spectral, wi, wo), [0.2, 0.3, 0.1])
-    grey = measured(tmp_path, "# wavelength: 633 nm\n# material: Black Paint\n" + table(), "x.csv")
+    grey = measured(tmp_path, "# wavelength: 633 nm\n# material: Black Paint\n" + table())
     assert (grey.wavelengths.tolist(), grey.material) == ([633], "Black Paint")
-    assert np.isnan(measured(tmp_path, table(), "x.csv").wavelengths).all()
+    assert np.isnan(measured(tmp_path, table()).wavelengths).all()
     with pytest.raises(FileError, match=r"the wavelength '0\.65 um' is no number of nm, such as 650"):
-        measured(tmp_path, "# wavelength: 0.65 um\n" + table(), "x.csv")
+        measured(tmp_path, "# wavelength: 0.65 um\n" + table())
 
 
 def test_rows_that_are_no_grid_are_samples(tmp_path):
     for text in (table().rsplit("\n", 2)[0], table().replace("\n40,40,80", "\n40,41,80")):
-        measurement = measured(tmp_path, text, "x.csv")
+        measurement = measured(tmp_path, text)
         assert isinstance(measurement.data, Samples)
         np.testing.assert_allclose(value_at(measurement, spherical(40, 0), spherical(20, 80)), f_of(40, 20, 80))
 
@@ -254,8 +270,8 @@ def test_rows_that_contradict_others_are_told(tmp_path):
     noisy, other = (table("", factor=lambda *_, it=it: it).lstrip() for it in (1.1, 5.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        measured(tmp_path, table() + noisy, "x.csv")
-        measured(tmp_path, table() + other + "50,50,10,1000\n", "x.csv")
+        measured(tmp_path, table() + noisy)
+        measured(tmp_path, table() + other + "50,50,10,1000\n")
     with pytest.warns(UserWarning, match="more than twice or less than half their values, are averaged: 90"):
         measured(tmp_path, table() + other, "y.csv")
 
@@ -264,14 +280,14 @@ def test_rows_of_anisotropic_materials(tmp_path):
     """A turn may be closed by 360°; a single row may stand for all azimuths at the pole, in isotropic tables."""
     angles = itertools.product((10, 40), range(0, 361, 90), (20, 50), range(0, 361, 60))
     rows = [f"{i},{p},{o},{p + d},{i + o / 100 + (p % 360) / 1e5 + (d % 360) / 1e7}" for i, p, o, d in angles]
-    data = measured(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows), "x.csv").data
+    data = measured(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows)).data
     assert data.anisotropic
     assert [len(axis.nodes) for axis in data.axes] == [2, 2, 6, 4]
     assert [axis.period for axis in data.axes[2:]] == [2 * np.pi, 2 * np.pi]
     found = data.evaluate(spherical(40, 270), spherical(20, 270 + 300), "nearest")
     np.testing.assert_allclose(found, 40 + 0.2 + 270e-5 + 300e-7, rtol=1e-9)
     once = "\n".join(line for line in table().splitlines() if not re.search(r"^\d+,0,[1-9]", line))
-    assert isinstance(measured(tmp_path, once, "x.csv").data, Grid)
+    assert isinstance(measured(tmp_path, once).data, Grid)
 
 
 def test_a_row_without_a_value_takes_none_from_others(tmp_path):
@@ -282,7 +298,7 @@ def test_a_row_without_a_value_takes_none_from_others(tmp_path):
     def data(*lacking, again=""):
         rows = [f"{i},{o},{d},{'' if (i, o, d) in lacking else f}" for (i, o, d), f in values.items()]
         text = "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + "\n".join(rows) + again
-        return measured(tmp_path, text, "x.csv").data.values
+        return measured(tmp_path, text).data.values
 
     np.testing.assert_allclose(data((0, 20, 0), (20, 0, 60), again="\n30,30,20,"), data(), rtol=1e-12)
     assert np.isnan(data((30, 30, 20))).sum() == 1
@@ -296,9 +312,7 @@ def test_an_anisotropic_grid_of_alta_has_azimuths_at_the_normal(tmp_path):
 
 
 def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
-    rows = "\n".join(f"{i},{o},0,{highlight(spherical(i, 0), spherical(o, 0))}"
-                     for i, o in itertools.product(range(-60, 61, 10), range(-60, 61, 5)))  # fmt: skip
-    data = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv").data
+    data = tabulated(tmp_path, range(-60, 61, 10), range(-60, 61, 5), [0]).data
     assert not data.anisotropic
     wi, wo = spherical(30, 70), spherical(30, 250)
     np.testing.assert_allclose(as_grid(data).evaluate(wi, wo), highlight(wi, wo), rtol=0.05)
@@ -306,9 +320,7 @@ def test_both_directions_may_be_on_either_side_of_the_normal(tmp_path):
 
 def test_light_on_both_sides_is_in_one_plane(tmp_path):
     """Where f depends on the azimuth between light and view, the material is isotropic."""
-    angles = itertools.product(range(-60, 61, 10), range(0, 61, 10), range(0, 180, 20))
-    rows = "\n".join(f"{i},{o},{d},{highlight(spherical(i, 0), spherical(o, d))}" for i, o, d in angles)
-    data = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows, "x.csv").data
+    data = tabulated(tmp_path, range(-60, 61, 10), range(0, 61, 10), range(0, 180, 20)).data
     assert isinstance(data, Grid) and not data.anisotropic
     wi, wo = spherical(40, 70), spherical(40, 250)
     np.testing.assert_allclose(data.evaluate(wi, wo), highlight(wi, wo), rtol=1e-3)
@@ -316,11 +328,9 @@ def test_light_on_both_sides_is_in_one_plane(tmp_path):
 
 def test_half_a_turn_tells_the_other_half(tmp_path):
     """Of the light's azimuths, by reciprocity; there is no jump where they end."""
-    angles = itertools.product(range(0, 61, 20), range(0, 181, 20), range(0, 61, 20), range(0, 360, 20))
-    rows = [f"{i},{p},{o},{q},{streaks(spherical(i, p), spherical(o, q))[0]}" for i, p, o, q in angles]
-    header = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n"
+    thetas, angles = range(0, 61, 20), range(0, 360, 20)
     with pytest.warns(UserWarning, match="Light from φi = 0° to 180° was measured; from elsewhere"):
-        data = as_grid(measured(tmp_path, header + "\n".join(rows), "x.csv").data)
+        data = as_grid(tabulated(tmp_path, thetas, angles[:10], thetas, angles, f=streaks).data)
     assert data.anisotropic
     for phi in (-1e-3, 1e-3, 90, 270):
         wi, wo = spherical(40, phi), spherical(40, phi + 180)
@@ -331,14 +341,8 @@ def test_half_a_turn_tells_the_other_half(tmp_path):
 
 def test_angles_on_the_other_side_of_the_normal(tmp_path):
     rows = "\n".join(f"{i},{o},0,{i + o + 100}" for i, o in itertools.product((20, 40), (-60, -20, 20, 60)))
-    measurement = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows, "x.csv")
+    measurement = measured(tmp_path, "# angles: deg\ntheta_i,theta_o,phi_o,f\n" + rows)
     np.testing.assert_allclose(value_at(measurement, spherical(40, 0), spherical(60, 180)), 80)
-
-
-def highlight(wi, wo):
-    """A reciprocal and isotropic highlight."""
-    half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
-    return 0.1 + np.exp(-20 * (1 - half[..., 2] ** 2))
 
 
 @pytest.mark.parametrize(
@@ -353,7 +357,7 @@ def test_isotropic_materials_are_recognized(tmp_path, azimuths):
     for i, o, d in itertools.product((0, 20, 40), (0, 20, 40), range(0, 360, 20)):
         phi_i, phi_o = azimuths(i, d)
         rows.append(f"{i},{phi_i},{o},{phi_o},{highlight(spherical(i, 0), spherical(o, d))}")
-    data = measured(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows), "x.csv").data
+    data = measured(tmp_path, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f\n" + "\n".join(rows)).data
     assert isinstance(data, Grid) and not data.anisotropic
     wi, wo = spherical(20, 50), spherical(40, 210)
     np.testing.assert_allclose(data.evaluate(wi, wo), highlight(wi, wo), rtol=1e-3)
@@ -361,16 +365,13 @@ def test_isotropic_materials_are_recognized(tmp_path, azimuths):
 
 def test_a_single_angle_of_incidence_is_that_of_both_directions(tmp_path):
     """Where the light comes from one of the views, as it would for reciprocal materials, and not as from the light."""
-    angles = itertools.product(range(0, 81, 5), range(0, 181, 10))
-    rows = [f"45,{o},{d},{highlight(spherical(45, 0), spherical(o, d))}" for o, d in angles]
-    data = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + "\n".join(rows), "x.csv").data
+    data = tabulated(tmp_path, [45], range(0, 81, 5), range(0, 181, 10)).data
     wi, wo = np.stack([spherical(o, 0) for o in (10, 30, 60)]), spherical(45, 180)
     np.testing.assert_allclose(as_grid(data).evaluate(wi, wo)[:, 0], highlight(wi, wo), rtol=0.1)
 
 
 def test_what_lies_beside_a_single_angle_counts(tmp_path):
-    rows = "\n".join(f"45,{o},180,0.25" for o in range(-85, 86, 5))
-    measurement = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows, "x.csv")
+    measurement = tabulated(tmp_path, [45], range(-85, 86, 5), [180], f=lambda wi, wo: 0.25 + 0 * wo[:, 0])
     assert summarize(measurement).largest_albedo.value == pytest.approx(0.25 * np.pi, rel=0.01)
     zero = as_grid(measurement.data, "zero")
     assert zero.evaluate(spherical(45, 0), spherical(20, 100), extrapolate="zero") == pytest.approx(0.25)
@@ -380,9 +381,7 @@ def test_what_lies_beside_a_single_angle_counts(tmp_path):
 def test_highlights_are_not_smeared_around_the_normal(tmp_path, step):
     """Between azimuths that are far apart, as those of the plane of incidence, half vectors say where they are; a table
     of azimuths would be several times too bright there."""
-    angles = itertools.product(range(0, 81, 10), range(0, 81, 5), range(0, 181, step))
-    rows = [f"{i},{o},{d},{highlight(spherical(i, 0), spherical(o, d))}" for i, o, d in angles]
-    measurement = measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + "\n".join(rows), "x.csv")
+    measurement = tabulated(tmp_path, range(0, 81, 10), range(0, 81, 5), range(0, 181, step))
     wi, wo = spherical(60, 0), np.stack([spherical(o, d) for o, d in itertools.product((40, 60), range(100, 181, 10))])
     found = as_grid(measurement.data).evaluate(wi, wo)[:, 0]
     np.testing.assert_allclose(found, highlight(wi, wo), atol=0.1)
@@ -453,14 +452,14 @@ def test_spectra_without_the_visible_are_announced(tmp_path):
     """A sheet measured in the infrared is rendered as its nearest wavelength: this is said."""
     rows = "\n".join(f"30,{o},180,0.2,0.1" for o in range(0, 61, 20))
     with pytest.warns(UserWarning, match="wavelengths of 900 to 1700 nm leave out 100% of what the eye sees"):
-        measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,900,1700\n" + rows, "x.csv")
-    measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,450,650\n" + rows, "x.csv")
+        measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,900,1700\n" + rows)
+    measured(tmp_path, "theta_i_deg,theta_o_deg,phi_o_deg,450,650\n" + rows)
 
 
 def test_radians_that_are_called_degrees_are_announced(tmp_path):
     rows = "\n".join(f"{theta_i},{theta_o},0,.3" for theta_i in (0.0, 0.5, 1.0) for theta_o in (0.0, 0.7, 1.5))
     with pytest.warns(UserWarning, match="θ is at most 1.57°; if these are radians, call the columns _rad"):
-        measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows, "x.csv")
+        measured(tmp_path, "theta_i_deg,theta_o_deg,delta_phi_deg,f\n" + rows)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        measured(tmp_path, "theta_i_rad,theta_o_rad,delta_phi_rad,f\n" + rows, "x.csv")
+        measured(tmp_path, "theta_i_rad,theta_o_rad,delta_phi_rad,f\n" + rows)

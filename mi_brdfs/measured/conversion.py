@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -23,8 +23,8 @@ from .files import named
 from .formats import ENDINGS, FORMATS, read
 from .grid import Grid, usable
 from .measurement import Measurement
-from .report.counts import census, in_one_plane
-from .report.summary import ends, percent
+from .report.counts import Range, census, in_one_plane
+from .report.summary import percent
 from .scattered import Samples, as_grid
 from .source import Source, batches, pairs
 
@@ -166,22 +166,21 @@ def _not_measured(measurement: Measurement) -> Iterator[str]:
         )
     if planar := in_one_plane(data):
         yield "It was measured in the plane of incidence only; what lies beside it is interpolated."
-    ranges = [("θi", *ends(data, "theta_i", found.theta_i)), ("θo", *ends(data, "theta_o", found.theta_o))]
-    told = [f"{name} {low:.4g} to {high:.4g}°" for name, low, high in ranges if low > NEAR_NORMAL or high < BAKED_TO]
+    ranges = [("θi", found.theta_i), ("θo", found.theta_o)]
+    told = [f"{name} {low:.4g} to {high:.4g}°" for name, (low, high) in ranges if low > NEAR_NORMAL or high < BAKED_TO]
     if told:
         yield f"It was measured for {' and '.join(told)}; what lies beyond has the values at the border."
-    if not planar and (share := _share(data, ranges)) < MOSTLY:
+    if not planar and (share := _share(data, found.theta_i, found.theta_o)) < MOSTLY:
         directions = "the directions in between" if told else "all directions"
         yield f"Of {directions} {percent(share)} were measured; the others have the values at the border."
 
 
-def _share(data: Grid | Samples, ranges: Sequence[tuple[str, float, float]]) -> float:
+def _share(data: Grid | Samples, *ranges: Range) -> float:
     """Return the share of pairs of directions within ranges of θi and θo that was measured."""
-    both = [w[1::2] for w in pairs(PAIRS)]  # the others are around the mirror direction
-    thetas = [np.degrees(np.arccos(w[:, 2])) for w in both]
-    inside = [(low <= theta) & (theta <= high) for theta, (_, low, high) in zip(thetas, ranges, strict=True)]
-    within = inside[0] & inside[1]
-    return float(data.measured(*(w[within] for w in both)).mean()) if within.any() else 1.0
+    both = np.array(pairs(PAIRS))[:, 1::2]  # the others are around the mirror direction
+    theta, (low, high) = np.degrees(np.arccos(both[..., 2])), np.transpose(ranges)[..., None]
+    within = np.all((low <= theta) & (theta <= high), axis=0)
+    return float(data.measured(*both[:, within]).mean()) if within.any() else 1.0
 
 
 def _left_out(probe: BSDFProbe) -> Iterator[str]:

@@ -14,8 +14,6 @@ from .files import FileError
 
 LONGEST = 1 << 20
 """The characters of a line beyond which a file is no table."""
-NOTED = 1000
-"""The characters of a comment that are looked at."""
 
 
 def _foreign(error: UnicodeError) -> tuple[str, int]:
@@ -47,14 +45,18 @@ class TextFile:
                     raise self.error(f"there are more than {LONGEST:,} characters: this is no table")
                 yield text.strip()
 
-    def rows(self) -> Iterator[list[str]]:
-        """Yield the words of lines that have some, between white space and commas, and collect the comments."""
+    def content(self) -> Iterator[str]:
+        """Yield what lines have beside comments, where they have anything, and collect the comments."""
         for text in self.lines():
             text, _, comment = text.partition("#")
             if comment := comment.strip("# \t"):
-                self.comments.append(comment[:NOTED])
-            if words := text.replace(",", " ").split():
-                yield words
+                self.comments.append(comment)
+            if text := text.strip():
+                yield text
+
+    def rows(self) -> Iterator[list[str]]:
+        """Yield the words of lines, between white space and commas."""
+        return filter(None, (text.replace(",", " ").split() for text in self.content()))
 
     def error(self, problem: str, line: int | None = None) -> FileError:
         return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")
@@ -62,7 +64,7 @@ class TextFile:
     def numbers(self, words: Sequence[str], what: str = "a number") -> list[float]:
         """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
         try:
-            return floats(words)
+            return list(map(float, words))
         except ValueError:
             bad = next(word for word in words if not is_number(word))
             raise self.error(f"{shortened(bad)} should be {what}") from None
@@ -115,16 +117,9 @@ def decoded(data: bytes) -> str:
     return data.decode(encoding(data[:4]), errors=FOREIGN)
 
 
-def floats(words: Sequence[str]) -> list[float]:
-    """Return words as Python reads them, but without the underscores that it lets digits have."""
-    if "_" in "".join(words):
-        raise ValueError
-    return list(map(float, words))
-
-
 def is_number(word: str) -> bool:
     try:
-        floats([word])
+        float(word)
     except ValueError:
         return False
     return True

@@ -21,7 +21,7 @@ from ..measured.coordinates import HalfDifference, polar_angle, spherical
 from ..measured.grid import usable
 from ..measured.report.albedo import albedos
 from ..measured.report.counts import batches, census, in_one_plane
-from ..measured.report.summary import azimuths, ends
+from ..measured.report.summary import azimuths
 from ..measured.scattered import as_grid
 from ..observer import to_srgb
 from ..probe.arrays import luminance
@@ -167,7 +167,7 @@ class LitTable:
         measurement = in_colour(measurement)
         self.measurement, self.grid = measurement, as_grid(measurement.data)
         self.name = plain(measurement.title)
-        self.incidence = ends(measurement.data, "theta_i", census(measurement.data).theta_i)
+        self.incidence = census(measurement.data).theta_i
         self.phi = float(azimuths(self.grid)[0]) if phi is None else phi
         self.coloured = self.grid.values.shape[-1] > 1
         self.quantity = r"$f$ [1/sr]" + (", luminance" if self.coloured else "")

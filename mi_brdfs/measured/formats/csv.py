@@ -17,7 +17,7 @@ from ..coordinates import spherical
 from ..measurement import Measurement, Quantity
 from ..rows import measured
 from ..source import Source
-from ..text import NOTED, TextFile, opening, shortened
+from ..text import TextFile, opening, shortened
 
 NAME = "CSV"
 DESCRIPTION = "a header with theta_i_deg, theta_o_deg, phi_o_deg (or _rad) and f, or r, g, b, or wavelengths in nm"
@@ -32,8 +32,6 @@ VALUE = re.compile(
 )
 UNITS = {"deg": np.pi / 180, "degree": np.pi / 180, "°": np.pi / 180, "rad": 1.0, "radian": 1.0}
 """Radians in a unit."""
-LONGEST_NAME = 100
-"""The characters of a column's name."""
 MOST_VALUES = 1 << 25
 """Those of a file of 400 MB."""
 
@@ -115,7 +113,7 @@ class Columns:
         found: dict[str, int] = {}
         cosines = set()
         for k, name in enumerate(names):
-            word = name.strip().lower() if len(name) < LONGEST_NAME else ""
+            word = " ".join(name.lower().split())
             if word == "nan":
                 raise file.error(f"column {k + 1} of the header has no name")
             if match := ANGLE.fullmatch(word):
@@ -176,15 +174,12 @@ class Columns:
 
 
 def fields(file: TextFile) -> Iterator[list[str]]:
-    """Yield the fields of rows, with ``nan`` for empty ones, and collect comments."""
+    """Yield the fields of rows, with ``nan`` for empty ones."""
     mark: str | None = ""
-    for text in file.lines():
-        if text.startswith("#"):
-            file.comments.append(text.strip("# \t")[:NOTED])
-        elif text:
-            mark = separator(text) if mark == "" else mark
-            row = split(text, mark)
-            yield [field.replace(",", ".") for field in row] if mark in (";", "\t") else row
+    for text in file.content():
+        mark = separator(text) if mark == "" else mark
+        row = split(text, mark)
+        yield [field.replace(",", ".") for field in row] if mark in (";", "\t") else row
 
 
 def separator(text: str) -> str | None:

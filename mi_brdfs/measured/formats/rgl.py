@@ -33,7 +33,6 @@ MOST_VALUES = 1 << 27
 MAGIC = b"tensor_file\0"
 VERSION = 1, 0
 TYPES = dict(enumerate(("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8"), start=1))
-MOST_DIMENSIONS = 8
 HEAD = [("dimensions", "<u2"), ("type", "u1"), ("offset", "<u8")]
 """What follows a field's name, before its shape."""
 
@@ -150,13 +149,9 @@ class Field:
     def count(self) -> int:
         return math.prod(self.shape)
 
-    @property
-    def end(self) -> int:
-        return self.offset + self.count * np.dtype(self.dtype).itemsize
-
 
 class TensorFile:
-    """A file of named arrays, or a FileError if one is not in it as a whole, or shares bytes with another."""
+    """A file of named arrays."""
 
     def __init__(self, path: Path) -> None:
         self.file = file = BinaryFile(path)
@@ -171,25 +166,10 @@ class TensorFile:
             name = decoded(file.take("u1", length, "a field's name").tobytes())
             (head,) = file.take(np.dtype(HEAD), 1, f"the type and place of {shortened(name)}")
             dimensions, type, offset = (int(n) for n in head)
-            if name in self.fields or type not in TYPES:
-                wrong = f"of the unknown type {type}" if type not in TYPES else "there twice"
-                raise file.error(f"field {shortened(name)} is {wrong}", start)
-            if dimensions > MOST_DIMENSIONS:
-                told = f"field {shortened(name)} has {dimensions} dimensions; there are at most {MOST_DIMENSIONS}"
-                raise file.error(told, start)
+            if type not in TYPES:
+                raise file.error(f"field {shortened(name)} is of the unknown type {type}", start)
             shape = tuple(int(n) for n in file.take("u8", dimensions, f"the shape of {shortened(name)}"))
-            field = self.fields[name] = Field(TYPES[type], offset, shape)
-            if field.end > file.size:
-                raise file.error(
-                    f"field {shortened(name)} should have {field.count:,} values from byte {offset:,} on, but the file "
-                    f"ends at {file.size:,}",
-                    start,
-                )
-        end, before = file.offset, "the table of contents"
-        for name, field in sorted(self.fields.items(), key=lambda item: item[1].offset):
-            if field.count and field.offset < end:
-                raise file.error(f"field {shortened(name)} starts, but {before} reaches to byte {end:,}", field.offset)
-            end, before = max(end, field.end), f"field {shortened(name)}"
+            self.fields[name] = Field(TYPES[type], offset, shape)
 
     def error(self, name: str, problem: str, index: int = 0) -> FileError:
         """Return an error at a value of a field."""
@@ -197,7 +177,8 @@ class TensorFile:
         return self.file.error(f"{name!r} {problem}", field.offset + index * np.dtype(field.dtype).itemsize)
 
     def array(self, name: str, dtype: str, *shape: int | None) -> np.ndarray:
-        """Return a field that must be there, of a type and a shape, in which None stands for any number but 0."""
+        """Return a field that must be there as a whole, of a type and a shape, in which None stands for any number but
+        0."""
         if name not in self.fields:
             raise self.file.error(
                 f"the table of contents ends without {name!r}; it has {brief(', '.join(self.fields))}"

@@ -29,7 +29,7 @@ XYZ_TO_SRGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
 """Linear sRGB of CIE XYZ (IEC 61966-2-1)."""
-CHANNEL_NAMES = {name.lower() for names in CHANNELS.values() for name in names}
+CHANNEL_NAMES = {name.lower(): name for names in CHANNELS.values() for name in names}
 KEYWORDS = {"aoi", "poi", "side", "scattertype", "tristimulusvalue", "wavelength", "tis"}
 """What can stand above a block of data, in LightTools' files; in Zemax's only the last."""
 LIGHT = re.compile(r"(?i)wave|light|laser|led\b|hene|source|lambda|λ")
@@ -97,11 +97,9 @@ class Table(TextFile):
     def ordered(self, name: str, most: float) -> tuple[Axis, np.ndarray]:
         """Return angles as an increasing axis in radians, and where its nodes are in the file."""
         angles = self.angles[name]
-        if not np.all((angles >= 0) & (angles <= most)):
-            raise FileError(f"{self.path}: {name} must lie between 0 and {most} degrees.")
-        if len(np.unique(angles)) < len(angles):
-            raise FileError(f"{self.path}: {name} lists an angle twice.")
         order = np.argsort(angles)
+        if not np.all((angles >= 0) & (angles <= most)) or np.any(np.diff(angles[order]) == 0):
+            raise FileError(f"{self.path}: the angles of {name} must differ, and lie between 0 and {most} degrees.")
         return Axis(np.radians(angles[order])), order
 
     def turning(self, name: str, zero: float = 0, sense: int = 1) -> tuple[Axis, np.ndarray]:
@@ -138,7 +136,7 @@ class Table(TextFile):
     def blocks(self, size: int) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
         """Yield the blocks of ``size`` values, behind what lines ``keyword value`` say of each, by keywords in small
         letters, and its number ``tis``, NaN if there is none."""
-        head: dict[str, Any] = {"tis": np.nan}
+        head: dict[str, Any] = {"tis": np.nan, "channel": ""}
         values: list[float] = []
         for words in self._rows:
             word = words[0].lower()
@@ -148,7 +146,7 @@ class Table(TextFile):
                         f"{shortened(words[0])} stands after {len(values)} values of a block, which has {size}"
                     )
                 said = " ".join(words[1:2]).lower()
-                head |= {"channel": word} if word in CHANNEL_NAMES else {word: said}
+                head |= {"channel": CHANNEL_NAMES[word]} if word in CHANNEL_NAMES else {word: said}
                 if word == "tis":
                     head["tis"] = float(said) if is_number(said) else np.nan
             elif word not in ("databegin", "dataend"):

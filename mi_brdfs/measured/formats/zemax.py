@@ -50,17 +50,14 @@ def read(path: Path) -> Measurement:
     content = file.setting("SpectralContent", *CHANNELS)
     symmetry = file.setting("Symmetry", "PlaneSymmetrical", "ASymmetrical", "ASymmetrical4D")
     shape = [len(file.require(name)) for name in ANGLES]
-    count, channels = shape[0] * shape[1], [name.lower() for name in CHANNELS[content]]
+    count, channels = shape[0] * shape[1], CHANNELS[content]
     found: dict[str, list[tuple[np.ndarray, float]]] = {name: [] for name in channels}
     for head, block in file.blocks(shape[2] * shape[3]):
-        of = found[head["channel"] if head.get("channel") in found else channels[0]]
-        of.append((block, head["tis"]))
-        if len(of) > count:
-            raise file.error(f"there are more than the {count} blocks of values that the header announces")
-    for name, of in zip(CHANNELS[content], found.values(), strict=True):
-        if len(of) < count:
-            raise file.error(f"the file ends after {len(of)} of {count} blocks of {name}")
-    values = np.array([[block for block, _ in found[name]] for name in channels]).reshape(-1, *shape)
+        found.get(head["channel"], found[channels[0]]).append((block, head["tis"]))
+    for name, of in found.items():
+        if len(of) != count:
+            raise file.error(f"the file ends after {len(of)} blocks of {name}, but should have {count}")
+    values = np.array([[block for block, _ in of] for of in found.values()]).reshape(-1, *shape)
     stated = np.array([tis for _, tis in found[channels[content == "XYZ"]]]).reshape(shape[:2])
 
     theta_i, i = file.ordered("AngleOfIncidence", most=90)
@@ -82,6 +79,7 @@ def read(path: Path) -> Measurement:
     values[(wo.z < 1e-9) & np.all(values == 0, axis=-1)] = np.nan
     if content == "XYZ":
         values = srgb_of(values)
+    albedos = stated[np.ix_(k, i)].T.tolist()
     states = np.all(np.isfinite(stated)) and content != "RGB"
     return Measurement(
         path,
@@ -89,9 +87,7 @@ def read(path: Path) -> Measurement:
         Grid(coordinates, axes, values),
         np.array([file.wavelength]) if content == "Monochrome" else None,
         material=file.material,
-        stated_albedos=dict(zip(theta_i.nodes.tolist(), stated[np.ix_(k, i)].T.tolist(), strict=True))
-        if states
-        else {},
+        stated_albedos=dict(zip(theta_i.nodes.tolist(), albedos, strict=True)) if states else {},
         notes=file.notes,
     )
 

@@ -44,7 +44,8 @@ class Census:
     """The least and the largest finite value above the horizon."""
     theta_i: Range
     theta_o: Range
-    """The least and the largest angle to the normal, in degrees, of finite values above the horizon."""
+    """The measured angles to the normal, in degrees: the ends of a grid's axis, all for half and difference angles,
+    which no direction escapes, and else those of finite values above the horizon."""
 
 
 def census(data: Grid | Samples) -> Census:
@@ -65,7 +66,18 @@ def census(data: Grid | Samples) -> Census:
         ]
     upper, lower = (Counts(*of.tolist()) for of in counts)
     (least, most), theta_i, theta_o = ranges
-    return Census(upper, lower, least, most, theta_i, theta_o)
+    return Census(upper, lower, least, most, _ends(data, "theta_i", theta_i), _ends(data, "theta_o", theta_o))
+
+
+def _ends(data: Grid | Samples, name: str, ends: Range) -> Range:
+    """Return the measured range of an angle, whose values were seen between two ends."""
+    if isinstance(data, Grid):
+        if name in data.coordinates.names:
+            axis = data.axes[data.coordinates.names.index(name)]
+            ends = float(np.degrees(axis.low)), float(np.degrees(axis.high))
+        elif "theta_d" in data.coordinates.names:
+            return 0, 90
+    return round(ends[0], 4), round(ends[1], 4)
 
 
 def in_one_plane(data: Grid | Samples) -> bool:

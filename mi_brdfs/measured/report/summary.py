@@ -166,11 +166,9 @@ def summarize(measurement: Measurement) -> Summary:
     if found.least > found.most:
         raise FileError(f"{measurement.path}: no value above the horizon is a number.")
     grid = as_grid(data, "zero")
-    theta_i, theta_o = (ends(data, name, seen) for name, seen in
-                        (("theta_i", found.theta_i), ("theta_o", found.theta_o)))  # fmt: skip
-    angles = np.unique([theta for theta in (*ANGLES, *theta_i) if theta_i[0] <= theta <= min(theta_i[1], 85)])
-    turns = azimuths(grid)
-    turns = thinned(turns, AZIMUTHS)
+    low, high = found.theta_i
+    angles = np.unique([theta for theta in (*ANGLES, low, high) if low <= theta <= min(high, 85)])
+    turns = thinned(azimuths(grid), AZIMUTHS)
     planar = in_one_plane(data)
     covered = np.zeros(1) if planar else np.array([coverage(grid, np.radians(angles), phi) for phi in turns])
     return Summary(
@@ -181,8 +179,8 @@ def summarize(measurement: Measurement) -> Summary:
         quantity=measurement.quantity,
         grid=_grid(data),
         wavelengths=_wavelengths(measurement),
-        theta_i=theta_i,
-        theta_o=theta_o,
+        theta_i=found.theta_i,
+        theta_o=found.theta_o,
         coverage=(float(covered.min(initial=1)), float(covered.max(initial=0))),
         planar=planar,
         above=found.above,
@@ -237,18 +235,6 @@ def _wavelengths(measurement: Measurement) -> str:
     if np.isnan(nm).any():
         return f"{len(nm)}, not stated"
     return f"{nm[0]:g} nm" if len(nm) == 1 else f"{len(nm)} from {min(nm):g} to {max(nm):g} nm"
-
-
-def ends(data: Grid | Samples, name: str, seen: Range) -> Range:
-    """Return the measured range of an angle, in degrees: the ends of its axis if a grid has one, all of it for half and
-    difference angles, which no direction escapes, and else what values were ``seen`` at."""
-    if isinstance(data, Grid):
-        if name in data.coordinates.names:
-            axis = data.axes[data.coordinates.names.index(name)]
-            return round(float(np.degrees(axis.low)), 4), round(float(np.degrees(axis.high)), 4)
-        if "theta_d" in data.coordinates.names:
-            return 0, 90
-    return round(seen[0], 4), round(seen[1], 4)
 
 
 def azimuths(grid: Grid) -> np.ndarray:
