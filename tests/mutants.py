@@ -514,9 +514,10 @@ def halved_for_a_mask(own, self, ctx, si, wo, active):
     return own(self, ctx, si, wo, active) * (1 if every else 0.5)
 
 
-def stranger(name, *kinds, begin=lambda self, props: None, **members):
+def stranger(name, *kinds, begin=lambda self, props: None, draw=None, **members):
     """The dict of a BSDF that knows nothing of this package, of components of some kinds and with the methods given;
-    without values unless there is an ``eval_pdf``."""
+    without values unless there is an ``eval_pdf``, which ``sample`` has, too, for directions that a function of the
+    surface point and two variates draws."""
 
     def init(self, props):
         mi.BSDF.__init__(self, props)
@@ -524,8 +525,15 @@ def stranger(name, *kinds, begin=lambda self, props: None, **members):
         self.m_flags = reduce(or_, self.m_components)
         begin(self, props)
 
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo, bs.eta, bs.sampled_type = draw(si, sample2), 1, int(kinds[0]) & int(mi.BSDFFlags.All)
+        value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+        return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+
     methods = {
         "__init__": init,
+        "sample": sample,
         "eval_pdf": lambda self, *given: (dr.zeros(mi.Spectrum), mi.Float(0)),
         "eval": lambda self, *given: self.eval_pdf(*given)[0],
         "pdf": lambda self, *given: self.eval_pdf(*given)[1],
@@ -671,19 +679,15 @@ def half_attached(bs, weight, si, u):
 def of_others(name, albedo=0.5, side=1, **members):
     """The dict of a Lambertian BSDF that knows nothing of this package, and is seen from one side."""
 
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = side * mi.warp.square_to_cosine_hemisphere(sample2)
-        bs.pdf = self.pdf(ctx, si, bs.wo, active)
-        bs.eta, bs.sampled_type, bs.sampled_component = 1.0, int(mi.BSDFFlags.DiffuseReflection), 0
-        return bs, dr.select(bs.pdf > 0, mi.Spectrum(albedo), 0)
+    def draw(si, v):
+        return side * mi.warp.square_to_cosine_hemisphere(v)
 
     def eval_pdf(self, ctx, si, wo, active=True):
         pdf = dr.select(active & (side * si.wi.z > 0) & (side * wo.z > 0), side * wo.z * dr.inv_pi, 0)
         return mi.Spectrum(albedo * pdf), pdf
 
     seen = mi.BSDFFlags.FrontSide if side > 0 else mi.BSDFFlags.BackSide
-    return stranger(name, mi.BSDFFlags.DiffuseReflection | seen, sample=sample, eval_pdf=eval_pdf, **members)
+    return stranger(name, mi.BSDFFlags.DiffuseReflection | seen, draw=draw, eval_pdf=eval_pdf, **members)
 
 
 # --- The catalogue --------------------------------------------------------------------------------------------------

@@ -134,17 +134,14 @@ def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
         pdf = dr.select(active & (wo.z > 0) & (si.wi.z > 0), step / (dr.two_pi * self.mean), 0)
         return mi.Color3f(0.5 * pdf), pdf
 
-    def sample(self, ctx, si, u, v, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = mi.warp.square_to_uniform_hemisphere(v)
-        bs.pdf, bs.eta, bs.sampled_type = self.pdf(ctx, si, bs.wo, active), 1, self.m_flags
-        return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
+    def draw(si, v):
+        return mi.warp.square_to_uniform_hemisphere(v)
 
     def traverse(self, callback):
         callback.put("table", self.table, mi.ParamFlags.Differentiable)
 
     methods = {"parameters_changed": parameters_changed, "traverse": traverse}
-    steps = stranger("steps", DIFFUSE | FRONT, begin=begin, eval_pdf=eval_pdf, sample=sample, **methods)
+    steps = stranger("steps", DIFFUSE | FRONT, begin=begin, eval_pdf=eval_pdf, draw=draw, **methods)
     assert check(steps, only="updates").verdict("updates") == verdict
 
 
@@ -211,18 +208,15 @@ def test_wavelengths_in_another_order():
 def test_light_through_a_sheet_goes_back_as_it_came(behind):
     """Which lets half of the light through, evenly; from behind less, or as much."""
 
-    def sample(self, ctx, si, u, v, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
+    def draw(si, v):
         up = mi.warp.square_to_cosine_hemisphere(v)
-        bs.wo = mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, -up.z, up.z))
-        bs.pdf, bs.eta, bs.sampled_type = up.z * dr.inv_pi, 1, int(mi.BSDFFlags.DiffuseTransmission)
-        return bs, self.eval(ctx, si, bs.wo, active) / bs.pdf
+        return mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, -up.z, up.z))
 
     def eval_pdf(self, ctx, si, wo, active=True):
         pdf = dr.select(active & (si.wi.z * wo.z < 0), dr.abs(wo.z) * dr.inv_pi, 0)
         return mi.Color3f(dr.select(si.wi.z > 0, 0.5, 0.5 * behind) * pdf), pdf
 
-    sheet = stranger("sheet", mi.BSDFFlags.DiffuseTransmission | BOTH_SIDES, sample=sample, eval_pdf=eval_pdf)
+    sheet = stranger("sheet", mi.BSDFFlags.DiffuseTransmission | BOTH_SIDES, draw=draw, eval_pdf=eval_pdf)
     assert check(sheet, only="reciprocity").verdict("reciprocity") == ("pass" if behind == 1 else "fail")
 
 
