@@ -404,21 +404,25 @@ def one_bit_of_the_mask(own, self, ctx, si, active):
     return own(self, ctx, si, active) if ctx.type_mask in map(int, kinds) else None
 
 
+def evaluated(value=None, density=None, **methods):
+    """An adapter with a factor on its values or its densities, of the context, the surface point and wo."""
+
+    def eval_pdf(own, self, ctx, si, wo, active):
+        f, pdf = own(self, ctx, si, wo, active)
+        return f * value(ctx, si, wo) if value else f, pdf * density(ctx, si, wo) if density else pdf
+
+    return adapted(eval_pdf=eval_pdf, **methods)
+
+
 def brighter_every_other_time(own, self, *given):
     value, pdf = own(self, *given)
     self.called = not getattr(self, "called", False)
     return (1.1 * value if self.called else value), pdf
 
 
-def in_the_world(own, self, ctx, si, *given):
+def in_the_world(ctx, si, wo):
     """A direction of the world is taken for a local one."""
-    value, pdf = own(self, ctx, si, *given)
-    return value * (0.75 + 0.25 * abs(si.n.z)), pdf
-
-
-def brighter_afar(own, self, ctx, si, *given):
-    value, pdf = own(self, ctx, si, *given)
-    return value * (1 + dr.squared_norm(si.duv_dx)), pdf
+    return 0.75 + 0.25 * abs(si.n.z)
 
 
 def suspended(own, self, *given):
@@ -435,19 +439,8 @@ def tiled_in_place(own, self, ctx, si, *given):
     return own(self, ctx, si, *given)
 
 
-def cosine_twice(own, self, ctx, si, wo, active):
-    """eval has another cosine, sample's weight has not."""
-    value, pdf = own(self, ctx, si, wo, active)
-    return value * dr.maximum(wo.z, 0), pdf
-
-
-def cosine_forgotten(own, self, ctx, si, wo, active):
-    value, pdf = own(self, ctx, si, wo, active)
-    return value / dr.maximum(wo.z, 0.01), pdf
-
-
-PairDisagrees = adapted(
-    eval_pdf=cosine_forgotten,
+PairDisagrees = evaluated(
+    lambda ctx, si, wo: 1 / dr.maximum(wo.z, 0.01),
     eval=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[0],
     pdf=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[1],
 )
@@ -510,10 +503,9 @@ class SharesKept(adapter.ModelBSDF):
         return self._sample(valid, mixture, components, frame, sample1, sample2)
 
 
-def no_number_in_the_horizon(own, self, ctx, si, wo, active):
+def no_number_in_the_horizon(ctx, si, wo):
     """Divides zero by zero where light comes along the surface."""
-    value, pdf = own(self, ctx, si, wo, active)
-    return value + dr.select(si.wi.z == 0, dr.nan, 0), pdf
+    return dr.select(si.wi.z == 0, mi.Float(dr.nan), 1)
 
 
 def halved_for_a_mask(own, self, ctx, si, wo, active):
@@ -522,18 +514,26 @@ def halved_for_a_mask(own, self, ctx, si, wo, active):
     return own(self, ctx, si, wo, active) * (1 if every else 0.5)
 
 
-def stranger(name, *kinds, begin=lambda self: None, **members):
+def stranger(name, *kinds, begin=lambda self, props: None, draw=None, **members):
     """The dict of a BSDF that knows nothing of this package, of components of some kinds and with the methods given;
-    without values unless there is an ``eval_pdf``."""
+    without values unless there is an ``eval_pdf``, which ``sample`` has, too, for directions that a function of the
+    surface point and two variates draws."""
 
     def init(self, props):
         mi.BSDF.__init__(self, props)
         self.m_components = list(map(int, kinds))
         self.m_flags = reduce(or_, self.m_components)
-        begin(self)
+        begin(self, props)
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo, bs.eta, bs.sampled_type = draw(si, sample2), 1, int(kinds[0]) & int(mi.BSDFFlags.All)
+        value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+        return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
 
     methods = {
         "__init__": init,
+        "sample": sample,
         "eval_pdf": lambda self, *given: (dr.zeros(mi.Spectrum), mi.Float(0)),
         "eval": lambda self, *given: self.eval_pdf(*given)[0],
         "pdf": lambda self, *given: self.eval_pdf(*given)[1],
@@ -554,6 +554,15 @@ def wrapped(name, given, **methods):
     return stranger(name, *kinds, **{each: method(each) for each in ("sample", "eval", "pdf", "eval_pdf")})
 
 
+def mirrored(ctx, si, active):
+    """The samples of a mirror, and which of them carry light."""
+    bs = dr.zeros(mi.BSDFSample3f)
+    bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
+    lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
+    bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
+    return bs, lit
+
+
 def half_of_the_mirror():
     """The dict of a copy of Mitsuba's plastic, whose mirror is drawn half of the time and weighted as if always."""
 
@@ -572,12 +581,9 @@ def ignored_mode(own, self, ctx, si, active):
     return own(self, radiance, si, active)
 
 
-def cosines_in_light_tracing(own, self, ctx, si, wo, active):
+def cosines_in_light_tracing(ctx, si, wo):
     """Corrects for shading normals that there are none of."""
-    value, pdf = own(self, ctx, si, wo, active)
-    if ctx.mode == mi.TransportMode.Importance:
-        value = value * abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3)
-    return value, pdf
+    return abs(si.wi.z) / dr.maximum(abs(wo.z), 1e-3) if ctx.mode == mi.TransportMode.Importance else 1
 
 
 def flagged(change):
@@ -666,11 +672,6 @@ class ShareForgottenInOne(adapter.ModelBSDF):
         return value, pdf + dr.select(valid & (wo.z > 0), second, 0)
 
 
-def root_in_the_density(own, self, ctx, si, wo, active=True):
-    value, pdf = own(self, ctx, si, wo, active)
-    return value, pdf * (1 + 1e-6 * root_at_normal(si.wi))
-
-
 def half_attached(bs, weight, si, u):
     return 0.5 * (weight + dr.detach(weight))
 
@@ -678,19 +679,15 @@ def half_attached(bs, weight, si, u):
 def of_others(name, albedo=0.5, side=1, **members):
     """The dict of a Lambertian BSDF that knows nothing of this package, and is seen from one side."""
 
-    def sample(self, ctx, si, sample1, sample2, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = side * mi.warp.square_to_cosine_hemisphere(sample2)
-        bs.pdf = self.pdf(ctx, si, bs.wo, active)
-        bs.eta, bs.sampled_type, bs.sampled_component = 1.0, int(mi.BSDFFlags.DiffuseReflection), 0
-        return bs, dr.select(bs.pdf > 0, mi.Spectrum(albedo), 0)
+    def draw(si, v):
+        return side * mi.warp.square_to_cosine_hemisphere(v)
 
     def eval_pdf(self, ctx, si, wo, active=True):
         pdf = dr.select(active & (side * si.wi.z > 0) & (side * wo.z > 0), side * wo.z * dr.inv_pi, 0)
         return mi.Spectrum(albedo * pdf), pdf
 
     seen = mi.BSDFFlags.FrontSide if side > 0 else mi.BSDFFlags.BackSide
-    return stranger(name, mi.BSDFFlags.DiffuseReflection | seen, sample=sample, eval_pdf=eval_pdf, **members)
+    return stranger(name, mi.BSDFFlags.DiffuseReflection | seen, draw=draw, eval_pdf=eval_pdf, **members)
 
 
 # --- The catalogue --------------------------------------------------------------------------------------------------
@@ -754,14 +751,16 @@ MUTANTS = [
     ),
     mutant("lobe probability omitted", "pdf components", phong(PowerLobe), SumOfDensities),
     mutant("weight not divided", "weight", Phong, sampled(weight=lambda bs, w, si, u: w * bs.pdf)),
-    mutant("weight without eval's second cosine", "weight", Ward, adapted(eval_pdf=cosine_twice)),
+    mutant("weight without eval's second cosine", "weight", Ward, evaluated(lambda ctx, si, wo: dr.maximum(wo.z, 0))),
     mutant("mask of one bit only", "components", Ward, adapted(_mixture=one_bit_of_the_mask)),
     mutant("shared by all", "updates", SharedByAll),
     mutant("brighter every other time", "calls", Lambert, adapted(eval_pdf=brighter_every_other_time)),
-    mutant("darker where the world is turned", "calls", Lambert, adapted(eval_pdf=in_the_world)),
+    mutant("darker where the world is turned", "calls", Lambert, evaluated(in_the_world)),
     mutant("attributes of any name", "calls", Lambert, adapted(has_attribute=lambda own, self, *given: mi.Bool(True))),
     mutant("texture of the last call", "calls", TextureKept, reflectance={"type": "checkerboard"}),
-    mutant("differentials not asked for", "flags", Lambert, adapted(eval_pdf=brighter_afar)),
+    mutant(
+        "differentials not asked for", "flags", Lambert, evaluated(lambda ctx, si, wo: 1 + dr.squared_norm(si.duv_dx))
+    ),
     mutant("density off for ten degrees of azimuth", "flags", diffuse(density=lit(azimuths(200, 210), 0.92))),
     mutant("not a number for exact mirror pairs", "finite", diffuse(sine_to_the_mirror)),
     mutant("eval_pdf without derivatives", "gradients", Lambert, adapted(eval_pdf=suspended, eval=with_derivatives)),
@@ -770,7 +769,7 @@ MUTANTS = [
     mutant("colours of wavelengths beside", "spectral", colour(beside)),
     mutant("direction lifted in place", "calls", Lambert, adapted(eval=lifted)),
     mutant("shares of the first call", "updates", Phong, SharesKept, **TWO),
-    mutant("not a number in the horizon", "finite", Lambert, adapted(eval_pdf=no_number_in_the_horizon)),
+    mutant("not a number in the horizon", "finite", Lambert, evaluated(no_number_in_the_horizon)),
     mutant("density of a mask", "components", Ward, adapted(pdf=halved_for_a_mask), **TWO),
     mutant("eval_pdf disagrees", "eval_pdf", Ward, PairDisagrees),
     mutant("mask forgotten", "components", Ward, adapted(_mixture=ignored_masks)),
@@ -899,7 +898,12 @@ MUTANTS = [
         "gradients",
         diffuse(lambda wi, wo: 1 + 0.01 * root_at_normal(wi) * root_at_normal(wo)),
     ),
-    mutant("root at normal incidence in the density", "gradients", Lambert, adapted(eval_pdf=root_in_the_density)),
+    mutant(
+        "root at normal incidence in the density",
+        "gradients",
+        Lambert,
+        evaluated(density=lambda ctx, si, wo: 1 + 1e-6 * root_at_normal(si.wi)),
+    ),
     mutant("weight detached", "gradients", Lambert, sampled(weight=lambda bs, w, si, u: dr.detach(w))),
     mutant("weight with half of its derivative", "gradients", Phong, sampled(weight=half_attached)),
     mutant("inactive lanes evaluated", "active", Ward, masked("eval_pdf")),
@@ -933,7 +937,7 @@ MUTANTS = [
     mutant("values asked for", "recorded", Ward, adapted(eval_pdf=asks_for_values)),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
-    mutant("cosines in light tracing", "mode", Lambert, adapted(eval_pdf=cosines_in_light_tracing)),
+    mutant("cosines in light tracing", "mode", Lambert, evaluated(cosines_in_light_tracing)),
     mutant("twice the reflectance", "reflectance", Ward, reflectance(lambda value: 2 * value)),
     mutant("reflectance over pi", "reflectance", Lambert, reflectance(lambda value: value * dr.inv_pi)),
 ]

@@ -25,6 +25,7 @@ from mutants import (
     half_of_the_mirror,
     in_spectra,
     lambert,
+    mirrored,
     of_others,
     stranger,
     without_fields,
@@ -41,6 +42,8 @@ from mi_brdfs.validation import run as run_of_checks
 from mi_brdfs.validation.incidents import random_incidents
 from mi_brdfs.validation.runner import ANGLES
 
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
 DIFFUSE, FRONT = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.FrontSide
 BOTH_SIDES = FRONT | mi.BSDFFlags.BackSide
 QUICK: dict[str, Mutant] = {}
@@ -54,7 +57,6 @@ FAINT = "density off towards 40 to 50 degrees"
 """Five per cent of a density in one band: of so little the usual angles see more than one does."""
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "mutant", [pytest.param(it, id=it.name, marks=[] if it in QUICK.values() else pytest.mark.slow) for it in MUTANTS]
 )
@@ -115,12 +117,11 @@ def test_mueller_matrices(method, fault):
     assert report.verdict("polarization") == ("fail" if fault else "pass"), report
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(("key", "verdict"), [("table", "pass"), ("values", "fail")])
 def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
     """By a density of four steps of the cosine, whose sum is taken where that key is said to have changed."""
 
-    def begin(self):
+    def begin(self, props):
         self.table = mi.Float([0.1, 0.4, 0.2, 0.3])
         self.parameters_changed([])
 
@@ -133,21 +134,17 @@ def test_what_is_kept_of_a_table_is_made_anew(key, verdict):
         pdf = dr.select(active & (wo.z > 0) & (si.wi.z > 0), step / (dr.two_pi * self.mean), 0)
         return mi.Color3f(0.5 * pdf), pdf
 
-    def sample(self, ctx, si, u, v, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
-        bs.wo = mi.warp.square_to_uniform_hemisphere(v)
-        bs.pdf, bs.eta, bs.sampled_type = self.pdf(ctx, si, bs.wo, active), 1, self.m_flags
-        return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), 0)
+    def draw(si, v):
+        return mi.warp.square_to_uniform_hemisphere(v)
 
     def traverse(self, callback):
         callback.put("table", self.table, mi.ParamFlags.Differentiable)
 
     methods = {"parameters_changed": parameters_changed, "traverse": traverse}
-    steps = stranger("steps", DIFFUSE | FRONT, begin=begin, eval_pdf=eval_pdf, sample=sample, **methods)
+    steps = stranger("steps", DIFFUSE | FRONT, begin=begin, eval_pdf=eval_pdf, draw=draw, **methods)
     assert check(steps, only="updates").verdict("updates") == verdict
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(("says", "bends"), [(0.3, False), (0.7, False), (0.3, True)])
 def test_what_goes_straight_through(says, bends):
     """Of a veil that lets .3 of the light through, and absorbs the rest."""
@@ -166,7 +163,6 @@ def test_what_goes_straight_through(says, bends):
     assert check(veil, only="null").verdict("null") == ("pass" if says == 0.3 and not bends else "fail")
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("density", "lopsided", "fails"), [(0.5, False, ""), (1, False, "deltas"), (0.5, True, "deltas")]
 )
@@ -208,23 +204,19 @@ def test_wavelengths_in_another_order():
     assert "in another order of the wavelengths" in str(report.failures[0].data["faults"]), report
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("behind", [1.0, 0.8])
 def test_light_through_a_sheet_goes_back_as_it_came(behind):
     """Which lets half of the light through, evenly; from behind less, or as much."""
 
-    def sample(self, ctx, si, u, v, active=True):
-        bs = dr.zeros(mi.BSDFSample3f)
+    def draw(si, v):
         up = mi.warp.square_to_cosine_hemisphere(v)
-        bs.wo = mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, -up.z, up.z))
-        bs.pdf, bs.eta, bs.sampled_type = up.z * dr.inv_pi, 1, int(mi.BSDFFlags.DiffuseTransmission)
-        return bs, self.eval(ctx, si, bs.wo, active) / bs.pdf
+        return mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, -up.z, up.z))
 
     def eval_pdf(self, ctx, si, wo, active=True):
         pdf = dr.select(active & (si.wi.z * wo.z < 0), dr.abs(wo.z) * dr.inv_pi, 0)
         return mi.Color3f(dr.select(si.wi.z > 0, 0.5, 0.5 * behind) * pdf), pdf
 
-    sheet = stranger("sheet", mi.BSDFFlags.DiffuseTransmission | BOTH_SIDES, sample=sample, eval_pdf=eval_pdf)
+    sheet = stranger("sheet", mi.BSDFFlags.DiffuseTransmission | BOTH_SIDES, draw=draw, eval_pdf=eval_pdf)
     assert check(sheet, only="reciprocity").verdict("reciprocity") == ("pass" if behind == 1 else "fail")
 
 
@@ -248,7 +240,6 @@ RIGHT = {
 }
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name == "lambert" else pytest.mark.slow) for name in RIGHT]
 )
@@ -333,7 +324,6 @@ ALL_PASS = {
 each finding passes, and none is skipped."""
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "name",
     [
@@ -360,7 +350,6 @@ def glints(wi, wo):
     return dr.select(((mi.Int(cell.x) + mi.Int(cell.y)) & 1) == 0, 1, 0.2)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("pattern", [halves, glints])
 def test_patterns_that_jump_everywhere_do_not_jump_at_the_normal(pattern):
     (finding,) = check(Mutant("pattern", (), diffuse(pattern)).register(), only="continuity").findings
@@ -387,7 +376,6 @@ def test_bitmaps_are_not_used_up():
     assert not report.failures and (np.array(bitmap) == before).all()
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_plugin_of_one_variant():
     """What cannot be loaded elsewhere cannot be judged there. Nor does it have a ``to_string``."""
     report = check(of_others("in_rgb_alone"), only=["spectral", "polarization", "calls"])
@@ -398,7 +386,6 @@ def test_a_plugin_of_one_variant():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_parameters_that_are_no_numbers():
     """Nor any numbers at all."""
 
@@ -413,29 +400,23 @@ def test_parameters_that_are_no_numbers():
     assert not report.failures, report
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_bsdf_without_components_fails():
     """Nothing of it could be judged."""
 
-    class Forgetful(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.m_flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
+    def begin(self, props):
+        self.m_components = []
 
-    mi.register_bsdf("forgetful", Forgetful)
-    (finding,) = check({"type": "forgetful"}, only="pdf").findings
+    (finding,) = check(stranger("forgetful", DIFFUSE | FRONT, begin=begin), only="pdf").findings
     assert finding.verdict == "fail" and "m_components" in finding.message
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_negative_channels_that_a_page_announces():
     """Those of RGL's colours outside sRGB, which ``measured`` renders, too."""
     (finding,) = check(str(shared("rgl", "chm_mint_rgb.bsdf")), only="finite").findings
     assert finding.verdict == "pass" and finding.message.endswith("Channels may be negative, as its page says.")
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_one_fault_is_one_sentence():
     """A density that is too low makes weights too large: that is no gain of energy."""
     low = changed(LambertLobe, density=lambda wi, wo: mi.Float(0.8))
@@ -445,7 +426,6 @@ def test_one_fault_is_one_sentence():
     assert skipped.verdict == "skip" and skipped.message.startswith("Not judged: mend pdf and chi2 first")
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("name", "only"),
     [
@@ -460,7 +440,7 @@ def test_other_checks_leave_a_fault_to_its_own(name, only):
     assert report.passed and "could not be checked" not in str(report), report
 
 
-def test_arguments_that_are_wrong_or_short(llvm_rgb):
+def test_arguments_that_are_wrong_or_short():
     assert check("lambert", only="finite", angles=30).passed
     assert check("ngan/ward/blue-acrylic", only="finite").passed
     with mi.variant_context("scalar_rgb"):
@@ -480,7 +460,6 @@ def test_arguments_that_are_wrong_or_short(llvm_rgb):
             check("lambert", **wrong)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_the_density_of_roughplastic_goes_below_the_horizon():
     """A fault of Mitsuba 3.9's: its pdf is not cut off at the horizon, and negative there."""
     with warnings.catch_warnings():
@@ -493,7 +472,6 @@ def test_the_density_of_roughplastic_goes_below_the_horizon():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_directions_beside_those_asked_for_are_looked_at():
     """With Beckmann's distribution Mitsuba approximates the masking in its density: at 82°, by 0.3 %."""
     (finding,) = check({"type": "roughconductor"}, only=["pdf"], angles=60).failures
@@ -502,7 +480,6 @@ def test_directions_beside_those_asked_for_are_looked_at():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_refraction(monkeypatch):
     """A rough dielectric, whose samples lie on both sides, seen from both."""
     look_at_few_directions(monkeypatch)
@@ -511,7 +488,6 @@ def test_refraction(monkeypatch):
     assert not [finding for finding in report.failures if finding.subject == "whole"], report
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_the_way_to_directions_may_follow_the_tangent():
     """As in ``bumpmap``, where values and densities stay when the surface is turned in the world."""
     heights = 0.05 * np.random.default_rng(1).random((8, 8, 1), np.float32)
@@ -519,7 +495,6 @@ def test_the_way_to_directions_may_follow_the_tangent():
     assert check({"type": "bumpmap", "bumps": bumps, "bsdf": {"type": "diffuse"}}, only=["calls"]).passed
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_kinks_have_the_derivatives_of_both_sides():
     """The largest of the lobe's three factors, which are equal by default, scales it."""
     report = check({"type": "lafortune"}, only=["gradients"])
@@ -527,20 +502,17 @@ def test_kinks_have_the_derivatives_of_both_sides():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_delta_functions_beside_others_are_skipped():
     mixed = check({"type": "plastic"}, only=["chi2", "pdf", "weight"], angles=(30,))
     assert mixed.passed and [finding.verdict for finding in mixed.findings] == ["skip", *["pass"] * 6]
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_delta_functions_carry_what_they_carry_alone():
     fault = check(half_of_the_mirror(), only=["deltas"], angles=(30,)).failures[0]
     assert fault.subject == "component 0 (delta reflection)" and "but 0.04017 where only" in fault.message, fault
     assert not check({"type": "plastic"}, only=["components", "deltas"], angles=(30,)).failures
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("fault", "told"),
     [
@@ -595,7 +567,6 @@ def test_delta_functions_alone_are_judged_by_their_samples(fault, told):
     assert report.passed == (not fault) and told in str([it.data for it in report.failures]) + str(report), report
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_plugin_may_change_its_mask_in_place():
     def sample(own, ctx, si, u, v, active):
         active &= u < 0.5
@@ -604,52 +575,34 @@ def test_a_plugin_may_change_its_mask_in_place():
     assert check(wrapped("changed_mask", {"type": "diffuse"}, sample=sample), only="active").passed
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("fault", ["", "stripes", "textures", "updates", "colours"])
 def test_parameters_of_delta_functions_are_judged(fault):
     """Of a mirror that looks up its reflectance elsewhere, keeps the first one, or exchanges red and green. Stripes of
     its own are no fault."""
 
-    class Mirror(mi.BSDF):
-        def __init__(self, props):
-            mi.BSDF.__init__(self, props)
-            self.reflectance = props.get_texture("reflectance", 0.8)
-            self.m_components = [int(mi.BSDFFlags.DeltaReflection | FRONT)]
-            self.m_flags = self.m_components[0]
+    def begin(self, props):
+        self.reflectance = props.get_texture("reflectance", 0.8)
 
-        def traverse(self, callback):
-            callback.put("reflectance", self.reflectance, mi.ParamFlags.Differentiable)
+    def traverse(self, callback):
+        callback.put("reflectance", self.reflectance, mi.ParamFlags.Differentiable)
 
-        def parameters_changed(self, keys):
-            if fault == "updates":
-                self.reflectance = mi.load_dict({"type": "rgb", "value": (0.2, 0.3, 0.4)})
+    def parameters_changed(self, keys):
+        if fault == "updates":
+            self.reflectance = mi.load_dict({"type": "rgb", "value": (0.2, 0.3, 0.4)})
 
-        def sample(self, ctx, si, u, v, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
-            lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
-            bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
-            at = mi.SurfaceInteraction3f(si)
-            if fault == "textures":
-                at.uv = mi.Point2f(si.uv.y, si.uv.x)
-            value = self.reflectance.eval(at)
-            if fault == "stripes":
-                value *= dr.select(dr.sin(20 * si.uv.x) > 0, mi.Float(1), 0.5)
-            value = mi.Color3f(value.y, value.x, value.z) if fault == "colours" else value
-            return bs, dr.select(lit, value, 0)
+    def sample(self, ctx, si, u, v, active=True):
+        (bs, lit), at = mirrored(ctx, si, active), mi.SurfaceInteraction3f(si)
+        if fault == "textures":
+            at.uv = mi.Point2f(si.uv.y, si.uv.x)
+        value = self.reflectance.eval(at)
+        if fault == "stripes":
+            value *= dr.select(dr.sin(20 * si.uv.x) > 0, mi.Float(1), 0.5)
+        value = mi.Color3f(value.y, value.x, value.z) if fault == "colours" else value
+        return bs, dr.select(lit, value, 0)
 
-        def eval(self, *given):
-            return mi.Color3f(0)
-
-        def pdf(self, *given):
-            return mi.Float(0)
-
-        def eval_pdf(self, *given):
-            return mi.Color3f(0), mi.Float(0)
-
-    name = f"judged_mirror_{fault}"
-    mi.register_bsdf(name, Mirror)
-    report = check({"type": name}, only=["deltas", "textures", "updates", "colours"])
+    methods = {"traverse": traverse, "parameters_changed": parameters_changed, "sample": sample}
+    mirror = stranger(f"judged_mirror_{fault}", mi.BSDFFlags.DeltaReflection | FRONT, begin=begin, **methods)
+    report = check(mirror, only=["deltas", "textures", "updates", "colours"])
     assert {it.check for it in report.failures} == {fault} - {"", "stripes"}, report
     verdicts = {it.check: it.verdict for it in report.findings if it.check != "components"}
     assert set(verdicts.values()) <= {"pass", "fail"}, report
@@ -661,10 +614,7 @@ def test_delta_functions_polarize_no_more_than_fully(circular, verdict):
     """Of a mirror of the intensity and of a part of the circular polarization."""
 
     def sample(self, ctx, si, u, v, active=True):
-        bs, matrix = dr.zeros(mi.BSDFSample3f), dr.zeros(mi.Spectrum)
-        bs.wo, bs.eta, bs.sampled_type = mi.reflect(si.wi), 1, int(mi.BSDFFlags.DeltaReflection)
-        lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
-        bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
+        (bs, lit), matrix = mirrored(ctx, si, active), dr.zeros(mi.Spectrum)
         if not mi.is_polarized:
             return bs, dr.select(lit, mi.Spectrum(1), 0)
         matrix[0, 0], matrix[3, 3] = mi.UnpolarizedSpectrum(1), mi.UnpolarizedSpectrum(circular)
@@ -677,7 +627,6 @@ def test_delta_functions_polarize_no_more_than_fully(circular, verdict):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_masks():
     """They pass as a whole. With a context of one component, Mitsuba's sampler lets all light through."""
     only = [word for word in CHECKS if word not in ("gradients", "recompiles", "continuity", "spectral", "colours")]
@@ -691,7 +640,6 @@ def test_masks():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_hair_is_checked_from_all_around():
     """Its parameters include one that is None, and its component for light from behind is a delta function."""
     report = check({"type": "hair"}, angles=(30,), only=["weight", "support", "horizon", "gradients", "efficiency"])
@@ -711,13 +659,11 @@ class Raises(Lambert):
         return p
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_fields_that_sample_leaves_empty_are_named():
     report = check(Mutant("empty", (), Lambert, adapted(sample=without_fields)).register(), only=["weight"])
     assert "sample leaves eta empty: begin with dr.zeros(mi.BSDFSample3f)" in report.failures[0].message
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_what_raises_is_told_and_the_rest_is_checked():
     report = check(Mutant("raises", (), Raises).register(), only=["finite", "gradients", "recompiles", "flags"])
     assert [f.check for f in report.failures] == ["gradients"], report
@@ -725,7 +671,6 @@ def test_what_raises_is_told_and_the_rest_is_checked():
     assert report.verdict("flags") == report.verdict("recompiles") == report.verdict("finite") == "pass"
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_loaded_bsdfs_and_reports():
     report = check(mi.load_dict({"type": "ward"}), only=["finite", "efficiency"], angles=(45,))
     assert report.name == "Ward" and "passed" in str(report) and "45°" in str(report)
@@ -751,7 +696,6 @@ def test_variants():
 run = partial(invoke, "check")
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_reports_verdicts(tmp_path):
     done = run("lambert", "roughplastic", "--only", "horizon", "--only", "weight", "--json", tmp_path / "out.json")
     assert done.exit_code == 1, done.stderr
@@ -764,7 +708,6 @@ def test_command_reports_verdicts(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_in_several_processes(tmp_path):
     """The same reports as in one, in the same order, and all of them on one page."""
     given = ["lambert", "wrap", "diffuse", "--only", "pdf", "--only", "weight", "--angles", "30", "--json"]
@@ -810,7 +753,6 @@ def test_a_job_in_the_background_ignores_ctrl_c():
     assert stdout.splitlines() == ["lambert: passed", "  pass  pdf", "diffuse: passed", "  pass  pdf"]
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_on_xml_and_on_a_scene(tmp_path, monkeypatch, pytestconfig):
     text = '<bsdf type="phong" id="mine"><float name="exponent" value="50"/></bsdf>'
     (tmp_path / "one.xml").write_text(text.replace("<bsdf", '<bsdf version="3.0.0"'))
@@ -821,7 +763,6 @@ def test_command_on_xml_and_on_a_scene(tmp_path, monkeypatch, pytestconfig):
     assert done.stdout.count("first_light.xml:") == 5  # and two lamps
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     "arguments, message",
     [

@@ -25,6 +25,8 @@ from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
 from mi_brdfs.validation.formats import block, junit
 
+pytestmark = pytest.mark.usefixtures("llvm_rgb")
+
 BRIGHT = {"diffuse_reflectance": 0.8, "specular_reflectance": 0.8}
 PHONG = (
     '<bsdf type="phong"><float name="diffuse_reflectance" value="0.8"/>'
@@ -41,7 +43,6 @@ def albedo(bsdf, **options):
 # --- Energy ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_what_gains_energy_in_a_channel_fails():
     """Though its page says that it does not."""
     warn_once.cache_clear()
@@ -52,7 +53,6 @@ def test_what_gains_energy_in_a_channel_fails():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_what_gains_as_much_as_its_page_says_is_noted():
     """Also on two sides. Unless energy is to be conserved. No page says that one of Mitsuba's gains any."""
     words = "It gains energy, as {} says (1.89): light from 89° is reflected 1.19"
@@ -69,7 +69,6 @@ def test_what_gains_as_much_as_its_page_says_is_noted():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
 def test_radiance_that_is_refracted_gains_none():
     """Its solid angle grows by η² as it leaves a dielectric."""
     report = check({"type": "roughdielectric", "distribution": "ggx", "alpha": 0.3}, only=["albedo"])
@@ -77,7 +76,6 @@ def test_radiance_that_is_refracted_gains_none():
     assert 0.85 < max(each["albedo"] for name, each in report.findings[0].data.items() if "behind" in name) <= 1.001
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_bsdf_of_others_may_gain_nothing():
     options = {"only": ["albedo", "weight", "pdf", "finite", "support"], "angles": (30,)}
     assert check(of_others("as_bright_as_white", 1.0), **options).passed
@@ -130,7 +128,6 @@ def test_colours_that_add_to_more_than_one_warn():
         assert not warnings_of(bsdf), bsdf
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_the_check_speaks_of_the_colours_of_now():
     """Not of those that were given."""
     with warnings.catch_warnings():
@@ -148,7 +145,6 @@ def test_the_check_speaks_of_the_colours_of_now():
 # --- What reproduces a failure --------------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_failures_say_what_reproduces_them():
     """The value that a sentence tells is that at its directions."""
     (mutant,) = (each for each in MUTANTS if each.name == "energy gained in blue")
@@ -187,7 +183,6 @@ def test_what_is_skipped_is_told_with_its_reason():
 # --- Comparison -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_bsdfs_are_compared():
     rough = {"type": "roughconductor", "distribution": "ggx", "material": "none", "alpha": 0.3}
     same = compare({"type": "walter", "alpha": 0.3}, rough)
@@ -211,7 +206,6 @@ def test_bsdfs_are_compared():
 # --- Tests of users -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_assert_bsdf():
     assert assert_bsdf({"type": "ward"}, only=["weight"]).passed
     with pytest.raises(AssertionError) as raised:
@@ -271,7 +265,6 @@ SCENE = """<scene version="3.0.0"><default name="n" value="10"/>
 LIBRARY = """<bsdf type="twosided" id="sheet"><bsdf type="ward" id="gloss"/></bsdf></scene>"""
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_materials_of_a_scene(tmp_path):
     """Each once, by its id or else its class, without the black ones of lamps; by an id any, also without a shape."""
     path = tmp_path / "s.xml"
@@ -300,7 +293,6 @@ FITS = """[{"model": "ward", "file": "a.bsdf", "bsdf": {"type": "ward", "alpha":
 {"model": "phong", "file": "a.bsdf", "bsdf": {"type": "phong", "exponent": 9}}]"""
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_materials_have_parameters_of_their_own(tmp_path):
     """They go before those for all, of which each has what it declares."""
     (tmp_path / "fit.json").write_text(FITS)
@@ -344,7 +336,6 @@ def run(*arguments):
     return done
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_says_that_colours_gain_energy():
     done = run(PHONG, "--only", "albedo", "--angles", "60")
     text = " ".join(done.stdout.split())
@@ -353,7 +344,7 @@ def test_command_says_that_colours_gain_energy():
     assert "diffuse_reflectance + specular_reflectance = 1.6, but energy is conserved only up to 1." in text
 
 
-@pytest.mark.usefixtures("llvm_rgb", "as_before")
+@pytest.mark.usefixtures("as_before")
 def test_command_on_a_file_of_others(tmp_path):
     (tmp_path / "bright.py").write_text(
         "import mi_brdfs\n\n\nclass Bright(mi_brdfs.Model):\n"
@@ -370,7 +361,6 @@ def test_command_on_a_file_of_others(tmp_path):
         imported.clear()
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_on_what_cannot_be_judged(tmp_path):
     done = run("conductor", "--only", "pdf", "--json", tmp_path / "x.json")
     assert done.exit_code == 3 and done.stdout.startswith("conductor: not judged\n")
@@ -380,7 +370,6 @@ def test_command_on_what_cannot_be_judged(tmp_path):
     assert run("conductor", "lambert", "--only", "flags").exit_code == 0
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_with_its_options(tmp_path):
     given = ["burley", "-D", "base_color=1.0", "-D", "roughness=0", "--param", "roughness=1", "--only", "albedo"]
     given += ["--angles", "5,83"]
@@ -395,7 +384,6 @@ def test_command_with_its_options(tmp_path):
     )
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_command_compares(tmp_path):
     rough = '<bsdf type="roughconductor"><string name="distribution" value="ggx"/></bsdf>'
     (tmp_path / "s.xml").write_text(SCENE)
@@ -420,7 +408,6 @@ def test_commands_warn_in_a_sentence(tmp_path):
     assert done.stderr.count("1.6") == 1
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_wrong_constant_is_told_as_one():
     """A density without its 1/π is off by the same factor wherever light comes from."""
     wrong = next(mutant for mutant in MUTANTS if mutant.name == "density without pi")
@@ -431,7 +418,6 @@ def test_a_wrong_constant_is_told_as_one():
     )
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_subclass_does_not_gain_the_energy_of_its_base():
     """The page of ``ward`` says that some of its variants gain energy."""
 
@@ -445,7 +431,6 @@ def test_a_subclass_does_not_gain_the_energy_of_its_base():
     assert not check({"type": "ward", "variant": "ward"}, only=["albedo"]).failures
 
 
-@pytest.mark.usefixtures("llvm_rgb")
 def test_a_wrong_constant_of_weights_is_told_as_one():
     """What is reflected is not judged by such weights, even if it is less than is received."""
     of_half = Mutant("half", (), Lambert, sampled(weight=lambda bs, weight, si, u: 0.5 * weight))

@@ -92,34 +92,23 @@ def pinned(texture: mi.Texture, si: mi.SurfaceInteraction3f, channel: int | None
     """Return a texture that has, whatever it is asked for, the values of another one at ``si``, lane by lane; as a
     colour, grey of one channel if that is given."""
 
-    class Pinned(mi.Texture):
-        def __init__(self) -> None:
-            super().__init__(mi.Properties())
+    def at(method: str, of: int | None = None) -> Callable[..., Any]:
+        def evaluated(self: mi.Texture, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            value = getattr(texture, method)(si, active)
+            return value if of is None else type(value)(value[of])
 
-        def eval(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            value = texture.eval(si, active)
-            return value if channel is None else type(value)(value[channel])
+        return evaluated
 
-        def eval_1(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            return texture.eval_1(si, active)
-
-        def eval_1_grad(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            return texture.eval_1_grad(si, active)
-
-        def eval_3(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            value = texture.eval_3(si, active)
-            return value if channel is None else type(value)(value[channel])
-
-        def mean(self) -> Any:
-            return 0.5 * texture.mean()  # samplers may be guided by it, but values that follow it show
-
-        def max(self) -> float:
-            return texture.max()
-
-        def is_spatially_varying(self) -> bool:
-            return True
-
-    return Pinned()
+    members = {
+        "eval": at("eval", channel),
+        "eval_1": at("eval_1"),
+        "eval_1_grad": at("eval_1_grad"),
+        "eval_3": at("eval_3", channel),
+        "mean": lambda self: 0.5 * texture.mean(),  # samplers may be guided by it, but values that follow it show
+        "max": lambda self: texture.max(),
+        "is_spatially_varying": lambda self: True,
+    }
+    return type("Pinned", (mi.Texture,), members)(mi.Properties())
 
 
 def numbers(value: Any, count: int | None = None) -> Array:

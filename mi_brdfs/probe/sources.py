@@ -26,6 +26,8 @@ RESERVED = ("path", "string", "parallel", "optimize")
 """The arguments of Mitsuba's functions that load XML, which no parameter of it may be called."""
 OWN = re.compile(r":(?=[A-Za-z_]\w*=)")
 """Where the parameters of a word begin."""
+FILE = re.compile(r"(.+?\.(?:xml|json))(?::(.+))?", re.DOTALL)
+"""The path of XML or of fits, and the material that is named after it."""
 
 
 class BSDFSource(NamedTuple):
@@ -85,30 +87,26 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     """
     word, own = split(word)
     parameters = {**(parameters or {}), **own}
-    is_data = is_measured(word)
-    if not is_data:
+    if not (is_data := is_measured(word)):
         check_name(word)
-    file, ending, wanted = ("", "", "") if is_data else _parted(word)
-    path = Path(f"{file}{ending}" if wanted else word)
-    is_text = word.startswith("<") and not is_data and not os.path.isfile(path)
-    is_file = path.suffix in (".xml", ".json") and not is_text
-    wanted = wanted if is_file else ""
-    if is_file and not path.is_file():
+    path, wanted = _parted(word)
+    is_text = word.startswith("<") and not (is_data or path)
+    if path and not path.is_file():
         raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
-    name = path.name if is_file or is_data else word
-    source = BSDFSource(name, word, str(path) if is_file else word, None, parameters)
-    if is_file and path.suffix == ".json":
+    name = Path(word).name if is_data else path.name if path else word
+    source = BSDFSource(name, word, str(path or word), None, parameters)
+    if path and path.suffix == ".json":
         found = list(_chosen(source, _names_of(_fits(path)), wanted))
         for each, given in zip(found, shared([it.word for it in found], parameters), strict=True):
             fitted = each._replace(name=each.name + _suffix(given), parameters=given)
             load(fitted.load())
             yield fitted
         return
-    if (is_file or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
+    if (path or is_text) and (reserved := [name for name in RESERVED if name in parameters]):
         raise ValueError(f"-D {reserved[0]}: Mitsuba reserves this name; rename the parameter in the XML")
     loaded = source.load()
     loaded = load(loaded) if isinstance(loaded, dict) else loaded
-    if isinstance(loaded, mi.Scene) and is_file:
+    if isinstance(loaded, mi.Scene) and path:
         names = _distinct([name_of(bsdf) for bsdf in _materials(loaded)])
         is_hidden = not names or wanted not in ("", *names)
         others = [id for id in loading.ids_of_bsdfs(path, parameters) if id not in names] if is_hidden else []
@@ -151,15 +149,13 @@ def shared(words: Sequence[str], parameters: Mapping[str, str]) -> list[dict[str
 def _declares(word: str, name: str) -> bool:
     """Return whether a BSDF that a word stands for has a parameter; also if that is seen only where it is loaded."""
     word, _ = split(word)
-    is_data = is_measured(word)
-    file, ending, wanted = ("", "", "") if is_data else _parted(word)
-    path = Path(file + ending)
-    if ending == ".json" and path.is_file():
+    path, wanted = _parted(word)
+    if path and path.suffix == ".json" and path.is_file():
         fits = _fits(path)
         rows = zip(_names_of(fits), fits, strict=True)
         return any(_has(row["bsdf"], name) for own, row in rows if wanted in ("", own))
-    if ending or (word.startswith("<") and not is_data):
-        text = path.read_text(encoding="utf-8", errors="replace") if ending and path.is_file() else word
+    if path or (word.startswith("<") and not is_measured(word)):
+        text = path.read_text(encoding="utf-8", errors="replace") if path and path.is_file() else word
         named = re.escape(name)
         return bool(re.search(rf"""\$\{{?{named}\b|<include|<default[^>]+["']{named}["']""", text))
     return _has(BSDFSource(word, word, word).load(), name)
@@ -180,7 +176,7 @@ def is_measured(word: str) -> bool:
     path = Path(word)
     if word in published.names():
         return False
-    if word.startswith("<") or _parted(word)[1]:  # unless it is the name of another file
+    if word.startswith("<") or FILE.fullmatch(word):  # unless it is the name of another file
         return os.path.isfile(word) and path.suffix not in (".xml", ".json")
     return bool(path.suffix) or path.name != word
 
@@ -264,10 +260,12 @@ def _is_black(bsdf: mi.BSDF) -> bool:
     return not any(probe.weights(probe.whole, wi[None], variates).any() for wi in sides)
 
 
-def _parted(word: str) -> tuple[str, str, str]:
-    """Return a word before the ending of XML or of fits, that ending, and the material that is named after it."""
-    found = re.fullmatch(r"(.+?)(\.xml|\.json)(?::(.+))?", word, re.DOTALL)
-    return (found[1], found[2], found[3] or "") if found else (word, "", "")
+def _parted(word: str) -> tuple[Path | None, str]:
+    """Return the path of XML or of fits in a word, if that is not text itself, and the material named after it."""
+    found = None if is_measured(word) else FILE.fullmatch(word)
+    if found is None or (word.startswith("<") and not os.path.isfile(found[1])):
+        return None, ""
+    return Path(found[1]), found[2] or ""
 
 
 def _suffix(parameters: Mapping[str, str]) -> str:

@@ -11,7 +11,7 @@ from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
 from .outcome import Findings, Outcome, relative
-from .run import SEED, Run
+from .run import SEED, Run, of_each
 
 COUNT = 4000
 
@@ -105,9 +105,7 @@ def _check_there_and_back(run: Run, outcome: Outcome, part: Part) -> None:
 def _check_sum(run: Run, outcome: Outcome) -> None:
     """Check that the components add up to the whole, and that its density is a mixture of theirs."""
     probe, tolerance = run.probe, 10 * run.rounding(run.probe.whole)
-    flags = 0
-    for k in range(probe.bsdf.component_count()):
-        flags |= int(probe.bsdf.flags(k))
+    flags = np.bitwise_or.reduce([int(probe.bsdf.flags(k)) for k in range(probe.bsdf.component_count())])
     if int(probe.bsdf.flags()) != flags:
         outcome.fault(f"flags() is {int(probe.bsdf.flags()):#x}, but those of the components make {flags:#x}", np.inf)
     for incident in run.views(probe.whole):
@@ -161,32 +159,31 @@ def check_masks(run: Run, outcome: Outcome, part: Part) -> None:
         outcome.differing(tolerance, name, *pair, why, wi, samples.wo, unknown=0, where=samples.lit, seed=13)
 
 
-def flags(run: Run) -> Findings:
+@of_each(lambda probe: probe.components)
+def flags(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that a component's flags fit its behaviour. One that gathers half of its light within 10° of the mirror
     direction is not diffuse, one whose f or density changes as the frame turns about the normal is anisotropic,
     one that is for reflection and transmission does both, and one that the differentials of uv change needs them."""
     probe, kinds = run.probe, mi.BSDFFlags
-    for part in probe.components:
-        outcome = Outcome("flags", part.name)
-        if not part.has(kinds.FrontSide) and not part.has(kinds.BackSide):
-            outcome.fault("neither FrontSide nor BackSide is flagged, so that it is seen from nowhere")
-        if part.has(kinds.Diffuse):
-            for theta in (30, 60):
-                wi = on_side(direction(theta), part.sides[0])
-                samples = probe.sample(part, wi, random(COUNT, 2))
-                wo = samples.wo[samples.drawn].astype(np.float64)
-                sign = 1 if part.has(kinds.Reflection) else -1
-                near = wo @ (wi * [-1, -1, sign]) > np.cos(np.radians(10)) if len(wo) else np.zeros(1)
-                if near.mean() > 0.5:
-                    told = "of the samples lie within 10° of the mirror direction, but it is flagged diffuse"
-                    outcome.fault(f"for light from {theta}° {near.mean():.0%} {told}", near.mean(), wi=wi, seed=2)
-        if part.has(kinds.Reflection) and part.has(kinds.Transmission):
-            _check_both_ways(run, outcome, part)
-        if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
-            _check_turned(run, outcome, part)
-        if not probe.bsdf.needs_differentials():
-            _check_differentials(run, outcome, part)
-        yield outcome.finding("They fit what it does.")
+    if not part.has(kinds.FrontSide) and not part.has(kinds.BackSide):
+        outcome.fault("neither FrontSide nor BackSide is flagged, so that it is seen from nowhere")
+    if part.has(kinds.Diffuse):
+        for theta in (30, 60):
+            wi = on_side(direction(theta), part.sides[0])
+            samples = probe.sample(part, wi, random(COUNT, 2))
+            wo = samples.wo[samples.drawn].astype(np.float64)
+            sign = 1 if part.has(kinds.Reflection) else -1
+            near = wo @ (wi * [-1, -1, sign]) > np.cos(np.radians(10)) if len(wo) else np.zeros(1)
+            if near.mean() > 0.5:
+                told = "of the samples lie within 10° of the mirror direction, but it is flagged diffuse"
+                outcome.fault(f"for light from {theta}° {near.mean():.0%} {told}", near.mean(), wi=wi, seed=2)
+    if part.has(kinds.Reflection) and part.has(kinds.Transmission):
+        _check_both_ways(run, outcome, part)
+    if not part.has(kinds.Anisotropic) and not part.has(kinds.SpatiallyVarying):
+        _check_turned(run, outcome, part)
+    if not probe.bsdf.needs_differentials():
+        _check_differentials(run, outcome, part)
+    return "They fit what it does."
 
 
 def _check_both_ways(run: Run, outcome: Outcome, part: Part) -> None:

@@ -19,9 +19,8 @@ from ..probe.directions import hemisphere, on_side, scattered
 from ..probe.variates import random
 from . import sampling
 from .deltas import deltas
-from .outcome import KNOWN, Findings, Outcome, Skipped, told
-from .report import Finding
-from .run import Run
+from .outcome import KNOWN, Outcome, Skipped, skipping, told
+from .run import Run, of_each, of_whole
 from .traced import traced_floats
 
 COUNT = 2000
@@ -30,14 +29,13 @@ AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sampl
 UNKNOWN = "no_such_attribute"
 
 
-def active(run: Run) -> Findings:
+@of_whole
+def active(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that lanes that are not active get no light: what ``eval``, ``eval_pdf`` and ``eval_pdf_sample`` return and
     the weights of samples are zero there, for masks as for ``False``, and so are the densities and
     ``eval_diffuse_reflectance`` of plugins of ours (Mitsuba's own rely on it that calls of a scene mask them); others
     get what they get when all are active. And no derivative comes from them, whatever directions they have."""
-    probe, part = run.probe, run.probe.whole
-    outcome = Outcome("active", part.name)
-    wi, u = scattered(COUNT, 61, part.sides), random(COUNT, 62)
+    probe, wi, u = run.probe, scattered(COUNT, 61, part.sides), random(COUNT, 62)
     wo = np.where(np.arange(COUNT)[:, None] % 3, probe.sample(part, wi, u).wo,
                   on_side(hemisphere(COUNT, 63), part.sides[0]))  # fmt: skip
     half = np.random.default_rng(64).random(COUNT) < 0.5
@@ -54,7 +52,7 @@ def active(run: Run) -> Findings:
             why = "when all are"
             outcome.differing(1e-5, f"{words}, {name}", value, every[name], why, wi, wo, where=lit, seed=62)
     _check_derivatives(run, outcome, wi, wo, half)
-    yield outcome.finding("Inactive lanes get no light, no weight and no derivative.")
+    return "Inactive lanes get no light, no weight and no derivative."
 
 
 def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.Bool) -> dict[str, Array]:
@@ -118,52 +116,51 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
             outcome.fault(f"the derivative for {each.key} {words}", abs(masked - alone).max())
 
 
-def mode(run: Run) -> Findings:
+@of_each(lambda probe: [*probe.parts, *probe.deltas])
+def mode(run: Run, part: Part, outcome: Outcome) -> str:
     """Check the mode ``TransportMode.Importance``, in which light is traced from the emitters: light reflected, or
     transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
     cosine of ``wo``: Mitsuba's ``eval`` and ``sample`` are those of the adjoint then, without which ``ptracer`` and
     ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
     not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too. Delta functions draw the same, and weigh
     it without the factor 1/η² of refracted radiance."""
-    for part in run.probe.parts:
-        if not part.passages:
-            yield Finding("mode", part.name, "skip", "Not checked, as it transmits from one side only.")
-            continue
-        outcome, tolerance = Outcome("mode", part.name), 10 * run.rounding(part)
-        traced = part._replace(context=context(part.component))
-        traced.context.mode = mi.TransportMode.Importance
-        symmetric = not part.has(mi.BSDFFlags.NonSymmetric)
-        for sides in part.passages:
-            wi, wo = run.probe.pairs(traced, COUNT, 65, sides)
-            got = run.probe.eval(traced, wi, wo)
-            if symmetric:
-                expected, why = run.probe.eval(part, wi, wo), "is needed, as it is not flagged NonSymmetric"
-            else:
-                expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
-                why = "is needed, as that is its adjoint, f from wo to wi"
-            name = "in the mode Importance eval"
-            # What grazing facets transmit is faint and has few digits.
-            outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
-            samples = run.probe.sample(traced, wi, random(COUNT, 67))
-            # What is wrong with a weight in any mode is said once.
-            if not sampling.failing(run, part, sampling.weight):
-                name, reflected = "in the mode Importance a weight times pdf", samples.weight * samples.pdf[:, None]
-                pair, lit = (reflected, samples.value), samples.lit
-                outcome.differing(
-                    tolerance, name, *pair, "is eval", wi, samples.wo, unknown=0, where=lit, but_for=0.01, seed=67
-                )
-        yield outcome.finding("Light may be traced from either end.")
-    for part in run.probe.deltas:
-        outcome = Outcome("mode", part.name)
-        if not sampling.failing(run, part, deltas):  # what is wrong with it in any mode is said once
-            _check_traced_samples(run, outcome, part)
-        yield outcome.finding("Light may be traced from either end.")
-
-
-def _check_traced_samples(run: Run, outcome: Outcome, part: Part) -> None:
-    """Check that a delta function draws the same in the mode Importance, and how it weighs it."""
     traced = part._replace(context=context(part.component))
     traced.context.mode = mi.TransportMode.Importance
+    if part not in run.probe.deltas:
+        _check_traced(run, outcome, part, traced)
+    elif not sampling.failing(run, part, deltas):  # what is wrong with it in any mode is said once
+        _check_traced_samples(run, outcome, part, traced)
+    return "Light may be traced from either end."
+
+
+def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
+    """Check values and weights in the mode Importance, of the part that is ``traced``."""
+    if not part.passages:
+        raise Skipped("Not checked, as it transmits from one side only.")
+    tolerance, symmetric = 10 * run.rounding(part), not part.has(mi.BSDFFlags.NonSymmetric)
+    for sides in part.passages:
+        wi, wo = run.probe.pairs(traced, COUNT, 65, sides)
+        got = run.probe.eval(traced, wi, wo)
+        if symmetric:
+            expected, why = run.probe.eval(part, wi, wo), "is needed, as it is not flagged NonSymmetric"
+        else:
+            expected = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64) / wi[:, 2:])
+            why = "is needed, as that is its adjoint, f from wo to wi"
+        name = "in the mode Importance eval"
+        # What grazing facets transmit is faint and has few digits.
+        outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
+        samples = run.probe.sample(traced, wi, random(COUNT, 67))
+        # What is wrong with a weight in any mode is said once.
+        if not sampling.failing(run, part, sampling.weight):
+            name, reflected = "in the mode Importance a weight times pdf", samples.weight * samples.pdf[:, None]
+            pair, lit = (reflected, samples.value), samples.lit
+            outcome.differing(
+                tolerance, name, *pair, "is eval", wi, samples.wo, unknown=0, where=lit, but_for=0.01, seed=67
+            )
+
+
+def _check_traced_samples(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
+    """Check that a delta function draws the same in the mode Importance, and how it weighs it."""
     wi, u = scattered(COUNT, 66, part.sides), random(COUNT, 67)
     got, usual = (run.probe.sample(each, wi, u) for each in (traced, part))
     name, why = "in the mode Importance a sample's weight", "is needed: that of radiance times η²"
@@ -182,12 +179,11 @@ def _methods(bsdf: mi.BSDF, ctx: mi.BSDFContext) -> dict[str, Callable[..., Any]
     }
 
 
-def recorded(run: Run) -> Findings:
+@of_whole
+def recorded(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that renderers can record it in their loops: ``eval``, ``pdf``, ``eval_pdf`` and ``sample`` ask for no
     values of arrays. There are none in a loop that is recorded, where it is an error to read an array, to branch by one
     in Python, or to take a mean over the lanes."""
-    part = run.probe.whole
-    outcome = Outcome("recorded", part.name)
     wi, wo, variates = scattered(COUNT, 68, part.sides), scattered(COUNT, 69, part.sides), random(COUNT, 70)
     for name, call in _methods(run.probe.bsdf, part.context).items():
         si, *others = interaction(wi), vectors(wo), *sample_arguments(variates)
@@ -198,17 +194,18 @@ def recorded(run: Run) -> Findings:
             call(si, *others)
             if dr.kernel_history([dr.KernelType.JIT, dr.KernelType.BlockReduce]):
                 outcome.fault(f"{name} asks for the values of an array, so that no renderer can record it in a loop")
-    yield outcome.finding("It asks for no values of arrays.")
+    return "It asks for no values of arrays."
 
 
-def calls(run: Run) -> Findings:
+@of_whole
+def calls(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that calls depend on what they are given alone: ``eval``, ``pdf`` and ``sample`` return the same for the
     same arguments whatever was called before, in whatever lane, to float32's rounding, for 99 in a hundred. Where the
     surface is turned in the world, values and densities are the same, too, as directions are local. And they leave the
     surface point, directions and context as they are; where Python defines ``to_string``, ``str`` of the BSDF does not
     raise; and ``has_attribute`` does not say yes to any name."""
-    probe, part = run.probe, run.probe.whole
-    outcome, elsewhere = Outcome("calls", part.name), replace(probe, turned=True)
+    probe = run.probe
+    elsewhere = replace(probe, turned=True)
     wi, wo, u = scattered(COUNT, 76, part.sides), scattered(COUNT, 77, part.sides), random(COUNT, 78)
     uv = random(COUNT, 79)[:, :2]
     wo[::2] = probe.sample(part, wi, u, uv).wo[::2]
@@ -252,7 +249,7 @@ def calls(run: Run) -> Findings:
         outcome.fault(f"str of it raises {told(error)}", np.inf)
     if np.any(probe.bsdf.has_attribute(UNKNOWN, True)):
         outcome.fault(f'has_attribute says that it has "{UNKNOWN}", as it may of any name', np.inf)
-    yield outcome.finding("Calls depend on what they are given alone, and change nothing.")
+    return "Calls depend on what they are given alone, and change nothing."
 
 
 def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array) -> None:
@@ -278,13 +275,13 @@ def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array)
                 outcome.fault(words, np.inf, wi=wi[k], wo=wo[k])
 
 
-def null(run: Run) -> Findings:
+@of_whole
+def null(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that samples of type Null go straight on, and that ``eval_null_transmission``, by which shadow rays go
     through, is their weight."""
-    probe, part = run.probe, run.probe.whole
+    probe, u = run.probe, random(1 << 14, 75)
     if not int(probe.bsdf.flags()) & int(mi.BSDFFlags.Null):
         raise Skipped("Nothing goes straight through.")
-    outcome, u = Outcome("null", part.name), random(1 << 14, 75)
     for incident in run.incidents(part):
         wi = np.tile(incident.wi, (len(u), 1))
         si = interaction(wi)
@@ -300,26 +297,24 @@ def null(run: Run) -> Findings:
             words = f"eval_null_transmission is {got[k]:.4g} for light from {incident.name}"
             other = f"but samples that go straight through weigh {each[:, k].mean():.4g} in the mean"
             outcome.fault(f"{words}, {other}", float(error[k]), wi=incident.wi, seed=75)
-    yield outcome.finding("As much as its samples.")
+    return "As much as its samples."
 
 
 LAMBERTIAN = 1e-3
 """How far f may change for a reflectance to be known exactly."""
 
 
-def reflectance(run: Run) -> Findings:
+@of_each(lambda probe: probe.parts[:1])
+def reflectance(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that ``eval_diffuse_reflectance``, which denoisers and renderers of albedos ask for, is finite and in [0,
     1]. Where f is constant it is π f, and of other diffuse plugins of ours, the albedo at normal incidence within 5 %.
     What is Mitsuba's stand-in, π times ``eval`` towards the normal, is not judged otherwise: it has no bound."""
-    probe, part = run.probe, run.probe.whole
-    outcome, normal = Outcome("reflectance", part.name), np.array([0, 0, part.sides[0]], np.float32)
-    try:
+    probe, normal = run.probe, np.array([0, 0, part.sides[0]], np.float32)
+    with skipping("It is not implemented, or raises "):
         found = [
             numbers(probe.bsdf.eval_diffuse_reflectance(interaction(wi), True), 1)[0]
             for wi in (normal, on_side(hemisphere(1, 71)[0], part.sides[0]))
         ]
-    except Exception as error:
-        raise Skipped(f"It is not implemented, or raises {told(error)}.") from None
     got = found[0]
     wi, wo = (on_side(hemisphere(200, seed), part.sides[0]) for seed in (72, 73))
     f = probe.eval(part, wi, wo) / abs(wo[:, 2:].astype(np.float64))
@@ -342,7 +337,7 @@ def reflectance(run: Run) -> Findings:
             wo = on_side(hemisphere(1 << 14, 74, 0), part.sides[0])
             albedo = 2 * np.pi * probe.eval(part, normal, wo).mean(axis=0)
             _compare(outcome, got, np.minimum(albedo, 1), 0.05, "the albedo at normal incidence is")
-    yield outcome.finding(f"It is {', '.join(f'{channel:.3g}' for channel in got)}.")
+    return f"It is {', '.join(f'{channel:.3g}' for channel in got)}."
 
 
 def _compare(outcome: Outcome, got: Array, expected: Array, tolerance: float, words: str) -> None:

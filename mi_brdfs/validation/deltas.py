@@ -11,27 +11,25 @@ from ..probe.directions import scattered
 from ..probe.variates import random
 from .components import check_eta, check_masks, turned
 from .incidents import SCATTERED, Incident
-from .outcome import KNOWN, Findings, Outcome
-from .report import Finding
-from .run import SEED, Run
+from .outcome import KNOWN, Outcome, Skipped
+from .run import SEED, Run, of_each
 
 DELTAS = int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null)
 """The types of delta functions."""
 
 
-def deltas(run: Run) -> Findings:
+@of_each(lambda probe: probe.deltas or [probe.whole])
+def deltas(run: Run, part: Part, outcome: Outcome) -> str:
     """Check delta functions by their samples: their density is how often they are drawn, they carry as much light among
     others as alone, to the side that their type says, which is that of their flags, none where a context excludes them,
     and ``eval`` and ``pdf`` do not know of them. Light is bent as ``eta`` says, after Snell, unless flags say that the
     surface turns it, and goes back where it came from, as much of it."""
     if not run.probe.deltas:
-        yield Finding("deltas", "whole", "skip", "There is no delta function.")
-    for part in run.probe.deltas:
-        outcome = Outcome("deltas", part.name)
-        _check_drawn(run, outcome, part)
-        _check_paths(run, outcome, part)
-        check_masks(run, outcome, part)
-        yield outcome.finding("Its samples fit together.")
+        raise Skipped("There is no delta function.")
+    _check_drawn(run, outcome, part)
+    _check_paths(run, outcome, part)
+    check_masks(run, outcome, part)
+    return "Its samples fit together."
 
 
 def _check_drawn(run: Run, outcome: Outcome, part: Part) -> None:

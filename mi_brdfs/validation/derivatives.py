@@ -64,6 +64,8 @@ def gradients(run: Run) -> Findings:
     And the derivatives of ``eval`` and ``pdf`` for the directions are finite, and where ``eval`` has any, they are
     those of finite differences, to 2 % on average, too.
     """
+    if not run.probe.parts:
+        return
     pairs, u = _drawn(run)
     yield _directional(run, pairs if len(u) else None)
     parameters, findings = traced_floats(run, "gradients", differentiable=True)

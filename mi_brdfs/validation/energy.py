@@ -106,7 +106,8 @@ def _judged(part: Part, outcome: Outcome, found: list[Reflected], limits: Limits
     if gains and limits.largest is not None:
         why = f"{limits.page} ({_shown(limits.largest)})" if limits.largest > 1 else "its lobes add up"
         message = f"It gains energy, as {why}: {most.words}."
-    finding = outcome.finding(message, limits.sums if is_whole else "")
+    outcome.remark = limits.sums if is_whole else ""
+    finding = outcome.finding(message)
     noted = is_whole and (gains or limits.sums) and not outcome.faults
     return replace(finding, verdict="note") if noted else finding
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.messages import brief
 from ..probe.arrays import Array
 from ..probe.directions import angles_of
@@ -34,6 +36,10 @@ class Outcome:
         self.check, self.subject = check, subject
         self.faults: list[Fault] = []
         self.data: dict[str, Any] = {}
+        self.remark = ""
+        """What follows in any case."""
+        self.tried = 0
+        """Of how many directions each may have a fault."""
 
     def fault(self, message: str, size: float = 1, *, seed: int | None = None, **directions: Array) -> None:
         """Add a fault, with the directions ``wi`` and ``wo`` and the seed of the variates that reproduce it."""
@@ -126,16 +132,15 @@ class Outcome:
             told = f"{when} sample draws {angles_of(got[k])} for light from {angles_of(wi[k])}"
             self.fault(f"{told}, but {angles_of(expected[k])} {why}", apart.sum(), wi=wi[k], seed=seed)
 
-    def finding(self, message: str, remark: str = "", tried: int = 0) -> Finding:
-        """Return the finding, with ``message`` if nothing is wrong. A remark follows in any case. Of each of the
-        directions ``tried`` there may be a fault."""
-        remark = f" {remark}" if remark else ""
+    def finding(self, message: str) -> Finding:
+        """Return the finding, with ``message`` if nothing is wrong."""
+        remark = f" {self.remark}" if self.remark else ""
         if not self.faults:
             return Finding(self.check, self.subject, "pass", message + remark, self.data)
         worst = max(self.faults, key=lambda fault: fault.size)
-        more = len(self.faults) - 1
-        others = f" (it fails for all {tried} directions tried)" if more and more + 1 == tried else ""
-        others = others or (f" (and {more} more like it)" if more else "")
+        others = f" (and {more} more like it)" if (more := len(self.faults) - 1) else ""
+        if more and more + 1 == self.tried:
+            others = f" (it fails for all {self.tried} directions tried)"
         text = worst.message + others + "." + remark
         data = self.data | {"faults": [fault.message for fault in self.faults]}
         return Finding(self.check, self.subject, "fail", text, data, worst.at)
@@ -145,7 +150,19 @@ Findings = Iterator[Finding]
 
 
 class Skipped(Exception):
-    """Raised by a check where the whole cannot be checked, with the reason."""
+    """Raised by a check where a part cannot be checked, with the reason."""
+
+
+@contextmanager
+def skipping(why: str) -> Iterator[None]:
+    """Skip what is checked where something within raises, which is told after ``why``."""
+    try:
+        with unwrapped_ctrl_c():
+            yield
+    except Skipped:
+        raise
+    except Exception as error:
+        raise Skipped(f"{why}{told(error)}.") from None
 
 
 def told(error: Exception) -> str:

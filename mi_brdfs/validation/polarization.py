@@ -9,14 +9,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
-from ..probe.bsdf import load
+from ..probe.bsdf import Part, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
-from .outcome import Findings, Outcome, Skipped, told
-from .report import Finding
-from .run import Run
+from .outcome import Outcome, Skipped, skipping
+from .run import Run, of_whole
 
 COUNT = 2000
 TOLERANCE = 1e-3
@@ -28,7 +26,8 @@ BACK = np.array([1, 1, -1, 1])
 """The signs of the Stokes parameters for light that goes back along its way."""
 
 
-def polarization(run: Run) -> Findings:
+@of_whole
+def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     """Check Mueller matrices: light of any polarization becomes light that is at most fully polarized; if directions
     are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
     NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
@@ -36,7 +35,7 @@ def polarization(run: Run) -> Findings:
     ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does ``eval`` in the mode
     Importance, for exchanged directions. Of delta functions alone, the weights of samples are looked at, and not
     exchanged. For this the BSDF must be given as a dict."""
-    part, described = run.probe.whole, run.described("To load it in a polarized variant")
+    described = run.described("To load it in a polarized variant")
     name = "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if name not in mi.variants():
         raise Skipped(f"It takes the variant {name}.")
@@ -44,23 +43,17 @@ def polarization(run: Run) -> Findings:
     # About the mirror direction, where most BSDFs that polarize have their light.
     near = wi * [-1, -1, 1] + 0.1 * hemisphere(COUNT, 103)
     wo[::2] = (near / np.linalg.norm(near, axis=1, keepdims=True))[::2]
-    outcome = Outcome("polarization", part.name)
-    with mi.variant_context(name):
-        try:
-            with unwrapped_ctrl_c():
-                bsdf, mueller = load(described), _mueller if run.probe.parts else _weight
-                if not run.probe.parts:
-                    wo = _directions(_sampled(bsdf, wi)[0], len(wi))
-                matrix = mueller(bsdf, wi, wo)
-                if not isinstance(matrix, mi.Spectrum):
-                    yield Finding("polarization", part.name, "skip", "It returns no Mueller matrices.")
-                    return
-                matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
-                exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
-                back = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
-                others = _others(run, bsdf, wi, wo, matrices, exchanged) if run.probe.parts else []
-        except Exception as error:
-            raise Skipped(f"It does not work in {name}: {told(error)}.") from None
+    with mi.variant_context(name), skipping(f"It does not work in {name}: "):
+        bsdf, mueller = load(described), _mueller if run.probe.parts else _weight
+        if not run.probe.parts:
+            wo = _directions(_sampled(bsdf, wi)[0], len(wi))
+        matrix = mueller(bsdf, wi, wo)
+        if not isinstance(matrix, mi.Spectrum):
+            raise Skipped("It returns no Mueller matrices.")
+        matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
+        exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
+        back = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
+        others = _others(run, bsdf, wi, wo, matrices, exchanged) if run.probe.parts else []
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)
     states = np.random.default_rng(104).normal(size=(STATES, 3))
     states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)
@@ -86,7 +79,7 @@ def polarization(run: Run) -> Findings:
         if lit.any() and np.quantile(difference[lit], 0.99) > TOLERANCE:
             name = f"the difference of the Mueller matrices of {name} and of eval"
             outcome.wrong(difference, name, difference, "in parts of their intensities", wi, towards, seed=SEED)
-    yield outcome.finding("Mueller matrices are physical.")
+    return "Mueller matrices are physical."
 
 
 def _others(

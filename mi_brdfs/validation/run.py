@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..probe.bsdf import BSDFProbe, Part, Samples
 from ..probe.directions import direction, on_side, scattered
 from ..probe.variates import random
 from .incidents import RANDOM, SCATTERED, Incident, all_over, incidents, random_incidents
-from .outcome import Skipped
+from .outcome import Findings, Outcome, Skipped
 from .report import Finding
 from .trial import Trial, trials_of
 
@@ -62,17 +63,16 @@ class Run:
             self._samples[key] = self.probe.sample(part, incident.wi, random(SCATTERED, SEED))
         return self._samples[key]
 
-    def is_black(self, part: Part) -> bool:
-        """Return whether f of a part is 0 and no sample carries light, so that its density is of no use."""
-        wi, wo = (scattered(1000, seed, part.sides) for seed in (4, 5))
-        lit = (self.samples(part, incident).lit.any() for incident in self.views(part))
-        return not (self.probe.eval(part, wi, wo).any() or any(lit))
-
     # --- Statistical tests ------------------------------------------------------------------------------------------
 
     def trials(self, part: Part) -> list[Trial]:
-        """Return the trials of a part, the same for every check."""
+        """Return the trials of a part, the same for every check. Where f is 0 and no sample carries light, the density
+        is of no use, and a check is skipped."""
         if part.name not in self._trials:
+            wi, wo = (scattered(1000, seed, part.sides) for seed in (4, 5))
+            lit = (self.samples(part, incident).lit.any() for incident in self.views(part))
+            if not (self.probe.eval(part, wi, wo).any() or any(lit)):
+                raise Skipped("Black.")
             at_random = random_incidents(part, self.at_random)
             self._trials[part.name] = trials_of(self.probe, part, self.incidents(part), at_random)
         return self._trials[part.name]
@@ -113,6 +113,33 @@ class Run:
         over σ: in its tails by ten.
         """
         return 1e-4 + 3e-6 / max(self.spread(part), 1e-6)
+
+
+Judge = Callable[[Run, Part, Outcome], str]
+"""What judges a part: it adds faults to an outcome, and returns what to say if there are none; where it raises
+:class:`Skipped`, the part is."""
+
+
+def of_each(parts: Callable[[BSDFProbe], list[Part]]) -> Callable[[Judge], Callable[[Run], Findings]]:
+    """Return a decorator that makes a check of some parts of what judges one."""
+
+    def decorated(judge: Judge) -> Callable[[Run], Findings]:
+        @wraps(judge)
+        def check(run: Run) -> Findings:
+            for part in parts(run.probe):
+                outcome = Outcome(judge.__name__, part.name)
+                try:
+                    yield outcome.finding(judge(run, part, outcome))
+                except Skipped as reason:
+                    yield Finding(outcome.check, part.name, "skip", str(reason))
+
+        return check
+
+    return decorated
+
+
+of_parts = of_each(lambda probe: probe.parts)
+of_whole = of_each(lambda probe: [probe.whole])
 
 
 def _half_width(probe: BSDFProbe, part: Part) -> float:

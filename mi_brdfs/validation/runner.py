@@ -78,11 +78,6 @@ SIGNIFICANCE = 0.01
 AGAINST_SEED = 91
 FAINT = 1e-6
 """Values below this part of the largest one for an angle of incidence differ as much as this part does."""
-OF_SAMPLES = (
-    "albedo", "deltas", "textures", "updates", "recompiles", "active", "mode", "recorded", "calls", "null", "colours",
-    "spectral", "polarization",
-)  # fmt: skip
-"""The checks that do without values, which delta functions have none of."""
 NO_COMPONENTS = "component_count() is 0: put the flags of each component into m_components."
 DELTA = "A delta function, which has no values: deltas judges its samples."
 
@@ -133,8 +128,7 @@ def check(
         if not probe.bsdf.component_count():
             run.found.append(Finding("components", "whole", "fail", NO_COMPONENTS))
         for word in wanted:
-            if probe.parts or word in OF_SAMPLES:
-                run.found += list(_found(word, run))
+            run.found += list(_found(word, run))
             on_progress()
         return Report(name or _name(bsdf), run.found, list(run.shown_trials()))
 

@@ -11,8 +11,7 @@ from ..probe.arrays import luminance
 from ..probe.bsdf import Part
 from ..probe.chi_square import in_words
 from .outcome import Findings, Outcome
-from .report import Finding
-from .run import SEED, Run
+from .run import SEED, Run, of_parts
 
 CONSTANTS = {
     2: "the probability of one of two lobes",
@@ -24,89 +23,81 @@ CONSTANTS = {
 """What a factor that is off, or its inverse, may be."""
 
 
-def chi2(run: Run) -> Findings:
+@of_parts
+def chi2(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that the directions drawn are distributed as ``pdf`` says: Pearson's test of the counts in cells that adapt
     to the lobe, and in larger ones. Together with ``pdf`` below it sees whatever is wrong with one of the two."""
-    for part in run.probe.parts:
-        outcome, smallest = Outcome("chi2", part.name), 1.0
-        if run.is_black(part):
-            yield Finding("chi2", part.name, "skip", "Black.")
-            continue
-        own = run.trials(part)
-        for trial in own:
-            name, test = trial.incident.name, trial.test
-            smallest = min(smallest, test.p_value)
-            outcome.data[name] = test.__dict__ | {"cells": len(trial.counts), "drawn": trial.share}
-            if not test.p_value >= run.level:
-                numbers = f"{in_words(test.p_value)}, χ² = {test.statistic:.0f} for {test.degrees} degrees of freedom"
-                told = f"the directions drawn are not distributed as pdf says ({numbers}): {trial.deviation}"
-                size = test.statistic / max(test.degrees, 1)
-                outcome.fault(f"for light from {name} {told}", size, wi=trial.incident.wi, seed=trial.seed)
-        left_out = max(trial.left_out for trial in own)
-        aside = f"; up to {left_out:.0%} of the samples lie in lines too narrow to be integrated" * (left_out > 0.01)
-        yield outcome.finding(f"{len(own)} tests, the smallest p-value is {smallest:.2g}{aside}.", tried=len(own))
+    smallest, own = 1.0, run.trials(part)
+    for trial in own:
+        name, test = trial.incident.name, trial.test
+        smallest = min(smallest, test.p_value)
+        outcome.data[name] = test.__dict__ | {"cells": len(trial.counts), "drawn": trial.share}
+        if not test.p_value >= run.level:
+            numbers = f"{in_words(test.p_value)}, χ² = {test.statistic:.0f} for {test.degrees} degrees of freedom"
+            told = f"the directions drawn are not distributed as pdf says ({numbers}): {trial.deviation}"
+            size = test.statistic / max(test.degrees, 1)
+            outcome.fault(f"for light from {name} {told}", size, wi=trial.incident.wi, seed=trial.seed)
+    outcome.tried = len(own)
+    left_out = max(trial.left_out for trial in own)
+    aside = f"; up to {left_out:.0%} of the samples lie in lines too narrow to be integrated" * (left_out > 0.01)
+    return f"{len(own)} tests, the smallest p-value is {smallest:.2g}{aside}."
 
 
-def pdf(run: Run) -> Findings:
+@of_parts
+def pdf(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that the integral of ``pdf`` over the sphere is the part of the samples that is drawn, so at most one:
     within 0.1 % for the quadrature and for float32, and the noise of the samples."""
-    for part in run.probe.parts:
-        outcome, largest = Outcome("pdf", part.name), 0.0
-        if run.is_black(part):
-            yield Finding("pdf", part.name, "skip", "Black.")
-            continue
-        own = run.trials(part)
-        for trial in own:
-            name = trial.incident.name
-            noise = sqrt(max(trial.share * (1 - trial.share), 1 / trial.count) / trial.count)
-            excess = max(trial.mismatch - 1e-3, 0) / noise
-            largest = max(largest, trial.mismatch)
-            outcome.data[name] = {"integral": trial.integral, "drawn": trial.share}
-            if not erfc(excess / sqrt(2)) >= run.level:
-                share = "all" if trial.share == 1 else f"{100 * trial.share:.2f} % of the"
-                told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
-                outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
-        factors = [trial.integral / max(trial.share, 1e-30) for trial in own]
-        remark = _constant(factors) if len(outcome.faults) == len(own) > 1 else ""
-        yield outcome.finding(f"Its integral agrees with the samples drawn to {largest:.1g}.", remark, len(own))
+    largest, own = 0.0, run.trials(part)
+    for trial in own:
+        name = trial.incident.name
+        noise = sqrt(max(trial.share * (1 - trial.share), 1 / trial.count) / trial.count)
+        excess = max(trial.mismatch - 1e-3, 0) / noise
+        largest = max(largest, trial.mismatch)
+        outcome.data[name] = {"integral": trial.integral, "drawn": trial.share}
+        if not erfc(excess / sqrt(2)) >= run.level:
+            share = "all" if trial.share == 1 else f"{100 * trial.share:.2f} % of the"
+            told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
+            outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
+    factors = [trial.integral / max(trial.share, 1e-30) for trial in own]
+    outcome.tried = len(own)
+    outcome.remark = _constant(factors) if len(outcome.faults) == len(own) > 1 else ""
+    return f"Its integral agrees with the samples drawn to {largest:.1g}."
 
 
-def weight(run: Run) -> Findings:
+@of_parts
+def weight(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that the weight that ``sample`` returns is ``eval``/``pdf`` of the direction drawn, and the density that it
     says is ``pdf``: to float32's rounding, for all but one sample in a thousand, and for all of them within a tenth."""
-    for part in run.probe.parts:
-        outcome, tolerance, worst = Outcome("weight", part.name), 3 * run.rounding(part), 0.0
-        factors: list[float] = []
-        for incident in run.views(part):
-            samples = run.samples(part, incident)
-            lit = samples.lit
-            if not lit.any():
-                continue  # black, or found by the check of the density's integral
-            weight, value, pdf, density = samples.weight, samples.value, samples.pdf, samples.density
-            with np.errstate(invalid="ignore", divide="ignore"):
-                quotient = value / pdf[:, None]
-                reflected = weight * pdf[:, None]
-                scale = np.maximum(np.maximum(abs(value), abs(reflected)).max(axis=1), 1e-6 * np.maximum(pdf, 1e-6))
-                off = abs(reflected - value).max(axis=1) / scale
-                wide = abs(density - pdf) / np.maximum(np.maximum(density, pdf), 1e-9)
-                factors += list(np.quantile(np.nan_to_num(luminance(reflected) / luminance(value))[lit], (0.01, 0.99)))
-            for name, got, expected, why, error in (
-                ("a sample's weight", weight, quotient, "is eval/pdf", off),
-                ("the density that sample says", density, pdf, "is pdf", wide),
-            ):
-                error = np.where(lit, np.where(np.isnan(error), np.inf, error), 0)
-                typical, largest = np.quantile(error[lit], 0.999), error.max()
-                worst = max(worst, typical)
-                if not (typical <= tolerance and largest <= max(0.1, 30 * tolerance)):
-                    # Of those that are off by much, name the one that carries most light.
-                    carried = np.where(
-                        error >= 0.5 * largest, 1 + np.nan_to_num(abs(got.reshape(len(got), -1)).max(1)), 0
-                    )
-                    outcome.wrong(carried, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
-        if outcome.faults and run.angles:
-            run.trials(part)  # whose pictures show where
-        remark = _constant(factors) if outcome.faults else ""
-        yield outcome.finding(f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}.", remark)
+    tolerance, worst = 3 * run.rounding(part), 0.0
+    factors: list[float] = []
+    for incident in run.views(part):
+        samples = run.samples(part, incident)
+        lit = samples.lit
+        if not lit.any():
+            continue  # black, or found by the check of the density's integral
+        weight, value, pdf, density = samples.weight, samples.value, samples.pdf, samples.density
+        with np.errstate(invalid="ignore", divide="ignore"):
+            quotient = value / pdf[:, None]
+            reflected = weight * pdf[:, None]
+            scale = np.maximum(np.maximum(abs(value), abs(reflected)).max(axis=1), 1e-6 * np.maximum(pdf, 1e-6))
+            off = abs(reflected - value).max(axis=1) / scale
+            wide = abs(density - pdf) / np.maximum(np.maximum(density, pdf), 1e-9)
+            factors += list(np.quantile(np.nan_to_num(luminance(reflected) / luminance(value))[lit], (0.01, 0.99)))
+        for name, got, expected, why, error in (
+            ("a sample's weight", weight, quotient, "is eval/pdf", off),
+            ("the density that sample says", density, pdf, "is pdf", wide),
+        ):
+            error = np.where(lit, np.where(np.isnan(error), np.inf, error), 0)
+            typical, largest = np.quantile(error[lit], 0.999), error.max()
+            worst = max(worst, typical)
+            if not (typical <= tolerance and largest <= max(0.1, 30 * tolerance)):
+                # Of those that are off by much, name the one that carries most light.
+                carried = np.where(error >= 0.5 * largest, 1 + np.nan_to_num(abs(got.reshape(len(got), -1)).max(1)), 0)
+                outcome.wrong(carried, name, got, why, incident.wi, samples.wo, expected=expected, seed=SEED)
+    if outcome.faults and run.angles:
+        run.trials(part)  # whose pictures show where
+    outcome.remark = _constant(factors) if outcome.faults else ""
+    return f"Weights are eval/pdf to {worst:.1g}, within {tolerance:.1g}."
 
 
 def _constant(factors: Sequence[float]) -> str:

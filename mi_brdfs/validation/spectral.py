@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -11,11 +11,11 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
 from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned
-from ..probe.bsdf import BSDFProbe, Value, load
+from ..probe.bsdf import BSDFProbe, Part, Value, load
 from ..probe.directions import hemisphere, on_side
 from . import sampling, values
-from .outcome import Findings, Outcome, Skipped, relative, told
-from .run import Run
+from .outcome import Outcome, Skipped, relative, skipping, told
+from .run import Run, of_whole
 from .updates import loaded_or_none
 
 COUNT = 1000
@@ -30,7 +30,8 @@ HUE = 1, 0.7, 0.45
 """The channels of a colour, as parts of the grey in its place."""
 
 
-def colours(run: Run) -> Findings:
+@of_whole
+def colours(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that no channels of colour are exchanged: with colours for parameters that are grey or coloured, each
     channel of ``eval``, and of the weights of delta functions, is what it is where all parameters are grey of their
     value in this channel, or at least nearer to that than to what another channel makes: a tint may depend on the
@@ -38,12 +39,12 @@ def colours(run: Run) -> Findings:
     greys = _greys(run.probe, run.described("To give it other colours"))
     if not greys:
         raise Skipped("It has no colours.")
-    outcome = Outcome("colours", "whole")
     _check_channels(run, outcome, greys)
-    yield outcome.finding("Each channel follows its own.")
+    return "Each channel follows its own."
 
 
-def spectral(run: Run) -> Findings:
+@of_whole
+def spectral(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that what is grey is the same in rgb and in spectral variants, to 0.5 %, at all visible wavelengths: all
     rgb colours become grey ones, as bright as they are. Those of plugins of ours are also tried brighter than 1, where
     they may be; Mitsuba's own plugins limit them to 1 in spectral variants.
@@ -52,7 +53,7 @@ def spectral(run: Run) -> Findings:
     and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
     colours have there, and not that of another wavelength, be it one beside it; their order does not matter. For this
     the BSDF must be given as a dict."""
-    part, described = run.probe.whole, run.described("To load it in two variants")
+    described = run.described("To load it in two variants")
     rgb, other = (f"{mi.variant().rpartition('_')[0]}_{kind}" for kind in ("rgb", "spectral"))
     if mi.variant() not in (rgb, other) or not {rgb, other} <= set(mi.variants()):
         raise Skipped(f"It takes the variants {rgb} and {other}.")
@@ -73,35 +74,29 @@ def spectral(run: Run) -> Findings:
         spread = [relative(it.value.min(axis=1), it.value.max(axis=1), 1e-12).max() for it in expected[""]]
         if max(spread) > 1e-4:
             tried = {}  # it has colours that cannot be replaced, of which spectral variants make other ones
-    outcome, worst = Outcome("spectral", part.name), 0.0
-    with mi.variant_context(other):
-        try:
-            with unwrapped_ctrl_c():
-                got = {words: _load(given).values(wi, wo) for words, given in tried.items()}
-                coloured = _load(described | _coloured(greys))
-                every = replace(run, probe=coloured, angles=(), given=None)
-                # Few tests, but judged as strictly as those of this run: they are as many more.
-                one = replace(
-                    run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, given=None, significance=run.level
-                )
-                failed = {
-                    check: [it for it in check(again) if it.verdict == "fail"]
-                    for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
-                    for check in checks
-                }
-                _check_channels(run, outcome, greys)
-        except Exception as failure:
-            raise Skipped(f"It does not work in {other}: {told(failure)}.") from None
+    worst = 0.0
+    with mi.variant_context(other), skipping(f"It does not work in {other}: "):
+        got = {words: _load(given).values(wi, wo) for words, given in tried.items()}
+        coloured = _load(described | _coloured(greys))
+        every = replace(run, probe=coloured, angles=(), given=None)
+        # Few tests, but judged as strictly as those of this run: they are as many more.
+        one = replace(every, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, significance=run.level)
+        failed = {
+            check: [it for it in check(again) if it.verdict == "fail"]
+            for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
+            for check in checks
+        }
+        _check_channels(run, outcome, greys)
     for check, findings in failed.items():
         if findings and all(finding.verdict != "fail" for finding in check(run)):
             outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
     for words in tried:
         for it, in_rgb in zip(got[words], expected[words], strict=True):
             wanted = np.broadcast_to(in_rgb.value.mean(axis=1, keepdims=True), it.value.shape)
-            places, name = Places(wi, it.wo, hero_wavelengths(COUNT)), f"in {other}, in grey{words}, {it.name}"
-            worst = max(worst, _compare(outcome, name, it.value, wanted, f"in {rgb}", places))
+            name, places = f"in {other}, in grey{words}, {it.name}", (wi, it.wo, hero_wavelengths(COUNT))
+            worst = max(worst, _compare(outcome, name, it.value, wanted, f"in {rgb}", *places))
     grey = f"Grey is the same in {rgb} and {other}, to {worst:.1g}. " if tried else ""
-    yield outcome.finding(f"{without}{grey}Wavelengths follow their own.")
+    return f"{without}{grey}Wavelengths follow their own."
 
 
 def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None:
@@ -130,15 +125,15 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     rolled, bound = evaluated(coloured, np.roll(wavelengths, 1, axis=1)), evaluated(held(), wavelengths)
     alone = [evaluated(coloured, alike[k]) for k in channels]
     for at, (name, wo, value) in enumerate(got):
-        places, usual = Places(wi, wo, wavelengths), np.roll(rolled[at].value, -1, axis=1)
+        places, usual = (wi, wo, wavelengths), np.roll(rolled[at].value, -1, axis=1)
         why = "in the first: it takes another's value"
-        _compare(outcome, f"in another order of the wavelengths {name}", usual, value, why, places)
+        _compare(outcome, f"in another order of the wavelengths {name}", usual, value, why, *places)
         # Asked at any wavelengths, these textures have the values of the light's, also to make a tint of.
         why = "if all colours have their values of the light's wavelengths: they are looked up at others"
-        _compare(outcome, name, value, bound[at].value, why, places)
+        _compare(outcome, name, value, bound[at].value, why, *places)
         for k in channels:  # of four equal wavelengths no tint can depend on the others
             one, own = (each[k][at].value[:, k] for each in (alone, grey))
-            _compare(outcome, name, one, own, OWN, Places(wi, wo, wavelengths[:, k]))
+            _compare(outcome, name, one, own, OWN, wi, wo, wavelengths[:, k])
 
 
 def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -> None:
@@ -152,17 +147,10 @@ def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -
             outcome.wrong(abs(got - expected), name, got, why, wi, it.wo, expected=expected)
 
 
-class Places(NamedTuple):
-    """Where values are compared: pairs of directions, and the wavelengths of each."""
-
-    wi: Array
-    wo: Array
-    wavelengths: Array
-
-
-def _compare(outcome: Outcome, name: str, got: Array, expected: Array, why: str, places: Places) -> float:
+def _compare(
+    outcome: Outcome, name: str, got: Array, expected: Array, why: str, wi: Array, wo: Array, wavelengths: Array
+) -> float:
     """Add a fault if values differ; return by how much 99 in 100 do at most."""
-    wi, wo, wavelengths = places
     return outcome.differing(
         TOLERANCE, name, got, expected, why, wi, wo, floor=1e-6, but_for=0.01, wavelengths=wavelengths
     )

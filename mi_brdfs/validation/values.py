@@ -13,9 +13,8 @@ from ..probe.bsdf import Part
 from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED
-from .outcome import Findings, Outcome, relative
-from .report import Finding
-from .run import SEED, Run
+from .outcome import Outcome, Skipped, relative
+from .run import SEED, Run, of_parts
 
 
 def _pairs(part: Part) -> tuple[Array, Array]:
@@ -39,38 +38,37 @@ def _bad(values: Array, signed: bool = False) -> Array:
     return np.logical_not(good.reshape(len(values), -1).all(axis=1))
 
 
-def finite(run: Run) -> Findings:
+@of_parts
+def finite(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that values, densities and weights are finite and not negative: at normal incidence, at grazing and in the
     horizon, at the mirror direction, towards the light, and for samples with variates of 0 and just below 1. Channels
     of values and weights may be negative where the page of a model says so, of colours outside sRGB."""
     signed = any(model is not None and model.signed for model in run.probe.models)
-    for part in run.probe.parts:
-        outcome = Outcome("finite", part.name)
-        wi, wo = _pairs(part)
-        # Rounding may put a direction into the horizon.
-        flat = np.resize(np.array([[1, 0, 0], [-0.6, 0.8, 0]], np.float32), wi.shape)
-        wi, wo = np.concatenate([wi, flat]), np.concatenate([wo, wo])
-        for name, values in (("eval", run.probe.eval(part, wi, wo)), ("pdf", run.probe.pdf(part, wi, wo))):
-            bad = _bad(values, signed and name == "eval")
-            why = f"and {bad.mean():.1%} of the pairs tried are negative or not finite"
-            outcome.wrong(bad, name, values, why, wi, wo)
-        corners = np.array([0, 2**-24, 0.5, 1 - 2**-24], np.float32)
-        u = np.stack(np.meshgrid(corners, corners, corners), axis=-1).reshape(-1, 3)
-        u = np.concatenate([u, random(2000, 4)])
-        for side in part.sides:
-            for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
-                w = on_side(direction(theta, 30), side)
-                samples = run.probe.sample(part, w, u)
-                length = np.linalg.norm(samples.wo.astype(np.float64), axis=1)
-                bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(abs(length - 1) < 1e-3))
-                if bad.any():
-                    k = int(np.argmax(bad))
-                    energy = f"the weight {_shown(samples.weight[k])}, the density {samples.density[k]:.4g}"
-                    way = f"the direction {samples.wo[k].tolist()}, of length {length[k]:.4g}"
-                    told = f"for light from {theta:g}° a sample has {energy} and {way}"
-                    outcome.fault(f"{told}, for the variates {u[k].tolist()}", bad.sum(), wi=w)
-        remark = "Channels may be negative, as its page says." if signed else ""
-        yield outcome.finding(f"{len(wi)} pairs of directions, down to the horizon.", remark)
+    wi, wo = _pairs(part)
+    # Rounding may put a direction into the horizon.
+    flat = np.resize(np.array([[1, 0, 0], [-0.6, 0.8, 0]], np.float32), wi.shape)
+    wi, wo = np.concatenate([wi, flat]), np.concatenate([wo, wo])
+    for name, values in (("eval", run.probe.eval(part, wi, wo)), ("pdf", run.probe.pdf(part, wi, wo))):
+        bad = _bad(values, signed and name == "eval")
+        why = f"and {bad.mean():.1%} of the pairs tried are negative or not finite"
+        outcome.wrong(bad, name, values, why, wi, wo)
+    corners = np.array([0, 2**-24, 0.5, 1 - 2**-24], np.float32)
+    u = np.stack(np.meshgrid(corners, corners, corners), axis=-1).reshape(-1, 3)
+    u = np.concatenate([u, random(2000, 4)])
+    for side in part.sides:
+        for theta in (0, 1e-3, 30, 80, 89.9, 89.9999):
+            w = on_side(direction(theta, 30), side)
+            samples = run.probe.sample(part, w, u)
+            length = np.linalg.norm(samples.wo.astype(np.float64), axis=1)
+            bad = _bad(samples.weight, signed) | samples.lit & (_bad(samples.density) | ~(abs(length - 1) < 1e-3))
+            if bad.any():
+                k = int(np.argmax(bad))
+                energy = f"the weight {_shown(samples.weight[k])}, the density {samples.density[k]:.4g}"
+                way = f"the direction {samples.wo[k].tolist()}, of length {length[k]:.4g}"
+                told = f"for light from {theta:g}° a sample has {energy} and {way}"
+                outcome.fault(f"{told}, for the variates {u[k].tolist()}", bad.sum(), wi=w)
+    outcome.remark = "Channels may be negative, as its page says." if signed else ""
+    return f"{len(wi)} pairs of directions, down to the horizon."
 
 
 def _shown(values: Array) -> str:
@@ -79,34 +77,33 @@ def _shown(values: Array) -> str:
     return f"{next((v for v in values if not (np.isfinite(v) and v >= 0)), values[0]):.4g}"
 
 
-def horizon(run: Run) -> Findings:
+@of_parts
+def horizon(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that a component is zero on the side that its flags exclude, and so is its density; and it sends no samples
     there."""
     flags = mi.BSDFFlags
-    for part in run.probe.parts:
-        outcome = Outcome("horizon", part.name)
-        wi, wo = _pairs(part)
-        above = wi[:, 2] * wo[:, 2] > 0
-        for flag, where, words in ((flags.Reflection, above, "above"), (flags.Transmission, ~above, "below")):
-            if part.has(flag):
-                continue
-            why = f"{words} the horizon, where the flags allow nothing"
-            _check_dark(run, outcome, part, wi[where], wo[where], why)
-            for incident in run.views(part):
-                samples = run.samples(part, incident)
-                lost = samples.lit & ((samples.wo[:, 2] * incident.wi[..., 2] > 0) == (words == "above"))
-                told = f"{why}, as of {lost.mean():.2%} of the samples"
-                outcome.wrong(lost, "a sample's weight", samples.weight, told, incident.wi, samples.wo, seed=SEED)
-        for side, words in (1, "the front"), (-1, "behind"):
-            if side not in run.probe.whole.sides:
-                wi, wo = (on_side(hemisphere(4000, seed), side) for seed in (2, 3))
-                wo[::2, 2] *= -1
-                why = f"but its flags say that it cannot be seen from {words}"
-                _check_dark(run, outcome, part, wi, wo, why)
-                samples = run.probe.sample(part, wi, random(4000, 4))
-                weights = samples.weight * samples.smooth[:, None]
-                outcome.wrong(weights != 0, "a sample's weight", weights, why, wi, samples.wo, seed=4)
-        yield outcome.finding("Nothing on the sides that the flags exclude.")
+    wi, wo = _pairs(part)
+    above = wi[:, 2] * wo[:, 2] > 0
+    for flag, where, words in ((flags.Reflection, above, "above"), (flags.Transmission, ~above, "below")):
+        if part.has(flag):
+            continue
+        why = f"{words} the horizon, where the flags allow nothing"
+        _check_dark(run, outcome, part, wi[where], wo[where], why)
+        for incident in run.views(part):
+            samples = run.samples(part, incident)
+            lost = samples.lit & ((samples.wo[:, 2] * incident.wi[..., 2] > 0) == (words == "above"))
+            told = f"{why}, as of {lost.mean():.2%} of the samples"
+            outcome.wrong(lost, "a sample's weight", samples.weight, told, incident.wi, samples.wo, seed=SEED)
+    for side, words in (1, "the front"), (-1, "behind"):
+        if side not in run.probe.whole.sides:
+            wi, wo = (on_side(hemisphere(4000, seed), side) for seed in (2, 3))
+            wo[::2, 2] *= -1
+            why = f"but its flags say that it cannot be seen from {words}"
+            _check_dark(run, outcome, part, wi, wo, why)
+            samples = run.probe.sample(part, wi, random(4000, 4))
+            weights = samples.weight * samples.smooth[:, None]
+            outcome.wrong(weights != 0, "a sample's weight", weights, why, wi, samples.wo, seed=4)
+    return "Nothing on the sides that the flags exclude."
 
 
 def _check_dark(run: Run, outcome: Outcome, part: Part, wi: Array, wo: Array, why: str) -> None:
@@ -116,76 +113,72 @@ def _check_dark(run: Run, outcome: Outcome, part: Part, wi: Array, wo: Array, wh
     outcome.wrong(density != 0, "pdf", density, why, wi, wo)
 
 
-def support(run: Run) -> Findings:
+@of_parts
+def support(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that light can be sampled wherever there is some: pdf > 0 where eval > 0. Values below 1e-9 of the largest
     do not count."""
-    for part in run.probe.parts:
-        outcome, tried = Outcome("support", part.name), 0
-        for incident in run.views(part):
-            lanes = np.arange(SCATTERED) % 2 == 0
-            own = hemisphere(SCATTERED, 3)
-            own[:, 2] *= np.sign(incident.wi[..., 2])
-            wo = np.where(lanes[:, None], own, run.samples(part, incident).wo)
-            if part.has(mi.BSDFFlags.Transmission):
-                wo = np.concatenate([wo, on_side(wo, -1)])
-            wi = incident.at(np.arange(len(wo)) % SCATTERED)
-            value = np.nan_to_num(run.probe.eval(part, wi, wo).max(axis=1))
-            pdf = run.probe.pdf(part, wi, wo)
-            missed = np.where((value > 1e-9 * value.max()) & ~(pdf > 0), value, 0)
-            tried += len(wo)
-            outcome.wrong(missed, "eval", value, "but pdf is not above 0: this light is never sampled", wi, wo)
-        yield outcome.finding(f"pdf > 0 where eval > 0, in {tried} directions.")
+    tried = 0
+    for incident in run.views(part):
+        lanes = np.arange(SCATTERED) % 2 == 0
+        own = hemisphere(SCATTERED, 3)
+        own[:, 2] *= np.sign(incident.wi[..., 2])
+        wo = np.where(lanes[:, None], own, run.samples(part, incident).wo)
+        if part.has(mi.BSDFFlags.Transmission):
+            wo = np.concatenate([wo, on_side(wo, -1)])
+        wi = incident.at(np.arange(len(wo)) % SCATTERED)
+        value = np.nan_to_num(run.probe.eval(part, wi, wo).max(axis=1))
+        pdf = run.probe.pdf(part, wi, wo)
+        missed = np.where((value > 1e-9 * value.max()) & ~(pdf > 0), value, 0)
+        tried += len(wo)
+        outcome.wrong(missed, "eval", value, "but pdf is not above 0: this light is never sampled", wi, wo)
+    return f"pdf > 0 where eval > 0, in {tried} directions."
 
 
-def eval_pdf(run: Run) -> Findings:
+@of_parts
+def eval_pdf(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that ``eval_pdf`` says what ``eval`` and ``pdf`` say, and ``eval_pdf_sample`` what they and ``sample`` say,
     to float32's rounding: some plugins compute a shared term differently."""
-    for part in run.probe.parts:
-        outcome, tolerance, worst = Outcome("eval_pdf", part.name), run.rounding(part), 0.0
-        for incident in run.views(part):
-            lanes = np.arange(0, SCATTERED, 8)
-            wi, u = incident.at(lanes), random(len(lanes), 6)
-            samples = run.probe.sample(part, wi, u)
-            wo = np.where(np.arange(len(u))[:, None] % 2, samples.wo, hemisphere(len(u), 7)).astype(np.float32)
-            wo[::4, 2] *= -1  # where nothing is, the sample must still be drawn
-            value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
-            pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
-            drawn = samples.drawn
-            for name, of, got, expected, which in (
-                ("eval_pdf", "eval", pair[0], value, None),
-                ("eval_pdf", "pdf", pair[1], density, None),
-                ("eval_pdf_sample", "eval", triple[0], value, None),
-                ("eval_pdf_sample", "pdf", triple[1], density, None),
-                ("eval_pdf_sample", "sample's density", triple[3], samples.density, drawn),
-                ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, None),
-                ("eval_pdf_sample", "sample's direction", triple[2] + 2.0, samples.wo + 2.0, drawn),
-            ):
-                name = f"{of} of {name}"
-                error = outcome.differing(
-                    tolerance, name, got, expected, f"by {of}", wi, wo, where=which, seed=6, digits=6
-                )
-                worst = max(worst, error)
-        yield outcome.finding(f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}.")
+    tolerance, worst = run.rounding(part), 0.0
+    for incident in run.views(part):
+        lanes = np.arange(0, SCATTERED, 8)
+        wi, u = incident.at(lanes), random(len(lanes), 6)
+        samples = run.probe.sample(part, wi, u)
+        wo = np.where(np.arange(len(u))[:, None] % 2, samples.wo, hemisphere(len(u), 7)).astype(np.float32)
+        wo[::4, 2] *= -1  # where nothing is, the sample must still be drawn
+        value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
+        pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
+        drawn = samples.drawn
+        for name, of, got, expected, which in (
+            ("eval_pdf", "eval", pair[0], value, None),
+            ("eval_pdf", "pdf", pair[1], density, None),
+            ("eval_pdf_sample", "eval", triple[0], value, None),
+            ("eval_pdf_sample", "pdf", triple[1], density, None),
+            ("eval_pdf_sample", "sample's density", triple[3], samples.density, drawn),
+            ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, None),
+            ("eval_pdf_sample", "sample's direction", triple[2] + 2.0, samples.wo + 2.0, drawn),
+        ):
+            name = f"{of} of {name}"
+            error = outcome.differing(tolerance, name, got, expected, f"by {of}", wi, wo, where=which, seed=6, digits=6)
+            worst = max(worst, error)
+    return f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}."
 
 
-def reciprocity(run: Run) -> Findings:
+@of_parts
+def reciprocity(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that f(wi, wo) = f(wo, wi), unless the component is flagged NonSymmetric: at generic pairs, and at pairs
     that the sampler draws, where narrow lobes are."""
-    for part in run.probe.parts:
-        if part.has(mi.BSDFFlags.NonSymmetric) or not part.passages:
-            reason = "it is flagged NonSymmetric" if part.passages else "no light goes back"
-            yield Finding("reciprocity", part.name, "skip", f"Not checked, as {reason}.")
-            continue
-        outcome, tolerance, worst = Outcome("reciprocity", part.name), 10 * run.rounding(part), 0.0
-        for sides in part.passages:
-            wi, wo = run.probe.pairs(part, 8000, 8, sides)
-            forth = run.probe.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
-            back = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
-            error = outcome.differing(
-                tolerance, F, forth, back, "from there back", wi, wo, floor=1e-6, unknown=0, but_for=1e-3
-            )
-            worst = max(worst, error)
-        yield outcome.finding(f"f(wi, wo) = f(wo, wi) to {worst:.1g}, within {tolerance:.1g}.")
+    if part.has(mi.BSDFFlags.NonSymmetric) or not part.passages:
+        raise Skipped(f"Not checked, as {'it is flagged NonSymmetric' if part.passages else 'no light goes back'}.")
+    tolerance, worst = 10 * run.rounding(part), 0.0
+    for sides in part.passages:
+        wi, wo = run.probe.pairs(part, 8000, 8, sides)
+        forth = run.probe.eval(part, wi, wo) * abs(wi[:, 2:].astype(np.float64))
+        back = run.probe.eval(part, wo, wi) * abs(wo[:, 2:].astype(np.float64))
+        error = outcome.differing(
+            tolerance, F, forth, back, "from there back", wi, wo, floor=1e-6, unknown=0, but_for=1e-3
+        )
+        worst = max(worst, error)
+    return f"f(wi, wo) = f(wo, wi) to {worst:.1g}, within {tolerance:.1g}."
 
 
 F = "f, times both cosines,"
@@ -199,7 +192,8 @@ HALVINGS = 14
 """How often it halves a way on which values change, to see whether they jump there."""
 
 
-def continuity(run: Run) -> Findings:
+@of_parts
+def continuity(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that values do not jump where formulas treat directions apart: at exactly normal incidence and reflection,
     and where azimuths are measured from and start again. There eval is the mean of what it is 0.03° to both sides (or,
     of narrow lobes, a twentieth of their width), to float32's rounding and for all but one pair in a hundred; or it
@@ -207,22 +201,19 @@ def continuity(run: Run) -> Findings:
     measured data may jump between nodes, and are judged at grazing only). And as the height above the horizon halves,
     from 0.5° to 0.01°, eval does not change by more than a fifth power does, unless it does so before and after, too.
     """
-    for part in run.probe.parts:
-        outcome, worst, remarks = Outcome("continuity", part.name), 0.0, list[str]()
-        for side in part.sides:
-            if not run.probe.is_data:
-                jump, remark = _check_crossings(run, outcome, part, side)
-                worst, remarks = max(worst, jump), remarks + [remark] * bool(remark)
-            for phi in (0, 77):
-                _check_grazing(run, outcome, part, side, phi)
-        told = f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
-        yield outcome.finding(told, remarks[-1] if remarks else "")
+    worst = 0.0
+    for side in part.sides:
+        if not run.probe.is_data:
+            worst = max(worst, _check_crossings(run, outcome, part, side))
+        for phi in (0, 77):
+            _check_grazing(run, outcome, part, side, phi)
+    return f"No jumps at normal and grazing directions or where azimuths begin, but for {worst:.1g}."
 
 
-def _check_crossings(run: Run, outcome: Outcome, part: Part, side: int) -> tuple[float, str]:
-    """Check that values do not jump at normal incidence and where azimuths begin; return by how much they do, and what
-    to say of jumps that are no larger than at other directions."""
-    worst, remark, tolerance = 0.0, "", 10 * run.rounding(part)
+def _check_crossings(run: Run, outcome: Outcome, part: Part, side: int) -> float:
+    """Check that values do not jump at normal incidence and where azimuths begin, but for jumps that are no larger than
+    at other directions, of which it tells; return by how much they do."""
+    worst, tolerance = 0.0, 10 * run.rounding(part)
     elsewhere = cache(partial(_jump_elsewhere, run, part, side))
     for where, directions in _crossings(np.degrees(min(STEP, run.spread(part) / 20))):
         crossing = [on_side(w, side) for w in directions]
@@ -232,14 +223,14 @@ def _check_crossings(run: Run, outcome: Outcome, part: Part, side: int) -> tuple
             jump = np.where(abs(at - mean) > 0.5 * abs(at - farther), relative(mean, at, 1e-6, unknown=0), 0)
             typical = float(np.quantile(jump, 0.99))
             if tolerance < typical <= elsewhere():
-                remark = f"At other directions it jumps, too, by {elsewhere():.1g}."
+                outcome.remark = f"At other directions it jumps, too, by {elsewhere():.1g}."
                 continue
             worst = max(worst, typical)
             if typical > tolerance:
                 wi, wo = (crossing[0], others)[:: 1 if word == "from" else -1]
                 name = f"eval jumps at light {word} {where}: it"
                 outcome.wrong(jump, name, at, "around that", wi, wo, expected=mean)
-    return worst, remark
+    return worst
 
 
 def _jump_elsewhere(run: Run, part: Part, side: int) -> float:
