@@ -27,6 +27,7 @@ from mi_brdfs.plot.command import write as write_figure
 from mi_brdfs.rendering.output import write
 from mi_brdfs.sweep import Sweep, plan, store
 
+PAINT = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
 FITTED = "--model", "lambert", "--starts", "1"
 
 
@@ -98,44 +99,37 @@ LONG = "long" * 75
 """More letters than a file system takes."""
 
 
+def ended(*words, **options):
+    """How a command ends in a process, and what it says."""
+    done = subprocess.run(command(*words), stderr=subprocess.PIPE, text=True, **options)
+    return done.returncode, done.stderr
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
-def test_a_full_disk_behind_the_standard_output_gets_a_sentence():
+def test_a_full_disk_behind_the_standard_output_gets_a_sentence(tmp_path):
+    """And files are written."""
+    target = tmp_path / "x.xml"
     with open("/dev/full", "w") as full:
-        done = subprocess.run(command("--version"), stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 1
-    assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
+        for words in ("--version",), ("fit", PAINT, *FITTED, "-o", target):
+            told = "mi-brdfs: cannot write to the standard output: No space left on device\n"
+            assert ended(*words, stdout=full) == (1, told)
+    assert target.is_file()
     assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
-
-
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
-def test_files_are_written_also_if_the_standard_output_is_full(tmp_path):
-    source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.xml"
-    arguments = command("fit", source, "--model", "lambert", "--starts", "1", "-o", target)
-    with open("/dev/full", "w") as full:
-        done = subprocess.run(arguments, stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 1 and target.is_file()
-    assert done.stderr == "mi-brdfs: cannot write to the standard output: No space left on device\n"
 
 
 def test_files_are_written_also_if_nobody_reads_on(tmp_path):
     """As behind ``head``, which ends after some lines."""
-    source, target = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf", tmp_path / "x.json"
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(
-        command("measured", source, "--json", target), stdout=writing, stderr=subprocess.PIPE, text=True
-    )
+    assert ended("measured", PAINT, "--json", tmp_path / "x.json", stdout=writing) == (0, "")
     os.close(writing)
-    assert (done.returncode, done.stderr) == (0, "") and target.is_file()
+    assert (tmp_path / "x.json").is_file()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")
 def test_a_working_folder_that_is_gone_gets_a_sentence(tmp_path):
-    done = subprocess.run(
-        command("--version"), cwd=tmp_path, preexec_fn=tmp_path.rmdir, stderr=subprocess.PIPE, text=True
-    )
-    assert done.returncode == 1
-    assert done.stderr == "mi-brdfs: the working folder is gone; change to one that is there\n"
+    told = "mi-brdfs: the working folder is gone; change to one that is there\n"
+    assert ended("--version", cwd=tmp_path, preexec_fn=tmp_path.rmdir) == (1, told)
 
 
 def test_letters_that_the_output_cannot_have_are_replaced():
