@@ -81,7 +81,7 @@ def explore(
     varied = _varied(vary or [])
     chosen = set_tracing_variant(variant, "_rgb")
 
-    from ..explorer.server import PortError, listening, serve
+    from ..explorer.server import listening, serve
     from ..explorer.stages import MESHES, UserScene
     from ..measured import read
     from ..measured.report.counts import in_one_plane
@@ -111,7 +111,7 @@ def explore(
         return
     if not host:
         fail("--host: name an address of this machine, or 0.0.0.0 for all of them", Exit.USAGE)
-    with failing(Exit.USAGE, PortError):
+    with failing(Exit.USAGE, ValueError):
         on = listening(host, port)
 
     def ready(address: str) -> None:
