@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import reference as ref
 from fits import MODELS, measured, pairs
-from support import ROOT, interaction, numbers, shared
+from support import LOFT, interaction, numbers, shared
 
 import mi_brdfs
 from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
@@ -24,7 +24,6 @@ from mi_brdfs.parameters import Reflectance, Rotation
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
-LOFT = ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf"
 WARD = MODELS["ward"].drawn(1)
 
 

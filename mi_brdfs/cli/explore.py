@@ -73,7 +73,9 @@ def explore(
     except ImportError:
         fail('this needs the extra of this name: pip install "mi_brdfs[explore]"')
     given = parameters_of(parameters)
-    for option, path in (("environment", environment), ("mesh", mesh)):
+    file, _, material = (scene or "").partition(".xml:")
+    room = Path(f"{file}.xml" if material else file) if scene else None
+    for option, path in (("scene", room), ("environment", environment), ("mesh", mesh)):
         if path and not path.is_file():
             fail(f"--{option} {path}: no such file", Exit.USAGE)
     if vary and not export:
@@ -88,10 +90,7 @@ def explore(
     from ..parameters.messages import brief
     from ..probe.sources import is_measured
 
-    file, _, material = (scene or "").partition(".xml:")
-    user = UserScene(Path(f"{file}.xml" if material else file) if scene else None, material or None)
-    if user.scene and not user.scene.is_file():
-        fail(f"--scene {user.scene}: no such file", Exit.USAGE)
+    user = UserScene(room, material or None)
     sources, subjects = _subjects(targets or ["walter"], given)
     if labels:
         if (names := labels.count(",") + 1) != len(subjects):
