@@ -349,19 +349,15 @@ def test_an_interrupt_leaves_the_scene_as_it_was():
     assert scene.sensors()[0].sampler().sample_count() == 4
 
 
-def test_files(tmp_path):
-    """Linear values from an EXR, and those behind sRGB from a PNG."""
+def test_a_file_of_linear_values(tmp_path):
     bsdf = {"type": "lambert", "reflectance": rgb(0.6, 0.3, 0.1)}
-    bitmap = mi.Bitmap(picture_of(scene_of(bsdf)).astype(np.float32))
-    bitmap.write(str(tmp_path / "picture.exr"))
-    mi.util.write_bitmap(str(tmp_path / "picture.png"), bitmap)
-    for name, precision in {"picture.exr": 0.01, "picture.png": 0.02}.items():
-        found = images(scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}), tmp_path / name)
-        assert values(found)["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=precision)
+    mi.Bitmap(picture_of(scene_of(bsdf)).astype(np.float32)).write(str(tmp_path / "picture.exr"))
+    found = images(scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}), tmp_path / "picture.exr")
+    assert values(found)["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=0.01)
 
 
 def test_pixels_that_were_clipped_do_not_count(tmp_path):
-    """A lamp so strong that a part of the picture is white in 8 bits."""
+    """A lamp so strong that a part of the picture is white in 8 bits of sRGB; the others have the values behind it."""
     lamp = lamps(key=([-1, 2, 5], 250.0))
     bsdf = {"type": "lambert", "reflectance": rgb(0.6, 0.3, 0.1)}
     picture = mi.Bitmap(picture_of(scene_of(bsdf, lights=lamp)).astype(np.float32))
