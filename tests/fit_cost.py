@@ -1,11 +1,10 @@
 """What fits cost: CPU time by directions and materials, and memory over repeated fits.
 
-python tests/fit_cost.py steps | fits | memory
+python tests/fit_cost.py steps | memory
 
-``steps`` measures one evaluation with its Jacobian and normal equations, which is what fits consist of, and ``fits``
-whole fits, both over more than a decade of directions and of materials, kernels warm, in alternating rounds: each
-figure is the median of the CPU time on one thread, which other processes hardly change. ``memory`` repeats fits of
-several models.
+``steps`` measures one evaluation with its Jacobian and normal equations, which is what fits consist of, over more than
+a decade of directions and of materials, kernels warm, in alternating rounds: each figure is the median of the CPU time
+on one thread, which other processes hardly change. ``memory`` repeats fits of several models.
 """
 
 from __future__ import annotations
@@ -53,12 +52,12 @@ def problem(model: str, directions: int, materials: int) -> Problem:
     return Problem(configuration.isotropic(), own, METRICS["log"])
 
 
-def medians(calls: dict[str, Callable[[], object]], rounds: int = ROUNDS) -> dict[str, float]:
+def medians(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
     """Return the median CPU time of each call in seconds; each is made once before, and then once a round."""
     times: dict[str, list[float]] = {name: [] for name in calls}
     for call in calls.values():
         call()
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         for name, call in calls.items():
             start = time.process_time()
             call()
@@ -73,17 +72,16 @@ def line(sizes: Iterable[float], seconds: Iterable[float]) -> tuple[float, float
     return float(fixed), float(slope), float(np.abs((fixed + slope * x) / y - 1).max())
 
 
-def report(what: str, found: dict[int, float]) -> float:
-    """Print times by size with the line through them, and return the largest deviation from it."""
+def report(what: str, found: dict[int, float]) -> None:
+    """Print times by size with the line through them, and the largest deviation from it."""
     fixed, slope, deviation = line(found, found.values())
     cells = ", ".join(f"{size}: {seconds * 1e3:.1f}" for size, seconds in found.items())
     formula = f"{fixed * 1e3:.1f} ms + {slope * 1e6:.3g} µs each, within {deviation:.0%}"
     print(f"{what}  {cells} ms; about {formula}", flush=True)
-    return deviation
 
 
-def steps(model: str = "walter") -> float:
-    """One step of fits of a model; return the largest deviation from a line."""
+def steps(model: str = "walter") -> None:
+    """One step of fits of a model."""
     calls, point = {}, None
     for directions, materials in [*((n, 3) for n in DIRECTIONS), *((1000, m) for m in MATERIALS)]:
         it = problem(model, directions, materials)
@@ -93,24 +91,8 @@ def steps(model: str = "walter") -> float:
         calls[f"{directions} {materials}"] = lambda it=it, points=points: it.sums(range(len(points)), points)
     found = medians(calls)
     print(f"One step of {model}, three channels, {len(point)} unknowns:")
-    return max(
-        report("  by directions, of 3 materials: ", {n: found[f"{n} 3"] for n in DIRECTIONS}),
-        report("  by materials, of 1000 directions:", {m: found[f"1000 {m}"] for m in MATERIALS}),
-    )
-
-
-def fits(model: str = "ward", starts: int = 4, rounds: int = 3) -> float:
-    """Whole fits: the choice of starts is a fixed part for each material, as it looks at the same number of pairs."""
-    by_directions = {n: [material(model, n, seed) for seed in range(3)] for n in DIRECTIONS}
-    by_materials = {m: [material(model, 1000, seed) for seed in range(m)] for m in MATERIALS}
-    calls = {f"n {n}": lambda it=it: fit(it, model, starts=starts) for n, it in by_directions.items()}
-    calls |= {f"m {m}": lambda own=own: fit(own, model, starts=starts) for m, own in by_materials.items()}
-    found = medians(calls, rounds)
-    print(f"Whole fits of {model}, three channels, {starts} starts:")
-    return max(
-        report("  by directions, of 3 materials:   ", {n: found[f"n {n}"] for n in DIRECTIONS}),
-        report("  by materials, of 1000 directions:", {m: found[f"m {m}"] for m in MATERIALS}),
-    )
+    report("  by directions, of 3 materials:   ", {n: found[f"{n} 3"] for n in DIRECTIONS})
+    report("  by materials, of 1000 directions:", {m: found[f"1000 {m}"] for m in MATERIALS})
 
 
 def resident() -> float:
@@ -136,12 +118,12 @@ def memory(models: Iterable[str] = REPEATED, repeats: int = REPEATS) -> list[tup
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["steps", "fits", "memory"])
+    parser.add_argument("what", choices=["steps", "memory"])
     what = parser.parse_args().what
     mi.set_variant("llvm_ad_rgb")
-    if what != "memory":
+    if what == "steps":
         dr.set_thread_count(1)  # threads that wait for work take CPU time
-    {"steps": steps, "fits": fits, "memory": memory}[what]()
+    {"steps": steps, "memory": memory}[what]()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import time
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import ROOT
+from support import LOFT, ROOT
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -308,7 +308,6 @@ def interrupted_in_a_kernel(*_, **__):
     raise RuntimeError("dr.while_loop(): …") from KeyboardInterrupt()
 
 
-MEASURED = str(ROOT / "scenes" / "measured" / "AnoBlackEC1onAlum.bsdf")
 RESUMED = "Interrupted; 0 of 1 fits are finished: the same command goes on from there."
 
 
@@ -321,15 +320,15 @@ RESUMED = "Interrupted; 0 of 1 fits are finished: the same command goes on from 
         ("mi_brdfs.probe.sources.find_sources", ["show", "lambert"], NOTHING),
         ("mi_brdfs.probe.sources.find_sources", ["check", "lambert"], NOTHING),
         ("mi_brdfs.bench.comparison.compare", ["bench", "lambert"], NOTHING),
-        ("mi_brdfs.measured.convert", ["convert", MEASURED, "it.csv"], NOTHING),
+        ("mi_brdfs.measured.convert", ["convert", LOFT, "it.csv"], NOTHING),
         ("mi_brdfs.probe.largest_albedo.default_albedo", ["energy", "lambert"], NOTHING),
         ("mi_brdfs.gallery.gallery", ["gallery"], "Interrupted; nothing is finished, nothing was written."),
         ("mi_brdfs.explorer.materials.Materials.loaded", ["explore", "lambert"], NOTHING),
         ("mi_brdfs.explorer.server.serve", ["explore", "lambert", "--port", "0"], "Ended."),
         ("mi_brdfs.explorer.export.page", ["explore", "lambert", "--export", "it.html"], NOTHING),
-        ("mi_brdfs.sweep.plan.checked", ["sweep", MEASURED], NOTHING),
-        ("mi_brdfs.sweep.plan.observe", ["sweep", MEASURED, "--model", "ward", "--workers", "0"], RESUMED),
-        ("mi_brdfs.sweep.plan.fit", ["sweep", MEASURED, "--model", "ward", "--workers", "0"], RESUMED),
+        ("mi_brdfs.sweep.plan.checked", ["sweep", LOFT], NOTHING),
+        ("mi_brdfs.sweep.plan.observe", ["sweep", LOFT, "--model", "ward", "--workers", "0"], RESUMED),
+        ("mi_brdfs.sweep.plan.fit", ["sweep", LOFT, "--model", "ward", "--workers", "0"], RESUMED),
     ],
 )
 def test_ctrl_c_that_a_kernel_wraps_is_no_error(where, arguments, sentence, folder, monkeypatch):

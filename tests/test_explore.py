@@ -488,16 +488,20 @@ def test_fits_wait_for_edits_go_on_and_are_cancelled(with_file, monkeypatch):
     assert not [it for it in with_file.work() if "bsdf" in it]
 
 
+def shades_show(scene, material=None):
+    """The client of a scene whose pictures show what its material is replaced by."""
+    client, shown = Client(UserScene(scene, material)), {"views": ["picture"], "shape": "scene", "size": 32}
+    dark, bright = (of(client.show({"type": "lambert", "reflectance": it}, **shown), "picture") for it in (0.1, 0.9))
+    assert dark[0]["payload"] != bright[0]["payload"]
+    return client
+
+
 def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     scene = ROOT / "scenes" / "cornell_box.xml"
-    client = Client(UserScene(scene))
-    shown = {"views": ["picture"], "shape": "scene", "size": 64}
-    pictures = [of(client.show({"type": "lambert", "reflectance": it}, **shown), "picture")[0] for it in (0.1, 0.9)]
-    assert pictures[0]["payload"] != pictures[1]["payload"]
+    client = shades_show(scene)
     (film,) = [it.film() for it in client.session._pictures[0][1].stage.scene.sensors()]
     assert film.rfilter().is_box_filter()  # as the denoiser expects
-    client = Client(UserScene(scene, "ward"))  # the id of a shape
-    client.show({"type": "lambert"}, **shown)
+    client = shades_show(scene, "ward")  # the id of a shape
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]
 
 
@@ -505,19 +509,25 @@ TWINS = """<scene version="3.0.0"><integrator type="path"/><sensor type="perspec
 <bsdf id="one" type="diffuse"/><bsdf id="other" type="diffuse"/>
 <shape id="left" type="cube"><ref id="one"/></shape><shape id="right" type="cube"><ref id="one"/></shape>
 <shape id="above" type="cube"><ref id="other"/></shape></scene>"""
+GREY, BLACK = (BSDFSource(it, it, it) for it in ("lambert", "ward"))
+
+
+@pytest.fixture
+def twins(llvm_rgb, tmp_path):
+    path = tmp_path / "twins.xml"
+    path.write_text(TWINS)
+    return path
 
 
 @pytest.mark.parametrize(
     ("id", "shapes"), [("one", ["left", "right"]), ("other", ["above"]), ("left", ["left"]), ("right", ["right"])]
 )
-def test_materials_that_are_alike_are_not_one(llvm_rgb, tmp_path, id, shapes):
+def test_materials_that_are_alike_are_not_one(twins, id, shapes):
     """Mitsuba makes one of those, and of meshes that share one, and forgets the names of the rest."""
-    path = tmp_path / "twins.xml"
-    path.write_text(TWINS)
-    client = Client(UserScene(path, id))
+    client = Client(UserScene(twins, id))
     client.show({"type": "lambert"}, views=["picture"], shape="scene", size=32)
     assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == shapes
-    scene = SceneFile(str(path), replaced={id: BSDFSource("lambert", "lambert", "lambert")}).load()
+    scene = SceneFile(str(twins), replaced={id: GREY}).load()
     assert [it.id() for it in scene.shapes() if it.bsdf().class_name() != "SmoothDiffuse"] == shapes
 
 
@@ -544,21 +554,16 @@ def test_materials_that_instances_show(llvm_rgb, tmp_path):
     (found,) = find_sources(str(path))
     assert found.name == "group.xml:paint"
     path.write_text(GROUP.replace("mute", "diffuse"))
-    client = Client(UserScene(path, "paint"))
-    shown = {"views": ["picture"], "shape": "scene", "size": 32}
-    pictures = [of(client.show({"type": "lambert", "reflectance": it}, **shown), "picture")[0] for it in (0.1, 0.9)]
-    assert pictures[0]["payload"] != pictures[1]["payload"]
+    shades_show(path, "paint")
 
 
-def test_each_material_of_a_scene_is_its_own(llvm_rgb, tmp_path):
-    path = tmp_path / "twins.xml"
+def test_each_material_of_a_scene_is_its_own(twins):
     unused = '<bsdf id="unused" type="twosided"><bsdf id="inside" type="diffuse"/></bsdf><shape'
-    path.write_text(TWINS.replace("<shape", unused, 1))
-    assert [it.name for it in find_sources(str(path))] == ["twins.xml:one", "twins.xml:other"]
-    grey = BSDFSource("lambert", "lambert", "lambert")
+    twins.write_text(TWINS.replace("<shape", unused, 1))
+    assert [it.name for it in find_sources(str(twins))] == ["twins.xml:one", "twins.xml:other"]
     for id in ("unused", "inside"):
         with pytest.raises(ValueError, match=f"nothing in the scene has the BSDF {id}"):
-            SceneFile(str(path), replaced={id: grey}).load()
+            SceneFile(str(twins), replaced={id: GREY}).load()
 
 
 TWISTED = """<scene version="3.0.0"><integrator type="direct"/><emitter type="constant"/>
@@ -597,13 +602,9 @@ def test_pictures_replacements_and_copies_are_the_same(llvm_rgb, tmp_path, word,
         np.testing.assert_allclose(it, pictures[0], rtol=1e-5)
 
 
-def test_a_material_and_a_shape_that_has_it_are_both_replaced(llvm_rgb, tmp_path):
-    path = tmp_path / "twins.xml"
-    path.write_text(TWINS)
-    grey = BSDFSource("lambert", "lambert", "lambert")
-    black = BSDFSource("ward", "ward", "ward")
-    for replaced in ({"one": grey, "left": black}, {"left": black, "right": black, "one": grey}):
-        scene = SceneFile(str(path), replaced=replaced).load()
+def test_a_material_and_a_shape_that_has_it_are_both_replaced(twins):
+    for replaced in ({"one": GREY, "left": BLACK}, {"left": BLACK, "right": BLACK, "one": GREY}):
+        scene = SceneFile(str(twins), replaced=replaced).load()
         right = "Ward" if "right" in replaced else "Lambert"
         assert [type(it.bsdf()).__name__ for it in scene.shapes()] == ["Ward", right, "BSDF"]
 

@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from support import LOFT
+from support import LOFT, ROOT
 from test_cli import SCENE, command, invoke
 
 import mi_brdfs
@@ -27,11 +27,8 @@ from mi_brdfs.plot.command import write as write_figure
 from mi_brdfs.rendering.output import write
 from mi_brdfs.sweep import Sweep, plan, store
 
+PAINT = ROOT / "scenes" / "measured" / "aeroglaze_z307.bsdf"
 FITTED = "--model", "lambert", "--starts", "1"
-
-
-def ended(*words, **options):
-    return subprocess.run(command(*words), stderr=subprocess.PIPE, text=True, **options)
 
 
 # --- Ends ------------------------------------------------------------------------------------------------------------
@@ -102,12 +99,21 @@ LONG = "long" * 75
 """More letters than a file system takes."""
 
 
+def ended(*words, **options):
+    """How a command ends in a process, and what it says."""
+    done = subprocess.run(command(*words), stderr=subprocess.PIPE, text=True, **options)
+    return done.returncode, done.stderr
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
-def test_a_full_disk_behind_the_standard_output_gets_a_sentence_and_files_are_written(tmp_path):
+def test_a_full_disk_behind_the_standard_output_gets_a_sentence(tmp_path):
+    """And files are written."""
+    target = tmp_path / "x.xml"
     with open("/dev/full", "w") as full:
-        done = ended("fit", LOFT, *FITTED, "-o", tmp_path / "x.xml", stdout=full)
-    sentence = "mi-brdfs: cannot write to the standard output: No space left on device\n"
-    assert (done.returncode, done.stderr) == (1, sentence) and (tmp_path / "x.xml").is_file()
+        for words in ("--version",), ("fit", PAINT, *FITTED, "-o", target):
+            told = "mi-brdfs: cannot write to the standard output: No space left on device\n"
+            assert ended(*words, stdout=full) == (1, told)
+    assert target.is_file()
     assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
 
 
@@ -115,21 +121,20 @@ def test_files_are_written_also_if_nobody_reads_on(tmp_path):
     """As behind ``head``, which ends after some lines."""
     reading, writing = os.pipe()
     os.close(reading)
-    done = ended("measured", LOFT, "--json", tmp_path / "x.json", stdout=writing)
+    assert ended("measured", PAINT, "--json", tmp_path / "x.json", stdout=writing) == (0, "")
     os.close(writing)
-    assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "x.json").is_file()
+    assert (tmp_path / "x.json").is_file()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows keeps a folder that a process works in")
 def test_a_working_folder_that_is_gone_gets_a_sentence(tmp_path):
-    done = ended("--version", cwd=tmp_path, preexec_fn=tmp_path.rmdir)
-    sentence = "mi-brdfs: the working folder is gone; change to one that is there\n"
-    assert (done.returncode, done.stderr) == (1, sentence)
+    told = "mi-brdfs: the working folder is gone; change to one that is there\n"
+    assert ended("--version", cwd=tmp_path, preexec_fn=tmp_path.rmdir) == (1, told)
 
 
 def test_letters_that_the_output_cannot_have_are_replaced():
-    done = ended("info", "ward", stdout=subprocess.PIPE, env=os.environ | {"PYTHONIOENCODING": "ascii"})
-    assert (done.returncode, done.stderr) == (0, "") and "?" in done.stdout
+    done = subprocess.run(command("info", "ward"), capture_output=True, env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, b"") and b"?" in done.stdout
 
 
 def swept(folder):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fits import MODELS, measured
 
-from mi_brdfs.fit import Fit, fit
+from mi_brdfs.fit import fit
 from mi_brdfs.mitsuba.registry import own_models
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -24,20 +24,17 @@ def test_every_model_is_tried():
     assert set(MODELS) == {model.plugins[0] for model in own_models()}
 
 
-def deviations(truth: dict[str, float], found: Fit) -> list[float]:
-    """Return how many of the stated standard deviations each parameter is off."""
-    return [(found.bsdf[name] - value) / found.sigma[name] for name, value in truth.items()]
-
-
 def noisy(name: str) -> list[list[float]]:
-    """Return the deviations of fits to materials at random, with noise, gaps and negatives that are of one model."""
+    """Return how many of the stated standard deviations each parameter is off, in fits to materials at random that are
+    of one model, with noise, gaps and negatives."""
     own = 1000 * (1 + list(MODELS).index(name))
     truths = [MODELS[name].drawn(own + k) for k in range(12)]
     data = [measured(name, truth, COUNT, own + k, noise=0.01) for k, truth in enumerate(truths)]
     fits = fit(data, name, given=MODELS[name].given, starts=2)
     assert np.mean([it.negative for it in fits]) > COUNT / 60 and np.mean([it.missing for it in fits]) > COUNT / 15
     assert np.median([it.held_out / it.errors["log"]["fitted"] for it in fits]) < 1.2
-    return [deviations(truth, it) for truth, it in zip(truths, fits, strict=True)]
+    pairs = zip(truths, fits, strict=True)
+    return [[(it.bsdf[key] - value) / it.sigma[key] for key, value in truth.items()] for truth, it in pairs]
 
 
 @pytest.mark.parametrize(

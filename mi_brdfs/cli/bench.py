@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Annotated
 
 from .app import command
 from .options import (
+    Json,
     Parameters,
     TracingVariant,
-    file_option,
     material_argument,
     parameters_of,
     set_tracing_variant,
@@ -24,9 +23,7 @@ from .terminal import Exit, err, failing, print_table, progress, stdout_to_stder
 def bench(
     targets: Annotated[list[str], material_argument("One or two.")],
     parameters: Parameters = None,
-    json_file: Annotated[
-        Path | None, file_option("--json", "Also write all figures to this file.", endings=[".json"])
-    ] = None,
+    json_file: Json = None,
     variant: TracingVariant = None,
 ) -> None:
     """Compare two BSDFs: the efficiency of their samplers, the time of calls and pictures, noise. One alone shows its

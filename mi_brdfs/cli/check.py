@@ -26,6 +26,7 @@ from ..validation import CHECKS
 from .app import command, imported
 from .options import (
     PAGES,
+    Json,
     Parameters,
     TracingVariant,
     file_option,
@@ -75,9 +76,7 @@ def check(
     html_file: Annotated[
         Path | None, file_option("--html", "Also write a page with pictures (extra report).", endings=PAGES)
     ] = None,
-    json_file: Annotated[
-        Path | None, file_option("--json", "Also write all findings to this file.", endings=[".json"])
-    ] = None,
+    json_file: Json = None,
     junit_file: Annotated[
         Path | None, file_option("--junit", "Also write all findings as JUnit's XML.", endings=[".xml"])
     ] = None,

@@ -73,7 +73,9 @@ def explore(
     except ImportError:
         fail('this needs the extra of this name: pip install "mi_brdfs[explore]"')
     given = parameters_of(parameters)
-    for option, path in (("environment", environment), ("mesh", mesh)):
+    file, _, material = (scene or "").partition(".xml:")
+    room = Path(f"{file}.xml" if material else file) if scene else None
+    for option, path in (("scene", room), ("environment", environment), ("mesh", mesh)):
         if path and not path.is_file():
             fail(f"--{option} {path}: no such file", Exit.USAGE)
     if vary and not export:
@@ -81,17 +83,14 @@ def explore(
     varied = _varied(vary or [])
     chosen = set_tracing_variant(variant, "_rgb")
 
-    from ..explorer.server import PortError, listening, serve
+    from ..explorer.server import listening, serve
     from ..explorer.stages import MESHES, UserScene
     from ..measured import read
     from ..measured.report.counts import in_one_plane
     from ..parameters.messages import brief
     from ..probe.sources import is_measured
 
-    file, _, material = (scene or "").partition(".xml:")
-    user = UserScene(Path(f"{file}.xml" if material else file) if scene else None, material or None)
-    if user.scene and not user.scene.is_file():
-        fail(f"--scene {user.scene}: no such file", Exit.USAGE)
+    user = UserScene(room, material or None)
     sources, subjects = _subjects(targets or ["walter"], given)
     if labels:
         if (names := labels.count(",") + 1) != len(subjects):
@@ -111,7 +110,7 @@ def explore(
         return
     if not host:
         fail("--host: name an address of this machine, or 0.0.0.0 for all of them", Exit.USAGE)
-    with failing(Exit.USAGE, PortError):
+    with failing(Exit.USAGE, ValueError):
         on = listening(host, port)
 
     def ready(address: str) -> None:

@@ -20,6 +20,7 @@ from .app import command
 from .files import check_output
 from .options import (
     PAGES,
+    Json,
     TracingVariant,
     file_option,
     parameters_of,
@@ -81,9 +82,7 @@ def fit_(
     save: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Also write each fit there: FILE-MODEL.xml.")
     ] = None,
-    json_file: Annotated[
-        Path | None, file_option("--json", "Also write all fits to this file.", endings=[".json"])
-    ] = None,
+    json_file: Json = None,
     variant: TracingVariant = None,
 ) -> None:
     """Fit models to measured BRDFs, and rank them by their error on directions that were not fitted. Ctrl-C keeps what
@@ -265,6 +264,14 @@ def _look(
 # --- What is printed --------------------------------------------------------------------------------------------------
 
 
+def _table(seen: bool, *columns: str) -> Table:
+    """Return a table of models and their errors, with columns of other numbers."""
+    table = Table("model", box=None, pad_edge=False)
+    for column in (*["FLIP"] * seen, "held out", "fitted", *columns):
+        table.add_column(column, justify="right")
+    return table
+
+
 def print_ranking(fits: list[Fit]) -> None:
     """Print the models by their error, and the best one to paste."""
     from ..fit import METRICS
@@ -273,10 +280,8 @@ def print_ranking(fits: list[Fit]) -> None:
     best = fits[0]
     out.print(printable(best.file), style="bold")
     seen = best.flip is not None
-    table = Table("model", *["FLIP"] * seen, "held out", "fitted", "ΔBIC", "albedo", "agree", "notes", box=None,
-                  pad_edge=False)  # fmt: skip
-    for column in table.columns[1:-1]:
-        column.justify = "right"
+    table = _table(seen, "ΔBIC", "albedo", "agree")
+    table.add_column("notes")
     lowest = min(it.bic for it in fits)
     for it in fits:
         table.add_row(
@@ -306,9 +311,7 @@ def print_medians(ranked: list[list[Fit]]) -> None:
     out.print("Medians", style="bold")
     rows = medians(ranked)
     seen = any(row.flip is not None for row in rows)
-    table = Table("model", *["FLIP"] * seen, "held out", "fitted", "files", "best in", box=None, pad_edge=False)
-    for column in table.columns[1:]:
-        column.justify = "right"
+    table = _table(seen, "files", "best in")
     for row in rows:
         table.add_row(
             row.model, *[number(row.flip)] * seen, f"{row.held_out:.4g}", f"{row.fitted:.4g}",

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ..mitsuba.errors import one_line
 from .app import command
-from .options import FIGURES, file_option, parameters_of, parameters_option, quantity_of, write_json, writing_to
+from .options import FIGURES, Json, file_option, parameters_of, parameters_option, quantity_of, write_json, writing_to
 from .terminal import Exit, err, out, print_table
 
 FORMATS = "MERL, RGL, MBSDF, Zemax, LightTools, ALTA, Cornell, CSV or UTIA"
@@ -27,9 +27,7 @@ def measured(
     parameters: Annotated[
         list[str] | None, parameters_option("What files hold that do not state it: f or f cos.", "quantity=NAME")
     ] = None,
-    json_file: Annotated[
-        Path | None, file_option("--json", "Also write all findings to this file.", endings=[".json"])
-    ] = None,
+    json_file: Json = None,
 ) -> None:
     """Tell what files with measured BRDFs hold: grid, range and symmetry, how much is negative or missing, errors of
     reciprocity, albedos."""

@@ -50,16 +50,16 @@ def written(name: str, endings: Sequence[str] = ()) -> Callable:
     return checked
 
 
-def scheduler_option(doing: str) -> Any:
-    """Return an option for the address of a Dask scheduler."""
+Json = Annotated[Path | None, file_option("--json", "Also write all that is found to this file.", endings=[".json"])]
 
-    def checked(address: str | None) -> str | None:
-        if address == "":
-            fail("--scheduler: give the address of one, tcp://HOST:PORT", Exit.USAGE)
-        return address
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Work on the workers of a Dask scheduler, tcp://HOST:PORT.")
+]
 
-    help = f"{doing} on the workers of a Dask scheduler, tcp://HOST:PORT."
-    return typer.Option(metavar="ADDRESS", help=help, callback=checked)
+
+def check_workers(workers: int | None, scheduler: str | None) -> None:
+    if scheduler is not None and (workers or not scheduler):
+        fail("give --workers, or --scheduler tcp://HOST:PORT, whose workers are started beside it", Exit.USAGE)
 
 
 Parameters = Annotated[

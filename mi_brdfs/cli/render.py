@@ -11,7 +11,16 @@ import typer
 from ..parameters.messages import listed
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
-from .options import AnyVariant, Lenient, parameters_of, parameters_option, scheduler_option, set_variant, source_of
+from .options import (
+    AnyVariant,
+    Lenient,
+    Scheduler,
+    check_workers,
+    parameters_of,
+    parameters_option,
+    set_variant,
+    source_of,
+)
 from .picture import Denoise, Output, Seconds, Seed, output_files, render_to
 from .terminal import Exit, fail, failing, stdout_to_stderr
 
@@ -49,11 +58,10 @@ def render(
         int | None,
         typer.Option(metavar="N", min=1, help="Render with N processes of one thread each, on this machine."),
     ] = None,
-    scheduler: Annotated[str | None, scheduler_option("Render")] = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Render a scene progressively; Ctrl-C keeps the finished passes."""
-    if workers and scheduler:
-        fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
+    check_workers(workers, scheduler)
     parameters = parameters_of(define)
     for name in parameters:
         if name in RESERVED:

@@ -15,7 +15,7 @@ from ..mitsuba.errors import one_line, unwrapped_ctrl_c
 from .app import command
 from .files import check_output
 from .fit import Cut, Files, Models, Starts
-from .options import TracingVariant, scheduler_option, set_tracing_variant
+from .options import Scheduler, TracingVariant, check_workers, set_tracing_variant
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def sweep(
     workers: Annotated[
         int | None, typer.Option(min=0, help="Processes; 0 for none but this. Default: one for each core, up to 8.")
     ] = None,
-    scheduler: Annotated[str | None, scheduler_option("Fit")] = None,
+    scheduler: Scheduler = None,
     render: Annotated[
         bool, typer.Option("--render", help="Also render the materials and their fits: wall_METRIC.jpg.")
     ] = False,
@@ -60,8 +60,7 @@ def sweep(
         from ..sweep.wall import Wall
     if table not in TABLES:
         fail(f"--table {table}: there is no such table; there are {', '.join(TABLES)}", Exit.USAGE)
-    if workers and scheduler:
-        fail("give --workers or --scheduler; a scheduler's workers are started beside it", Exit.USAGE)
+    check_workers(workers, scheduler)
     if (workers or scheduler) and find_spec("distributed") is None:
         fail('workers need the extra "cluster": pip install "mi_brdfs[cluster]"')
     seeds = _numbers(seed)

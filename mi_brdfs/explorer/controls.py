@@ -93,26 +93,17 @@ def _spelled(parameter: Parameter, bsdf: Bsdf, group: str) -> Iterator[Control]:
 
 
 def _lobes(parameter: PerLobe, bsdf: Bsdf) -> Iterator[Control]:
-    count = lobe_count(parameter, bsdf)
-    words = [str(k) for k in range(1, len(parameter.numbers))]
-    yield _control(LOBES, "number of lobes", "choice", str(count), "1", "") | {"words": words}
-    for number in parameter.numbers[1 : count + 1] if numbered(parameter, bsdf) else [""]:
+    numbers, words = _lobe_numbers(parameter, bsdf), [str(k) for k in range(1, len(parameter.numbers))]
+    yield _control(LOBES, "number of lobes", "choice", str(len(numbers)), "1", "") | {"words": words}
+    for number in numbers:
         yield from _controls(parameter.lobe(number), bsdf, f"lobe {number[1:]}" if number else "")
 
 
-def numbered(parameter: PerLobe, bsdf: Bsdf) -> bool:
-    """Return whether the names of lobes have numbers in a plugin dict."""
-    return any(name in bsdf for number in parameter.numbers[1:] for name in _lobe_names(parameter, number))
-
-
-def lobe_count(parameter: PerLobe, bsdf: Bsdf) -> int:
-    """Return the number of lobes of a plugin dict."""
-    given = [k for k, number in enumerate(parameter.numbers) if any(n in bsdf for n in _lobe_names(parameter, number))]
-    return max([1, *given])
-
-
-def _lobe_names(parameter: PerLobe, number: str) -> list[str]:
-    return [name for it in parameter.declared.values() for name in it.numbered(number).names]
+def _lobe_numbers(parameter: PerLobe, bsdf: Bsdf) -> list[str]:
+    """Return the numbers in the names of each lobe of a plugin dict: "" where there is but one, without a number."""
+    return [
+        it for it in parameter.numbers[1:] if any(name in bsdf for own in parameter.lobe(it) for name in own.names)
+    ] or [""]
 
 
 def with_lobes(model: type[Model], bsdf: Bsdf) -> Bsdf:
@@ -122,8 +113,7 @@ def with_lobes(model: type[Model], bsdf: Bsdf) -> Bsdf:
     if parameter is None or str(wanted) not in [str(k) for k in range(1, len(parameter.numbers))]:
         return found
     count = int(wanted)
-    numbers = parameter.numbers[1 : lobe_count(parameter, found) + 1] if numbered(parameter, found) else [""]
-    lobes = [_popped(parameter, number, found) for number in numbers]
+    lobes = [_popped(parameter, number, found) for number in _lobe_numbers(parameter, found)]
     lobes = (lobes + count * lobes[-1:])[:count]
     for number, lobe in zip(parameter.numbers[1:] if count > 1 else [""], lobes, strict=False):
         found |= {f"{name}{number}": value for name, value in lobe.items()}

@@ -66,7 +66,7 @@ class Materials:
             given = {name: value for name, value in bsdf.items() if name not in ("type", "name")}
             return self.expanded(published | given)
         if kind in (MEASURED, GIVEN):
-            self._source(bsdf)
+            self.source(bsdf)
             return bsdf
         if kind in BUILT_IN:
             return bsdf
@@ -80,7 +80,8 @@ class Materials:
             return {**plain(MODELS[kind].example()), "type": kind}
         return controls.with_lobes(MODELS[kind], bsdf) if controls.LOBES in bsdf else bsdf
 
-    def _source(self, bsdf: Bsdf) -> BSDFSource:
+    def source(self, bsdf: Bsdf) -> BSDFSource:
+        """Return the file of a plugin dict, or raise a StateError."""
         file = str(bsdf.get("file", ""))
         if file not in self.files:
             raise StateError(f"{brief(file) or 'A file'} is not here: name it on the command line, or drop it in.")
@@ -96,7 +97,7 @@ class Materials:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", EnergyWarning)  # the albedo tells
                 if kind == GIVEN:
-                    source = self._source(bsdf)
+                    source = self.source(bsdf)
                     if source.word not in self._loaded:
                         found = source.load()
                         self._loaded[source.word] = mi.load_dict(found) if isinstance(found, dict) else found
@@ -107,7 +108,7 @@ class Materials:
                     finally:
                         mi.traverse(kept).update(usual)
                 elif kind == MEASURED:
-                    measured: Any = self._source(bsdf).load()
+                    measured: Any = self.source(bsdf).load()
                     yield mi.load_dict({**measured, **properties(values)})
                 elif kind in MODELS:
                     yield mi.load_dict(properties(controls.with_defaults(MODELS[kind], bsdf)))
@@ -118,7 +119,7 @@ class Materials:
 
     def data(self, bsdf: Bsdf) -> Grid | Samples | None:
         """Return what the file of an expanded plugin dict holds, if there is one and nothing says how it goes on."""
-        if bsdf["type"] != MEASURED or not (file := measured_file(bsdf | {"filename": self._source(bsdf).path})):
+        if bsdf["type"] != MEASURED or not (file := measured_file(bsdf | {"filename": self.source(bsdf).path})):
             return None
         if file not in self._data:
             self._data[file] = read(*file).data
@@ -150,11 +151,11 @@ class Materials:
         kind = bsdf["type"]
         values = properties({name: value for name, value in bsdf.items() if name not in ("type", "file")})
         if kind == GIVEN:
-            word = self._source(bsdf).word
+            word = self.source(bsdf).word
             return {**_remark(word), "command": _command(word)}
         word, named = kind, {"type": kind, **values}
         if kind == MEASURED:
-            word = self._source(bsdf).path
+            word = self.source(bsdf).path
             named = {"type": kind, "filename": word, **values}
         options = [text for name, value in values.items() for text in ("-D", f"{name}={text_of(value)}")]
         try:

@@ -237,12 +237,8 @@ def _refusal(status: int, sentence: str) -> web.Response:
 # --- Its life ---------------------------------------------------------------------------------------------------------
 
 
-class PortError(ValueError):
-    """No page can be served at an address."""
-
-
 def listening(host: str, port: int | None) -> socket.socket:
-    """Return a socket that listens, or raise a PortError that says in a sentence why there is none."""
+    """Return a socket that listens, or raise a ValueError that says in a sentence why there is none."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for wanted in [port] if port is not None else [PORT, 0]:
         found = socket.socket(family)
@@ -255,8 +251,8 @@ def listening(host: str, port: int | None) -> socket.socket:
             found.close()
             problem = error
     if problem.errno == errno.EADDRINUSE:
-        raise PortError(f"port {port} is in use; choose another one, or none")
-    raise PortError(f"{host} port {port}: {problem.strerror or problem}")
+        raise ValueError(f"port {port} is in use; choose another one, or none")
+    raise ValueError(f"{host} port {port}: {problem.strerror or problem}")
 
 
 def _logger() -> logging.Logger:

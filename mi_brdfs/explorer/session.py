@@ -68,8 +68,8 @@ class Session:
         self._edited = 0.0
         self._requests: list[Mapping[str, Any]] = []
         self._fits: Iterator[None] | None = None
-        self._told: dict[int, str] = {}
-        self._broken: set[str] = set()
+        self._told: dict[int, tuple[str, bool]] = {}
+        """Of each subject its key, and whether it can be shown."""
         self._shown: dict[tuple[str, int], Any] = {}
         self._pictures: dict[int, tuple[Any, stages.Progress]] = {}
         self._sent: dict[int, tuple[Any, int, int]] = {}
@@ -98,7 +98,6 @@ class Session:
     def forget(self) -> None:
         """Show all anew, as models have changed. Pictures stay until there are others."""
         self._told.clear()
-        self._broken.clear()
         self._shown.clear()
         self._pictures.clear()
         self.materials.forget()
@@ -127,8 +126,8 @@ class Session:
         """Send the controls of a subject that is new or has changed."""
         for k, given in enumerate(state.subjects):
             key = key_of(given)
-            if self._told.get(k) != key:
-                self._told[k] = key
+            if self._told.get(k, ("", False))[0] != key:
+                self._told[k] = key, False
                 told: dict[str, Any] = {"bsdf": None, "controls": [], "error": None}
                 try:
                     bsdf = self.materials.expanded(given)
@@ -136,10 +135,9 @@ class Session:
                     told["controls"] = self.materials.controls(bsdf)
                     told |= self.materials.written(bsdf)
                     told |= self.materials.described(bsdf)
-                    self._broken.discard(key)
+                    self._told[k] = key, True
                 except StateError as error:
                     told["error"] = str(error)
-                    self._broken.add(key)
                 self.send(text(type="subject", serial=serial, subject=k, **told))
                 return True
         return False
@@ -148,9 +146,9 @@ class Session:
         """Return the subjects that can be seen, each with its number and key."""
         keys = [key_of(it) for it in state.subjects]
         return [
-            (k, keys[k], it)
-            for k, it in enumerate(state.subjects)
-            if not state.hidden[k] and keys[k] not in self._broken
+            (k, key, it)
+            for k, (key, it) in enumerate(zip(keys, state.subjects, strict=True))
+            if not state.hidden[k] and self._told.get(k) == (key, True)
         ]
 
     def _draw(self, state: State, serial: int) -> bool:
@@ -262,9 +260,7 @@ class Session:
         bsdf = state.subjects[k]
         if bsdf["type"] != MEASURED:
             raise StateError("Only measured files can be fitted.")
-        source = self.materials.files.get(str(bsdf.get("file")))
-        if source is None:
-            raise StateError("This file is not here any more; drop it in again.")
+        source = self.materials.source(bsdf)
         find_metric(request["metric"])
         chosen = find_models([] if request["model"] == EVERY else [request["model"]])
         self._fits = self._fitting(observe(source.source), [it.plugins[0] for it in chosen], request["metric"])

@@ -55,7 +55,6 @@ def fit_configuration(
             bsdf=configuration.bsdf(x),
             errors=errors[m],
             **spread[m],
-            bounds=[u.label for u, value in zip(configuration.unknowns, x, strict=True) if u.at_end(float(value))],
             starts=Starts(len(own), warm, int((own <= AGREEMENT**2 * own.min() + 1e-16).sum())),
             bic=float(residuals * np.log(max(own.min(), 1e-300)) + len(x) * np.log(residuals)),
             pairs=material.fitted,
@@ -66,9 +65,9 @@ def fit_configuration(
 
 
 def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Array) -> dict[str, Any]:
-    """Return what a fit says of its uncertainty (``sigma``, ``correlations`` and ``undetermined``), from the Jacobian
-    and from how far the data are from the model at each pair of directions, so that noise may differ from pair to pair
-    and be common to the channels.
+    """Return what a fit says of its uncertainty (``bounds``, ``sigma``, ``correlations`` and ``undetermined``), from
+    the Jacobian and from how far the data are from the model at each pair of directions, so that noise may differ from
+    pair to pair and be common to the channels.
 
     Unknowns at the end of their range are anywhere in it as far as the data allow: where the others stand depends on
     that. They are given the variance of a uniform distribution beforehand.
@@ -102,8 +101,8 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     for name in problem.configuration.names:
         own = [float(deviations[k]) if k in known else None for k in problem.configuration.indices(name)]
         sigma[name] = own[0] if len(own) == 1 else own
-    undetermined = [label for label, gone in zip(labels, lost, strict=True) if gone]
-    return {"sigma": sigma, "correlations": rows, "undetermined": undetermined}
+    bounds, undetermined = ([labels[k] for k in np.flatnonzero(it)] for it in (ended, lost))
+    return {"bounds": bounds, "sigma": sigma, "correlations": rows, "undetermined": undetermined}
 
 
 def _in_highlight(problem: Problem, material: Observations, x: Array) -> int:

@@ -96,25 +96,18 @@ def observe(source: Source, cut: float = CUT, pairs: int = PAIRS, seed: int = 0)
         solid_angle = np.ones(len(f))
     f, converted = _colours(f, source.wavelengths)
     signed = converted or (isinstance(data, Grid) and data.signed)
-    lowest = math.cos(math.radians(cut))
-    if not np.any((wi[:, 2] > 0) & (wo[:, 2] > 0)):
-        raise FitError(f"{name}: no pair of directions has both above the horizon.")
-    within = (wi[:, 2] >= lowest) & (wo[:, 2] >= lowest)
-    if not within.any():
-        raise FitError(f"{name}: all pairs of directions are beyond the cut at {cut:g}°; give a larger one.")
-    kept = np.flatnonzero(within & (solid_angle > 0))
-    if not len(kept):
-        raise FitError(f"{name}: its pairs of directions within the cut at {cut:g}° cover no solid angle.")
-    kept = rng.permutation(kept)[:pairs]
+    within = np.minimum(wi[:, 2], wo[:, 2]) >= math.cos(math.radians(cut))
+    kept = rng.permutation(np.flatnonzero(within & (solid_angle > 0)))[:pairs]
     wi, wo, f, solid_angle = wi[kept], wo[kept], f[kept], solid_angle[kept]
     missing = ~np.isfinite(f)
     negative = ~missing & (f < 0) & (not signed)
     usable = ~missing & ~negative
-    if not np.any(abs(f[usable]) > DARKEST):
-        raise FitError(f"{name}: no value within the cut at {cut:g}° is above {DARKEST:g}/sr: nothing is so dark.")
     some = np.flatnonzero(usable.any(axis=1))
-    if len(some) < 2:
-        raise FitError(f"{name}: only one pair of directions has a value within the cut at {cut:g}°.")
+    if len(some) < 2 or not np.any(abs(f[usable]) > DARKEST):
+        raise FitError(
+            f"{name}: there are no two pairs of directions above the horizon, and within the cut at {cut:g}°, whose "
+            f"values are above {DARKEST:g}/sr, as those of the darkest materials are."
+        )
     some, fitted = _halves(some, np.where(usable, f, 0).sum(axis=1)[some] * wi[some, 2], rng)
     return Observations(
         file=name,
@@ -150,11 +143,11 @@ def _of_arrays(source: Any) -> Measurement:
         raise FitError(f"Data are files, measurements or tuples of arrays (wi, wo, f), not {type(source).__name__}.")
     wi, wo, f = (np.asarray(array, np.float64) for array in source)
     f = f[:, None] if f.ndim == 1 else f
-    if wi.ndim != 2 or wi.shape[1:] != (3,) or wo.shape != wi.shape or f.ndim != 2 or len(f) != len(wi):
+    if not wi.shape == wo.shape == (*f.shape[:1], 3) or f.shape[1:] not in ((1,), (3,)):
         shapes = ", ".join(str(np.shape(array)) for array in source)
-        raise FitError(f"Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,) or (N, channels), not {shapes}.")
-    if f.shape[1] not in (1, 3):
-        raise FitError(f"Arrays of f have one channel or three, linear sRGB, not {f.shape[1]}.")
+        raise FitError(
+            f"Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,), or (N, 3) of linear sRGB, not {shapes}."
+        )
     for directions in (wi, wo):
         try:
             components(directions)

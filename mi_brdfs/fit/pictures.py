@@ -298,23 +298,21 @@ def _views(
     indices = range(len(given)) if sensors is None else [*map(int, np.atleast_1d(sensors))]
     if not given:
         raise FitError("There is no picture to fit to.")
-    if len(indices) != len(given):
-        raise FitError(f"Each picture has its sensor: there are {len(given)} pictures and {len(indices)} sensors.")
-    for index in indices:
-        if not 0 <= index < count:
-            raise FitError(f"The scene has no sensor {index} for a picture: it has {count}, counted from 0.")
+    if len(indices) != len(given) or not {*indices} <= {*range(count)}:
+        raise FitError(
+            f"Each picture has its sensor: these are {[*indices]} of {len(given)} pictures, and the scene has {count}, "
+            "counted from 0."
+        )
     views = []
     for index, pixels in zip(indices, given, strict=True):
         sensor = scene.sensors()[index]
         own = sensor.sampler().sample_count()
         height, width, channels = integrator.render(scene, sensor, seed=0, spp=1).shape
         sensor.sampler().set_sample_count(own)
-        if pixels.shape[:2] != (height, width):
-            shape = f"{pixels.shape[1]} x {pixels.shape[0]}"
-            raise FitError(f"A picture has {shape} pixels, and the film of its sensor {width} x {height}.")
         colours = channels - mi.has_flag(sensor.film().flags(), mi.FilmFlags.Alpha)
-        if pixels.shape[2] not in {channels, colours}:
-            raise FitError(f"A picture has {pixels.shape[2]} channels, and the film of its sensor {channels}.")
+        if pixels.shape not in {(height, width, channels), (height, width, colours)}:
+            shape = (height, width, channels)
+            raise FitError(f"A picture has the shape {pixels.shape}, and the film of its sensor has {shape}.")
         pixels = pixels[..., :colours]
         if not np.nan_to_num(pixels, posinf=0).any():
             raise FitError("A picture is black, or has no numbers.")
@@ -343,9 +341,7 @@ def _pixels(picture: Picture) -> Array:
     if pixels.dtype.kind in "iub":
         raise FitError("A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.")
     pixels = pixels.astype(np.float64)
-    if pixels.ndim not in (2, 3):
-        raise FitError(f"A picture has the shape (height, width, channels), not {pixels.shape}.")
-    pixels = pixels if pixels.ndim == 3 else pixels[..., None]
+    pixels = pixels if pixels.ndim != 2 else pixels[..., None]
     if clips:
         # What is white may be brighter. The value below is 3e-5 less even of 16 bits.
         pixels[(pixels > 1 - 1e-6).any(axis=2)] = np.nan

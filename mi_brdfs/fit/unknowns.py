@@ -181,14 +181,12 @@ class Configuration:
 
 def default_words(model: type[Model]) -> dict[str, Any]:
     """Return the word of each choice that stands where none is given."""
-    return {name: words[0] for name, words in _choices(model.declared())}
+    return {name: words[0] for name, words in _choices(model).items()}
 
 
-def _choices(declared: Iterable[Parameter]) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Yield choices with their words, the default first."""
-    for parameter in nested(declared):
-        if parameter.fit_words:
-            yield parameter.name, parameter.fit_words
+def _choices(model: type[Model]) -> dict[str, tuple[Any, ...]]:
+    """Return the words of each choice, the default first."""
+    return {it.name: it.fit_words for it in nested(model.declared()) if it.fit_words}
 
 
 def configurations(
@@ -202,7 +200,7 @@ def configurations(
     given = {key: value for key, value in given.items() if key in known}
     tied = {key: value for key, value in tied.items() if {key, value} <= known}
     words = dict[str, tuple[Any, ...]]()
-    for choice, allowed in _choices(model.declared()):
+    for choice, allowed in _choices(model).items():
         wanted = given.get(choice, allowed[0])
         words[choice] = wanted if isinstance(wanted, tuple) else (wanted,)
         for word in words[choice]:
@@ -237,10 +235,7 @@ def configurations(
 
 def known_names(model: type[Model]) -> set[str]:
     """Return the names of all parameters of a model, and of the choice among Fresnel terms if it has one."""
-    return {
-        *(name for name, _ in _choices(model.declared())),
-        *(name for parameter in model.declared() for name in parameter.names),
-    }
+    return {*_choices(model), *(name for parameter in model.declared() for name in parameter.names)}
 
 
 def check_names(models: Iterable[type[Model]], names: Iterable[str]) -> None:

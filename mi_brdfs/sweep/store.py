@@ -6,9 +6,9 @@ import io
 import json
 import tempfile
 import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from csv import DictWriter
-from itertools import groupby
 from pathlib import Path
 from statistics import mean, median
 from typing import Any
@@ -110,32 +110,29 @@ MEDIANS = ["content", "model", "metric", "seed", *(f"{metric}_{part}" for metric
 def medians(rows: Iterable[dict[str, Any]]) -> str:
     """Return a table in Markdown: by metric and model, the medians over files and seeds of the errors in this metric,
     the mean rank by the error on held-out directions, and in how many files and seeds it is the least."""
-    order = {name: k for k, name in enumerate(METRICS)}
-    slim = [
-        (order[r["metric"]], r["metric"], r["model"], r["content"], r["seed"], *errors)
-        for r in rows
-        if None not in (errors := [r[f"{r['metric']}_{part}"] for part in ("held_out", "fitted")])
-    ]
-    table = [list(COLUMNS)]
-    for (_, metric), group in groupby(sorted(slim), key=lambda row: row[:2]):
-        own = list(group)
-        places: dict[str, list[int]] = {}
-        for _, contest in groupby(sorted(own, key=lambda row: (row[3:5], row[5])), key=lambda row: row[3:5]):
-            for place, row in enumerate(contest, 1):
-                places.setdefault(row[2], []).append(place)
-        lines = []
-        for model, some in groupby(own, key=lambda row: row[2]):
-            fits = list(some)
-            held_out, fitted = (median(row[k] for row in fits) for k in (5, 6))
-            lines.append((
-                held_out, metric, model, f"{held_out:.4g}", f"{fitted:.4g}", f"{mean(places[model]):.1f}",
-                str(places[model].count(1)), str(len({row[3] for row in fits})),
-            ))  # fmt: skip
-        table += [list(line[1:]) for line in sorted(lines)]
-    return "\n".join(_markdown(table))
+    fits = defaultdict[tuple, list[tuple]](list)
+    contests = defaultdict[tuple, list[tuple]](list)
+    for row in rows:
+        held_out, fitted = (row[f"{row['metric']}_{part}"] for part in ("held_out", "fitted"))
+        if held_out is not None and fitted is not None:
+            fits[row["metric"], row["model"]].append((held_out, fitted, row["content"]))
+            contests[row["metric"], row["content"], row["seed"]].append((held_out, row["model"]))
+    places = defaultdict[tuple, list[int]](list)
+    for (metric, *_), contest in contests.items():
+        for place, (_, model) in enumerate(sorted(contest), 1):
+            places[metric, model].append(place)
+    lines = []
+    for (metric, model), own in fits.items():
+        held_out, fitted, contents = zip(*own, strict=True)
+        ranks = places[metric, model]
+        lines.append((
+            [*METRICS].index(metric), median(held_out), metric, model, f"{median(held_out):.4g}",
+            f"{median(fitted):.4g}", f"{mean(ranks):.1f}", str(ranks.count(1)), str(len({*contents})),
+        ))  # fmt: skip
+    return "\n".join(_markdown([COLUMNS, *(line[2:] for line in sorted(lines))]))
 
 
-def _markdown(table: list[list[str]]) -> Iterator[str]:
+def _markdown(table: list[tuple[str, ...]]) -> Iterator[str]:
     """Yield lines with the columns aligned, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     for k, row in enumerate(table):

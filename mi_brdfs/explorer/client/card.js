@@ -1,13 +1,13 @@
 // A card of the page: a heading, buttons, a figure, and a line for the values under the pointer.
-import { element, save, shape, standalone, subscripted } from "./util.js";
+import { block, element, save, shape, standalone, subscripted } from "./util.js";
 import { session } from "./session.js";
 
 export const cards = {};
 
 /** Add a card for a view, which `draw` draws; it can be saved if there is an `image`, a canvas, or a `table` of curves. */
 export function makeCard(view, { title, note = "", draw, image, table }) {
-  const tools = element("div", { class: "tools" });
-  const figure = element("div", { class: `figure ${view}` });
+  const tools = block("tools");
+  const figure = block(`figure ${view}`);
   const readout = element("output", { class: "readout" });
   const card = { view, title, draw, image, table, figure, readout, tools, legend: [] };
   for (const kind of image ? ["PNG"] : ["SVG", "CSV"]) {

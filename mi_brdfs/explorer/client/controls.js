@@ -1,5 +1,5 @@
 // Controls of a subject's parameters, made from what the server declares of them.
-import { byId, clamp, element, format, fromDisplay, onArrows, rgbOf, subscripted, toDisplay } from "./util.js";
+import { block, byId, clamp, element, format, fromDisplay, onArrows, rgbOf, subscripted, toDisplay } from "./util.js";
 import { changeSubject, session, setParameter } from "./session.js";
 import { scrub } from "./link.js";
 
@@ -55,14 +55,9 @@ function drawList(host, bsdf) {
     .filter(([name]) => name !== "type" && !varied.includes(name))
     .map(([name, value]) => [name, name === "file" ? value.replace(/^.*[\\/]/, "") : value])
     .map(([name, value]) =>
-      element(
-        "div",
-        { class: "fixed" },
-        nameOf(name),
-        element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value)),
-      ),
+      block("fixed", nameOf(name), element("b", {}, Array.isArray(value) ? value.map(told).join(", ") : told(value))),
     );
-  const list = element("div", { class: "list" }, ...rows);
+  const list = block("list", ...rows);
   host.replaceChildren(element("details", { open }, element("summary", {}, "Parameters"), list));
 }
 
@@ -83,26 +78,19 @@ function makeScrubber({ name, values }, k) {
   const id = `scrub-${name}`;
   const phi = session.state.phi ? `, φi = ${format(session.state.phi)}°` : "";
   const oninput = ({ target }) => scrub(k, Number(target.value));
-  return element(
-    "div",
-    { class: "control" },
-    element(
-      "div",
-      { class: "name" },
-      element(
-        "label",
-        { for: id },
-        ...(name === "theta" ? subscripted(`θi in degrees${phi}`) : [nameOf(name)]),
-      ),
+  return block(
+    "control",
+    block(
+      "name",
+      element("label", { for: id }, ...(name === "theta" ? subscripted(`θi in degrees${phi}`) : [nameOf(name)])),
     ),
-    element(
-      "div",
-      { class: "pair" },
+    block(
+      "pair",
       element(
         "div",
         {},
         element("input", { type: "range", id, min: 0, max: values.length - 1, step: 1, oninput }),
-        element("div", { class: "values" }, ...values.map((value) => element("span", {}, format(value, 4)))),
+        block("values", ...values.map((value) => element("span", {}, format(value, 4)))),
       ),
       element("output", { for: id }),
     ),
@@ -118,7 +106,7 @@ function grouped(all) {
     return [
       name ? element("h3", {}, name) : null,
       ...members.filter((row) => !row.absent).map(({ node }) => node),
-      absent.length ? element("div", { class: "row absent" }, ...absent) : null,
+      absent.length ? block("row absent", ...absent) : null,
     ].filter(Boolean);
   });
 }
@@ -157,9 +145,8 @@ function makeRow(control, k) {
   ];
   const { body, show } = make(control, id, set, described);
   const act = control.optional ? "leave out" : "reset";
-  const head = element(
-    "div",
-    { class: "name" },
+  const head = block(
+    "name",
     element("label", { for: id, title: control.text ?? "" }, nameOf(control.name)),
     element(
       "button",
@@ -170,7 +157,7 @@ function makeRow(control, k) {
   const meaning = control.text ? element("p", { class: "meaning" }, ...subscripted(control.text)) : null;
   return {
     control,
-    node: element("div", { class: `control ${control.kind}` }, head, body, error, meaning),
+    node: block(`control ${control.kind}`, head, body, error, meaning),
     show,
     error,
   };
@@ -227,7 +214,7 @@ function makeNumber(control, id, set, described) {
     slideTo(number);
     settled(field, number == null ? "" : rounded(number));
   };
-  return { body: element("div", { class: "pair" }, slider, field), show };
+  return { body: block("pair", slider, field), show };
 }
 
 // --- Colours --------------------------------------------------------------------------------------------------------
@@ -262,12 +249,7 @@ function makeColour(control, id, set, described) {
     fields.forEach((field, c) => settled(field, rounded(current[c])));
   };
   return {
-    body: element(
-      "div",
-      { class: "colours" },
-      element("div", { class: "pair" }, level, control.high <= 1 ? picker : null),
-      element("div", { class: "three" }, ...fields),
-    ),
+    body: block("colours", block("pair", level, control.high <= 1 ? picker : null), block("three", ...fields)),
     show,
   };
 }

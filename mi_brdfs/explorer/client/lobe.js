@@ -1,5 +1,5 @@
 // The lobe as a body to turn, drawn by WebGL; the arrow of wi can be dragged.
-import { clamp, decades, degrees, element, format, largest, onArrows, radians, rgbOf, subscripted, wrapped } from "./util.js";
+import { block, clamp, decades, degrees, element, format, largest, onArrows, radians, rgbOf, subscripted, wrapped } from "./util.js";
 import { ARROW, cross, dot, furniture, makeBody, scaled, sum, unit } from "./geometry.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
@@ -35,7 +35,7 @@ export function startLobe() {
     [null, "Drag ωi to move it, or elsewhere to rotate. Arrow keys rotate; Shift+arrows move ωi."],
   ];
   tell(card, []);
-  labels = element("div", { class: "labels" });
+  labels = block("labels");
   card.figure.append(canvas, labels);
   setUp();
   canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());

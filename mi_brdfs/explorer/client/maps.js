@@ -1,5 +1,5 @@
 // Maps in false colours: the θh × θd slice and the hemisphere.
-import { COLOUR_MAP, clamp, decades, degrees, element, format, largest, onArrows, onPointer, power, quantile, shape, subscripted, wrapped } from "./util.js";
+import { COLOUR_MAP, block, clamp, decades, degrees, element, format, largest, onArrows, onPointer, power, quantile, shape, subscripted, wrapped } from "./util.js";
 import { session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { quantity } from "./plots.js";
@@ -15,7 +15,7 @@ export function drawMaps(view) {
   const bright = view === "slice" ? arrays.map((values) => quantile(values, 0.99) ?? 0) : [];
   const peak = Math.max(...bright, 0) || largest(arrays);
   const [low, high] = decades(arrays, peak);
-  card.maps ??= card.figure.appendChild(element("div", { class: "maps" }));
+  card.maps ??= card.figure.appendChild(block("maps"));
   card.node.classList.toggle("wide", found.length > 1);
   card.maps.className = `maps of-${Math.min(found.length, 4)}`;
   const boxes = [...card.maps.children];
@@ -35,13 +35,13 @@ export function drawMaps(view) {
 function addBox(card, view) {
   const canvas = element("canvas", { role: "img", tabindex: 0 });
   const marks = shape("svg", { class: "marks", viewBox: "-1 -1 2 2", "aria-hidden": "true" });
-  const frame = element("div", { class: "plate" }, canvas, marks, element("i", { class: "spot", hidden: true }));
+  const frame = block("plate", canvas, marks, element("i", { class: "spot", hidden: true }));
   const ticks = (symbol, side) =>
     [[0, "0°"], [30, "30°"], [45, symbol], [60, "60°"], [90, "90°"]].map(([at, text]) =>
       element("span", { style: `${side}:${at / 0.9}%` }, ...subscripted(text)),
     );
-  const axes = view === "slice" ? [element("div", { class: "labels" }, ...ticks("θh", "left"))] : [];
-  if (view === "slice") frame.append(element("div", { class: "up" }, ...ticks("θd", "bottom")));
+  const axes = view === "slice" ? [block("labels", ...ticks("θh", "left"))] : [];
+  if (view === "slice") frame.append(block("up", ...ticks("θd", "bottom")));
   const box = element("figure", { class: "map" }, element("figcaption"), frame, ...axes);
   card.maps.append(box);
   let spot = [0.5, 0.5];
@@ -127,7 +127,7 @@ function ringsOf(map) {
 }
 
 function bar(card, low, high, unit) {
-  const box = card.figure.querySelector(".bar") ?? card.figure.appendChild(element("div", { class: "bar" }));
+  const box = card.figure.querySelector(".bar") ?? card.figure.appendChild(block("bar"));
   const stops = Array.from(
     { length: 17 },
     (_, k) => `rgb(${[...COLOUR_MAP.subarray(4 * Math.round(k * 15.9375), 4 * Math.round(k * 15.9375) + 3)]})`,
@@ -137,8 +137,8 @@ function bar(card, low, high, unit) {
     labels.push(element("span", { style: `left:${(100 * (k - low)) / (high - low)}%` }, power(k)));
   box.replaceChildren(
     element("div", { class: "ramp", style: `background:linear-gradient(90deg,${stops})` }),
-    element("div", { class: "labels" }, ...labels),
-    element("div", { class: "unit" }, ...subscripted(unit)),
+    block("labels", ...labels),
+    block("unit", ...subscripted(unit)),
   );
 }
 

@@ -1,5 +1,5 @@
 // The pictures: side by side, wiped over each other, or their difference.
-import { clamp, element, format, fromDisplay, onArrows, onPointer, wrapped } from "./util.js";
+import { block, clamp, element, format, fromDisplay, onArrows, onPointer, wrapped } from "./util.js";
 import { change, session, visible } from "./session.js";
 import { cards, tell } from "./card.js";
 import { colourOf } from "./drawing.js";
@@ -10,7 +10,7 @@ let stack, divider;
 
 export function startPicture() {
   const card = cards.picture;
-  stack = element("div", { class: "pictures" });
+  stack = block("pictures");
   divider = element("input", {
     type: "range",
     class: "divider",
@@ -83,11 +83,9 @@ function build(mode, shown, layout) {
   for (const k of shown) if (!canvases.has(k)) canvases.set(k, makeCanvas(k));
   const caption = (k) => element("figcaption", { "data-subject": k, class: "marked" }, element("b"), element("small"));
   if (mode === "side") {
-    stack.replaceChildren(
-      ...shown.map((k) => element("figure", {}, element("div", { class: "frame" }, canvases.get(k)), caption(k))),
-    );
+    stack.replaceChildren(...shown.map((k) => element("figure", {}, block("frame", canvases.get(k)), caption(k))));
   } else {
-    const frame = element("div", { class: "frame" }, canvases.get(shown[1]), canvases.get(shown[0]));
+    const frame = block("frame", canvases.get(shown[1]), canvases.get(shown[0]));
     if (mode === "wipe") frame.append(divider);
     else frame.append(element("canvas", { class: "difference", role: "img" }));
     stack.replaceChildren(
@@ -95,7 +93,7 @@ function build(mode, shown, layout) {
         "figure",
         {},
         frame,
-        element("div", { class: "captions" }, ...shown.map(caption)),
+        block("captions", ...shown.map(caption)),
         mode === "difference" ? element("p", { class: "scale" }) : null,
       ),
     );

@@ -1,5 +1,5 @@
 // The sampler's view: directions drawn, a histogram of weights, the efficiency over the angle.
-import { DASHES, clamp, degrees, element, format, onPointer, radians, shape, subscripted, ticks, valueScale, wrapped } from "./util.js";
+import { DASHES, block, clamp, degrees, element, format, onPointer, radians, shape, subscripted, ticks, valueScale, wrapped } from "./util.js";
 import { emit, on, session, visible } from "./session.js";
 import { post } from "./link.js";
 import { cards, tell } from "./card.js";
@@ -55,7 +55,7 @@ export function drawSampler() {
     titled("Weight ÷ mean weight", drawHistogram(found, width, height)),
     titled("Efficiency η over θi", drawEfficiency(found, width, height)),
   ];
-  card.figure.replaceChildren(element("div", { class: "verdicts" }, ...visible().map(verdictOf)), ...figures);
+  card.figure.replaceChildren(block("verdicts", ...visible().map(verdictOf)), ...figures);
 }
 
 function drawDots(found, width, height) {

@@ -18,6 +18,9 @@ export function element(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);
 }
 
+/** Return a `div` of a class. */
+export const block = (name, ...children) => element("div", { class: name }, ...children);
+
 /** Return an SVG element. */
 export function shape(tag, attributes = {}, ...children) {
   return fill(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
