@@ -348,8 +348,8 @@ def test_angles_on_the_other_side_of_the_normal(tmp_path):
 @pytest.mark.parametrize(
     "azimuths",
     [lambda i, d: (180, 180 + d), lambda i, d: (180 if i else 0, 180 + d), lambda i, d: (-d, 0),
-     lambda i, d: (d // 180 * 180, d // 180 * 180 + d)],
-    ids=["light at 180°", "light at 180°, but 0 at the normal", "light goes round", "light on both sides"],
+     lambda i, d: (d // 180 * 180, d // 180 * 180 + d), lambda i, d: (i * d % 7 / 100, d + i * d % 7 / 100)],
+    ids=["light at 180°", "light at 180°, but 0 at the normal", "light goes round", "light on both sides", "as read"],
 )  # fmt: skip
 def test_isotropic_materials_are_recognized(tmp_path, azimuths):
     """Whichever azimuth a file keeps; at the normal one means nothing."""

@@ -22,6 +22,8 @@ from .text import TextFile
 Angles: TypeAlias = Sequence[np.ndarray]
 SAME = 1e-6
 """By how much, in radians, angles of one node may differ."""
+ONE_AZIMUTH = math.radians(0.5)
+"""And azimuths of a light that stays where it is, as encoders read them."""
 COARSE = math.radians(25)
 """The step from which half and difference angles interpolate rough highlights as well as a table or better."""
 WIDE = math.radians(40)
@@ -61,7 +63,7 @@ def arranged(angles: Angles, values: np.ndarray) -> Grid | Samples:
     theta_i, phi_i = upright(theta_i, phi_i)
     theta_o, phi_o = upright(theta_o, phi_o)
     turned_i, turned_o = phi_i[theta_i > SAME], phi_o[theta_o > SAME]
-    anisotropic = not (is_single(2 * turned_i) or (len(turned_o) and is_single(2 * turned_o)))
+    anisotropic = not (is_single(turned_i) or (len(turned_o) and is_single(turned_o)))
     if not anisotropic:
         # At the normal the azimuth means nothing, and files have any there.
         phi_o = phi_o - np.where(theta_i > SAME, phi_i, turned_i[:1].sum())
@@ -101,8 +103,9 @@ def warn_of_a_sector(phi_i: np.ndarray) -> None:
 
 
 def is_single(azimuths: np.ndarray) -> bool:
-    """Return whether there is at most one azimuth."""
-    return not len(azimuths) or bool(np.ptp(around_zero(azimuths - azimuths[0])) <= SAME)
+    """Return whether there is at most one azimuth, but for its opposite."""
+    away = wrapped(azimuths - azimuths[:1] + np.pi / 2, np.pi) - np.pi / 2
+    return bool(np.all(abs(away) < ONE_AZIMUTH))
 
 
 def upright(theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
