@@ -294,8 +294,8 @@ def test_a_leak_is_caught():
     for function, given in ((resources.load_render_discard, [[LAMBERT]]), (leaking_cycles, [])):
         seconds, memory = in_new_process(function, *given, 30)
         assert len(seconds) == 30 and len(memory) == 31
-        growth.append(memory[-1] - memory[5])  # once the first are warm
-    assert growth[0] < 3 < growth[1], growth
+        growth.append(np.median(np.diff(memory[5::5])))  # of warm cycles; a machine with other work may add a step
+    assert growth[0] < 0.5 < growth[1], growth
 
 
 # --- All together ---------------------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from ..mitsuba import guests
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
 from ..parameters.messages import printable
+from ..starting import signals_held
 from ..validation import CHECKS
 from .app import command, imported
 from .options import (
@@ -156,7 +157,9 @@ def _check_all(
         known = variant, guests.sources()
         with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
             try:
-                for future in [pool.submit(_check_one, source, other, options) for source in sources]:
+                with signals_held():  # a process that is not told what to do prints a traceback
+                    futures = [pool.submit(_check_one, source, other, options) for source in sources]
+                for future in futures:
                     reports.append(future.result())
                     bar.update(task, description=reports[-1].name, advance=each)
             except BrokenProcessPool:

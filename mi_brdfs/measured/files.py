@@ -69,7 +69,7 @@ class BinaryFile:
     @property
     def left(self) -> int:
         """The bytes behind the offset."""
-        return self.size - self.offset
+        return max(self.size - self.offset, 0)
 
     def error(self, problem: str, offset: int | None = None) -> FileError:
         return FileError(f"{self.path}: at byte {self.offset if offset is None else offset}, {problem}.")
