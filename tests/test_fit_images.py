@@ -101,6 +101,16 @@ def test_alpha_is_no_colour():
     assert first.losses == pytest.approx(second.losses, rel=1e-3)
 
 
+def test_bitmaps_are_in_the_colours_of_the_film():
+    """What mi.Bitmap holds says which colours it has, but an array is as the film."""
+    lambert, grey = ({"type": "lambert", "reflectance": rgb(*value)} for value in ((0.2, 0.5, 0.8), (0.5, 0.5, 0.5)))
+    scene = scene_of(lambert, pixel_format="xyz")
+    array = picture_of(scene, spp=64)
+    for given in (array, scene.sensors()[0].film().bitmap(), mi.Bitmap(picture_of(scene_of(lambert), spp=64))):
+        found = images(scene_of(grey, pixel_format="xyz"), given)
+        assert values(found)["reflectance"] == pytest.approx([0.2, 0.5, 0.8], abs=5e-3)
+
+
 def test_a_number_that_few_pixels_decide_is_no_surer_than_others():
     """They leave no residuals of their own. From picture to picture, what is found varies by 0.0021."""
     start, hidden = ({"type": "ward", "alpha": alpha} for alpha in (0.3, 0.15))

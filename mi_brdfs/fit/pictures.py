@@ -293,7 +293,7 @@ def _views(
     sensors: int | Sequence[int] | None,
 ) -> list[View]:
     """Return the pictures with their sensors."""
-    given = [_pixels(it) for it in (pictures if isinstance(pictures, (list, tuple)) else [pictures])]
+    given = pictures if isinstance(pictures, (list, tuple)) else [pictures]
     count = len(scene.sensors())
     indices = range(len(given)) if sensors is None else [*map(int, np.atleast_1d(sensors))]
     if not given:
@@ -304,11 +304,12 @@ def _views(
             "counted from 0."
         )
     views = []
-    for index, pixels in zip(indices, given, strict=True):
+    for index, picture in zip(indices, given, strict=True):
         sensor = scene.sensors()[index]
         own = sensor.sampler().sample_count()
         height, width, channels = integrator.render(scene, sensor, seed=0, spp=1).shape
         sensor.sampler().set_sample_count(own)
+        pixels = _pixels(picture, sensor.film().bitmap().pixel_format())
         colours = channels - mi.has_flag(sensor.film().flags(), mi.FilmFlags.Alpha)
         if pixels.shape not in {(height, width, channels), (height, width, colours)}:
             shape = (height, width, channels)
@@ -320,8 +321,9 @@ def _views(
     return views
 
 
-def _pixels(picture: Picture) -> Array:
-    """Return a picture as an array of linear values, shape (height, width, channels)."""
+def _pixels(picture: Picture, film: mi.Bitmap.PixelFormat) -> Array:
+    """Return a picture as an array of linear values, shape (height, width, channels), in the colours of a film unless
+    it is an array."""
     if isinstance(picture, (str, os.PathLike)):
         if not Path(picture).is_file():
             raise FitError(f"There is no file {picture}.")
@@ -329,20 +331,20 @@ def _pixels(picture: Picture) -> Array:
             picture = mi.Bitmap(str(picture))
         except RuntimeError as error:
             raise FitError(f"Mitsuba cannot read {picture}: {one_line(error)}") from None
-    clips = False
     if isinstance(picture, mi.Bitmap):
         formats = mi.Bitmap.PixelFormat
         if (count := picture.channel_count()) > 4:
             raise FitError(f"A picture has {count} channels: give the colours among what mi.Bitmap.split returns.")
         colour = formats.Y if picture.pixel_format() in (formats.Y, formats.YA) else formats.RGB
-        clips = np.array(picture).dtype.kind == "u"
-        picture = picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)
+        clips, shape = np.array(picture).dtype.kind == "u", (picture.height(), picture.width(), -1)
+        linear = np.array(picture.convert(colour, mi.Struct.Type.Float32, srgb_gamma=False)).reshape(shape)
+        if clips:
+            # What is white may be brighter. The value below is 3e-5 less even of 16 bits.
+            linear[(linear > 1 - 1e-6).any(axis=2)] = np.nan
+        in_xyz = colour == formats.RGB and film in (formats.XYZ, formats.XYZA)
+        picture = np.array(mi.Bitmap(linear).convert(formats.XYZ)) if in_xyz else linear
     pixels = np.array(picture)
     if pixels.dtype.kind in "iub":
         raise FitError("A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.")
     pixels = pixels.astype(np.float64)
-    pixels = pixels if pixels.ndim != 2 else pixels[..., None]
-    if clips:
-        # What is white may be brighter. The value below is 3e-5 less even of 16 bits.
-        pixels[(pixels > 1 - 1e-6).any(axis=2)] = np.nan
-    return pixels
+    return pixels if pixels.ndim != 2 else pixels[..., None]
