@@ -90,6 +90,7 @@ def variation(base, /, **attributes):
         (variation(Dusk, word="kelemen"), 'the word "kelemen" belongs to mi_brdfs; take another one'),
         (variation(Steep, parameters={"rotation": Number(1, (0, 2), "")}), "a parameter cannot be called rotation"),
         (variation(Dusk, parameters={"alpha": Number(1, (0, 2), "")}), "a parameter cannot be called alpha"),
+        (variation(Squared, parameters={"k": Number(1, (0, 2), "")}), 'called k, which means the word "conductor"'),
         (variation(Squared, parameters={"normalization": Number(1, (0, 2), "")}), "normalization, a parameter of cook"),
     ],
 )

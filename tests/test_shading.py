@@ -96,6 +96,9 @@ def test_environments_shine_and_only_their_mean_is_clamped():
 
 # --- Ambient light --------------------------------------------------------------------------------------------------
 
+TILT = {"type": "rgb", "value": [0.8, 0.5, 0.9]}
+"""The normal (.6, 0, .8)."""
+
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
@@ -108,6 +111,12 @@ def test_environments_shine_and_only_their_mean_is_clamped():
         ({"type": "wrap", "normalization": "none", "domain": "sphere"}, 0.5, 0),
         ({"type": "toon", "normalization": "none", "diffuse_threshold": 0.2}, 0.5, 0),
         ({"type": "walter"}, 0, 0),
+        ({"type": "bumpmap", "arbitrary": {"type": "checkerboard"}, "inner": {"type": "phong"}}, 0.5, 0),
+        ({"type": "normalmap", "normalmap": TILT, "inner": {"type": "phong"}}, 0.5, 0),
+        ({"type": "mask", "opacity": 0.4, "inner": {"type": "phong"}}, 0.2, 0),
+        ({"type": "twosided", "i": {"type": "normalmap", "normalmap": TILT, "inner": {"type": "phong"}}}, 0.5, 0.5),
+        ({"type": "blendbsdf", "weight": 0.25, "a": {"type": "phong"}, "b": {"type": "walter"}}, 0.375, 0),
+        ({"type": "twosided", "front": {"type": "phong"}, "back": {"type": "diffuse", "reflectance": 0.3}}, 0.5, 0.3),
         ({"type": "diffuse", "reflectance": 0.3}, 0.3, 0.3),
         ({"type": "conductor"}, 0, 0),
     ],

@@ -51,7 +51,7 @@ class Shading(Plugin):
       belongs to every light, so that the result is π times the direct light of ``path``; with ``pi_folded`` = false
       both are the same.
     * k_a is the diffuse reflectance, π f of the diffuse lobes seen and lit along the normal: the scale ρ or ρd of the
-      formulas above. Built-in BSDFs use their own ``eval_diffuse_reflectance``.
+      formulas above, also where they are nested. Built-in BSDFs use their own ``eval_diffuse_reflectance``.
     * ``environment_reflection`` looks up the environment in the mirror direction r, ignoring objects in between. ρ_m is
       the specular colour times the Fresnel reflectance at r. The environment then lights only the diffuse lobes: the
       look-up replaces its reflection by the others. Built-in BSDFs have no ρ_m, nor have ours nested in them, except in
@@ -247,8 +247,8 @@ def may_pass(scene: mi.Scene) -> bool:
 
 def bsdfs_of(scene: mi.Scene) -> list[Any]:
     """Return the BSDFs of a scene's shapes, including those in shape groups."""
-    shapes = [it for it in children(scene) if isinstance(it, mi.Shape)]
-    grouped = [it for shape in shapes for it in children(shape) if isinstance(it, mi.Shape)]
+    shapes = children(scene, mi.Shape)
+    grouped = [it for shape in shapes for it in children(shape, mi.Shape)]
     return [shape.bsdf() for shape in [*scene.shapes(), *grouped]]
 
 
@@ -261,13 +261,21 @@ def of_each(function: Callable[..., Any], bsdf: mi.BSDF, si: mi.SurfaceInteracti
 
 
 def diffuse_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Spectrum:
-    """Return k_a: for our BSDFs, also in ``twosided``, from their diffuse lobes, as their ``eval_diffuse_reflectance``
+    """Return k_a: for our BSDFs, also nested ones, from their diffuse lobes, as their ``eval_diffuse_reflectance``
     includes the others."""
-    if not mirrors(bsdf):
-        k_a = mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
-        if bsdf.class_name() == "MaskBSDF":  # its own ignores the mask
-            k_a *= 1 - mi.unpolarized_spectrum(bsdf.eval_null_transmission(si, active))
-        return k_a
+    kind, inner = bsdf.class_name(), children(bsdf, mi.BSDF)
+    if kind in ("BumpMap", "NormalMap"):  # along their own normal
+        return diffuse_reflectance(inner[0], si, active)
+    if kind == "MaskBSDF":
+        through = mi.unpolarized_spectrum(bsdf.eval_null_transmission(si, active))
+        return (1 - through) * diffuse_reflectance(inner[0], si, active)
+    if kind == "TwoSidedBRDF":
+        seen = mi.SurfaceInteraction3f(si)
+        seen.wi = mi.Vector3f(si.wi.x, si.wi.y, abs(si.wi.z))
+        front, back = (diffuse_reflectance(it, seen, active) for it in (inner[0], inner[-1]))
+        return select(si.wi.z > 0, front, back)
+    if not any(hasattr(it, "mirror_reflectance") for it in (bsdf, *inner)):
+        return mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
     normal = mi.Vector3f(0, 0, dr.select(si.wi.z > 0, 1, -1))
     upright = mi.SurfaceInteraction3f(si)
     upright.wi = normal
@@ -291,7 +299,7 @@ def mirrors(bsdf: mi.BSDF) -> list[Any]:
     """Return our BSDFs that make up a BSDF, front side first: itself, or those in ``twosided``."""
     inner = [bsdf]
     if bsdf.class_name() == "TwoSidedBRDF":
-        inner = children(bsdf)
+        inner = children(bsdf, mi.BSDF)
     return inner if all(hasattr(it, "mirror_reflectance") for it in inner) else []
 
 
@@ -301,8 +309,8 @@ def only_diffuse() -> mi.BSDFContext:
     return ctx
 
 
-def children(parent: mi.Object) -> list[Any]:
-    """Return the objects in another."""
+def children(parent: mi.Object, kind: type[mi.Object]) -> list[Any]:
+    """Return the objects of a kind in another."""
 
     class Collector(mi.TraversalCallback):
         def __init__(self) -> None:
@@ -310,7 +318,7 @@ def children(parent: mi.Object) -> list[Any]:
             self.objects: list[Any] = []
 
         def put(self, name: str, value: Any, flags: int, cpptype: Any = None) -> None:
-            if isinstance(value, mi.Object):
+            if isinstance(value, kind):
                 self.objects.append(value)
 
     found = Collector()

@@ -122,6 +122,9 @@ def _register_term(term: type[Term], replace: bool) -> None:
             f'{name}: the word "{word}" belongs to {owner}; take another one, or register with replace=True.'
         )
     names = {each for it in term.parameters for each in (it, f"{it}_u", f"{it}_v")}
+    implying = {it: other for other in choice.implied_words for it in choice.names_of(other)}
+    if word not in choice.implied_words and (clash := next((it for it in implying if it in names), None)):
+        raise ValueError(f'{name}: a parameter cannot be called {clash}, which means the word "{implying[clash]}".')
     for model in all_models():
         choosing = [it for it in model.declared() if getattr(it, "terms", None) is choice.terms]
         others = [it for it in model.declared() if it not in choosing] if choosing else []
