@@ -239,6 +239,19 @@ def test_the_intensity_is_that_of_unpolarized_variants(mode):
             np.testing.assert_allclose(ours, plain, rtol=rtol, atol=1e-6 * np.median(abs(plain)), err_msg=name)
 
 
+WORDS = {"retroreflectivity": 0.4}, {"haze": 0.5}, {"multiscatter": "walk"}, {"multiscatter": "turquin"}
+
+
+@pytest.mark.usefixtures("polarized")
+@pytest.mark.parametrize("words", [*WORDS, WORDS[0] | WORDS[3]], ids=" ".join)
+def test_light_is_traced_by_the_matrix_of_the_exchanged_directions(words):
+    bsdf = {"type": "walter", "eta": 1.5, "k": 2.0, "alpha": 0.5} | words
+    wi, wo = directions(2000)
+    found, expected = matrices(bsdf, wi, wo, MODES[1]), matrices(bsdf, wo, wi)
+    expected *= (wo[:, 2] / wi[:, 2])[:, None, None, None]
+    assert in_parts_of_the_intensity(found, expected).max() < 1e-4
+
+
 # --- Frames -----------------------------------------------------------------------------------------------------------
 
 METAL = {"type": "microfacet", "distribution": "ggx", "eta": 1.5, "k": 2.0}

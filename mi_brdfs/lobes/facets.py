@@ -90,9 +90,6 @@ class RetroreflectiveLobe(Lobe):
         back, u = choose(u, self.share)
         return self.lobe.sample(dr.select(back, self._mirrored(wi), wi), u, v)
 
-    def adjoint(self) -> Lobe:
-        return self if self.reciprocal else RetroreflectiveLobe(self.lobe.adjoint(), self.share)
-
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return self.lobe.mirror_reflectance(wi) * (1 - self.share)
 
