@@ -63,7 +63,7 @@ def page(
     controls = (it for given in state.subjects for it in materials.controls(materials.expanded(given)))
     known = dict.fromkeys(it["name"] for it in controls if it["kind"] == "number")
     if missing := [name for name in vary or {} if name not in ("theta", *known)]:
-        raise StateError(f"{missing[0]} is no number of these BSDFs; these have {listed(known, 'and')}.")
+        raise StateError(f"{missing[0]} is no number of these BSDFs; choose {listed(['theta', *known])}.")
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
     baked = _Baked(state, materials, scenes, vary, on_progress)
