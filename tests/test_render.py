@@ -214,6 +214,6 @@ def test_tonemapping_is_smooth_and_survives_bad_pixels():
 
 def test_the_display_image_of_a_well_exposed_picture_is_plain_srgb(variant):
     pixels = np.random.default_rng(3).uniform(0, 1, (20, 30, 3)).astype(np.float32)
-    bitmap = mi.Bitmap(pixels)
-    plain = np.array(mi.util.convert_to_bitmap(bitmap)).astype(int)
-    assert np.abs(np.array(display_image(bitmap)).astype(int) - plain).max() <= 1
+    plain = np.array(mi.util.convert_to_bitmap(mi.Bitmap(pixels))).astype(int)
+    for given in mi.Bitmap(pixels), pixels, mi.TensorXf(pixels):
+        assert np.abs(np.array(display_image(given)).astype(int) - plain).max() <= 1

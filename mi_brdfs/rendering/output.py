@@ -9,6 +9,7 @@ from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..writing import replacing
 from .passes import Picture
@@ -83,8 +84,10 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
     return image * np.minimum(f, 1) / np.where(m > 0, m, 1)
 
 
-def display_image(bitmap: mi.Bitmap) -> mi.Bitmap | None:
-    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours."""
+def display_image(bitmap: mi.Bitmap | ArrayLike) -> mi.Bitmap | None:
+    """Return the tone-mapped 8-bit sRGB image of a developed film, as a bitmap or an array, without alpha and AOVs;
+    None without colours."""
+    bitmap = bitmap if isinstance(bitmap, mi.Bitmap) else mi.Bitmap(np.array(bitmap, np.float32))
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
     colours = next((it for it in formats if names.startswith(it.name)), None)
