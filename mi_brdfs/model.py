@@ -162,9 +162,9 @@ class Plugin:
 
     @classmethod
     def example(cls) -> dict[str, Any]:
-        """Return the plugin dict of the section "Example", or else the defaults."""
-        _, heading, last = inspect.cleandoc(cls.__doc__ or "").rpartition(EXAMPLE)
-        return ast.literal_eval(last) if heading and last.startswith("{") else {"type": cls.plugins[0]}
+        """Return the plugin dict at the end of the docstring, or else the defaults."""
+        last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2].removeprefix(EXAMPLE)
+        return ast.literal_eval(last) if last.startswith('{"') else {"type": cls.plugins[0]}
 
     @classmethod
     def page(cls) -> str:

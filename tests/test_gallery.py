@@ -50,6 +50,16 @@ def test_every_model_has_a_portrait_and_sweeps():
 
 
 @pytest.mark.usefixtures("llvm_rgb", "as_before")
+def test_braces_at_the_end_of_a_docstring_need_be_no_example():
+    class Sawtooth(Model):
+        """Sawtooth.
+
+        {x} is the fractional part of x.
+        """
+
+    assert Sawtooth.example() == {"type": "sawtooth"}
+
+
 def test_sweeps_of_others_models_come_from_their_declarations():
     """With what else the example on the manual page gives, and without what excludes the parameter."""
 
