@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import json
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -164,7 +165,7 @@ class Plugin:
     def example(cls) -> dict[str, Any]:
         """Return the plugin dict at the end of the docstring, or else the defaults."""
         last = inspect.cleandoc(cls.__doc__ or "").rpartition("\n\n")[2].removeprefix(EXAMPLE)
-        return ast.literal_eval(last) if last.startswith('{"') else {"type": cls.plugins[0]}
+        return ast.literal_eval(last) if re.match(r"""\{\s*["']""", last) else {"type": cls.plugins[0]}
 
     @classmethod
     def page(cls) -> str:

@@ -46,7 +46,8 @@ def exit_on_sigterm() -> None:
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait until the end: imports that they interrupt make other errors of them."""
+    """Let Ctrl-C and SIGTERM wait until the end: imports that they interrupt make other errors of them, and processes
+    that start print tracebacks."""
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
     if threading.current_thread() is not threading.main_thread():

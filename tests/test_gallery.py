@@ -58,6 +58,8 @@ def test_braces_at_the_end_of_a_docstring_need_be_no_example():
         """
 
     assert Sawtooth.example() == {"type": "sawtooth"}
+    Sawtooth.__doc__ = "Sawtooth.\n\n{\n 'type': 'sawtooth', 'x': 2}"
+    assert Sawtooth.example() == {"type": "sawtooth", "x": 2}
 
 
 def test_sweeps_of_others_models_come_from_their_declarations():

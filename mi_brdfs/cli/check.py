@@ -157,7 +157,7 @@ def _check_all(
         known = variant, guests.sources()
         with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_start_job, initargs=known) as pool:
             try:
-                with signals_held():  # a process that is not told what to do prints a traceback
+                with signals_held():
                     futures = [pool.submit(_check_one, source, other, options) for source in sources]
                 for future in futures:
                     reports.append(future.result())
