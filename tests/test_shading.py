@@ -100,6 +100,10 @@ TILT = {"type": "rgb", "value": [0.8, 0.5, 0.9]}
 """The normal (.6, 0, .8)."""
 
 
+def blend(first, second):
+    return {"type": "blendbsdf", "weight": 0.25, "first": first, "second": second}
+
+
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize(
     ("bsdf", "front", "back"),
@@ -115,7 +119,9 @@ TILT = {"type": "rgb", "value": [0.8, 0.5, 0.9]}
         ({"type": "normalmap", "normalmap": TILT, "inner": {"type": "phong"}}, 0.5, 0),
         ({"type": "mask", "opacity": 0.4, "inner": {"type": "phong"}}, 0.2, 0),
         ({"type": "twosided", "i": {"type": "normalmap", "normalmap": TILT, "inner": {"type": "phong"}}}, 0.5, 0.5),
-        ({"type": "blendbsdf", "weight": 0.25, "a": {"type": "phong"}, "b": {"type": "walter"}}, 0.375, 0),
+        (blend({"type": "phong"}, {"type": "walter"}), 0.375, 0),
+        (blend({"type": "twosided", "inner": {"type": "phong"}}, {"type": "diffuse", "reflectance": 0.3}), 0.45, 0.45),
+        (blend(blend({"type": "phong"}, {"type": "walter"}), {"type": "walter"}), 0.28125, 0),
         ({"type": "twosided", "front": {"type": "phong"}, "back": {"type": "diffuse", "reflectance": 0.3}}, 0.5, 0.3),
         ({"type": "diffuse", "reflectance": 0.3}, 0.3, 0.3),
         ({"type": "conductor"}, 0, 0),

@@ -274,7 +274,11 @@ def diffuse_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.B
         seen.wi = mi.Vector3f(si.wi.x, si.wi.y, abs(si.wi.z))
         front, back = (diffuse_reflectance(it, seen, active) for it in (inner[0], inner[-1]))
         return select(si.wi.z > 0, front, back)
-    if not any(hasattr(it, "mirror_reflectance") for it in (bsdf, *inner)):
+    if kind == "BlendBSDF":
+        (weight,) = children(bsdf, mi.Texture)
+        first, second = (diffuse_reflectance(it, si, active) for it in inner)
+        return dr.lerp(first, second, clamp(weight.eval_1(si, active), 0, 1))
+    if not hasattr(bsdf, "mirror_reflectance"):
         return mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
     normal = mi.Vector3f(0, 0, dr.select(si.wi.z > 0, 1, -1))
     upright = mi.SurfaceInteraction3f(si)
