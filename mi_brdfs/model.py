@@ -109,13 +109,14 @@ class Plugin:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls.plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
-        if isinstance(cls.plugins, str):
-            raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{cls.plugins}",).')
         every = [it for base in cls.__mro__ for it in vars(base).values() if isinstance(it, Parameter)]
         for name in (name for parameter in every for name in (parameter.name, *parameter.names)):
             if hasattr(Model, name) or name in MEMBERS:
                 raise TypeError(f"{cls.__name__}: a parameter cannot be called {name}, an attribute of every model.")
+        plugins = cls.__dict__.get("plugins", (cls.__name__.lower(),))
+        if isinstance(plugins, str):
+            raise TypeError(f'{cls.__name__}: plugins is a tuple of names; write plugins = ("{plugins}",).')
+        cls.plugins = tuple(plugins)
 
         declared = cls.declared()
         for it in (it for parameter in nested(declared) for way in parameter.spellings for it in way):

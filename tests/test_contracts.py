@@ -192,6 +192,7 @@ def test_a_default_is_in_range():
 def test_plugins_are_a_tuple():
     with pytest.raises(TypeError, match=r'Slip: plugins is a tuple of names; write plugins = \("slip",\).'):
         model(matte, plugins="slip")
+    assert model(matte, plugins=["slip", "slips"]).plugins == ("slip", "slips")
 
 
 class Dimmed(MicrofacetLobe):
