@@ -211,6 +211,7 @@ def chi_square(bsdf, ctx, wi, *, seed, **resolution) -> ChiSquareTest:
     def pdf(w):
         return bsdf.pdf(ctx, si, mi.Vector3f(w.x, w.z, w.y), True)
 
+    seed = dr.opaque(mi.UInt32, seed)  # all seeds have one kernel
     return ChiSquareTest(SphericalDomain(), sample, pdf, sample_dim=3, seed=seed, **{"ires": 16} | resolution)
 
 

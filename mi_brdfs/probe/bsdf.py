@@ -180,7 +180,9 @@ class BSDFProbe:
     # --- Calls ------------------------------------------------------------------------------------------------------
 
     def _at(self, wi: Array, uv: ArrayLike, count: int) -> mi.SurfaceInteraction3f:
-        si = interaction(wi, uv, hero_wavelengths(count) if self.every_wavelength else WAVELENGTHS)
+        # A direction for each lane: Dr.Jit compiles other kernels for one that is given once.
+        each = np.broadcast_to(wi, (count, 3))
+        si = interaction(each, uv, hero_wavelengths(count) if self.every_wavelength else WAVELENGTHS)
         if self.turned:
             s, t, n = mi.Vector3f(0.6, 0, -0.8), mi.Vector3f(-0.64, 0.6, -0.48), mi.Vector3f(0.48, 0.8, 0.36)
             si.n, si.sh_frame, si.dp_du, si.dp_dv = mi.Normal3f(n), mi.Frame3f(s, t, n), s, t
