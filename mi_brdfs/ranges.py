@@ -34,7 +34,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     """Clamp the parameters of all BSDFs of this package in a scene to their ranges; a NaN stays one, to be seen, and
     attributes of meshes are theirs.
 
-    In an optimisation, call it after each step with the optimizer, whose variables are clamped, too::
+    In an optimisation, call it after each step with the optimizer; only its variables are clamped then, there, too::
 
         optimizer.step()
         params.update(optimizer)
@@ -42,8 +42,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
 
     Args:
         params: what ``mi.traverse`` returned for a scene, a shape or a BSDF.
-        optimizer: an optimizer such as ``mi.ad.Adam``, with variables named like the parameters. With it, only these
-            are projected.
+        optimizer: an optimizer such as ``mi.ad.Adam``, with variables named like the parameters.
 
     Raises:
         ValueError: if these are no such parameters, or those of another variant than the active one.

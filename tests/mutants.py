@@ -308,8 +308,8 @@ class TextureKept(Lambert):
     width = 0
 
     def evaluate(self, si, active):
-        if self.width != dr.width(si.uv):
-            self.width, self.kept = dr.width(si.uv), super().evaluate(si, active)
+        if self.width != dr.width(si):
+            self.width, self.kept = dr.width(si), super().evaluate(si, active)
         return self.kept
 
 

@@ -108,9 +108,10 @@ class Microfacet(Model):
     In polarized variants facets of conductors and dielectrics polarise the light as a smooth surface or film does. All
     else depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
-    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling),
-    so that no sample falls below the horizon: visible normals for ggx with smith, smith-correlated or schlick, and
-    otherwise those of D, with a few uniform directions at grazing if steep facets may reflect most there.
+    Sampling: an antithetic pair of half vectors, one chosen by how much each reflects (mi_brdfs.microfacet.sampling):
+    visible normals for ggx with smith, smith-correlated or schlick, of which some reflect below the horizon (see
+    ``walter``), and otherwise those of D, of which one of the pair always reflects above it, with a few uniform
+    directions at grazing if steep facets may reflect most there.
 
     Example
     -------

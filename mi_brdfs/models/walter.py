@@ -35,7 +35,8 @@ class Walter(Model):
     else depolarises it: ``f0``, F = 1, the diffuse lobe, and what ``multiscatter`` adds.
 
     Sampling: an antithetic pair of visible normals, bounded and tilted towards the normal, one chosen by how much each
-    reflects (mi_brdfs.microfacet.visible.VisibleNormals). No sample falls below the horizon.
+    reflects (mi_brdfs.microfacet.visible.VisibleNormals). At most 0.6 % of the samples fall below the horizon for one
+    alpha up to 1, 27 % for αu : αv = 1 : 0.125, and 42 % for alpha = 2.
 
     Example
     -------
