@@ -317,6 +317,15 @@ def test_what_is_no_scheduler_is_not_waited_for(command, handler, scene, tmp_pat
     assert done.exit_code == 1 and done.stderr.splitlines()[0] == f"mi-brdfs: {NO_SCHEDULER.format(address)}"
 
 
+def test_a_function_of_the_script_that_runs_is_refused():
+    def task():
+        pass
+
+    task.__module__ = "__main__"
+    with pytest.raises(ClusterError, match="task is defined in the script that runs; put it into a module"):
+        run(task, {"one": ()}, workers=1)
+
+
 def test_other_versions_are_refused(address, monkeypatch):
     monkeypatch.setattr(mi_brdfs.cluster.worker, "__version__", "9.9")
     with pytest.raises(ClusterError, match=r"The worker at tcp://\S+ has mi_brdfs 0.1.0, this process has 9.9\.$"):

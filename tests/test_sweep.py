@@ -16,9 +16,11 @@ from pyarrow import parquet
 from support import ROOT
 from test_cli import interrupted, invoke
 
+import mi_brdfs
 from mi_brdfs.fit import METRICS, fit, observe
 from mi_brdfs.mitsuba import guests
 from mi_brdfs.mitsuba.registry import find_model
+from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.sweep import Store, StoreWarning, Sweep, medians, plan, wall
 from mi_brdfs.sweep.store import SCHEMA
 
@@ -152,6 +154,16 @@ def test_a_guest_is_known_by_its_source(tmp_path, as_before):
         found.append(plan.versions(find_model("grey")))
     assert found[0] == found[2] and len({*found}) == 3
     assert plan.versions(find_model("ward")) == f"mi_brdfs {plan.__version__}, Mitsuba {mi.__version__}"
+
+
+@pytest.mark.usefixtures("llvm_rgb", "as_before")
+def test_a_guest_is_of_a_file_and_for_workers_of_a_module(tmp_path):
+    """Which a notebook's is not, and one of a function, as here, or of the script that runs."""
+    for where, told in (("nowhere", "no file"), (__name__, "the script that runs")):
+        members = {"__doc__": "A guest.", "__module__": where, "plugins": ("guest",)}
+        mi_brdfs.register(type("Guest", (Lambert,), members), replace=True)
+        with pytest.raises(ValueError, match=f"guest is defined in {told}"):
+            next(swept(tmp_path, models=["guest"]).fit(workers=1))
 
 
 # --- Files ----------------------------------------------------------------------------------------------------------

@@ -83,7 +83,7 @@ def plot(
             labels=labels and labels.split(","),
             size=asked.size_of(size),
         )
-    file = output or asked.default_file(kind, targets)
+        file = output or asked.default_file(kind, targets)
     check_output("-o", file)
     set_tracing_variant(variant)
     with stdout_to_stderr(), err.status(f"Drawing {file.name}"):

@@ -32,9 +32,9 @@ def run(
     end. Each key comes once.
 
     Without ``workers`` and ``scheduler``, all calls are made here. Worker processes have the variant that is active
-    here and the models registered here, and run one task at a time. The tasks of one that dies go to the others; one
-    of this machine is started again. When the iterator is closed, or Ctrl-C is pressed, the calls that run here end at
-    once, those of a scheduler's workers when they are done.
+    here and the models registered here, except those that the script that runs or a notebook defines, and run one task
+    at a time. The tasks of one that dies go to the others; one of this machine is started again. When the iterator is
+    closed, or Ctrl-C is pressed, the calls that run here end at once, those of a scheduler's workers when done.
 
     Args:
         function: one that can be imported by name, on the workers' machines too. It gets all it needs as arguments,
@@ -57,6 +57,8 @@ def run(
     pairs = iter(tasks.items() if isinstance(tasks, Mapping) else tasks)
     if not workers and not scheduler:
         return ((key, call(function, (*shared, *arguments))) for key, arguments in pairs)
+    if function.__module__ == "__main__":
+        raise ClusterError(f"{function.__name__} is defined in the script that runs; put it into a module of its own.")
     with signals_held():
         try:
             import distributed  # noqa: F401

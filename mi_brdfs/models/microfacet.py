@@ -90,8 +90,9 @@ class Microfacet(Model):
     * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
     * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
 
-    For F = 1 all of them conserve energy within 0.005 up to 85° and αu : αv = 8 : 1, with ggx and beckmann; rough blinn
-    gains by itself. Beyond that facets may be up to 0.07 too dark or 0.06 too bright. The albedo of walk is that of the
+    For F = 1 all of them conserve energy within 0.005 (turquin within 0.006), with ggx and beckmann, where neither α
+    exceeds 1, up to 85° and αu : αv = 8 : 1; where one reaches 2, within 0.015 (turquin within 0.03); rough blinn gains
+    by itself. Beyond that facets may be up to 0.07 too dark or 0.06 too bright. The albedo of walk is that of the
     simulated walk within 0.005 up to 60°, and 0.02 at 80°, for Schlick's reflectance, f82 and metals, up to 4 : 1;
     within 0.025 at 8 : 1; and for films, in rgb, within 0.013.
 

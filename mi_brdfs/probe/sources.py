@@ -125,7 +125,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
 def split(word: str) -> tuple[str, dict[str, str]]:
     """Return a word without its own parameters, ``:name=value,name=value`` at its end, and these as text. What is no
     ``name=value`` after a comma belongs to the value before it, as in ``alpha=0.1,0.2``. The name of a file that exists
-    has none, nor has what is within XML. Raise a ValueError if a parameter has no value."""
+    has none, nor has what is within XML. Raise a ValueError if a parameter has no value, or two."""
     start = word.rfind(">") + 1 if word.startswith("<") else 0
     found = None if os.path.exists(word) else OWN.search(word, start)
     if found is None:
@@ -134,6 +134,8 @@ def split(word: str) -> tuple[str, dict[str, str]]:
     for name, value in re.findall(r"(\w+)=(.*?)(?=,\w+=|$)", word[found.end() :], re.DOTALL):
         if not value:
             raise ValueError(f"{word}: write {name}=value")
+        if name in values:
+            raise ValueError(f"{word}: {name} is given twice")
         values[name] = value
     return word[: found.start()], values
 

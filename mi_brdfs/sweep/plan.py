@@ -20,6 +20,7 @@ from ..cluster import Failed, run
 from ..fit import STARTS, Observations, find_metric, fit, observe
 from ..fit.observations import CUT
 from ..measured.files import FileError, checked, content_hash
+from ..mitsuba.guests import source
 from ..mitsuba.registry import find_models, is_own
 from ..model import Model
 from .store import Store, row_of
@@ -52,7 +53,7 @@ class Sweep:
         cut: the largest angle to the normal, in degrees.
 
     Raises:
-        ValueError: if there is no such model or metric.
+        ValueError: if there is no such model or metric, or a model is defined in no file.
         FileError: if a file cannot be opened.
     """
 
@@ -113,7 +114,14 @@ class Sweep:
 
         Raises:
             OSError: if the folder cannot be written to.
+            ValueError: if workers are asked for, and a model is defined in the script that runs.
         """
+        for model in find_models(self.models) if workers or scheduler else ():
+            if not is_own(model) and not source(model):
+                raise ValueError(
+                    f"{model.plugins[0]} is defined in the script that runs; put it into a module, to be imported by "
+                    "workers."
+                )
         left: dict[tuple[str, str], list[dict[str, Any]]] = {}
         done = self._done()
         for identity in self.wanted():
@@ -186,8 +194,11 @@ def versions(model: type[Model] | None = None) -> str:
         return found
     try:
         sources = [inspect.getsource(it) for it in _beside(inspect.getmodule(model) or model)]
-    except (OSError, TypeError):  # defined in a notebook
-        sources = [inspect.getsource(model)]
+    except (OSError, TypeError):
+        raise ValueError(
+            f"{model.plugins[0]} is defined in no file; put it into one and import that, as fits are known by the "
+            "source of their model."
+        ) from None
     return f"{found}, {model.__module__} {digest(sources)}"
 
 

@@ -24,7 +24,7 @@ import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # i
 import mitsuba as mi  # isort: skip
 import numpy as np  # isort: skip
 
-ALPHAS, RATIOS = 36, 14
+ALPHAS, RATIOS = 36, 27
 BRIGHTER = 0.008
 """What polynomials may add to E where they err most, on facets of extreme anisotropy."""
 WALK_COSINES, WALK_ALPHAS = 13, 9
