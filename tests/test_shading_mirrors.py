@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from plates import SKY, SUN, WHITE, plate, shade, shaded
-from support import call, direction
+from support import LOFT, call, direction
 
 import mi_brdfs
 
@@ -55,6 +55,15 @@ def test_the_mirrored_environment_does_not_light_the_lobes_that_mirror_it():
     mirrored = shade(metal, SKY, spp=20000, environment_reflection=True, clamp=False)
     assert mirrored == pytest.approx(0.5 * (0.3 * np.pi + 0.2), rel=0.02)
     assert shade(metal, SKY, spp=20000, clamp=False) == pytest.approx(0.5 * np.pi * (0.3 + 0.2 * 0.75), rel=0.1)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_environment_lights_measured_data_as_it_does_without_reflection():
+    """Of which nobody knows what is a mirror's."""
+    paint = {"type": "tabulated", "filename": str(LOFT)}
+    with pytest.warns(UserWarning, match="no mirror reflectance is known for tabulated"):
+        lit = shade(paint, SKY, environment_reflection=True, spp=64)
+    assert lit == shade(paint, SKY, spp=64) > 0.001
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -54,8 +54,8 @@ class Shading(Plugin):
       formulas above, also where they are nested. Built-in BSDFs use their own ``eval_diffuse_reflectance``.
     * ``environment_reflection`` looks up the environment in the mirror direction r, ignoring objects in between. ρ_m is
       the specular colour times the Fresnel reflectance at r. The environment then lights only the diffuse lobes: the
-      look-up replaces its reflection by the others. Built-in BSDFs have no ρ_m, nor have ours nested in them, except in
-      ``twosided``: they get no reflection, and a warning names them.
+      look-up replaces its reflection by the others. Built-in BSDFs and measured data have no ρ_m, nor have ours nested
+      in built-ins, except in ``twosided``: they get no reflection, and a warning names them.
     * At the end, ``tonemap`` = reinhard maps each channel x of a pixel to x/(1+x), and ``clamp`` cuts off values above
       1, of which reinhard leaves none.
 
@@ -132,7 +132,8 @@ class Shading(Plugin):
         if self.environment_reflection and not self.warned:
             self.warned = True
             shiny = int(mi.BSDFFlags.GlossyReflection) | int(mi.BSDFFlags.DeltaReflection)
-            dull = {it.class_name() for it in bsdfs_of(scene) if int(it.flags()) & shiny and not mirrors(it)}
+            found = [it for it in bsdfs_of(scene) if int(it.flags()) & shiny and not mirrors(it)]
+            dull = {it.model.plugins[0] if hasattr(it, "model") else it.class_name() for it in found}
             if dull:
                 warnings.warn(
                     f"shading: no mirror reflectance is known for {listed(sorted(dull), 'and')}; "
@@ -300,11 +301,12 @@ def mirror_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bo
 
 
 def mirrors(bsdf: mi.BSDF) -> list[Any]:
-    """Return our BSDFs that make up a BSDF, front side first: itself, or those in ``twosided``."""
+    """Return our BSDFs that make up a BSDF, front side first: itself, or those in ``twosided``. Measured data are none:
+    what of them is a mirror's is not known."""
     inner = [bsdf]
     if bsdf.class_name() == "TwoSidedBRDF":
         inner = children(bsdf, mi.BSDF)
-    return inner if all(hasattr(it, "mirror_reflectance") for it in inner) else []
+    return inner if all(hasattr(it, "mirror_reflectance") and not it.model.data for it in inner) else []
 
 
 def only_diffuse() -> mi.BSDFContext:
