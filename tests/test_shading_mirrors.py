@@ -9,6 +9,7 @@ from plates import SKY, SUN, WHITE, plate, shade, shaded
 from support import LOFT, call, direction
 
 import mi_brdfs
+from mi_brdfs.lobes import LambertLobe
 
 
 def grazing(f0, degrees):
@@ -57,13 +58,19 @@ def test_the_mirrored_environment_does_not_light_the_lobes_that_mirror_it():
     assert shade(metal, SKY, spp=20000, clamp=False) == pytest.approx(0.5 * np.pi * (0.3 + 0.2 * 0.75), rel=0.1)
 
 
-@pytest.mark.usefixtures("llvm_rgb")
-def test_the_environment_lights_measured_data_as_it_does_without_reflection():
-    """Of which nobody knows what is a mirror's."""
-    paint = {"type": "tabulated", "filename": str(LOFT)}
-    with pytest.warns(UserWarning, match="no mirror reflectance is known for tabulated"):
-        lit = shade(paint, SKY, environment_reflection=True, spp=64)
-    assert lit == shade(paint, SKY, spp=64) > 0.001
+@pytest.mark.usefixtures("llvm_rgb", "as_before")
+def test_the_environment_lights_what_knows_no_mirror_as_ever():
+    """Measured data, and a guest whose glossy lobe does not say what it mirrors."""
+
+    class Sheen(LambertLobe):
+        glossy = True
+
+    members = {"__doc__": "A guest.", "lobes": lambda self, p: (Sheen(0.5),)}
+    mi_brdfs.register(type("Guest", (mi_brdfs.Model,), members))
+    for bsdf in {"type": "tabulated", "filename": str(LOFT)}, {"type": "guest"}:
+        with pytest.warns(UserWarning, match=f"no mirror reflectance is known for {bsdf['type']}"):
+            lit = shade(bsdf, SKY, environment_reflection=True, spp=64)
+        assert lit == shade(bsdf, SKY, spp=64) > 0.001
 
 
 @pytest.mark.usefixtures("llvm_rgb")

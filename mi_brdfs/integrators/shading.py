@@ -55,7 +55,7 @@ class Shading(Plugin):
     * ``environment_reflection`` looks up the environment in the mirror direction r, ignoring objects in between. ρ_m is
       the specular colour times the Fresnel reflectance at r. The environment then lights only the diffuse lobes: the
       look-up replaces its reflection by the others. Built-in BSDFs and measured data have no ρ_m, nor have ours nested
-      in built-ins, except in ``twosided``: they get no reflection, and a warning names them.
+      in built-ins, except in ``twosided``: the environment lights them as ever, and a warning names them.
     * At the end, ``tonemap`` = reinhard maps each channel x of a pixel to x/(1+x), and ``clamp`` cuts off values above
       1, of which reinhard leaves none.
 
@@ -301,12 +301,12 @@ def mirror_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.Bo
 
 
 def mirrors(bsdf: mi.BSDF) -> list[Any]:
-    """Return our BSDFs that make up a BSDF, front side first: itself, or those in ``twosided``. Measured data are none:
-    what of them is a mirror's is not known."""
+    """Return our BSDFs that make up a BSDF, front side first, if they know what they mirror: itself, or those in
+    ``twosided``."""
     inner = [bsdf]
     if bsdf.class_name() == "TwoSidedBRDF":
         inner = children(bsdf, mi.BSDF)
-    return inner if all(hasattr(it, "mirror_reflectance") and not it.model.data for it in inner) else []
+    return inner if all(getattr(it, "is_mirror", False) for it in inner) else []
 
 
 def only_diffuse() -> mi.BSDFContext:

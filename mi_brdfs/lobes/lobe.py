@@ -67,7 +67,8 @@ class Lobe:
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         """Return the lobe's colour times its Fresnel reflectance for the mirror direction of ``wi``, regardless of its
-        width and scale: its reflectance as a mirror. It is 0 for diffuse lobes."""
+        width and scale: its reflectance as a mirror. It is 0 for diffuse lobes; a BSDF with a glossy one that does not
+        define it reflects an environment as it lights it, also under ``environment_reflection``."""
         return 0
 
 

@@ -52,6 +52,9 @@ class MultipleScattering(Lobe):
     def energy(self, wi: mi.Vector3f) -> mi.Float:
         return self.typical * self.walks.of(wi).lost
 
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
+        return 0  # as mirrors, facets lose nothing
+
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         i, o = self.walks.of(wi), self.walks.of(wo)
         # What is the same for all directions of wi comes first, so that Dr.Jit computes it once.

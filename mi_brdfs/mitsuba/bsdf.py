@@ -48,7 +48,9 @@ class ModelBSDF:
             common |= flags.SpatiallyVarying
         self.lobe_kinds: list[tuple[bool, bool, bool]] = []
         self.kinds, self.transmits, components = [], [], []
-        for lobe in self._lobes(self.model.placeholders()):
+        lobes = self._lobes(self.model.placeholders())
+        self.is_mirror = all(type(it).mirror_reflectance is not Lobe.mirror_reflectance for it in lobes if it.glossy)
+        for lobe in lobes:
             if lobe.transmits:
                 kind = flags.GlossyTransmission if lobe.glossy else flags.DiffuseTransmission
             else:

@@ -177,6 +177,9 @@ class InterreflectionLobe(Lobe):
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         return self.fresnel(TYPICAL) * (0.5 * self._constant(wi)[1] / dr.maximum(wi.z, EPSILON))
 
+    def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
+        return 0  # a mirror sends no light from facet to facet
+
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         lost, integral = self._constant(wi)
         x, k = wo.z, self.k
