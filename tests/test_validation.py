@@ -376,6 +376,26 @@ def test_bitmaps_are_not_used_up():
     assert not report.failures and (np.array(bitmap) == before).all()
 
 
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_channels_of_a_colour_that_is_no_texture(exchanged):
+    colour = mi.Color3f(0.5)
+
+    def eval_pdf(self, ctx, si, wo, active):
+        lit = active & (si.wi.z > 0) & (wo.z > 0) & ctx.is_enabled(DIFFUSE, 0)
+        seen = mi.Color3f(colour.z, colour.y, colour.x) if exchanged else colour
+        density = dr.select(lit, wo.z * dr.inv_pi, 0)
+        return seen * density, density
+
+    def traverse(self, callback):
+        callback.put("colour", colour, mi.ParamFlags.Differentiable)
+
+    def draw(si, v):
+        return mi.warp.square_to_cosine_hemisphere(v)
+
+    paint = stranger(f"paint_{exchanged}", DIFFUSE | FRONT, draw=draw, eval_pdf=eval_pdf, traverse=traverse)
+    assert check(paint, only="colours").verdict("colours") == ("fail" if exchanged else "pass")
+
+
 def test_a_plugin_of_one_variant():
     """What cannot be loaded elsewhere cannot be judged there. Nor does it have a ``to_string``."""
     report = check(of_others("in_rgb_alone"), only=["spectral", "polarization", "calls"])

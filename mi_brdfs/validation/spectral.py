@@ -16,6 +16,7 @@ from ..probe.directions import hemisphere, on_side
 from . import sampling, values
 from .outcome import Outcome, Skipped, relative, skipping, told
 from .run import Run, of_whole
+from .traced import Parameter, traced_floats
 from .updates import loaded_or_none
 
 COUNT = 1000
@@ -37,9 +38,14 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
     value in this channel, or at least nearer to that than to what another channel makes: a tint may depend on the
     luminance. For this the BSDF must be given as a dict."""
     greys = _greys(run.probe, run.described("To give it other colours"))
-    if not greys:
+    # Colours that are no textures can be set.
+    kept = [it for it in traced_floats(run, "colours")[0] if "." not in it.key and isinstance(it.value, mi.Color3f)]
+    if not (greys or kept):
         raise Skipped("It has no colours.")
-    _check_channels(run, outcome, greys)
+    if greys:
+        _check_channels(run, outcome, greys)
+    for parameter in kept:
+        _check_kept(run, outcome, parameter)
     return "Each channel follows its own."
 
 
@@ -134,6 +140,21 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
         for k in channels:  # of four equal wavelengths no tint can depend on the others
             one, own = (each[k][at].value[:, k] for each in (alone, grey))
             _compare(outcome, name, one, own, OWN, wi, wo, wavelengths[:, k])
+
+
+def _check_kept(run: Run, outcome: Outcome, parameter: Parameter) -> None:
+    """Check that channels follow their own of a colour that the BSDF keeps itself."""
+    wi, wo = run.probe.pairs(run.probe.whole, COUNT, 84)
+    with parameter.restored() as original:
+        bright = float(numbers(original, 1).mean())
+
+        def evaluated(*channels: float) -> list[Value]:
+            parameter.set(mi.Color3f(*(bright * each for each in channels)))
+            return run.probe.values(wi, wo)
+
+        grey = [evaluated(each, each, each) for each in HUE]
+        for at, it in enumerate(evaluated(*HUE)):
+            _check_followed(outcome, it, [each[at].value for each in grey], wi)
 
 
 def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -> None:
