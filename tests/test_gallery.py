@@ -49,7 +49,6 @@ def test_every_model_has_a_portrait_and_sweeps():
     assert swept["film_thickness"].startswith("film_thickness in nm")
 
 
-@pytest.mark.usefixtures("llvm_rgb", "as_before")
 def test_braces_at_the_end_of_a_docstring_need_be_no_example():
     class Sawtooth(Model):
         """Sawtooth.
@@ -62,6 +61,7 @@ def test_braces_at_the_end_of_a_docstring_need_be_no_example():
     assert Sawtooth.example() == {"type": "sawtooth", "x": 2}
 
 
+@pytest.mark.usefixtures("llvm_rgb", "as_before")
 def test_sweeps_of_others_models_come_from_their_declarations():
     """With what else the example on the manual page gives, and without what excludes the parameter."""
 
