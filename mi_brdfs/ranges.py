@@ -34,7 +34,7 @@ def project(params: mi.SceneParameters, optimizer: MutableMapping[str, Any] | No
     """Clamp the parameters of all BSDFs of this package in a scene to their ranges; a NaN stays one, to be seen, and
     attributes of meshes are theirs.
 
-    In an optimisation, call it after each step with the optimizer; only its variables are clamped then, there, too::
+    In an optimisation, call it after each step with the optimizer, whose variables alone are clamped then, in both::
 
         optimizer.step()
         params.update(optimizer)

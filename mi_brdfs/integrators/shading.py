@@ -279,7 +279,7 @@ def diffuse_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.B
         (weight,) = children(bsdf, mi.Texture)
         first, second = (diffuse_reflectance(it, si, active) for it in inner)
         return dr.lerp(first, second, clamp(weight.eval_1(si, active), 0, 1))
-    if not hasattr(bsdf, "mirror_reflectance"):
+    if not hasattr(bsdf, "model"):
         return mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si, active))
     normal = mi.Vector3f(0, 0, dr.select(si.wi.z > 0, 1, -1))
     upright = mi.SurfaceInteraction3f(si)

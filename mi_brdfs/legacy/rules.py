@@ -366,7 +366,7 @@ Jensen et al., A practical model for subsurface light transport, SIGGRAPH 2001."
 
 @rule("medium", "homogeneous")
 def _homogeneous(work: Work, element: Element) -> None:
-    scattered, absorbed = (_coefficient(element, *it) for it in zip(("sigma_s", "sigma_a"), SKIN, strict=True))
+    scattered, absorbed = _coefficient(element, "sigma_s", SKIN[0]), _coefficient(element, "sigma_a", SKIN[1])
     extinct = scattered + absorbed
     albedo = _coefficient(element, "albedo", scattered / np.maximum(extinct, 1e-30))
     extinct = _coefficient(element, "sigma_t", extinct)
