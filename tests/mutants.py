@@ -325,6 +325,15 @@ def elsewhere(moved):
     return Mutant
 
 
+def greyed(value):
+    return mi.Color3f(mi.luminance(value)) if mi.is_rgb else value
+
+
+def greyed_pair(own, self, *given):
+    value, pdf = own(self, *given)
+    return greyed(value), pdf
+
+
 def red_and_blue_exchanged(texture, si, active):
     value = texture.eval(si, active)
     return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
@@ -931,6 +940,8 @@ MUTANTS = [
         in_spectra(lambda value, nm: type(value)(value[1], value[0], value[2], value[3])),
     ),
     mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
+    mutant("grey weights", "colours", Lambert, sampled(weight=lambda bs, w, si, u: greyed(w))),
+    mutant("grey of eval_pdf", "colours", Lambert, adapted(eval_pdf=greyed_pair)),
     mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
     mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
     mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),

@@ -376,15 +376,19 @@ def test_bitmaps_are_not_used_up():
     assert not report.failures and (np.array(bitmap) == before).all()
 
 
-@pytest.mark.parametrize("exchanged", [False, True])
-def test_channels_of_a_colour_that_is_no_texture(exchanged):
+@pytest.mark.parametrize("fault", ["", "exchanged", "grey pairs"])
+def test_channels_of_a_colour_that_is_no_texture(fault):
     colour = mi.Color3f(0.5)
 
-    def eval_pdf(self, ctx, si, wo, active):
+    def coloured(self, ctx, si, wo, active):
         lit = active & (si.wi.z > 0) & (wo.z > 0) & ctx.is_enabled(DIFFUSE, 0)
-        seen = mi.Color3f(colour.z, colour.y, colour.x) if exchanged else colour
+        seen = mi.Color3f(colour.z, colour.y, colour.x) if fault == "exchanged" else colour
         density = dr.select(lit, wo.z * dr.inv_pi, 0)
         return seen * density, density
+
+    def eval_pdf(self, *given):
+        value, density = coloured(self, *given)
+        return mi.Color3f(mi.luminance(value)) if fault == "grey pairs" else value, density
 
     def traverse(self, callback):
         callback.put("colour", colour, mi.ParamFlags.Differentiable)
@@ -392,8 +396,9 @@ def test_channels_of_a_colour_that_is_no_texture(exchanged):
     def draw(si, v):
         return mi.warp.square_to_cosine_hemisphere(v)
 
-    paint = stranger(f"paint_{exchanged}", DIFFUSE | FRONT, draw=draw, eval_pdf=eval_pdf, traverse=traverse)
-    assert check(paint, only="colours").verdict("colours") == ("fail" if exchanged else "pass")
+    methods = {"eval": lambda self, *given: coloured(self, *given)[0], "eval_pdf": eval_pdf, "traverse": traverse}
+    paint = stranger(f"paint_{fault}", DIFFUSE | FRONT, draw=draw, **methods)
+    assert check(paint, only="colours").verdict("colours") == ("fail" if fault else "pass")
 
 
 def test_a_plugin_of_one_variant():

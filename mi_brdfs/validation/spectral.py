@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,8 @@ from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned
 from ..probe.bsdf import BSDFProbe, Part, Value, load
 from ..probe.directions import hemisphere, on_side
 from . import sampling, values
-from .outcome import Outcome, Skipped, relative, skipping, told
+from .outcome import Findings, Outcome, Skipped, relative, skipping, told
+from .report import Finding
 from .run import Run, of_whole
 from .traced import Parameter, traced_floats
 from .updates import loaded_or_none
@@ -25,7 +27,7 @@ TOLERANCE = 5e-3
 BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
 AGAIN = values.finite, sampling.weight, values.eval_pdf
-"""The checks to run again in a spectral variant, of what they pass in rgb."""
+"""The checks to run again in colours, and in colours in a spectral variant, of what they pass as it is."""
 OWN = "where all colours are grey of their value there"
 HUE = 1, 0.7, 0.45
 """The channels of a colour, as parts of the grey in its place."""
@@ -36,7 +38,8 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that no channels of colour are exchanged: with colours for parameters that are grey or coloured, each
     channel of ``eval``, and of the weights of delta functions, is what it is where all parameters are grey of their
     value in this channel, or at least nearer to that than to what another channel makes: a tint may depend on the
-    luminance. For this the BSDF must be given as a dict."""
+    luminance. And there values are finite, weights are eval/pdf, and ``eval_pdf`` says what ``eval`` and ``pdf`` say.
+    For this the BSDF must be given as a dict."""
     greys = _greys(run.probe, run.described("To give it other colours"))
     # Colours that are no textures can be set.
     kept = [it for it in traced_floats(run, "colours")[0] if "." not in it.key and isinstance(it.value, mi.Color3f)]
@@ -44,6 +47,7 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
         raise Skipped("It has no colours.")
     if greys:
         _check_channels(run, outcome, greys)
+        _tell(run, outcome, _failed(_anywhere(run, BSDFProbe(load((run.given or {}) | _coloured(greys)))), AGAIN))
     for parameter in kept:
         _check_kept(run, outcome, parameter)
     return "Each channel follows its own."
@@ -84,18 +88,11 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
     with mi.variant_context(other), skipping(f"It does not work in {other}: "):
         got = {words: _load(given).values(wi, wo) for words, given in tried.items()}
         coloured = _load(described | _coloured(greys))
-        every = replace(run, probe=coloured, angles=(), given=None)
         # Few tests, but judged as strictly as those of this run: they are as many more.
-        one = replace(every, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, significance=run.level)
-        failed = {
-            check: [it for it in check(again) if it.verdict == "fail"]
-            for again, checks in ((every, AGAIN), (one, (sampling.pdf, sampling.chi2)))
-            for check in checks
-        }
+        one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, significance=run.level)
+        failed = _failed(_anywhere(run, coloured), AGAIN) | _failed(one, (sampling.pdf, sampling.chi2))
         _check_channels(run, outcome, greys)
-    for check, findings in failed.items():
-        if findings and all(finding.verdict != "fail" for finding in check(run)):
-            outcome.fault(f"in {other}, {findings[0].check}: {findings[0].message.rstrip('.')}", np.inf)
+    _tell(run, outcome, failed, f"in {other}, ")
     for words in tried:
         for it, in_rgb in zip(got[words], expected[words], strict=True):
             wanted = np.broadcast_to(in_rgb.value.mean(axis=1, keepdims=True), it.value.shape)
@@ -155,6 +152,29 @@ def _check_kept(run: Run, outcome: Outcome, parameter: Parameter) -> None:
         grey = [evaluated(each, each, each) for each in HUE]
         for at, it in enumerate(evaluated(*HUE)):
             _check_followed(outcome, it, [each[at].value for each in grey], wi)
+        failed = _failed(_anywhere(run, run.probe), AGAIN)
+    _tell(run, outcome, failed)
+
+
+Failed = dict[Callable[[Run], Findings], list[Finding]]
+"""What failed, by check."""
+
+
+def _anywhere(run: Run, probe: BSDFProbe) -> Run:
+    """Return a run for a BSDF in colours, and for directions all over the hemisphere alone."""
+    return replace(run, probe=probe, angles=(), given=None)
+
+
+def _failed(run: Run, checks: Iterable[Callable[[Run], Findings]]) -> Failed:
+    return {check: [finding for finding in check(run) if finding.verdict == "fail"] for check in checks}
+
+
+def _tell(run: Run, outcome: Outcome, failed: Failed, where: str = "") -> None:
+    """Add faults of the BSDF in colours that it has not as it is."""
+    for check, findings in failed.items():
+        if findings and all(finding.verdict != "fail" for finding in check(run)):
+            first = findings[0]
+            outcome.fault(f"{where}in colours, {first.check}: {first.message.rstrip('.')}", np.inf)
 
 
 def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -> None:
