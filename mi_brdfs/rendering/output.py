@@ -21,21 +21,25 @@ IMAGES = {
 """Mitsuba's formats by the endings of file names."""
 
 
-def denoise(colours: np.ndarray | mi.TensorXf) -> np.ndarray:
+def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
     """Return linear RGB, shape (height, width, 3), denoised by Intel's Open Image Denoise. Films with a box filter give
     the best result, as pixels then share no samples.
 
     Raises:
         ImportError: without the extra that brings it.
+        ValueError: if the shape is another one.
     """
     try:
         import mitsuba_oidn
     except ImportError as error:
         raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
-    height, width = colours.shape[:2]
+    pixels = np.array(colours, np.float32)
+    if pixels.ndim != 3 or pixels.shape[2] != 3:
+        raise ValueError(f"denoise takes colours of the shape (height, width, 3), not {pixels.shape}")
+    height, width, _ = pixels.shape
     # It leaves lines along the edges where sides are no multiples of 16.
-    padded = np.pad(colours, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
-    return mitsuba_oidn.denoise(np.ascontiguousarray(padded, np.float32), hdr=True)[:height, :width]
+    padded = np.pad(pixels, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
+    return mitsuba_oidn.denoise(padded, hdr=True)[:height, :width]
 
 
 def denoiser() -> Callable[[np.ndarray], np.ndarray] | None:
