@@ -334,6 +334,11 @@ def greyed_pair(own, self, *given):
     return greyed(value), pdf
 
 
+def greyed_in_light_tracing(own, self, ctx, *given):
+    value = own(self, ctx, *given)
+    return greyed(value) if ctx.mode == mi.TransportMode.Importance else value
+
+
 def red_and_blue_exchanged(texture, si, active):
     value = texture.eval(si, active)
     return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
@@ -942,6 +947,8 @@ MUTANTS = [
     mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
     mutant("grey weights", "colours", Lambert, sampled(weight=lambda bs, w, si, u: greyed(w))),
     mutant("grey of eval_pdf", "colours", Lambert, adapted(eval_pdf=greyed_pair)),
+    mutant("grey in light tracing", "colours", Lambert, adapted(eval=greyed_in_light_tracing)),
+    mutant("grey reflectance", "colours", Lambert, reflectance(greyed)),
     mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
     mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
     mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),

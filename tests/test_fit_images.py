@@ -141,6 +141,20 @@ def test_a_texture_that_the_scene_holds(tmp_path):
     assert found.bsdfs["ball"]["type"] == "phong"
 
 
+def test_derivatives_of_another_scene():
+    """Of a picture that waits for them: Dr.Jit cannot take ours alone, and does after what the message says."""
+    other = scene_of({"type": "ward", "alpha": 0.3}, integrator="path", size=8)
+    params = mi.traverse(other)
+    dr.enable_grad(params["ball.bsdf.alpha.value"])
+    params.update()
+    picture = mi.render(other, params, spp=4)
+    scene = scene_of({"type": "ward", "alpha": 0.5}, size=8)
+    with pytest.raises(FitError, match=r"call dr\.disable_grad for that parameter, or dr\.backward for that picture"):
+        images(scene, np.array(picture), "ball.bsdf.alpha", iterations=1)
+    dr.disable_grad(params["ball.bsdf.alpha.value"])
+    assert images(scene, np.array(picture), "ball.bsdf.alpha", iterations=1).values
+
+
 @pytest.mark.slow
 def test_noise_of_a_few_pixels_is_part_of_the_uncertainty():
     """Of a highlight of some pixels: squares of sixteen that are taken as one each are too few to judge it by."""

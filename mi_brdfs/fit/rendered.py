@@ -11,6 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..mitsuba.errors import one_line
 from ..probe.arrays import Array
 from .observations import FitError
 from .unknowns import LARGEST, Unknown
@@ -171,9 +172,21 @@ class Rendered:
             # Bitmaps hold copies of their values: integrators need the derivatives of these.
             dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearEdges)
             for k, (view, root) in enumerate(zip(self.views, self._roots, strict=True)):
-                image = self.integrator.render_forward(self.scene, self.params, view.sensor, seed=seed + k, spp=spp)
+                image = self._render_forward(view, seed + k, spp)
                 found.append((root * view.cut(image)).ravel())
         return np.concatenate(found)
+
+    def _render_forward(self, view: View, seed: int, spp: int) -> mi.TensorXf:
+        try:
+            return self.integrator.render_forward(self.scene, self.params, view.sensor, seed=seed, spp=spp)
+        except RuntimeError as error:
+            if "isolate_grad" not in one_line(error):
+                raise
+            # Every BSDF that lives is part of the kernels.
+            raise FitError(
+                "A parameter of another scene has derivatives, and a picture of it that was not differentiated: first "
+                "call dr.disable_grad for that parameter, or dr.backward for that picture."
+            ) from error
 
     def gradients(self, point: Array) -> list[Array]:
         """Return half the derivatives of the sum of squares by the base of each slot, by backward differentiation;

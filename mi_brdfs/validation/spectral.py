@@ -14,7 +14,7 @@ from ..parameters.colours import rgb_texture
 from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned
 from ..probe.bsdf import BSDFProbe, Part, Value, load
 from ..probe.directions import hemisphere, on_side
-from . import sampling, values
+from . import contract, sampling, values
 from .outcome import Findings, Outcome, Skipped, relative, skipping, told
 from .report import Finding
 from .run import Run, of_whole
@@ -26,7 +26,7 @@ TOLERANCE = 5e-3
 """Mitsuba fits spectra to rgb colours to about a thousandth."""
 BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
-AGAIN = values.finite, sampling.weight, values.eval_pdf
+AGAIN = values.finite, sampling.weight, values.eval_pdf, contract.mode, contract.reflectance
 """The checks to run again in colours, and in colours in a spectral variant, of what they pass as it is."""
 OWN = "where all colours are grey of their value there"
 HUE = 1, 0.7, 0.45
@@ -38,8 +38,9 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that no channels of colour are exchanged: with colours for parameters that are grey or coloured, each
     channel of ``eval``, and of the weights of delta functions, is what it is where all parameters are grey of their
     value in this channel, or at least nearer to that than to what another channel makes: a tint may depend on the
-    luminance. And there values are finite, weights are eval/pdf, and ``eval_pdf`` says what ``eval`` and ``pdf`` say.
-    For this the BSDF must be given as a dict."""
+    luminance. And there values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval`` and ``pdf`` say, light
+    may be traced from the emitters, and ``eval_diffuse_reflectance`` is right. For this the BSDF must be given as a
+    dict."""
     greys = _greys(run.probe, run.described("To give it other colours"))
     # Colours that are no textures can be set.
     kept = [it for it in traced_floats(run, "colours")[0] if "." not in it.key and isinstance(it.value, mi.Color3f)]
@@ -59,10 +60,9 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
     rgb colours become grey ones, as bright as they are. Those of plugins of ours are also tried brighter than 1, where
     they may be; Mitsuba's own plugins limit them to 1 in spectral variants.
 
-    And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
-    and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
-    colours have there, and not that of another wavelength, be it one beside it; their order does not matter. For this
-    the BSDF must be given as a dict."""
+    And in colours, in the spectral variant, what ``colours`` says holds, directions are drawn as ``pdf`` says, at one
+    angle, and each wavelength follows the value that the colours have there, and not that of another wavelength, be it
+    one beside it; their order does not matter. For this the BSDF must be given as a dict."""
     described = run.described("To load it in two variants")
     rgb, other = (f"{mi.variant().rpartition('_')[0]}_{kind}" for kind in ("rgb", "spectral"))
     if mi.variant() not in (rgb, other) or not {rgb, other} <= set(mi.variants()):
