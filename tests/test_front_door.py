@@ -228,6 +228,13 @@ def test_a_file_imports_what_is_beside_it(tmp_path):
     assert "toned" in mi_brdfs.list_models()
 
 
+def test_a_file_registers_what_a_function_makes(tmp_path):
+    body = textwrap.indent(GUEST.replace("Chalk", "Made"), "    ")
+    (tmp_path / "made.py").write_text(f"def make():{body}    mi_brdfs.register(Made)\n\n\nmake()\n")
+    guests.import_models(str(tmp_path / "made.py"))
+    assert "made" in mi_brdfs.list_models()
+
+
 def test_models_that_a_function_makes_are_told_apart_by_their_names():
     def made(name):
         return mi_brdfs.register(type("Made", (EON,), {"__doc__": "Made.", "plugins": (name,)}))

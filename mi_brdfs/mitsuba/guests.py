@@ -44,8 +44,8 @@ def register_installed() -> None:
 
 def import_models(target: str) -> None:
     """Import a file, ``FILE.py``, or a module by its dotted name, and register the models and the terms of the kit that
-    it defines. A subclass of ``mi.BSDF`` it registers itself, in the active variant; without one, the fastest is
-    activated where the file needs it.
+    it defines. Models of functions, and subclasses of ``mi.BSDF`` in the active variant, it registers itself; without a
+    variant, the fastest is activated where the file needs it.
 
     Raises:
         ImportError: if it cannot be imported, or fails.
@@ -54,6 +54,8 @@ def import_models(target: str) -> None:
     path = Path(target) if target.endswith(".py") else None
     if path and not path.is_file():
         raise ImportError("no such file")
+
+    known = all_models()
 
     def imported() -> ModuleType:
         return _of_file(path) if path else importlib.import_module(target)
@@ -73,7 +75,7 @@ def import_models(target: str) -> None:
     found = _brought_by(module)
     if _defines_bsdf(module):
         _of_bsdfs.append(module.__name__)
-    elif not found:
+    elif not found and all_models() == known:
         raise ValueError("it defines no subclass of mi_brdfs.Model or mi.BSDF, nor a term of the kit with a word")
     for each in found:
         register(each)
