@@ -26,8 +26,10 @@ TOLERANCE = 5e-3
 """Mitsuba fits spectra to rgb colours to about a thousandth."""
 BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
-AGAIN = values.finite, sampling.weight, values.eval_pdf, contract.mode, contract.reflectance
-"""The checks to run again in colours, and in colours in a spectral variant, of what they pass as it is."""
+AGAIN = values.finite, sampling.weight, values.eval_pdf
+"""The checks to run again in colours in a spectral variant, of what they pass as it is in rgb."""
+EVERY = *AGAIN, contract.mode, contract.reflectance
+"""Those to run again in colours in the same variant, which take all lanes to have the same wavelengths."""
 OWN = "where all colours are grey of their value there"
 HUE = 1, 0.7, 0.45
 """The channels of a colour, as parts of the grey in its place."""
@@ -48,7 +50,7 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
         raise Skipped("It has no colours.")
     if greys:
         _check_channels(run, outcome, greys)
-        _tell(run, outcome, _failed(_anywhere(run, BSDFProbe(load((run.given or {}) | _coloured(greys)))), AGAIN))
+        _tell(run, outcome, _failed(_anywhere(run, BSDFProbe(load((run.given or {}) | _coloured(greys)))), EVERY))
     for parameter in kept:
         _check_kept(run, outcome, parameter)
     return "Each channel follows its own."
@@ -60,9 +62,10 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
     rgb colours become grey ones, as bright as they are. Those of plugins of ours are also tried brighter than 1, where
     they may be; Mitsuba's own plugins limit them to 1 in spectral variants.
 
-    And in colours, in the spectral variant, what ``colours`` says holds, directions are drawn as ``pdf`` says, at one
-    angle, and each wavelength follows the value that the colours have there, and not that of another wavelength, be it
-    one beside it; their order does not matter. For this the BSDF must be given as a dict."""
+    And in colours, in the spectral variant, values are finite, weights are eval/pdf, ``eval_pdf`` says what ``eval``
+    and ``pdf`` say, directions are drawn as ``pdf`` says, at one angle, and each wavelength follows the value that the
+    colours have there, and not that of another wavelength, be it one beside it; their order does not matter. For this
+    the BSDF must be given as a dict."""
     described = run.described("To load it in two variants")
     rgb, other = (f"{mi.variant().rpartition('_')[0]}_{kind}" for kind in ("rgb", "spectral"))
     if mi.variant() not in (rgb, other) or not {rgb, other} <= set(mi.variants()):
@@ -152,7 +155,7 @@ def _check_kept(run: Run, outcome: Outcome, parameter: Parameter) -> None:
         grey = [evaluated(each, each, each) for each in HUE]
         for at, it in enumerate(evaluated(*HUE)):
             _check_followed(outcome, it, [each[at].value for each in grey], wi)
-        failed = _failed(_anywhere(run, run.probe), AGAIN)
+        failed = _failed(_anywhere(run, run.probe), EVERY)
     _tell(run, outcome, failed)
 
 
