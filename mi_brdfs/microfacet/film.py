@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, SMALL, Spectrum, gauss_legendre, leaving, luminance, safe_sqrt
+from ..math import EPSILON, SMALL, Spectrum, leaving, luminance, safe_sqrt
 from ..observer import observer
 from ..parameters import Number, ParameterError
 from ..parameters.parameter import Quantity
@@ -98,12 +98,6 @@ class Film(Fresnel):
         amplitude = safe_sqrt(luminance(self(mi.Float(1))))
         return Dielectric((1 + amplitude) / dr.maximum(1 - amplitude, SMALL)).forward(distribution, wi)
 
-    def combination(self) -> tuple[Spectrum, ...]:
-        """That nearest to the reflectance at four angles: at 0, 82 and 90° alone it has other hues."""
-        seen = [(self(mi.Float(cos)), weights) for cos, weights in _combination()]
-        normal, rise, raised = (sum(f * weights[k] for f, weights in seen) for k in range(3))
-        return normal, rise, -raised
-
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...]:
         s, p = self._polarized(cos, self.thickness)
         f, b, product = self._unpolarized(s, p), 0.5 * (s.reflectance() - p.reflectance()), p.times_conjugate(s)
@@ -137,16 +131,6 @@ class Film(Fresnel):
             parts = (mi.Color3f(*part.tolist()) for part in (colour.real, colour.imag))
             weight = Complex(*(part if mi.is_rgb else mi.luminance(part) for part in parts))
             yield weight, Complex(cos, sin) * dr.exp(rate.real * path)
-
-
-@functools.cache
-def _combination() -> list[tuple[float, list[float]]]:
-    """Return cosines, each with how much the reflectance there counts in the coefficients of 1, (1 - cosθ)⁵ and cosθ
-    (1 - cosθ)⁶: those of least squares over a hemisphere."""
-    cos, weight = np.array(gauss_legendre(4)).T
-    root = np.sqrt(cos * weight)
-    basis = np.stack([np.ones_like(cos), (1 - cos) ** 5, cos * (1 - cos) ** 6])
-    return list(zip(cos.tolist(), (np.linalg.pinv((basis * root).T) * root).T.tolist(), strict=True))
 
 
 @dataclass

@@ -48,10 +48,13 @@ class Schlick(Fresnel):
     def __call__(self, cos: mi.Float) -> Any:
         if self.f82 is None:
             return self.estimate(cos)
-        m = 1 - self.DIP
-        dip = (1 - self.f82) * self.estimate(mi.Float(self.DIP)) / (self.DIP * m**6)
         m2 = dr.square(dr.maximum(1 - cos, 0))
-        return dr.maximum(self.estimate(cos) - dip * (cos * m2 * m2 * m2), 0)
+        return dr.maximum(self.estimate(cos) - self._dip(self.f82) * (cos * m2 * m2 * m2), 0)
+
+    def _dip(self, f82: Spectrum) -> Spectrum:
+        """Return the multiple."""
+        cos = 1 / 7
+        return (1 - f82) * self.estimate(mi.Float(cos)) / (cos * (1 - cos) ** 6)
 
     def estimate(self, cos: mi.Float) -> Any:
         m = dr.maximum(1 - cos, 0)
@@ -63,9 +66,10 @@ class Schlick(Fresnel):
         return self.f0 + ((1 if self.f90 is None else self.f90) - self.f0) * power
 
     def combination(self) -> tuple[Spectrum, ...]:
-        if self.f82 is not None or self.exponent is not None:
+        if self.exponent is not None:
             return super().combination()
-        return self.f0, (1 if self.f90 is None else self.f90) - self.f0
+        rise = (1 if self.f90 is None else self.f90) - self.f0
+        return (self.f0, rise) if self.f82 is None else (self.f0, rise, self._dip(self.f82))
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         if self.f82 is not None:

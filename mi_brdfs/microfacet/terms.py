@@ -3,13 +3,15 @@ proposals that samplers are made of."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from ..math import Spectrum, luminance
+from ..math import Spectrum, gauss_legendre, luminance
 from ..parameters import Number, Parameter
 from .facet import Facet
 
@@ -127,9 +129,6 @@ class Isotropic(Distribution):
 class Fresnel(Term):
     """A Fresnel reflectance, called with the cosine."""
 
-    DIP = 1 / 7
-    """The cosine at which conductors reflect less than Schlick's approximation, about."""
-
     def __call__(self, cos: mi.Float) -> Spectrum:
         raise NotImplementedError(f"{type(self).__name__} does not define __call__.")
 
@@ -143,11 +142,11 @@ class Fresnel(Term):
 
     def combination(self) -> tuple[Spectrum, ...]:
         """Return a, b and c of a + b (1 - cosθ)⁵ - c cosθ (1 - cosθ)⁶, or a and b where c is 0, as for Schlick's
-        reflectance. That of conductors (Lazányi and Szirmay-Kalos 2005) and others is replaced by the one with its
-        values at 0, 82 and 90°."""
-        normal, m = self(mi.Float(1)), 1 - self.DIP
-        rise = self(mi.Float(0)) - normal
-        return normal, rise, (normal + rise * m**5 - self(mi.Float(self.DIP))) / (self.DIP * m**6)
+        reflectance. That of conductors (Lazányi and Szirmay-Kalos 2005) and others is replaced by the one nearest to it
+        over a hemisphere, which has its mean."""
+        seen = [(self(mi.Float(cos)), weights) for cos, weights in _combination()]
+        normal, rise, raised = (sum(f * weights[k] for f, weights in seen) for k in range(3))
+        return normal, rise, -raised
 
     @staticmethod
     def mean(combination: Sequence[Spectrum], schlick: Any, dip: Any) -> Spectrum:
@@ -171,6 +170,16 @@ class Fresnel(Term):
     def forward(self, distribution: Distribution, wi: mi.Vector3f) -> Any:
         """Return the forward directions to draw besides half vectors, if there are such."""
         return None
+
+
+@functools.cache
+def _combination() -> list[tuple[float, list[float]]]:
+    """Return cosines, each with how much the reflectance there counts in the coefficients of 1, (1 - cosθ)⁵ and cosθ
+    (1 - cosθ)⁶: those of least squares over a hemisphere."""
+    cos, weight = np.array(gauss_legendre(5)).T
+    root = np.sqrt(cos * weight)
+    basis = np.stack([np.ones_like(cos), (1 - cos) ** 5, cos * (1 - cos) ** 6])
+    return list(zip(cos.tolist(), (np.linalg.pinv((basis * root).T) * root).T.tolist(), strict=True))
 
 
 class Directions(Protocol):
