@@ -176,7 +176,7 @@ class Fresnel(Term):
 def _combination() -> list[tuple[float, list[float]]]:
     """Return cosines, each with how much the reflectance there counts in the coefficients of 1, (1 - cosθ)⁵ and cosθ
     (1 - cosθ)⁶: those of least squares over a hemisphere."""
-    cos, weight = np.array(gauss_legendre(5)).T
+    cos, weight = np.array(gauss_legendre(4)).T
     root = np.sqrt(cos * weight)
     basis = np.stack([np.ones_like(cos), (1 - cos) ** 5, cos * (1 - cos) ** 6])
     return list(zip(cos.tolist(), (np.linalg.pinv((basis * root).T) * root).T.tolist(), strict=True))
