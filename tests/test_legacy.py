@@ -329,6 +329,38 @@ def test_many_parts_of_a_mixture(load):
     np.testing.assert_allclose(evaluated(scene.shapes()[0].bsdf()), weights @ grey / np.pi * cosines, rtol=1e-4)
 
 
+GIVEN = {"eta": [1.5, 0.5, 3.0], "k": [2.0, 3.0, 1.0]}
+METALS = {
+    "": {"eta": [0.200438, 0.924033, 1.102212], "k": [3.912949, 2.452848, 2.142188]},
+    "Au": {"eta": [0.143119, 0.374957, 1.442479], "k": [3.98316, 2.385721, 1.603215]},
+    "none": {"eta": [0.0] * 3, "k": [1.0] * 3},
+}
+"""What 0.6 reads of its materials, copper where none is given, in linear RGB."""
+
+
+@pytest.mark.parametrize("names", ["eta", "k", "eta k"])
+@pytest.mark.parametrize("material", METALS)
+@pytest.mark.parametrize("kind", ["conductor", "roughconductor", "roughconductor phong"])
+def test_conductors_take_the_index_that_is_not_given_from_their_material(load, kind, material, names):
+    """At normal incidence, where a mirror reflects F, and the rough ones F D / 4 with D = 1 / (πα²). η of microfacet,
+    which phong becomes, is at least .01."""
+    kind, _, distribution = kind.partition(" ")
+    indices = {name: GIVEN[name] for name in names.split()}
+    words = {"material": material, "distribution": distribution}
+    inner = "".join(f'<rgb name="{name}" value="{", ".join(map(str, it))}"/>' for name, it in indices.items())
+    inner += "".join(f'<string name="{name}" value="{it}"/>' for name, it in words.items() if it)
+    scene, _ = load(in_shape(f'<bsdf type="{kind}">{inner}</bsdf>'))
+    bsdf, si = scene.shapes()[0].bsdf(), interaction([0, 0, 1])
+    if kind == "conductor":
+        value = bsdf.sample(context(), si, 0.5, mi.Point2f(0.5))[1]
+    else:
+        value = bsdf.eval(context(), si, si.wi) * 4 * np.pi * 0.1**2
+    eta, k = (np.array((METALS[material] | indices)[name]) for name in ("eta", "k"))
+    eta = np.maximum(eta, 0.01 if distribution else 0)
+    expected = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
+    np.testing.assert_allclose(numbers(value).ravel(), expected, rtol=5e-4)
+
+
 @pytest.mark.parametrize("old, stand_in", MISSING)
 def test_missing_files(upgraded, old, stand_in):
     old = old.format('<transform name="toWorld"><scale value="2"/></transform><bsdf type="conductor"/>')
@@ -500,3 +532,14 @@ def test_many_parameters_are_looked_up_once_for_each_use(folder):
 def test_malformed_values_are_refused(upgraded, inside, sentence):
     with pytest.raises(ValueError, match=sentence):
         upgraded(f'<bsdf type="phong">{inside}</bsdf>')
+
+
+@pytest.mark.parametrize(
+    ("bsdf", "sentence"),
+    [
+        (f'<bsdf type="conductor">{given(eta=[1.5], material="xy")}</bsdf>', "'xy' is no metal that Mitsuba knows"),
+    ],
+)
+def test_what_0_6_refuses_is_refused_with_its_reason(upgraded, bsdf, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        upgraded(bsdf)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import mitsuba as mi
 import numpy as np
 
+from ..parameters.fresnel import conductors, indices
 from .document import Element, plugin, prop, written
 from .tables import PLUGINS
 
@@ -145,6 +146,8 @@ def _bounded(work: Work, element: Element) -> Element:
 
 @rule("bsdf", "conductor", "roughconductor")
 def _conductor(work: Work, element: Element) -> Element:
+    if element["eta"] or element["k"]:
+        _eta_and_k(work, element)
     exterior, given = element.pop("ext_eta"), [it for it in element.of("rgb", "float") if it.name in ("eta", "k")]
     if exterior and given:
         for it in given:
@@ -166,6 +169,28 @@ def _conductor(work: Work, element: Element) -> Element:
         element.set("exponent", max(2 / max(alphas.pop() ** 2, 1e-8) - 2, 0.1))  # as 0.6 converts α
         element.type = "microfacet"
     return _bounded(work, element)
+
+
+def _eta_and_k(work: Work, element: Element) -> None:
+    """Give a conductor that has eta or k both, and no material, which in 0.6 has the one that is not given."""
+    material = element.pop("material")
+    if missing := next((name for name in ("eta", "k") if not element[name]), ""):
+        material = material or prop("material", "Cu")
+        element.put(prop(missing, _of_material(material, missing)))
+        work.changed(element, f"{missing} of {element.type} is that of material {material.value}, as a colour")
+    elif material and material.value.lower() != "none":
+        work.changed(element, f"material of {element.type} goes, as 0.6 takes eta and k before it")
+
+
+def _of_material(material: Element, name: str) -> list[float]:
+    """Return eta or k of a conductor's material, in linear RGB."""
+    if material.value.lower() == "none":
+        return [0.0 if name == "eta" else 1.0]
+    if material.value not in conductors():
+        raise material.error(f"{material.value!r} is no metal that Mitsuba knows")
+    scalar = importlib.import_module("mitsuba.scalar_rgb")
+    spectrum = scalar.spectrum_from_file(str(indices() / f"{material.value}.{name}.spd"))
+    return [float(v) for v in scalar.spectrum_list_to_srgb(*spectrum, bounded=False, d65=False)]
 
 
 def _index(element: Element) -> float:

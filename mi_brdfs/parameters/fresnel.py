@@ -108,7 +108,7 @@ class ConductorName(Parameter):
                 f'= {shown(material)} is unknown{beginning} must be "none", for F = 1, or one of Mitsuba\'s conductors '
                 + ", ".join(first),
             )
-        textures = {name: _measured(_indices() / f"{material}.{name}.spd") for name in self.limits}
+        textures = {name: _measured(indices() / f"{material}.{name}.spd") for name in self.limits}
         return self.replace(textures=textures, ranges=dict(self.limits))
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Any, ...] | None:
@@ -121,10 +121,11 @@ class ConductorName(Parameter):
 @cache
 def conductors() -> list[str]:
     """Return the names of Mitsuba's conductors."""
-    return sorted(path.name.removesuffix(".eta.spd") for path in _indices().glob("*.eta.spd"))
+    return sorted(path.name.removesuffix(".eta.spd") for path in indices().glob("*.eta.spd"))
 
 
-def _indices() -> Path:
+def indices() -> Path:
+    """Return the folder of their indices of refraction: ``NAME.eta.spd`` and ``NAME.k.spd``."""
     return Path(mi.__file__).parent / "data" / "ior"
 
 
