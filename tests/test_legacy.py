@@ -538,6 +538,7 @@ def test_malformed_values_are_refused(upgraded, inside, sentence):
     ("bsdf", "sentence"),
     [
         (f'<bsdf type="conductor">{given(eta=[1.5], material="xy")}</bsdf>', "'xy' is no metal that Mitsuba knows"),
+        (f'<bsdf type="mixturebsdf">{given(weights="-1, .5")}<bsdf/><bsdf/></bsdf>', "the weight -1 is negative"),
     ],
 )
 def test_what_0_6_refuses_is_refused_with_its_reason(upgraded, bsdf, sentence):

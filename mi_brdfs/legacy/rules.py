@@ -250,8 +250,10 @@ def _mask(work: Work, element: Element) -> None:
 def _mixture(work: Work, element: Element) -> Element:
     parts, given = element.of(element.tag, "ref"), element.pop("weights")
     weights = given.numbers() if given else []
-    if len(weights) != len(parts) or not parts or min(weights) < 0:
+    if len(weights) != len(parts) or not parts:
         raise element.error(f"there are {len(parts)} parts and {len(weights)} weights")
+    if min(weights) < 0:
+        raise element.error(f"the weight {min(weights):g} is negative")
     if element.tag == "bsdf" and sum(weights) < 1 - 1e-6:  # the rest absorbs
         parts.append(plugin("bsdf", "diffuse", reflectance=[0.0]))
         weights.append(1 - sum(weights))
