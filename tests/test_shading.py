@@ -49,10 +49,10 @@ def test_spots_shine_by_the_square_of_the_distance():
 @pytest.mark.parametrize(
     ("shape", "solid_angle"),
     [
-        # The area over the squared distance; of the sphere, that of its cone.
+        # The area over the squared distance; of the sphere, that of its disk.
         ("rectangle", 4 / 10**2),
         ("disk", np.pi / 10**2),
-        ("sphere", 2 * np.pi * (1 - np.sqrt(1 - 1 / 10**2))),
+        ("sphere", np.pi / 10**2),
     ],
 )
 def test_area_lights_may_shine_from_their_centre(shape, solid_angle):
@@ -63,6 +63,21 @@ def test_area_lights_may_shine_from_their_centre(shape, solid_angle):
     np.testing.assert_allclose(image[50, 50], ALBEDO * radiance * solid_angle, rtol=1e-3)
     np.testing.assert_allclose(image[::-1, ::-1], image, rtol=1e-3)
     np.testing.assert_array_equal(shaded(scene, spp=1, seed=7), image)
+
+
+@pytest.mark.parametrize("name", ["llvm_ad_rgb", "scalar_rgb"])
+def test_spheres_shine_from_their_centre_as_points_do(name):
+    """Of intensity π r² L; and within one, as the point that its sample finds does for all of it."""
+    radiance, height = 3.0, 40.0
+    settings = {"area_lights": "centre", "clamp": False}
+    with mi.variant_context(name):
+        for radius in (0.25 * height, 0.75 * height):
+            intensity = np.pi * radius**2 * radiance
+            point = {"type": "point", "position": [0, 0, height], "intensity": intensity}
+            sphere = lamp("sphere", radiance, T().translate([0, 0, height]).scale(radius))
+            assert shade(WHITE, sphere, **settings) == pytest.approx(shade(WHITE, point, clamp=False), rel=1e-5)
+        around = lamp("sphere", radiance, T().scale(40)) | {"flip_normals": True}
+        assert shade(WHITE, around, **settings) == pytest.approx(ALBEDO * 4 * np.pi * radiance, rel=1e-3)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -174,6 +174,8 @@ class Shading(Plugin):
         for light in scene.emitters():
             ds, irradiance = light.sample_direction(si, self._place(light, sampler), hit)
             irradiance, lit = mi.unpolarized_spectrum(irradiance), select(ds.pdf > 0, hit, False)
+            if self.area_lights == "centre":
+                irradiance *= mean_cosine(light, si, ds)
             if self.shadows and veils:
                 through = straight_through(scene, si, ds, light, lit)
                 irradiance, lit = irradiance * through, select(dr.any(through > 0), lit, False)
@@ -205,6 +207,17 @@ class Shading(Plugin):
 
 CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
 """The sample that yields the centre of a shape; a sphere samples the cone that it subtends."""
+
+
+def mean_cosine(light: mi.Emitter, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f) -> mi.Float:
+    """Return the factor from a light's sample to its irradiance at normal incidence: outside a sphere, the mean cosine
+    over its cone, (1 + cosθ_max) / 2, as the sample is the axis alone; its density is 1 / (2π (1 - cosθ_max))."""
+    shape = light.get_shape()
+    if shape is None or shape.class_name() != "Sphere":
+        return mi.Float(1)
+    box = shape.bbox()
+    outside = dr.norm(si.p - box.center()) > box.extents().x / 2
+    return dr.select(outside, 1 - 1 / (4 * dr.pi * dr.maximum(ds.pdf, dr.inv_two_pi)), 1)
 
 
 # --- Occlusion ---------------------------------------------------------------------------------------------
