@@ -57,13 +57,16 @@ def listed(words: Iterable[str], last: str = "or", quote: bool = False) -> str:
 
 
 def meant(name: str, known: Iterable[str], likeness: float = 0.6) -> str | None:
-    """Return the known name that may have been meant by another one: a close one, of at least that ``likeness``, with
-    the same letters if there is such, or one that begins with it. Return None if there is none."""
+    """Return the known name that may have been meant by another one: the one in another case or with other underscores,
+    a close one, of at least that ``likeness``, with the same letters if there is such, or one that begins with it.
+    Return None if there is none."""
     known = list(known)
+    plain = name.lower().replace("_", "")
+    spelt = [it for it in known if it.lower().replace("_", "") == plain]
     close = difflib.get_close_matches(name, known, n=3, cutoff=likeness)
     same = [it for it in close if sorted(it) == sorted(name)]
     longer = [it for it in known if len(name) > 2 and it.startswith(name)]
-    return next(iter([*same, *close, *longer]), None)
+    return next(iter([*spelt, *same, *close, *longer]), None)
 
 
 def interval(low: float, high: float) -> str:
