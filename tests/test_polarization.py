@@ -242,6 +242,19 @@ def test_the_intensity_is_that_of_unpolarized_variants(mode):
 WORDS = {"retroreflectivity": 0.4}, {"haze": 0.5}, {"multiscatter": "walk"}, {"multiscatter": "turquin"}
 
 
+@pytest.mark.parametrize("words", [*WORDS, WORDS[0] | WORDS[3]], ids=" ".join)
+def test_the_colour_of_gold_is_that_of_unpolarized_variants(words):
+    """But for rounding, as above: also of the light that a word depolarises."""
+    wi, wo = directions(2000)
+    values = []
+    for variant in "llvm_ad_spectral", IN_LLVM:
+        with mi.variant_context(variant):
+            gold = mi.load_dict({"type": "walter", "material": "Au", "alpha": 0.5} | words)
+            values.append(call(gold.eval, context(MODES[0]), wi, wo)[0])
+    assert (np.ptp(values[0], axis=1) > 0.1 * values[0].max(axis=1)).mean() > 0.9
+    np.testing.assert_allclose(*reversed(values), rtol=5e-6, atol=1e-6 * np.median(values[0]))
+
+
 @pytest.mark.usefixtures("polarized")
 @pytest.mark.parametrize("words", [*WORDS, WORDS[0] | WORDS[3]], ids=" ".join)
 def test_light_is_traced_by_the_matrix_of_the_exchanged_directions(words):

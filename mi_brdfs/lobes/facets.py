@@ -84,7 +84,7 @@ class RetroreflectiveLobe(Lobe):
         value, pdf = self.eval_pdf(wi, wo)
         matrix, _ = self.lobe.mueller_pdf(wi, wo, x_i, x_o)
         matrix = matrix * (1 - self.share)
-        return matrix + mi.depolarizer(value - matrix[0, 0]), pdf
+        return matrix + mi.depolarizer(mi.UnpolarizedSpectrum(value - matrix[0, 0])), pdf
 
     def sample(self, wi: mi.Vector3f, u: mi.Float, v: mi.Point2f) -> mi.Vector3f:
         back, u = choose(u, self.share)

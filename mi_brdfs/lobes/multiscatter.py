@@ -108,7 +108,7 @@ class TurquinLobe(WeightedLobe):
     ) -> tuple[mi.Spectrum, mi.Float]:
         value, pdf = self.eval_pdf(wi, wo)
         matrix, _ = self.lobe.mueller_pdf(wi, wo, x_i, x_o)
-        return matrix + mi.depolarizer(value - matrix[0, 0]), pdf
+        return matrix + mi.depolarizer(mi.UnpolarizedSpectrum(value - matrix[0, 0])), pdf
 
 
 def turquin(lobe: MicrofacetLobe, walks: Walks) -> Lobe:
