@@ -9,12 +9,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
-from ..probe.bsdf import Part, load
+from ..probe.bsdf import BSDFProbe, Part, Value, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
+from .incidents import all_over
 from .outcome import Outcome, Skipped, skipping
 from .run import Run, of_whole
+from .spectral import AGAIN, anywhere, failures, tell
 
 COUNT = 2000
 TOLERANCE = 1e-3
@@ -34,7 +37,11 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
     ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does ``eval`` in the mode
     Importance, for exchanged directions. Of delta functions alone, the weights of samples are looked at, and not
-    exchanged. For this the BSDF must be given as a dict."""
+    exchanged.
+
+    The first elements of values, and of the weights of delta functions, are what the unpolarized variant has, if the
+    BSDF works there, to float32's rounding; and by them, too, values are finite, weights are eval/pdf, as many samples
+    carry light, and ``eval_pdf`` says what ``eval`` and ``pdf`` say. For this the BSDF must be given as a dict."""
     described = run.described("To load it in a polarized variant")
     name = "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if name not in mi.variants():
@@ -54,6 +61,16 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
         exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
         back = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
         others = _others(run, bsdf, wi, wo, matrices, exchanged) if run.probe.parts else []
+        there = anywhere(run, BSDFProbe(bsdf))
+        failed, lit = failures(there, AGAIN), there.samples(part, all_over(part)).lit.mean()
+        passages = ((side, other) for side in part.sides for other in part.sides)
+        ways = (there.probe.pairs(part, COUNT, 106, passage) for passage in passages)
+        pairs = [np.concatenate(each) for each in zip(*ways, strict=True)]
+        bright = there.probe.values(*pairs)
+    tell(run, outcome, failed, f"in {name}, ")
+    if lit < 0.9 * (usual := run.samples(part, all_over(part)).lit.mean()):
+        outcome.fault(f"in {name}, {lit:.1%} of the samples carry light, but {usual:.1%} in {mi.variant()}", np.inf)
+    _check_intensity(run, outcome, name, bright, *pairs)
     intensity = np.maximum(matrices[..., 0, 0], 1e-30)
     states = np.random.default_rng(104).normal(size=(STATES, 3))
     states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)
@@ -80,6 +97,21 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
             name = f"the difference of the Mueller matrices of {name} and of eval"
             outcome.wrong(difference, name, difference, "in parts of their intensities", wi, towards, seed=SEED)
     return "Mueller matrices are physical."
+
+
+def _check_intensity(run: Run, outcome: Outcome, name: str, bright: list[Value], wi: Array, wo: Array) -> None:
+    """Check that what is ``bright`` in the polarized variant is as bright in the unpolarized one, if the BSDF works
+    there: but for one in a hundred, as near critical angles."""
+    plain = name.removesuffix("_polarized")
+    try:
+        with unwrapped_ctrl_c(), mi.variant_context(plain):
+            expected = BSDFProbe(load(run.given or {})).values(wi, wo)
+    except Exception:  # of which the check spectral tells
+        return
+    tolerance = 10 * run.rounding(run.probe.whole)
+    for it, own in zip(bright, expected, strict=False):
+        words = f"in {name}, {it.name}"
+        outcome.differing(tolerance, words, it.value, own.value, f"in {plain}", wi, it.wo, floor=1e-6, but_for=0.01)
 
 
 def _others(

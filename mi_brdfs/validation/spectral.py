@@ -27,7 +27,7 @@ TOLERANCE = 5e-3
 BRIGHT = 2.5
 """A grey that no reflectance may have, but other colours may."""
 AGAIN = values.finite, sampling.weight, values.eval_pdf
-"""The checks to run again in colours in a spectral variant, of what they pass as it is in rgb."""
+"""The checks to run again in a polarized variant, and in colours in a spectral one, of what passes in rgb as it is."""
 EVERY = *AGAIN, contract.mode, contract.reflectance
 """Those to run again in colours in the same variant, which take all lanes to have the same wavelengths."""
 OWN = "where all colours are grey of their value there"
@@ -50,7 +50,8 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
         raise Skipped("It has no colours.")
     if greys:
         _check_channels(run, outcome, greys)
-        _tell(run, outcome, _failed(_anywhere(run, BSDFProbe(load((run.given or {}) | _coloured(greys)))), EVERY))
+        coloured = BSDFProbe(load((run.given or {}) | _coloured(greys)))
+        tell(run, outcome, failures(anywhere(run, coloured), EVERY), "in colours, ")
     for parameter in kept:
         _check_kept(run, outcome, parameter)
     return "Each channel follows its own."
@@ -93,9 +94,9 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
         coloured = _load(described | _coloured(greys))
         # Few tests, but judged as strictly as those of this run: they are as many more.
         one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, significance=run.level)
-        failed = _failed(_anywhere(run, coloured), AGAIN) | _failed(one, (sampling.pdf, sampling.chi2))
+        failed = failures(anywhere(run, coloured), AGAIN) | failures(one, (sampling.pdf, sampling.chi2))
         _check_channels(run, outcome, greys)
-    _tell(run, outcome, failed, f"in {other}, ")
+    tell(run, outcome, failed, f"in {other}, in colours, ")
     for words in tried:
         for it, in_rgb in zip(got[words], expected[words], strict=True):
             wanted = np.broadcast_to(in_rgb.value.mean(axis=1, keepdims=True), it.value.shape)
@@ -155,29 +156,29 @@ def _check_kept(run: Run, outcome: Outcome, parameter: Parameter) -> None:
         grey = [evaluated(each, each, each) for each in HUE]
         for at, it in enumerate(evaluated(*HUE)):
             _check_followed(outcome, it, [each[at].value for each in grey], wi)
-        failed = _failed(_anywhere(run, run.probe), EVERY)
-    _tell(run, outcome, failed)
+        failed = failures(anywhere(run, run.probe), EVERY)
+    tell(run, outcome, failed, "in colours, ")
 
 
 Failed = dict[Callable[[Run], Findings], list[Finding]]
 """What failed, by check."""
 
 
-def _anywhere(run: Run, probe: BSDFProbe) -> Run:
-    """Return a run for a BSDF in colours, and for directions all over the hemisphere alone."""
+def anywhere(run: Run, probe: BSDFProbe) -> Run:
+    """Return a run for a BSDF in colours or another variant, and for directions all over the hemisphere alone."""
     return replace(run, probe=probe, angles=(), given=None)
 
 
-def _failed(run: Run, checks: Iterable[Callable[[Run], Findings]]) -> Failed:
+def failures(run: Run, checks: Iterable[Callable[[Run], Findings]]) -> Failed:
     return {check: [finding for finding in check(run) if finding.verdict == "fail"] for check in checks}
 
 
-def _tell(run: Run, outcome: Outcome, failed: Failed, where: str = "") -> None:
-    """Add faults of the BSDF in colours that it has not as it is."""
+def tell(run: Run, outcome: Outcome, failed: Failed, where: str) -> None:
+    """Add faults that the BSDF has ``where`` it was checked again, and not as it is."""
     for check, findings in failed.items():
         if findings and all(finding.verdict != "fail" for finding in check(run)):
             first = findings[0]
-            outcome.fault(f"{where}in colours, {first.check}: {first.message.rstrip('.')}", np.inf)
+            outcome.fault(f"{where}{first.check}: {first.message.rstrip('.')}", np.inf)
 
 
 def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -> None:
