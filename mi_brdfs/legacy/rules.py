@@ -53,8 +53,10 @@ def _from_2(element: Element) -> None:
             inner.name = "value"
             scaled = plugin("texture", "scale", inner, scale=amount)
             element.put(replace(scaled, name=name, place=element.place))
-    if supplied := {"obj": ("flip_tex_coords", False), "mirror": ("material", "Cr")}.get(element.type):
-        element.set(*supplied)
+    supplied = {"obj": {"flip_tex_coords": False}, "mirror": {"material": "Cr"}, "roughmetal": {"ior": 0.37, "k": 2.82}}
+    for name, value in supplied.get(element.type, {}).items():
+        if not element[name]:
+            element.set(name, value)
 
 
 def _from_3(element: Element, say: Callable[[Element, str], None]) -> None:
