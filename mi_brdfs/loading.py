@@ -31,8 +31,10 @@ def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters:
 
     Raises:
         ValueError: as :func:`upgrade`.
-        RuntimeError: what Mitsuba says where it cannot load the scene.
+        RuntimeError: what Mitsuba says where it cannot load the scene, as without a variant.
     """
+    if mi.variant() is None:
+        raise RuntimeError("No variant is set; first call mi.set_variant, as with llvm_ad_rgb.")
     return load(Path(path), {name: str(value) for name, value in parameters.items()}, lenient, merge=True)
 
 

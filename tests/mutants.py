@@ -339,6 +339,15 @@ def greyed_in_light_tracing(own, self, ctx, *given):
     return greyed(value) if ctx.mode == mi.TransportMode.Importance else value
 
 
+def drawn_elsewhere(own, self, ctx, si, u, v, active):
+    """Weights are right for the directions, which are drawn by other parameters."""
+    moved = mi.SurfaceInteraction3f(si)
+    moved.uv = mi.Point2f(0.3)
+    bs, _ = own(self, ctx, moved, u, v, active)
+    value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+    return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+
+
 def red_and_blue_exchanged(texture, si, active):
     value = texture.eval(si, active)
     return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
@@ -808,6 +817,7 @@ MUTANTS = [
     mutant("cut at grazing", "continuity", diffuse(where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 4e-4, 1e-4))),
     mutant("mean of a texture", "textures", colour(lambda texture, si, active: texture.mean())),
     mutant("texture at a fixed point", "textures", elsewhere(lambda uv: mi.Point2f(0))),
+    mutant("drawn as at a fixed point", "textures", Ward, adapted(sample=drawn_elsewhere), alpha=0.3),
     mutant("density zero where light is", "support", diffuse(density=towards(lambda w: w.z < 0.2, 0))),
     mutant("shines through", "horizon", Lambert, adapted(eval_pdf=shines_through)),
     mutant(

@@ -186,6 +186,8 @@ def test_bad_scenes():
         mi.render(plate(WHITE, SUN, environment_reflection=True))
     with refused('area_lights = "centre" knows Rectangle, Disk and Sphere, but a light is a Cylinder'):
         mi.render(plate(WHITE, lamp("cylinder"), area_lights="centre"))
+    with refused('area_lights = "centre" knows lights of one radiance, but that of a light is a texture'):
+        mi.render(plate(WHITE, lamp("disk", {"type": "checkerboard"}), area_lights="centre"))
 
 
 def test_films_without_colours_are_refused():

@@ -192,6 +192,12 @@ def test_what_goes_straight_through(says, bends):
     assert check(veil, only="null").verdict("null") == ("pass" if says == 0.3 and not bends else "fail")
 
 
+def test_shadow_rays_go_through_what_has_a_component_for_it():
+    screen = stranger("screen", DIFFUSE | FRONT, eval_null_transmission=lambda self, si, active=True: mi.Color3f(0.3))
+    (finding,) = check(screen, only="null").failures
+    assert finding.message == "eval_null_transmission is 0.3, but no component is flagged Null."
+
+
 @pytest.mark.parametrize(
     ("density", "lopsided", "fails"), [(0.5, False, ""), (1, False, "deltas"), (0.5, True, "deltas")]
 )
@@ -325,6 +331,8 @@ FALSE_ALARMS = {
     "texels of an index down to that outside": case("gradients", "walter", int_ior=texels(True), ext_ior=0.01),
     "gradients of textures": case("textures", "bumpmap", arbitrary=texels(True), a={"type": "diffuse"}),
     "index above one as a colour": case("colours spectral", "low", variant="microfacet", int_ior=1.006),
+    "a reflection that is drawn once in 40,000 samples": case("deltas", "dielectric", int_ior=1.01),
+    "a faint one over a diffuse one": case("deltas", "plastic", specular_reflectance=2e-4),
     "tints": case("colours spectral", "burley", sheen=1.0, sheen_tint=1.0, spec_tint=1.0, base_color=0.5),
     "a lobe opposite to the normal": case("pdf chi2", "lafortune", 0, cz=-1.5, exponent=0.0, diffuse_reflectance=0.2),
     "a narrow lobe far below the horizon": case(

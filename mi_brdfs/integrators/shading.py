@@ -201,6 +201,11 @@ class Shading(Plugin):
                     f'shading: area_lights = "centre" knows {listed(list(CENTRES), "and")}, but a light is a {shape}; '
                     'replace it, or use area_lights = "sample".'
                 )
+            if mi.has_flag(light.flags(), flags.SpatiallyVarying):
+                raise ParameterError(
+                    'shading: area_lights = "centre" knows lights of one radiance, but that of a light is a texture; '
+                    'use area_lights = "sample".'
+                )
             return mi.Point2f(*CENTRES[shape])
         return sampler.next_2d()
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 RULES: dict[tuple[str, str], Callable[[Work, Element], Element | None]] = {}
 """The functions that change a plugin of a kind and a type, whose parts are those of Mitsuba 3, in place, or return what
 replaces it. Under "" and a kind is the one for all its other types."""
+SMALLEST_SUN = 0.05
+"""What Mitsuba 3 draws of a sun without width, in degrees."""
 HEAD = 1 << 16
 """The bytes of an OBJ file in which its library of materials is named."""
 
@@ -53,8 +55,9 @@ def _from_2(element: Element) -> None:
             inner.name = "value"
             scaled = plugin("texture", "scale", inner, scale=amount)
             element.put(replace(scaled, name=name, place=element.place))
-    supplied = {"obj": {"flip_tex_coords": False}, "mirror": {"material": "Cr"}, "roughmetal": {"ior": 0.37, "k": 2.82}}
-    for name, value in supplied.get(element.type, {}).items():
+    supplied = {"obj": [("flip_tex_coords", False)], "mirror": [("material", "Cr")],
+                "roughmetal": [("ior", 0.37), ("k", 2.82)]}  # fmt: skip
+    for name, value in supplied.get(element.type, []):
         if not element[name]:
             element.set(name, value)
 
@@ -341,7 +344,10 @@ def _sunsky(work: Work, element: Element) -> None:
         elif scale and not element[f"{part}_scale"]:
             element.set(f"{part}_scale", scale.numbers()[0])
     if radius := element.pop("sun_radius_scale"):
-        element.set("sun_aperture", 0.5358 * radius.numbers()[0])
+        aperture = 0.5358 * radius.numbers()[0]
+        element.set("sun_aperture", max(aperture, SMALLEST_SUN))
+        if aperture < SMALLEST_SUN:
+            work.approximated(element, f"the sun is {SMALLEST_SUN}° wide")
     element.type = "sunsky"
     # Z is up there, and Y in 0.6.
     element.to_world().children.insert(0, Element("rotate", {"x": "1", "angle": "-90"}))

@@ -89,8 +89,8 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
 
 
 def display_image(bitmap: mi.Bitmap | ArrayLike) -> mi.Bitmap | None:
-    """Return the tone-mapped 8-bit sRGB image of a developed film, as a bitmap or an array, without alpha and AOVs;
-    None without colours."""
+    """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours. The
+    film is given as a bitmap, or as an array of up to four channels: those of more have no names."""
     bitmap = bitmap if isinstance(bitmap, mi.Bitmap) else mi.Bitmap(np.array(bitmap, np.float32))
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)

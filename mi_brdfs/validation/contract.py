@@ -278,10 +278,15 @@ def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array)
 @of_whole
 def null(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that samples of type Null go straight on, and that ``eval_null_transmission``, by which shadow rays go
-    through, is their weight."""
+    through, is their weight, and 0 if no flag is Null."""
     probe, u = run.probe, random(1 << 14, 75)
     if not int(probe.bsdf.flags()) & int(mi.BSDFFlags.Null):
-        raise Skipped("Nothing goes straight through.")
+        with skipping("Nothing goes straight through: eval_null_transmission raises "):
+            got = numbers(probe.bsdf.eval_null_transmission(interaction(hemisphere(1, 76)), True), 1).max()
+        if got == 0:
+            raise Skipped("Nothing goes straight through.")
+        outcome.fault(f"eval_null_transmission is {got:.4g}, but no component is flagged Null", got)
+        return ""
     for incident in run.incidents(part):
         wi = np.tile(incident.wi, (len(u), 1))
         si = interaction(wi)

@@ -16,6 +16,8 @@ from .run import SEED, Run, of_each
 
 DELTAS = int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null)
 """The types of delta functions."""
+FEW = 100
+"""Samples that do not tell their own noise."""
 
 
 @of_each(lambda probe: probe.deltas or [probe.whole])
@@ -47,6 +49,8 @@ def _check_drawn(run: Run, outcome: Outcome, part: Part) -> None:
         alone = run.probe.sample(part, incident.wi, random(SCATTERED, SEED)).weight
         both = samples.weight * own[:, None], alone
         (got, noise), (expected, other) = ((it.mean(axis=0), it.std(axis=0)) for it in both)
+        if drawn.sum() < FEW:
+            noise = np.maximum(noise, np.sqrt(expected))  # as of weights of 1
         error = abs(got - expected)
         if (error > 6 * np.hypot(noise, other) / np.sqrt(len(alone)) + 1e-3 * expected).any():
             k = int(np.argmax(error))

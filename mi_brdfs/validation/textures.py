@@ -26,8 +26,9 @@ def textures(run: Run) -> Findings:
     """Check that a parameter given as a texture acts as its value at the surface point does, wherever that is, also
     outside the unit square. Constant parameters become bitmaps of random texels, and given textures stay. All over them
     ``eval``, ``eval_diffuse_reflectance`` and the weights of delta functions are what they are where each texture has
-    the value of the point everywhere, and no other than if fewer points are evaluated; and weights are eval/pdf, to
-    float32's rounding. For this the BSDF must be given as a dict."""
+    the value of the point everywhere, and no other than if fewer points are evaluated; weights are eval/pdf, to
+    float32's rounding; and samples carry as much light to the same directions, to six standard errors. For this the
+    BSDF must be given as a dict."""
     varied, refused = _textured(run.probe, run.described("To replace its parameters by textures"))
     for name in refused:
         yield Finding("textures", name, "skip", "It does not take a bitmap of its kind beside the others.")
@@ -56,11 +57,11 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     samples = real.sample(part, wi, u := random(COUNT, 31), uv)
     wo[::2] = samples.wo[::2]
     other = BSDFProbe(load(given | constant))
-    why = "where its textures have the values of this point everywhere"
+    where = "where its textures have the values of this point everywhere"
     reflectance = Value("eval_diffuse_reflectance", wo, real.diffuse_reflectance(wi, uv))
     found, few = [*real.values(wi, wo, uv), reflectance], slice(COUNT // 8)
     pinned_down = [it.value for it in other.values(wi, wo, uv)] + [other.diffuse_reflectance(wi, uv)]
-    rows = [(it, expected, why) for it, expected in zip(found, pinned_down, strict=True)]
+    rows = [(it, expected, where) for it, expected in zip(found, pinned_down, strict=True)]
     if len(free) == len(varied):  # those that are pinned have as many lanes
         alone = [it.value for it in real.values(wi[few], wo[few], uv[few])]
         rows += [(it._replace(value=it.value[few]), value, "if fewer points are evaluated at once")
@@ -71,6 +72,17 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
         rows.append((Value("the weight times pdf", wo, reflected), value, "is eval"))
     for it, expected, why in rows:
         outcome.differing(tolerance, it.name, it.value, expected, why, wi, it.wo, uv=uv)
+    # The same variates leave little noise, unless a sampler is guided by the mean of a texture.
+    own, usual = (_moments(it, wi) for it in (samples, other.sample(part, wi, u, uv)))
+    error, noise = abs((own - usual).mean(axis=0)), (own - usual).std(axis=0) / np.sqrt(COUNT)
+    if (error > 6 * noise + 1e-3 * abs(usual).mean(axis=0)).any():
+        outcome.fault(f"samples carry other light, or to other directions, than {where}", error.max(), seed=31)
+
+
+def _moments(samples: Samples, wi: Array) -> Array:
+    """Return the light of each sample, and it times how far that goes from the mirror direction."""
+    light = samples.weight.mean(axis=1)
+    return np.stack([light, light * (1 - np.sum(samples.wo * wi * [-1, -1, 1], axis=1))], axis=1)
 
 
 def _reflected(samples: Samples) -> tuple[Array, Array]:
