@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 RULES: dict[tuple[str, str], Callable[[Work, Element], Element | None]] = {}
 """The functions that change a plugin of a kind and a type, whose parts are those of Mitsuba 3, in place, or return what
 replaces it. Under "" and a kind is the one for all its other types."""
+DEFAULTS: dict[str, list[tuple[str, Any]]] = {
+    "obj": [("flip_tex_coords", False)], "mirror": [("material", "Cr")], "roughmetal": [("ior", 0.37), ("k", 2.82)],
+}  # fmt: skip
+"""What 0.2 has where it is not given, by the type of a plugin."""
 SMALLEST_SUN = 0.05
 """What Mitsuba 3 draws of a sun without width, in degrees."""
 HEAD = 1 << 16
@@ -55,9 +59,7 @@ def _from_2(element: Element) -> None:
             inner.name = "value"
             scaled = plugin("texture", "scale", inner, scale=amount)
             element.put(replace(scaled, name=name, place=element.place))
-    supplied = {"obj": [("flip_tex_coords", False)], "mirror": [("material", "Cr")],
-                "roughmetal": [("ior", 0.37), ("k", 2.82)]}  # fmt: skip
-    for name, value in supplied.get(element.type, []):
+    for name, value in DEFAULTS.get(element.type, []):
         if not element[name]:
             element.set(name, value)
 
