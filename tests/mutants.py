@@ -348,6 +348,16 @@ def drawn_elsewhere(own, self, ctx, si, u, v, active):
     return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
 
 
+def drawn_otherwise_from_lights(own, self, ctx, si, u, v, active):
+    """Weights are right for the directions, which are nearer to the normal."""
+    bs, weight = own(self, ctx, si, u, v, active)
+    if ctx.mode != mi.TransportMode.Importance:
+        return bs, weight
+    bs.wo = dr.normalize(bs.wo + mi.Vector3f(0, 0, 0.2))
+    value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+    return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+
+
 def red_and_blue_exchanged(texture, si, active):
     value = texture.eval(si, active)
     return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
@@ -965,6 +975,7 @@ MUTANTS = [
     mutant("values asked for", "recorded", Ward, adapted(eval_pdf=asks_for_values)),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
+    mutant("drawn otherwise from lights", "mode", Ward, adapted(sample=drawn_otherwise_from_lights), alpha=0.3),
     mutant("cosines in light tracing", "mode", Lambert, evaluated(cosines_in_light_tracing)),
     mutant("twice the reflectance", "reflectance", Ward, reflectance(lambda value: 2 * value)),
     mutant("reflectance over pi", "reflectance", Lambert, reflectance(lambda value: value * dr.inv_pi)),

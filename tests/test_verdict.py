@@ -201,6 +201,9 @@ def test_bsdfs_are_compared():
     assert "behind" in back.failures[0].message
     black = {"reflectance": 0.0}
     assert compare({"type": "lambert"} | black, {"type": "diffuse"} | black).passed
+    checked = {"type": "diffuse", "reflectance": {"type": "checkerboard", "color0": 0.5, "color1": 0.1}}
+    assert compare(checked, checked).passed and not compare(checked, {"type": "diffuse"}).passed
+    assert compare({"type": "plastic"}, {"type": "plastic"}).verdict("against") == "note"  # of its mirror
 
 
 # --- Tests of users -------------------------------------------------------------------------------------------------

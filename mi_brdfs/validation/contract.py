@@ -122,8 +122,9 @@ def mode(run: Run, part: Part, outcome: Outcome) -> str:
     transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
     cosine of ``wo``: Mitsuba's ``eval`` and ``sample`` are those of the adjoint then, without which ``ptracer`` and
     ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
-    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too. Delta functions draw the same, and weigh
-    it without the factor 1/η² of refracted radiance."""
+    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too, and if the two modes are the same, it
+    carries as much light to the same directions. Delta functions draw the same, and weigh it without the factor 1/η² of
+    refracted radiance."""
     traced = part._replace(context=context(part.component))
     traced.context.mode = mi.TransportMode.Importance
     if part not in run.probe.deltas:
@@ -157,6 +158,9 @@ def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
             outcome.differing(
                 tolerance, name, *pair, "is eval", wi, samples.wo, unknown=0, where=lit, but_for=0.01, seed=67
             )
+        if symmetric and (error := sampling.strays(samples, run.probe.sample(part, wi, random(COUNT, 67)), wi)):
+            told = "samples carry other light, or to other directions, than in the other"
+            outcome.fault(f"in the mode Importance {told}", error, seed=67)
 
 
 def _check_traced_samples(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:

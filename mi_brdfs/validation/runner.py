@@ -142,11 +142,12 @@ def compare(
     angles: float | Iterable[float] = ANGLES,
 ) -> Report:
     """Compare what ``eval`` returns for two BSDFs: at the angles of incidence and all over, towards directions all over
-    and those that each draws. They are the same if the largest relative difference is at most what float32 rounds by:
-    1e-4, or more for narrow lobes (1.9e-3 for α = 1e-3). What is less than a millionth of the largest value counts as
-    that much.
+    and those that each draws, at points all over textures. They are the same if the largest relative difference is at
+    most what float32 rounds by: 1e-4, or more for narrow lobes (1.9e-3 for α = 1e-3). What is less than a millionth of
+    the largest value counts as that much.
 
-    The arguments are those of :func:`check`. The report has one finding, ``against``.
+    The arguments are those of :func:`check`. The report has one finding, ``against``, and another one if there are
+    delta functions, which are not compared.
 
     Raises:
         ValueError: as :func:`check` does.
@@ -155,14 +156,17 @@ def compare(
     with _measurable(bsdf, other):
         bsdf, other = described(bsdf), described(other)
         run = Run(_probe(bsdf), angles, SIGNIFICANCE, None, None)
-        return Report(name or _name(bsdf), [_against(run, _probe(other), other_name or _name(other))])
+        return Report(name or _name(bsdf), list(_against(run, _probe(other), other_name or _name(other))))
 
 
-def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
+def _against(run: Run, other: BSDFProbe, name: str) -> Findings:
     """Check that another BSDF, called ``name``, has the same values: see :func:`compare`."""
     outcome, probes = Outcome("against", name), (run.probe, other)
     if not all(probe.components for probe in probes):
-        return Finding("against", name, "skip", "A delta function has no values to compare.")
+        yield Finding("against", name, "skip", "A delta function has no values to compare.")
+        return
+    if any(probe.deltas for probe in probes):
+        yield Finding("against", name, "note", "Delta functions have no values, and are not compared.")
     tolerance = max(run.rounding(run.probe.whole), replace(run, probe=other).rounding(other.whole))
     sides = tuple(sorted({side for probe in probes for side in probe.whole.sides}, reverse=True))
     part = run.probe.whole._replace(sides=sides)
@@ -171,7 +175,8 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
         lanes = np.tile(np.arange(SCATTERED), 3)
         drawn = [probe.sample(probe.whole, incident.wi, random(SCATTERED, AGAINST_SEED)).wo for probe in probes]
         wo = np.concatenate([scattered(SCATTERED, AGAINST_SEED, (1, -1)), *drawn])
-        ours, theirs = (probe.eval(probe.whole, incident.at(lanes), wo) for probe in probes)
+        uv = np.random.default_rng(AGAINST_SEED).random((len(wo), 2))
+        ours, theirs = (probe.eval(probe.whole, incident.at(lanes), wo, uv) for probe in probes)
         scale = np.maximum(ours, theirs)
         error = np.nan_to_num(abs(ours - theirs) / np.maximum(scale, FAINT * np.nanmax(scale) + 1e-12), nan=np.inf)
         k, channel = np.unravel_index(int(np.argmax(error)), error.shape)
@@ -182,12 +187,12 @@ def _against(run: Run, other: BSDFProbe, name: str) -> Finding:
                 f"the largest relative difference is {largest:.2g}, for light from {light} towards "
                 f"{angles_of(wo[k])}: {ours[k, channel]:.6g}, but {theirs[k, channel]:.6g} of {name}"
             )
-            at = {"wi": incident.at(lanes[k]), "wo": wo[k]}
+            at = {"wi": incident.at(lanes[k]), "wo": wo[k], "uv": uv[k]}
     outcome.data = {"difference": largest, "tolerance": tolerance}
     words += f"; float32 rounds by up to {tolerance:.2g}"
     if largest > tolerance:
         outcome.fault(words, largest, **at)
-    return outcome.finding(f"{words[0].upper()}{words[1:]}.")
+    yield outcome.finding(f"{words[0].upper()}{words[1:]}.")
 
 
 def _measurable(*bsdfs: str | dict[str, Any] | mi.BSDF) -> AbstractContextManager:

@@ -7,8 +7,8 @@ from math import erfc, pi, sqrt
 
 import numpy as np
 
-from ..probe.arrays import luminance
-from ..probe.bsdf import Part
+from ..probe.arrays import Array, luminance
+from ..probe.bsdf import Part, Samples
 from ..probe.chi_square import in_words
 from .outcome import Findings, Outcome
 from .run import SEED, Run, of_parts
@@ -118,3 +118,16 @@ def failing(run: Run, part: Part, *checks: Callable[[Run], Findings], anew: bool
     failed = [it for it in [*run.found, *findings] if it.subject == part.name and it.verdict == "fail"]
     names = [check.__name__ for check in checks]
     return [it.check for it in failed if it.check in names]
+
+
+def strays(own: Samples, usual: Samples, wi: Array) -> float:
+    """Return by how much samples carry other light than the usual ones for the same variates, or to directions nearer
+    to the mirror direction or farther; 0 within six standard errors, which are small unless the two are drawn in other
+    ways."""
+    both = []
+    for samples in (own, usual):
+        light = samples.weight.mean(axis=1)
+        both.append(np.stack([light, light * (1 - np.sum(samples.wo * wi * [-1, -1, 1], axis=1))]))
+    change = both[0] - both[1]
+    error, noise = abs(change.mean(axis=1)), change.std(axis=1) / sqrt(len(wi))
+    return float(np.max(error * (error > 6 * noise + 1e-3 * abs(both[1]).mean(axis=1))))

@@ -12,6 +12,7 @@ from ..probe.arrays import Array, interaction, numbers, pinned
 from ..probe.bsdf import BSDFProbe, Samples, Value, load
 from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
+from . import sampling
 from .outcome import Findings, Outcome, Skipped, relative
 from .report import Finding
 from .run import Run
@@ -72,17 +73,8 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
         rows.append((Value("the weight times pdf", wo, reflected), value, "is eval"))
     for it, expected, why in rows:
         outcome.differing(tolerance, it.name, it.value, expected, why, wi, it.wo, uv=uv)
-    # The same variates leave little noise, unless a sampler is guided by the mean of a texture.
-    own, usual = (_moments(it, wi) for it in (samples, other.sample(part, wi, u, uv)))
-    error, noise = abs((own - usual).mean(axis=0)), (own - usual).std(axis=0) / np.sqrt(COUNT)
-    if (error > 6 * noise + 1e-3 * abs(usual).mean(axis=0)).any():
-        outcome.fault(f"samples carry other light, or to other directions, than {where}", error.max(), seed=31)
-
-
-def _moments(samples: Samples, wi: Array) -> Array:
-    """Return the light of each sample, and it times how far that goes from the mirror direction."""
-    light = samples.weight.mean(axis=1)
-    return np.stack([light, light * (1 - np.sum(samples.wo * wi * [-1, -1, 1], axis=1))], axis=1)
+    if astray := sampling.strays(samples, other.sample(part, wi, u, uv), wi):
+        outcome.fault(f"samples carry other light, or to other directions, than {where}", astray, seed=31)
 
 
 def _reflected(samples: Samples) -> tuple[Array, Array]:
